@@ -1,0 +1,30 @@
+"""Inband: probe readings in, decisions out, tool-offset corrections back to the machine.
+
+The map of the house. Whoever knows the shop floor knows where to look:
+
+    core             the decisions themselves, pure: parameters R10-R37, zones, running average, decide()
+    machines         machine tools, their keys, the lock that serialises what happens on one machine
+    characteristics  what is measured: nominal, limits, and the versions of the R parameters
+    readings         the door: probe readings come in, are decided, stored and answered together
+    offsets          tool memory (R10), average memory (R11), corrections and their life
+    alarms           what needs a person, and what follows when one acknowledges it
+    statistics       what the readings say together: counts, spread, charts of ten million points
+    setup            the pages where all of that is set up
+    people           who may do what: sign-in, sessions, roles, personal keys
+    audit            who changed what, from what, to what, and why
+    formats          files in and out
+    demo             a simulated plant that talks to the public API like real machines do
+
+    web              the browser kit: templates, problem pages, live events, translation
+    db               PostgreSQL: engine, column types, migrations, the embedded server
+    cli              the command `inband`
+    settings.py      every setting with its meaning; unsafe values are refused
+    errors.py        every error that people or machines may see
+    main.py          create_app(): the wiring
+
+A part holds at most: tables (columns), queries (SELECT only), actions (load, decide in core, save),
+schemas (JSON), api and pages (routes), figures (pure, charts as dicts). Parts meet only through each
+other's queries and actions. frontend/ and migrations/ lie beside this folder.
+"""
+
+__version__ = "0.1.0"

@@ -1,0 +1,1 @@
+"""PostgreSQL: connections, column types, migrations, the embedded server. No business words."""

@@ -1,0 +1,113 @@
+"""What an installation may decide for itself. Every field is also an environment variable: ``port`` is ``INBAND_PORT``."""
+
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Annotated, Self
+from urllib.parse import urlsplit
+
+import platformdirs
+from pydantic import AfterValidator, Field, PostgresDsn, TypeAdapter, ValidationError, model_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+HOUSE = Path(__file__).resolve().parent.parent
+"""The tree Inband runs from: ``frontend/`` and ``migrations/`` lie here, beside ``app/``."""
+
+_POSTGRES = TypeAdapter(PostgresDsn)
+
+
+def _postgres_url(url: str) -> str:
+    scheme, separator, rest = url.partition("://")
+    if not separator or scheme not in {"postgresql", "postgres", "postgresql+psycopg"}:
+        raise ValueError(
+            "must be a PostgreSQL address such as postgresql://inband:secret@db.example:5432/inband; "
+            "Inband runs on PostgreSQL only"
+        )
+    if not rest.startswith(("/", "?")) and "@/" not in rest:  # a unix socket has no host; pydantic asks for one
+        try:
+            _POSTGRES.validate_python(url)
+        except ValidationError:
+            # The address may hold a password: say what is wanted, never what was given.
+            raise ValueError(
+                "is not a well-formed address; write postgresql://user:password@host:5432/database"
+            ) from None
+    if not urlsplit(url).path.strip("/"):
+        raise ValueError("names no database; write postgresql://user:password@host:5432/DATABASE")
+    return url
+
+
+def _private_folder(path: Path) -> Path:
+    path = Path.absolute(path.expanduser())
+    if path in {Path("/"), Path.home(), Path("/tmp"), HOUSE}:  # noqa: S108 - these are refused, not used
+        raise ValueError(f"{path} is shared with other things; name a folder of its own, for example {path / 'inband'}")
+    return path
+
+
+def _origin(url: str) -> str:
+    parts = urlsplit(url)
+    if parts.scheme not in {"http", "https"} or not parts.hostname or parts.path.strip("/") or parts.query:
+        raise ValueError("must be the address people type, without a path: https://inband.example")
+    return url.rstrip("/")
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only programs on this computer reach ``host``."""
+    try:
+        return ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+class Settings(BaseSettings):
+    """Taken from arguments first, then from the environment; what is unsafe or senseless is refused in words."""
+
+    model_config = SettingsConfigDict(
+        env_prefix="INBAND_", frozen=True, env_ignore_empty=True, hide_input_in_errors=True
+    )
+
+    database_url: Annotated[str, AfterValidator(_postgres_url)] | None = Field(
+        default=None,
+        repr=False,
+        description="A PostgreSQL server of your own. Without it Inband starts its own in data_dir.",
+    )
+    data_dir: Annotated[Path, AfterValidator(_private_folder)] = Field(
+        default_factory=lambda: platformdirs.user_data_path("inband"),
+        description="Where Inband keeps what it stores, the embedded PostgreSQL included.",
+    )
+    host: str = Field(default="127.0.0.1", min_length=1, description="Address to listen on.")
+    port: int = Field(default=8000, ge=1, le=65535, description="Port to listen on.")
+    workers: int = Field(default=1, ge=1, le=32, description="Server processes; one is enough for most plants.")
+    public_url: Annotated[str, AfterValidator(_origin)] | None = Field(
+        default=None,
+        description="The address people type when a proxy stands before Inband; https makes cookies Secure.",
+    )
+    allow_plain_http: bool = Field(
+        default=False, description="Listen beyond this computer without https: passwords and keys travel readable."
+    )
+    forwarded_allow_ips: str = Field(
+        default="127.0.0.1", description="Proxies whose X-Forwarded-* headers are believed, comma-separated."
+    )
+    pool_size: int = Field(default=10, ge=1, le=200, description="Database connections kept open per process.")
+    session_hours: int = Field(default=12, ge=1, le=24 * 31, description="Hours until a browser must sign in again.")
+
+    @model_validator(mode="after")
+    def _nobody_listens_in(self) -> Self:
+        if is_loopback(self.host) or self.allow_plain_http or self.secure_cookies:
+            return self
+        raise ValueError(
+            f"host {self.host} is reached from other computers, where passwords and keys would travel readable. "
+            "Put a proxy with https before Inband and name its address in INBAND_PUBLIC_URL=https://..., "
+            "or accept the risk on a closed network with INBAND_ALLOW_PLAIN_HTTP=true"
+        )
+
+    @property
+    def secure_cookies(self) -> bool:
+        """Cookies are for https only, because people come by https."""
+        return self.public_url is not None and self.public_url.startswith("https://")
+
+    @property
+    def address(self) -> str:
+        """What a person types to get here."""
+        if self.public_url:
+            return self.public_url
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{'127.0.0.1' if host in {'0.0.0.0', '[::]'} else host}:{self.port}"  # noqa: S104 - compared only
