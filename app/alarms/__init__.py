@@ -1,0 +1,1 @@
+"""Alarms: what needs a person, what that person did about it, and what followed."""

@@ -1,0 +1,59 @@
+"""Alarms and their acknowledgement.
+
+While an alarm is active, the same trouble does not raise another: it adds to `count`. Numbers are
+global, so that an alarm can be named without its machine.
+"""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import BigInteger, ForeignKey, Index, Sequence, func
+from sqlalchemy.orm import Mapped, mapped_column
+
+from app.db.base import Base
+
+ALARM_ID = Sequence("alarm_id", metadata=Base.metadata)
+
+
+class Alarm(Base):
+    """Something that needs a person; active until acknowledged."""
+
+    __tablename__ = "alarm"
+    __table_args__ = (
+        Index("alarm_id_key", "id"),
+        Index(
+            "alarm_active_characteristic_key",
+            "machine_id",
+            "characteristic_id",
+            "kind",
+            unique=True,
+            postgresql_where="acknowledged_at IS NULL AND characteristic_id IS NOT NULL",
+        ),
+        Index(
+            "alarm_active_tool_key",
+            "machine_id",
+            "tool_memory",
+            "kind",
+            unique=True,
+            postgresql_where="acknowledged_at IS NULL AND characteristic_id IS NULL",
+        ),
+    )
+
+    machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), primary_key=True, autoincrement=False)
+    id: Mapped[int] = mapped_column(
+        BigInteger, ALARM_ID, primary_key=True, server_default=ALARM_ID.next_value(), autoincrement=False
+    )
+    kind: Mapped[str]
+    characteristic_id: Mapped[int | None]
+    tool_memory: Mapped[int | None]
+    raised_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    last_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    count: Mapped[int] = mapped_column(server_default="1")
+    sequence: Mapped[int | None] = mapped_column(BigInteger)  # the reading that raised it
+    last_sequence: Mapped[int | None] = mapped_column(BigInteger)  # the latest that repeated it
+    data: Mapped[dict[str, Any]] = mapped_column(server_default="{}")  # the values its sentence is worded from
+    acknowledged_at: Mapped[datetime | None]
+    acknowledged_by: Mapped[str | None]
+    action: Mapped[str | None]
+    comment: Mapped[str | None]
+    outcome: Mapped[list[Any] | None]  # what followed, as codes with values

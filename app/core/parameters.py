@@ -1,0 +1,364 @@
+"""The parameters of a characteristic: names, R numbers, order, ranges, and L75 (domain §2).
+
+`FIELDS` is the one table of them: the API, the form and the documents are made from it. `read`
+turns what a person or a program sent into `Parameters`, or into the complete list of `Problem`.
+Lengths are mm.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from functools import cached_property
+from math import isfinite
+from typing import Any, NamedTuple
+
+from app.core.zones import Limits, nanometres
+
+LARGEST_LENGTH = 100_000.0  # mm; no machine tool is a hundred metres long
+
+
+class Variant(StrEnum):
+    """How a dimension is probed (R25, and R24 for two points)."""
+
+    SINGLE = "single"
+    INDEXED = "indexed"
+    ROUND = "round"
+    ALONG = "along"
+    TWO_POINT = "two_point"
+
+
+class Axis(StrEnum):
+    """Measuring axis (R30)."""
+
+    X = "X"
+    Z = "Z"
+    Y = "Y"
+
+
+class Direction(StrEnum):
+    """Direction of probing (R31)."""
+
+    POSITIVE = "positive"
+    NEGATIVE = "negative"
+
+
+class Mode(StrEnum):
+    """What becomes of a computed correction."""
+
+    AUTOMATIC = "automatic"
+    APPROVAL = "approval"
+    MEASURE_ONLY = "measure_only"
+
+
+class WearPolicy(StrEnum):
+    """Whether a correction computed in the wear zone waits for the operator."""
+
+    HOLD = "hold"
+    RELEASE = "release"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters:
+    """One complete, consistent set. Made by `read`; made directly, the caller vouches for it."""
+
+    target: float
+    tolerance_width: float
+    zero_range: float
+    averaging_limit: float
+    wear_limit: float
+    confidence_limit: float
+    weighting_factor: float = 1.0
+    factor: float = -1.0
+    tool_memory: int = 0
+    average_memory: int = 0
+    variant: Variant = Variant.SINGLE
+    points: int = 1
+    repeats: int = 1
+    index: float | None = None
+    wait: float | None = None
+    axis: Axis = Axis.X
+    direction: Direction = Direction.POSITIVE
+    path_factor: float = 1.0
+    nominal: float | None = None
+    upper_deviation: float | None = None
+    lower_deviation: float | None = None
+    accept_n: int = 1
+    accept_m: int = 1
+    rejected_may_correct: bool = False
+    mode: Mode = Mode.AUTOMATIC
+    wear_policy: WearPolicy = WearPolicy.HOLD
+    max_step: float | None = None
+    max_total: float | None = None
+
+    @cached_property
+    def limits(self) -> Limits:
+        """The zone limits in whole nanometres."""
+        return Limits.of(self)
+
+    @property
+    def measures_only(self) -> bool:
+        """No correction is ever computed: by mode, or because no tool memory is named (R10 = 0)."""
+        return self.mode is Mode.MEASURE_ONLY or self.tool_memory == 0
+
+    @property
+    def window(self) -> float:
+        """a, mm: the trigger is expected within ±a of the programmed dimension (1 mm x R28)."""
+        return 1.0 * self.path_factor
+
+    def as_dict(self) -> dict[str, Any]:
+        """The JSON form of the contract, both ways of saying the target included."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        values["accept"] = {"n": values.pop("accept_n"), "m": values.pop("accept_m")}
+        return {name: value.value if isinstance(value, StrEnum) else value for name, value in values.items()}
+
+
+class Kind(StrEnum):
+    """What a field may hold."""
+
+    LENGTH = "length"
+    NUMBER = "number"
+    WHOLE = "whole"
+    CHOICE = "choice"
+    YES_NO = "yes_no"
+
+
+class Field(NamedTuple):
+    """One parameter: its name, R number (or None), what it holds and the range printed in the source.
+
+    required: must be said; `default` stands where it is not. codes: the control's numbers for choices.
+    lowest, highest: outside it has no meaning and is refused; source_range: outside it is unusual, a warning.
+    """
+
+    name: str
+    r: str | None
+    kind: Kind
+    required: bool = False
+    default: Any = None
+    lowest: float | None = None
+    highest: float | None = None
+    source_range: tuple[float, float] | None = None
+    choices: tuple[str, ...] = ()
+    codes: tuple[int, ...] = ()
+
+
+def _choices(enum: type[StrEnum]) -> tuple[str, ...]:
+    return tuple(member.value for member in enum)
+
+
+FIELDS: tuple[Field, ...] = (
+    Field("tool_memory", "R10", Kind.WHOLE, default=0, lowest=0, highest=32),
+    Field("average_memory", "R11", Kind.WHOLE, default=0, lowest=0, highest=20),
+    Field("variant", "R25", Kind.CHOICE, default="single", choices=_choices(Variant), codes=(0, 1, 2, 3)),
+    Field("points", "R23", Kind.WHOLE, default=1, lowest=1, highest=100),
+    Field("repeats", "R27", Kind.WHOLE, default=1, lowest=1, highest=100, source_range=(1, 10)),
+    Field("index", "R26", Kind.NUMBER, lowest=-100_000, highest=100_000),
+    Field("wait", "R04", Kind.NUMBER, lowest=0, highest=3600),
+    Field("axis", "R30", Kind.CHOICE, default="X", choices=_choices(Axis), codes=(1, 2)),
+    Field("direction", "R31", Kind.CHOICE, default="positive", choices=_choices(Direction), codes=(0, 1)),
+    Field("nominal", "R42", Kind.LENGTH),
+    Field("upper_deviation", "R40", Kind.LENGTH),
+    Field("lower_deviation", "R41", Kind.LENGTH),
+    Field("target", "R32", Kind.LENGTH),
+    Field("tolerance_width", "R35", Kind.LENGTH, lowest=0),
+    Field("zero_range", "R33", Kind.LENGTH, required=True, lowest=0, source_range=(0, 0.1)),
+    Field("averaging_limit", "R34", Kind.LENGTH, lowest=0, source_range=(0, 0.1)),
+    Field("wear_limit", "R37", Kind.LENGTH, required=True, lowest=0, source_range=(0.3, 3)),
+    Field("confidence_limit", "R36", Kind.LENGTH, required=True, lowest=0, source_range=(1, 3)),
+    Field("weighting_factor", "R29", Kind.NUMBER, default=1.0, lowest=1, highest=1_000_000, source_range=(1, 4)),
+    Field("path_factor", "R28", Kind.NUMBER, default=1.0, lowest=0.001, highest=1000, source_range=(1, 10)),
+    Field("factor", None, Kind.NUMBER, lowest=-1000, highest=1000),
+    Field("rejected_may_correct", None, Kind.YES_NO, default=False),
+    Field("mode", None, Kind.CHOICE, default="automatic", choices=_choices(Mode)),
+    Field("wear_policy", None, Kind.CHOICE, default="hold", choices=_choices(WearPolicy)),
+    Field("max_step", None, Kind.LENGTH, lowest=0),
+    Field("max_total", None, Kind.LENGTH, lowest=0),
+)
+BY_NAME: dict[str, Field] = {field.name: field for field in FIELDS}
+BY_R: dict[str, str] = {field.r: field.name for field in FIELDS if field.r}
+# R24 is the control's switch for two-point measurement; here that is a variant of its own.
+TWO_POINT_SWITCH = "R24"
+
+
+class Problem(NamedTuple):
+    """Something wrong with a parameter set: where, what (a code with values), and how bad.
+
+    Codes: required, unknown, twice, not_a_number, not_whole, not_a_choice, not_yes_no, range, order, target_missing,
+    target_twice, tolerance_sign, sign_missing, factor_zero, accept, and the warning source_range.
+    """
+
+    field: str
+    code: str
+    data: dict[str, Any]
+    warning: bool = False
+
+
+class ParameterError(ValueError):
+    """A parameter set that cannot be used; `problems` lists everything that is wrong with it."""
+
+    def __init__(self, problems: list[Problem]) -> None:
+        super().__init__("; ".join(f"{problem.field}: {problem.code}" for problem in problems))
+        self.problems = problems
+
+
+def mean_nominal(nominal: float, upper_deviation: float, lower_deviation: float) -> tuple[float, float]:
+    """L75: target R32 = R42 + (R40 + R41)/2 and tolerance width R35 = R40 - R41, mm.
+
+    >>> mean_nominal(10, 0, -0.004)
+    (9.998, 0.004)
+    """
+    return (
+        round(nominal + (upper_deviation + lower_deviation) / 2, 9),
+        round(upper_deviation - lower_deviation, 9),
+    )
+
+
+def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
+    """Make parameters of what was sent, under names or R numbers; return them with the warnings.
+
+    ``accept`` is ``{"n": 2, "m": 3}``. Raises `ParameterError` with everything that is wrong.
+    """
+    problems: list[Problem] = []
+    values = dict(_named(given, problems))
+    accept = values.pop("accept", None)
+    values = {name: value for name, value in values.items() if value is not None}
+    for field in FIELDS:
+        if field.name in values:
+            values[field.name] = _checked(field, values[field.name], problems)
+        elif field.required:
+            problems.append(Problem(field.name, "required", {}))
+        elif field.default is not None:
+            values[field.name] = field.default
+    values["accept_n"], values["accept_m"] = _accept(accept, problems)
+    _target(values, problems)
+    if problems:
+        raise ParameterError(problems)
+    values.setdefault("averaging_limit", round(values["tolerance_width"] / 3, 9))
+    if values["tool_memory"] != 0 and values["mode"] != Mode.MEASURE_ONLY and "factor" not in values:
+        problems.append(Problem("factor", "sign_missing", {}))
+    elif values.setdefault("factor", -1.0) == 0:
+        problems.append(Problem("factor", "factor_zero", {}))
+    problems.extend(_order(values))
+    if problems:
+        raise ParameterError(problems)
+    for name, enum in (("variant", Variant), ("axis", Axis), ("direction", Direction), ("mode", Mode)):
+        values[name] = enum(values[name])
+    values["wear_policy"] = WearPolicy(values["wear_policy"])
+    return Parameters(**values), list(_unusual(values))
+
+
+def _named(given: Mapping[str, Any], problems: list[Problem]) -> Iterator[tuple[str, Any]]:
+    """Translate R numbers to names; refuse unknown and doubled ones."""
+    seen: dict[str, str] = {}
+    for raw, value in given.items():
+        key = raw.upper()
+        if key == TWO_POINT_SWITCH:
+            if value not in (0, 0.0, None, False):
+                yield "variant", "two_point"
+            continue
+        name = BY_R.get(key, raw)
+        if name not in BY_NAME and name != "accept":
+            problems.append(Problem(raw, "unknown", {}))
+        elif name in seen:
+            problems.append(Problem(raw, "twice", {"other": seen[name]}))
+        else:
+            seen[name] = raw
+            yield name, value
+
+
+def _checked(field: Field, value: Any, problems: list[Problem]) -> Any:
+    """One value as its kind, or a problem noted (and something harmless returned)."""
+    if field.kind is Kind.YES_NO:
+        if isinstance(value, bool):
+            return value
+        problems.append(Problem(field.name, "not_yes_no", {}))
+        return False
+    if field.kind is Kind.CHOICE:
+        if isinstance(value, str) and value in field.choices:
+            return value
+        if isinstance(value, int | float) and not isinstance(value, bool) and value in field.codes:
+            return field.choices[field.codes.index(int(value))]
+        problems.append(Problem(field.name, "not_a_choice", {"choices": field.choices}))
+        return field.choices[0]
+    # int(…) of something as large as 1e400 written out would not become a float.
+    if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > 1e300 or not isfinite(value):
+        problems.append(Problem(field.name, "not_a_number", {}))
+        return 1
+    if field.kind is Kind.WHOLE:
+        if value != int(value):
+            problems.append(Problem(field.name, "not_whole", {"value": value}))
+            return 1
+        value = int(value)
+    else:
+        value = float(value)
+    lowest = -LARGEST_LENGTH if field.lowest is None else field.lowest
+    highest = LARGEST_LENGTH if field.highest is None else field.highest
+    if not lowest <= value <= highest:
+        problems.append(Problem(field.name, "range", {"value": value, "lowest": lowest, "highest": highest}))
+    return value
+
+
+def _accept(accept: Any, problems: list[Problem]) -> tuple[int, int]:
+    if accept is None:
+        return 1, 1
+    n, m = (accept.get("n"), accept.get("m")) if isinstance(accept, Mapping) else (None, None)
+    whole = all(isinstance(value, int) and not isinstance(value, bool) for value in (n, m))
+    if not whole or set(accept) != {"n", "m"} or not 1 <= n <= m <= 100:  # type: ignore[operator]
+        problems.append(Problem("accept", "accept", {}))
+        return 1, 1
+    return n, m  # type: ignore[return-value]
+
+
+def _target(values: dict[str, Any], problems: list[Problem]) -> None:
+    """Bring nominal with deviations (L75) and target with width into one; refuse both that disagree."""
+    drawing = [values.get(name) for name in ("nominal", "upper_deviation", "lower_deviation")]
+    if any(value is not None for value in drawing):
+        missing = [name for name in ("nominal", "upper_deviation", "lower_deviation") if values.get(name) is None]
+        problems.extend(Problem(name, "required", {}) for name in missing)
+        if missing or problems:
+            return
+        target, width = mean_nominal(values["nominal"], values["upper_deviation"], values["lower_deviation"])
+        if width <= 0:
+            problems.append(
+                Problem(
+                    "upper_deviation",
+                    "tolerance_sign",
+                    {"upper": values["upper_deviation"], "lower": values["lower_deviation"]},
+                )
+            )
+            return
+        for name, computed in (("target", target), ("tolerance_width", width)):
+            if name in values and nanometres(values[name]) != nanometres(computed):
+                problems.append(Problem(name, "target_twice", {"value": values[name], "computed": computed}))
+            values[name] = computed
+    elif "target" not in values and "tolerance_width" not in values:
+        problems.append(Problem("nominal", "target_missing", {}))
+    else:
+        problems.extend(Problem(name, "required", {}) for name in ("target", "tolerance_width") if name not in values)
+
+
+def _order(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """R33 < R34 <= R35/2 <= R37 <= R36; every broken pair is named at its outer member."""
+    chain = (
+        ("zero_range", "R33", values["zero_range"]),
+        ("averaging_limit", "R34", values["averaging_limit"]),
+        ("tolerance_width", "R35/2", values["tolerance_width"] / 2),
+        ("wear_limit", "R37", values["wear_limit"]),
+        ("confidence_limit", "R36", values["confidence_limit"]),
+    )
+    for (_, inner, smaller), (name, outer, larger) in zip(chain, chain[1:], strict=False):
+        strictly = inner == "R33"
+        broken = nanometres(smaller) >= nanometres(larger) if strictly else nanometres(smaller) > nanometres(larger)
+        if broken:
+            yield Problem(
+                name,
+                "order",
+                {"inner": inner, "outer": outer, "smaller": smaller, "larger": larger, "strict": strictly},
+            )
+
+
+def _unusual(values: Mapping[str, Any]) -> Iterator[Problem]:
+    for field in FIELDS:
+        value = values.get(field.name)
+        if field.source_range and value is not None and not field.source_range[0] <= value <= field.source_range[1]:
+            low, high = field.source_range
+            yield Problem(field.name, "source_range", {"value": value, "lowest": low, "highest": high}, warning=True)

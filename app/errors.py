@@ -1,0 +1,159 @@
+"""Everything that can be refused, and how it is said.
+
+    InbandError
+    ├── NotSignedIn        401  no key or session, or an unknown one
+    ├── NotAllowed         403  known, but not yours to do
+    ├── NotFound           404
+    ├── Conflict           409  the state of things does not permit it
+    ├── TooLarge           413
+    ├── Invalid            422  the payload; `errors` names each field
+    ├── TooManyRequests    429  with Retry-After
+    ├── DatabaseAway       503  with Retry-After; nothing was stored
+    └── OutcomeUnknown     503  the database went away during the commit; send again with the same key
+
+Each carries what is wrong (`detail`), where (`errors`) and what to do about it (`what_to_do`), in words
+that a machinist understands. The web layer makes RFC 9457 problem documents or problem pages of them.
+"""
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+
+class FieldError(NamedTuple):
+    """What is wrong with one field, e.g. ``parameters.averaging_limit`` or ``[17].measured``."""
+
+    field: str
+    message: str
+
+
+class InbandError(Exception):
+    """Base of all; never raised itself."""
+
+    status = 500
+    kind = "error"
+    title = "Something went wrong"
+
+    def __init__(
+        self,
+        detail: str,
+        what_to_do: str | None = None,
+        *,
+        errors: Iterable[FieldError] = (),
+        retry_after: int | None = None,
+        **more: Any,
+    ) -> None:
+        super().__init__(detail)
+        self.detail = detail
+        self.what_to_do = what_to_do
+        self.errors = list(errors)
+        self.retry_after = retry_after
+        self.more = more
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """Headers that belong to the answer."""
+        return {} if self.retry_after is None else {"Retry-After": str(self.retry_after)}
+
+    def as_problem(self) -> dict[str, Any]:
+        """The RFC 9457 problem document."""
+        problem: dict[str, Any] = {
+            "type": f"urn:inband:problem:{self.kind}",
+            "title": self.title,
+            "status": self.status,
+            "detail": self.detail,
+            "errors": [error._asdict() for error in self.errors],
+        }
+        if self.what_to_do:
+            problem["what_to_do"] = self.what_to_do
+        return problem | self.more
+
+
+class NotSignedIn(InbandError):
+    """No key or session came with the request, or one that is not known (any more)."""
+
+    status = 401
+    kind = "not-signed-in"
+    title = "Not signed in"
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """Say how one signs in, as RFC 9110 wants it of a 401."""
+        return {"WWW-Authenticate": "Bearer"}
+
+
+class NotAllowed(InbandError):
+    """The caller is known, but may not do this."""
+
+    status = 403
+    kind = "not-allowed"
+    title = "Not allowed"
+
+
+class NotFound(InbandError):
+    """There is no such thing."""
+
+    status = 404
+    kind = "not-found"
+    title = "Not found"
+
+
+class Conflict(InbandError):
+    """The present state does not permit it: taken key, decided correction, acknowledged alarm."""
+
+    status = 409
+    kind = "conflict"
+    title = "Conflicts with the present state"
+
+
+class TooLarge(InbandError):
+    """More bytes or items than are taken at once."""
+
+    status = 413
+    kind = "too-large"
+    title = "Too large"
+
+
+class Invalid(InbandError):
+    """The payload cannot be used; nothing of it was stored."""
+
+    status = 422
+    kind = "invalid"
+    title = "The request cannot be used as it is"
+
+
+class TooManyRequests(InbandError):
+    """Slower, please."""
+
+    status = 429
+    kind = "too-many-requests"
+    title = "Too many requests"
+
+
+class DatabaseAway(InbandError):
+    """The database cannot be reached; nothing was stored."""
+
+    status = 503
+    kind = "database-away"
+    title = "The database is away"
+
+    def __init__(self, detail: str | None = None) -> None:
+        super().__init__(
+            detail or "The database cannot be reached at the moment. Nothing of this request was stored.",
+            "Send the request again, with the same key, after the time in Retry-After.",
+            retry_after=2,
+        )
+
+
+class OutcomeUnknown(InbandError):
+    """The connection broke during the commit and the database has not come back to say how it ended."""
+
+    status = 503
+    kind = "outcome-unknown"
+    title = "The database went away during the commit"
+
+    def __init__(self) -> None:
+        super().__init__(
+            "The database went away while this was being committed, and has not come back to say whether it was.",
+            "Send it again with the same key: if it was stored you get its answer, if not it is stored now.",
+            retry_after=2,
+        )

@@ -1,0 +1,99 @@
+"""The memories of each machine and the life of every correction. Lengths in mm."""
+
+from datetime import datetime
+
+from sqlalchemy import BigInteger, CheckConstraint, ForeignKey, Identity, Index, func
+from sqlalchemy.orm import Mapped, mapped_column
+
+from app.db.base import Base
+
+OUTSTANDING = ("awaiting_approval", "pending")  # issued, not yet in effect
+OPEN = ("held", *OUTSTANDING)
+
+
+class Tool(Base):
+    """One location of the tool memory (R10, 1-32): the offset that the control is known to hold."""
+
+    __tablename__ = "tool"
+    __table_args__ = (CheckConstraint("number BETWEEN 1 AND 32", name="number"),)
+
+    machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), primary_key=True, autoincrement=False)
+    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    offset: Mapped[float] = mapped_column(server_default="0")
+    total: Mapped[float] = mapped_column(server_default="0")  # applied corrections since the tool was changed
+    changed_at: Mapped[datetime | None]  # tool changed
+    reset_at: Mapped[datetime | None]  # tool changed or offset edited by hand: parts cut before say nothing
+
+
+class ToolEvent(Base):
+    """A step of an offset: tool change, manual edit, correction applied. The history chart is drawn from it."""
+
+    __tablename__ = "tool_event"
+    __table_args__ = (
+        CheckConstraint("kind IN ('change', 'edit', 'correction')", name="kind"),
+        Index("tool_event_tool_idx", "machine_id", "number", "id"),
+    )
+
+    machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), primary_key=True, autoincrement=False)
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True)
+    number: Mapped[int]
+    at: Mapped[datetime] = mapped_column(server_default=func.now())
+    kind: Mapped[str]
+    offset_before: Mapped[float]
+    offset_after: Mapped[float]
+    correction: Mapped[int | None]
+    parts: Mapped[int | None]  # parts cut with the tool that went out, for a change
+    actor: Mapped[str]
+    reason: Mapped[str | None]
+
+
+class AverageMemory(Base):
+    """One location of the average memory (R11, 1-20): running average M and empirical value."""
+
+    __tablename__ = "average_memory"
+    __table_args__ = (
+        CheckConstraint("location BETWEEN 1 AND 20", name="location"),
+        {"postgresql_with": {"fillfactor": 50}},
+    )
+
+    machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), primary_key=True, autoincrement=False)
+    location: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    average: Mapped[float] = mapped_column(server_default="0")
+    empirical_value: Mapped[float] = mapped_column(server_default="0")
+    updated_at: Mapped[datetime | None]
+
+
+class Correction(Base):
+    """A change of a tool offset, from the reading that asked for it to the machine that made it."""
+
+    __tablename__ = "correction"
+    __table_args__ = (
+        CheckConstraint(
+            "status IN ('held', 'awaiting_approval', 'pending', 'applied', 'rejected', 'superseded')", name="status"
+        ),
+        Index("correction_tool_idx", "machine_id", "tool_memory", "number"),
+        Index(
+            "correction_open_idx",
+            "machine_id",
+            "tool_memory",
+            postgresql_where="status IN ('held', 'awaiting_approval', 'pending')",
+        ),
+        Index("correction_reading_idx", "machine_id", "characteristic_id", "sequence"),
+    )
+
+    machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), primary_key=True, autoincrement=False)
+    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    characteristic_id: Mapped[int]
+    sequence: Mapped[int] = mapped_column(BigInteger)
+    tool_memory: Mapped[int]
+    size_error: Mapped[float]
+    amount: Mapped[float]
+    status: Mapped[str]
+    created_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    decided_at: Mapped[datetime | None]  # released, approved, rejected or superseded
+    decided_by: Mapped[str | None]
+    reason: Mapped[str | None]
+    superseded_by: Mapped[int | None]
+    applied_at: Mapped[datetime | None]
+    applied_by: Mapped[str | None]
+    offset_after: Mapped[float | None]

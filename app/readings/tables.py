@@ -1,0 +1,132 @@
+"""Readings, what is kept beside them, and the state of each stream of readings.
+
+A reading row is written once and never updated: exclusion has a table of its own. The key is
+(machine, characteristic, sequence); the machine comes first so that the same schema shards by machine.
+`reading` has no foreign keys: its stream row is read under the machine's lock in the same transaction
+and is never deleted, so a check per row would only cost time.
+"""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import ARRAY, BigInteger, ForeignKeyConstraint, Index, Integer, SmallInteger, func
+from sqlalchemy.orm import Mapped, mapped_column
+
+from app.db.base import Base
+
+
+class Stream(Base):
+    """The running state of one characteristic, changed only under its machine's lock."""
+
+    __tablename__ = "stream"
+    __table_args__ = (
+        ForeignKeyConstraint(["machine_id", "characteristic_id"], ["characteristic.machine_id", "characteristic.id"]),
+        # Room for updates in place: this row changes with every reading.
+        {"postgresql_with": {"fillfactor": 50}},
+    )
+
+    machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    characteristic_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    sequence: Mapped[int] = mapped_column(BigInteger, server_default="0")
+    parameters_version: Mapped[int]
+    tool_memory: Mapped[int]
+    average_memory: Mapped[int]
+    paused_by: Mapped[int | None] = mapped_column(BigInteger)
+    sequence_at_tool_change: Mapped[int] = mapped_column(BigInteger, server_default="0")
+    last_measured_at: Mapped[datetime | None]
+    last_received_at: Mapped[datetime | None]
+    last_measured: Mapped[float | None]
+    last_deviation: Mapped[float | None]
+    last_average: Mapped[float | None]
+    last_zone: Mapped[str | None]
+
+
+class Reading(Base):
+    """One probe reading with the decision on it. Lengths in mm."""
+
+    __tablename__ = "reading"
+    __table_args__ = (
+        Index(
+            "reading_key_key",
+            "machine_id",
+            "characteristic_id",
+            "key",
+            unique=True,
+            postgresql_where="key IS NOT NULL",
+        ),
+    )
+
+    machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    characteristic_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    sequence: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    measured: Mapped[float]
+    deviation: Mapped[float]
+    decided: Mapped[float]
+    average_before: Mapped[float]
+    average_after: Mapped[float]
+    measured_at: Mapped[datetime]
+    received_at: Mapped[datetime]
+    machined_at: Mapped[datetime | None]
+    parameters_version: Mapped[int]
+    correction_in_effect: Mapped[int | None]
+    correction: Mapped[int | None]
+    paused_by: Mapped[int | None] = mapped_column(BigInteger)
+    late: Mapped[bool]
+    zone: Mapped[str]
+    action: Mapped[str]
+    code: Mapped[str]
+    key: Mapped[str | None]
+    part: Mapped[str | None]
+    outstanding: Mapped[list[int] | None] = mapped_column(ARRAY(Integer))
+    alarms: Mapped[list[int] | None] = mapped_column(ARRAY(BigInteger))
+
+
+class ReadingTouches(Base):
+    """The single touches of a reading that came as touches: one list of repeats per point, mm."""
+
+    __tablename__ = "reading_touches"
+
+    machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    characteristic_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    sequence: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    touches: Mapped[list[Any]]
+
+
+class Exclusion(Base):
+    """A reading taken out of the statistics, never out of the record."""
+
+    __tablename__ = "exclusion"
+
+    machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    characteristic_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    sequence: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    at: Mapped[datetime] = mapped_column(server_default=func.now())
+    actor: Mapped[str]
+    reason: Mapped[str]
+
+
+class ReadingSummary(Base):
+    """What a full block of 2^level readings amounts to, so that a chart of millions reads a few thousand rows.
+
+    Block b of level L holds the sequences b*2^L + 1 … (b+1)*2^L. Deviations in mm; `zones` counts readings
+    per zone in the order of `app.core.zones.Zone`. Excluded readings count: this is the record.
+    """
+
+    __tablename__ = "reading_summary"
+
+    machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    characteristic_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    level: Mapped[int] = mapped_column(SmallInteger, primary_key=True, autoincrement=False)
+    block: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    count: Mapped[int]
+    minimum: Mapped[float]
+    maximum: Mapped[float]
+    sum: Mapped[float]
+    sum_squares: Mapped[float]
+    first: Mapped[float]
+    last: Mapped[float]
+    average: Mapped[float]
+    corrections: Mapped[int]
+    zones: Mapped[list[int]] = mapped_column(ARRAY(Integer))
+    first_at: Mapped[datetime]
+    last_at: Mapped[datetime]
