@@ -7,12 +7,12 @@ global, so that an alarm can be named without its machine.
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import BigInteger, ForeignKey, Index, Sequence, func
+from sqlalchemy import BigInteger, ForeignKey, Index, Sequence, func, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
 
-ALARM_ID = Sequence("alarm_id", metadata=Base.metadata)
+ALARM_NUMBERS = Sequence("alarm_id", metadata=Base.metadata)
 
 
 class Alarm(Base):
@@ -27,7 +27,7 @@ class Alarm(Base):
             "characteristic_id",
             "kind",
             unique=True,
-            postgresql_where="acknowledged_at IS NULL AND characteristic_id IS NOT NULL",
+            postgresql_where=text("acknowledged_at IS NULL AND characteristic_id IS NOT NULL"),
         ),
         Index(
             "alarm_active_tool_key",
@@ -35,13 +35,13 @@ class Alarm(Base):
             "tool_memory",
             "kind",
             unique=True,
-            postgresql_where="acknowledged_at IS NULL AND characteristic_id IS NULL",
+            postgresql_where=text("acknowledged_at IS NULL AND characteristic_id IS NULL"),
         ),
     )
 
     machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), primary_key=True, autoincrement=False)
     id: Mapped[int] = mapped_column(
-        BigInteger, ALARM_ID, primary_key=True, server_default=ALARM_ID.next_value(), autoincrement=False
+        BigInteger, primary_key=True, server_default=text("nextval('alarm_id')"), autoincrement=False
     )
     kind: Mapped[str]
     characteristic_id: Mapped[int | None]

@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from sqlalchemy import BigInteger, CheckConstraint, ForeignKey, Identity, Index, func
+from sqlalchemy import BigInteger, CheckConstraint, ForeignKey, Identity, Index, func, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
@@ -76,7 +76,7 @@ class Correction(Base):
             "correction_open_idx",
             "machine_id",
             "tool_memory",
-            postgresql_where="status IN ('held', 'awaiting_approval', 'pending')",
+            postgresql_where=text("status IN ('held', 'awaiting_approval', 'pending')"),
         ),
         Index("correction_reading_idx", "machine_id", "characteristic_id", "sequence"),
     )

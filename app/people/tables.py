@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from sqlalchemy import CheckConstraint, ForeignKey, Identity, Index, LargeBinary, func
+from sqlalchemy import CheckConstraint, ForeignKey, Identity, Index, LargeBinary, func, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
@@ -18,7 +18,7 @@ class Person(Base):
     __table_args__ = (
         CheckConstraint(_ROLE_CHECK, name="role"),
         # One name in any spelling of upper and lower case.
-        Index("person_name_key", func.lower("name"), unique=True),
+        Index("person_name_key", text("lower(name)"), unique=True),
     )
 
     id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True)

@@ -9,7 +9,7 @@ and is never deleted, so a check per row would only cost time.
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ARRAY, BigInteger, ForeignKeyConstraint, Index, Integer, SmallInteger, func
+from sqlalchemy import ARRAY, BigInteger, ForeignKeyConstraint, Index, Integer, SmallInteger, func, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
@@ -52,7 +52,7 @@ class Reading(Base):
             "characteristic_id",
             "key",
             unique=True,
-            postgresql_where="key IS NOT NULL",
+            postgresql_where=text("key IS NOT NULL"),
         ),
     )
 
