@@ -1,0 +1,34 @@
+"""The wiring and nothing else: `create_app` puts the house together."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from fastapi import FastAPI
+from starlette.types import ASGIApp
+
+from app.db.engine import Database
+from app.settings import Settings
+from app.web.security import SecurityHeaders
+from app.web.templates import assets
+
+# Each part of the shop floor brings its JSON routes (api) and its pages.
+ROUTERS: tuple[str, ...] = ()
+
+
+def create_app(settings: Settings | None = None) -> ASGIApp:
+    """Make the application for one server process. Without settings they come from the environment."""
+    settings = settings or Settings()
+    if settings.database_url is None:
+        raise RuntimeError("no database: `inband serve` starts one, or set INBAND_DATABASE_URL")
+    database = Database(settings.database_url, pool_size=settings.pool_size)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        yield
+        database.close()
+
+    app = FastAPI(title="Inband", version="1", lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
+    app.state.settings = settings
+    app.state.database = database
+    app.mount("/static", assets())
+    return SecurityHeaders(app)
