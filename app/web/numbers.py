@@ -1,0 +1,101 @@
+"""How lengths and times are written for people. The minus sign is a minus sign (U+2212); a sign of a deviation is always shown.
+
+Lengths come in mm. Deviations, limits and corrections are read in µm, sizes in the drawing's mm.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+from babel.dates import format_datetime
+from markupsafe import Markup, escape
+
+from app.web.i18n import _, current_locale
+
+MINUS = "\N{MINUS SIGN}"
+PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
+NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
+NOTHING = "\N{EN DASH}"
+
+
+def signed(value: float | None, decimals: int = 1) -> str:
+    """A number with its sign, zero too: `+0.0`.
+
+    >>> signed(-6.14), signed(-0.01), signed(None)
+    ('−6.1', '+0.0', '–')
+    """
+    if value is None:
+        return NOTHING
+    rounded = round(value, decimals)
+    return f"{MINUS if rounded < 0 else '+'}{abs(rounded):.{decimals}f}"
+
+
+def um(deviation_mm: float | None, decimals: int = 1) -> str:
+    """A deviation in µm with its sign.
+
+    >>> um(0.0061), um(-0.3, 0), um(None)
+    ('+6.1\\xa0µm', '−300\\xa0µm', '–')
+    """
+    if deviation_mm is None:
+        return NOTHING
+    return f"{signed(deviation_mm * 1000, decimals)}{NO_BREAK_SPACE}µm"
+
+
+def um_limit(limit_mm: float) -> str:
+    """A limit in µm, both sides at once and no more decimals than it needs, in mm from 1 mm on.
+
+    >>> um_limit(0.0053), um_limit(0.3), um_limit(1.0)
+    ('±5.3\\xa0µm', '±300\\xa0µm', '±1\\xa0mm')
+    """
+    if limit_mm >= 1:
+        return f"{PLUS_MINUS}{limit_mm:.6g}{NO_BREAK_SPACE}mm"
+    return f"{PLUS_MINUS}{limit_mm * 1000:.6g}{NO_BREAK_SPACE}µm"
+
+
+def mm(size_mm: float | None, decimals: int = 4) -> str:
+    """A size in mm.
+
+    >>> mm(39.9981)
+    '39.9981\\xa0mm'
+    """
+    if size_mm is None:
+        return NOTHING
+    return f"{MINUS if round(size_mm, decimals) < 0 else ''}{abs(size_mm):.{decimals}f}{NO_BREAK_SPACE}mm"
+
+
+def when(moment: datetime | None, style: str = "seconds") -> Markup:
+    """A moment; the browser rewrites it in the reader's own time zone (times.js). Style: `seconds`, `minutes` or `date`."""
+    if moment is None:
+        return Markup(NOTHING)
+    utc = moment.astimezone(UTC)
+    pattern = {"seconds": "d MMM y HH:mm:ss", "minutes": "d MMM y HH:mm", "date": "d MMM y"}[style]
+    text = format_datetime(utc, pattern, locale=current_locale()) + ("" if style == "date" else " UTC")
+    return Markup('<local-time datetime="{}" show="{}"><time datetime="{}">{}</time></local-time>').format(
+        utc.isoformat(), style, utc.isoformat(), text
+    )
+
+
+def seconds_in_words(seconds: float) -> str:
+    """An age as one reads it from two metres away: one unit, no more.
+
+    >>> seconds_in_words(12), seconds_in_words(200), seconds_in_words(90_000)
+    ('12 s', '3 min', '25 h')
+    """
+    seconds = max(0, int(seconds))
+    if seconds < 60:
+        return _("{n} s").format(n=seconds)
+    if seconds < 3600:
+        return _("{n} min").format(n=seconds // 60)
+    if seconds < 2 * 86400:
+        return _("{n} h").format(n=seconds // 3600)
+    return _("{n} days").format(n=seconds // 86400)
+
+
+def ago(moment: datetime | None, now: datetime | None = None) -> Markup:
+    """How long ago a moment was; the browser keeps it going (times.js)."""
+    if moment is None:
+        return Markup(NOTHING)
+    age = ((now or datetime.now(UTC)) - moment).total_seconds()
+    return Markup('<time-ago datetime="{}">{}</time-ago>').format(
+        moment.astimezone(UTC).isoformat(), escape(_("{age} ago").format(age=seconds_in_words(age)))
+    )

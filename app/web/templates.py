@@ -1,0 +1,96 @@
+"""Pages: Jinja2 templates under `frontend/templates` with our filters, the assets' URLs and the language of the request.
+
+A page is answered with `page(request, "plant.html", machines=…)`. The templates find in every context what the layers
+around the route have put into `request.state`: `person` (name, role; None if nobody is signed in), `csrf` (the token
+for forms) and `active_alarms` (number, or None if not known).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from starlette.requests import Request
+from starlette.responses import HTMLResponse
+
+from app.web import i18n, numbers, theme
+from app.web.assets import Assets
+
+TEMPLATE_DIR = Path(__file__).resolve().parents[2] / "frontend" / "templates"
+THEME_COOKIE = "inband_theme"
+
+
+@cache
+def assets() -> Assets:
+    """The static files of this process."""
+    return Assets()
+
+
+@cache
+def environment() -> Environment:
+    """The one Jinja2 environment: escaped, strict about missing names, translated."""
+    env = Environment(
+        loader=FileSystemLoader(TEMPLATE_DIR),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        extensions=["jinja2.ext.i18n", "jinja2.ext.do", "jinja2.ext.loopcontrols"],
+    )
+    env.install_gettext_callables(i18n._, i18n.ngettext, newstyle=True)  # type: ignore[attr-defined]
+    env.filters.update(
+        um=numbers.um,
+        um_limit=numbers.um_limit,
+        mm=numbers.mm,
+        signed=numbers.signed,
+        when=numbers.when,
+        ago=numbers.ago,
+    )
+    env.globals.update(asset=assets().url, assets=assets(), theme=theme)
+    return env
+
+
+def chosen_theme(request: Request) -> str:
+    """`light`, `dark` or `auto` (as the system has it), by the cookie that the theme switch sets."""
+    chosen = request.cookies.get(THEME_COOKIE, "auto")
+    return chosen if chosen in ("light", "dark") else "auto"
+
+
+def render(request: Request, template: str, **context: Any) -> str:
+    """The text of a template for this request."""
+    state = request.state
+    language = i18n.negotiate(request.headers.get("accept-language"))
+    with i18n.speaking(language):
+        return (
+            environment()
+            .get_template(template)
+            .render(
+                {
+                    "request": request,
+                    "path": request.url.path,
+                    "language": language,
+                    "chosen_theme": chosen_theme(request),
+                    "person": getattr(state, "person", None),
+                    "csrf": getattr(state, "csrf", ""),
+                    "active_alarms": getattr(state, "active_alarms", None),
+                }
+                | context
+            )
+        )
+
+
+def page(
+    request: Request,
+    template: str,
+    *,
+    status: int = HTTPStatus.OK,
+    headers: dict[str, str] | None = None,
+    **context: Any,
+) -> HTMLResponse:
+    """A whole page, or the part of one, as an answer. Pages show the state of now, so nobody keeps them."""
+    return HTMLResponse(
+        render(request, template, **context), status, headers={"Cache-Control": "no-store", **(headers or {})}
+    )

@@ -1,0 +1,148 @@
+"""One look for everything drawn: zone names, their shapes and colours, and the dress of a chart.
+
+ISA-101: quiet greys while all is well; colour only for what needs someone, and never colour alone – every zone and every
+state has a shape and a word as well. The colours are those of `frontend/static/css/tokens.css` (a test compares them).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from app.web.i18n import _
+
+ThemeName = Literal["light", "dark"]
+FONT = '"IBM Plex Sans", system-ui, "Segoe UI", Roboto, "Noto Sans", "Liberation Sans", sans-serif'
+
+
+@dataclass(frozen=True)
+class Palette:
+    """The colours of one theme, named by what they are for."""
+
+    surface: str  # behind a chart
+    ink: str  # what is read first
+    quiet: str  # what is read second
+    faint: str  # axis lines
+    grid: str
+    steady: str  # readings that need nobody
+    average: str  # the running average
+    attention: str  # out of tolerance
+    wear: str  # tool worn
+    stop: str  # probe fault, machine stopped
+    waiting: str  # waits for a person or for the machine
+    correction: str  # corrections and offsets
+    bands: tuple[str, str, str, str, str, str]  # behind the readings, from the target outward
+
+
+PALETTES: dict[ThemeName, Palette] = {
+    "light": Palette(
+        surface="#fbfbfa",
+        ink="#1d2328",
+        quiet="#5a646c",
+        faint="#8d979e",
+        grid="#dfe3e5",
+        steady="#4a5560",
+        average="#1d2328",
+        attention="#a84b00",
+        wear="#8a2a8c",
+        stop="#c00f1e",
+        waiting="#155fa8",
+        correction="#155fa8",
+        bands=("#fbfbfa", "#f0f2f2", "#e4e7e8", "#f6e9dc", "#f0e2f0", "#f6dede"),
+    ),
+    "dark": Palette(
+        surface="#1b2024",
+        ink="#eceff1",
+        quiet="#a7b1b8",
+        faint="#6c777f",
+        grid="#2c3338",
+        steady="#b3bdc4",
+        average="#ffffff",
+        attention="#ffa94d",
+        wear="#e08be2",
+        stop="#ff6b6b",
+        waiting="#74b6f2",
+        correction="#74b6f2",
+        bands=("#1b2024", "#22282d", "#2b3238", "#392d21", "#35273a", "#3d2528"),
+    ),
+}
+
+# Plotly's marker symbols; the icons of the badges (frontend/templates/icons.html) have the same outlines.
+ZONE_SYMBOLS = {
+    "zero": "circle",
+    "average": "diamond",
+    "full": "square",
+    "oversize": "triangle-up",
+    "undersize": "triangle-down",
+    "wear": "hexagon2",
+    "probe_fault": "x",
+}
+
+
+def zone_name(zone: str) -> str:
+    """The zone in one or two words."""
+    return {
+        "zero": _("Zero"),
+        "average": _("Averaging"),
+        "full": _("Full"),
+        "oversize": _("Oversize"),
+        "undersize": _("Undersize"),
+        "wear": _("Tool worn"),
+        "probe_fault": _("Probe fault"),
+    }.get(zone, zone)
+
+
+def zone_colour(zone: str, palette: Palette) -> str:
+    """Grey inside the tolerance; a colour where someone is needed."""
+    return {
+        "oversize": palette.attention,
+        "undersize": palette.attention,
+        "wear": palette.wear,
+        "probe_fault": palette.stop,
+    }.get(zone, palette.steady)
+
+
+def palette(theme: ThemeName) -> Palette:
+    return PALETTES[theme]
+
+
+def theme_from(name: str | None) -> ThemeName:
+    """The theme that a query asks for; light if it asks for none that we have."""
+    return "dark" if name == "dark" else "light"
+
+
+def layout(theme: ThemeName, **more: Any) -> dict[str, Any]:
+    """The layout that every chart begins with."""
+    colours = palette(theme)
+    axis = {
+        "color": colours.quiet,
+        "gridcolor": colours.grid,
+        "linecolor": colours.faint,
+        "zeroline": False,
+        "ticks": "",
+        "tickfont": {"size": 12},
+        "automargin": False,
+    }
+    base: dict[str, Any] = {
+        "autosize": True,
+        "font": {"family": FONT, "size": 13, "color": colours.ink},
+        "paper_bgcolor": colours.surface,
+        "plot_bgcolor": colours.surface,
+        "margin": {"l": 64, "r": 16, "t": 16, "b": 44, "pad": 0},
+        "showlegend": False,
+        "hovermode": "closest",
+        "hoverlabel": {
+            "bgcolor": colours.surface,
+            "bordercolor": colours.faint,
+            "font": {"family": FONT, "size": 13, "color": colours.ink},
+            "align": "left",
+        },
+        "dragmode": "zoom",
+        "uirevision": "keep",
+        "separators": ". ",
+        "xaxis": dict(axis),
+        "yaxis": dict(axis),
+    }
+    for key, value in more.items():
+        base[key] = base[key] | value if isinstance(base.get(key), dict) and isinstance(value, dict) else value
+    return base

@@ -1,0 +1,34 @@
+// What every page loads: the custom elements, and the small behaviours of plain markup.
+//
+//   data-opens="id"     a button that opens the <dialog> with that id
+//   data-closes         a button that closes the dialog it is in
+//   <dialog data-open>  is open from the start (a form that came back with errors)
+//
+// A click on the backdrop and Escape close a dialog too. A form is sent once: its buttons rest until the answer is there.
+
+import "./live-status.js";
+import "./live-part.js";
+import "./theme-switch.js";
+import "./times.js";
+import "./plotly-chart.js";
+
+document.addEventListener("click", (event) => {
+  const opener = event.target.closest("[data-opens]");
+  if (opener) document.getElementById(opener.dataset.opens)?.showModal();
+  if (event.target.closest("[data-closes]")) event.target.closest("dialog")?.close();
+  if (event.target instanceof HTMLDialogElement) {
+    const box = event.target.getBoundingClientRect();
+    const inside = event.clientX >= box.left && event.clientX <= box.right && event.clientY >= box.top && event.clientY <= box.bottom;
+    if (!inside) event.target.close();
+  }
+});
+
+document.addEventListener("submit", (event) => {
+  if (event.defaultPrevented || event.target.method === "dialog") return;
+  if (event.target.dataset.sent) event.preventDefault();
+  event.target.dataset.sent = "yes";
+});
+// Going back to a page must not leave its forms dead.
+window.addEventListener("pageshow", () => document.querySelectorAll("form[data-sent]").forEach((form) => delete form.dataset.sent));
+
+for (const dialog of document.querySelectorAll("dialog[data-open]")) dialog.showModal();

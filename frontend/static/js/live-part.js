@@ -1,0 +1,81 @@
+// <live-part id="…" src="URL" on="reading:shaft-d40 alarm" [now]>…</live-part>
+// A part of the page that is fetched again when a matching live event arrives (at most once a second).
+//
+//   src   where it comes from; the page's own URL if left out. If the answer holds an element with this element's id,
+//         that element's content is taken (so a whole page will do), else all of its body.
+//   on    see live.js
+//   now   fetch at once, too
+//
+// What the reader is doing is kept: focus, selection, opened <details> (those with an id or data-key), scrolling.
+// While he types in it or has a dialog of it open, it waits. If fetching fails it says so and how old the content is.
+// Fires "livepart" (bubbles) after each swap.
+
+import { coalesced } from "./coalesce.js";
+import { subscribe } from "./live.js";
+import { age } from "./times.js";
+
+const key = (element) => element.id || element.dataset.key || element.name || "";
+const same = (root, name, type) =>
+  name && [...root.querySelectorAll(type)].find((element) => key(element) === name);
+
+class LivePart extends HTMLElement {
+  connectedCallback() {
+    this.fetched = Date.now();
+    this.refresh = coalesced(() => this.load());
+    this.stop = subscribe(this.getAttribute("on"), () => this.refresh());
+    if (this.hasAttribute("now")) this.refresh();
+  }
+
+  disconnectedCallback() {
+    this.stop?.();
+  }
+
+  get busy() {
+    const active = document.activeElement;
+    const typing = this.contains(active) && active.matches("input:not([type=hidden]), textarea, select");
+    return typing || this.querySelector("dialog[open]") !== null;
+  }
+
+  async load() {
+    if (this.busy) return void setTimeout(() => this.isConnected && this.refresh(), 1_000);
+    try {
+      const answer = await fetch(this.getAttribute("src") || location.href, { headers: { "X-Live-Part": this.id || "yes" } });
+      if (!answer.ok) throw new Error(`${answer.status}`);
+      const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+      if (this.busy) return void this.refresh();
+      this.swap((this.id && page.getElementById(this.id)) || page.body);
+      this.fetched = Date.now();
+      this.removeAttribute("stale");
+      this.removeAttribute("title");
+    } catch {
+      this.setAttribute("stale", "");
+      this.setAttribute("title", age((Date.now() - this.fetched) / 1000));
+      setTimeout(() => this.isConnected && this.refresh(), 5_000);
+    }
+  }
+
+  swap(fresh) {
+    const opened = [...this.querySelectorAll("details")].map((details) => [key(details), details.open]);
+    const scrolled = [...this.querySelectorAll("[id], .table-wrap")].filter((e) => e.scrollTop || e.scrollLeft)
+      .map((e) => [e.id, e.scrollLeft, e.scrollTop]);
+    const focused = this.contains(document.activeElement) ? document.activeElement : null;
+    const focus = focused && [key(focused), focused.localName, focused.getAttribute("href")];
+
+    this.replaceChildren(...document.adoptNode(fresh).childNodes);
+
+    for (const [name, open] of opened) {
+      const details = same(this, name, "details");
+      if (details) details.open = open;
+    }
+    for (const [id, left, top] of scrolled) if (id) this.querySelector(`#${CSS.escape(id)}`)?.scrollTo(left, top);
+    if (focus) {
+      const [name, type, href] = focus;
+      const again = same(this, name, type) ||
+        (href && [...this.querySelectorAll("a")].find((link) => link.getAttribute("href") === href));
+      again?.focus({ preventScroll: true });
+    }
+    this.dispatchEvent(new CustomEvent("livepart", { bubbles: true }));
+  }
+}
+
+customElements.define("live-part", LivePart);
