@@ -1,0 +1,313 @@
+"""What tests stand on: a real PostgreSQL with the schema by migrations, real server processes, a real browser.
+
+One embedded server serves the whole run, xdist's workers too: each enters it as any process of Inband would, and the last
+one out stops it. A test that commits has a database of its own (``database``), made from a migrated template in some
+hundredths of a second; a test that only looks at what a transaction does takes ``session``, which is rolled back.
+"""
+
+import fcntl
+import itertools
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import httpx
+import psycopg
+import pytest
+from playwright.sync_api import Browser, Page, Playwright, Request, sync_playwright
+from sqlalchemy.orm import Session
+
+from app.db import migrate
+from app.db.embedded import EmbeddedServer
+from app.db.engine import Database
+from app.settings import HOUSE
+
+for name in [name for name in os.environ if name.startswith(("INBAND_", "PG"))]:
+    del os.environ[name]  # no test may meet a real installation
+
+TEMPLATE = "template_inband"
+BROWSER_OPTIONS = [
+    "--no-sandbox",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
+
+
+# --- the database
+
+
+@pytest.fixture(scope="session")
+def shared_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One folder for all workers of this run."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+
+@pytest.fixture(scope="session")
+def postgres(shared_dir: Path) -> Iterator[str]:
+    """The server of this run; the URL of a database that no test uses."""
+    server = EmbeddedServer(shared_dir / "inband", {"fsync": "off"})  # no test pulls the plug
+    url = server.start()
+    try:
+        with (shared_dir / "template.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            _make_template(url)
+        yield url
+    finally:
+        if server.stop():
+            shutil.rmtree(server.data_dir / "postgres")
+
+
+def _make_template(url: str) -> None:
+    with psycopg.connect(url, autocommit=True) as connection:
+        if connection.execute("SELECT 1 FROM pg_database WHERE datname = %s", [TEMPLATE]).fetchone():
+            return
+        connection.execute(f"CREATE DATABASE {TEMPLATE}_new")
+        migrate.upgrade(in_database(url, f"{TEMPLATE}_new"))
+        connection.execute(f"ALTER DATABASE {TEMPLATE}_new RENAME TO {TEMPLATE}")
+
+
+def in_database(url: str, name: str) -> str:
+    """The same server, another database."""
+    return urlsplit(url)._replace(path=f"/{name}").geturl()
+
+
+NewDatabase = Callable[[], str]
+
+
+@pytest.fixture(scope="session")
+def new_database(postgres: str) -> Iterator[NewDatabase]:
+    """Makes migrated, empty databases; the answer is the URL. They go when the run ends, or by ``drop_database``."""
+    numbers = itertools.count(1)
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "main")
+    with psycopg.connect(postgres, autocommit=True) as connection:
+
+        def make() -> str:
+            name = f"{worker}_{next(numbers)}"
+            connection.execute(f"CREATE DATABASE {name} TEMPLATE {TEMPLATE}")
+            return in_database(postgres, name)
+
+        yield make
+
+
+def drop_database(url: str) -> None:
+    """Drop it, whoever is still connected."""
+    with psycopg.connect(in_database(url, "postgres"), autocommit=True) as connection:
+        connection.execute(f'DROP DATABASE IF EXISTS "{urlsplit(url).path[1:]}" WITH (FORCE)')
+
+
+@pytest.fixture
+def database(new_database: NewDatabase) -> Iterator[Database]:
+    """An empty, migrated database of this test alone; what it commits is gone afterwards."""
+    made = Database(new_database(), pool_size=2)
+    yield made
+    made.close()
+    drop_database(made.dsn)
+
+
+@pytest.fixture(scope="session")
+def rolled_back_database(new_database: NewDatabase) -> Iterator[Database]:
+    made = Database(new_database(), pool_size=1)
+    yield made
+    made.close()
+    drop_database(made.dsn)
+
+
+@pytest.fixture
+def session(rolled_back_database: Database) -> Iterator[Session]:
+    """A session in a transaction that is rolled back; ``commit()`` inside ends a savepoint only."""
+    with rolled_back_database.engine.connect() as connection:
+        outer = connection.begin()
+        with Session(connection, join_transaction_mode="create_savepoint", expire_on_commit=False) as made:
+            yield made
+        outer.rollback()
+
+
+# --- the server
+
+
+@dataclass
+class Server:
+    """A running ``inband serve`` with a database of its own."""
+
+    url: str
+    database: Database
+    process: subprocess.Popen[bytes]
+    start: Callable[[], subprocess.Popen[bytes]]
+    stderr: Path
+    _clients: list[httpx.Client] = field(default_factory=list)
+
+    def client(self, key: str | None = None, **headers: str) -> httpx.Client:
+        """An HTTP client of this server; with ``key`` it calls as that key's owner."""
+        if key is not None:
+            headers["Authorization"] = f"Bearer {key}"
+        client = httpx.Client(base_url=self.url, headers=headers, timeout=30)
+        self._clients.append(client)
+        return client
+
+    def key(self, role: str | None = "admin", machine: str | None = None) -> str:
+        """The secret of a new key, for a role or for a machine."""
+        from app.people import actions
+
+        with self.database.begin() as session:
+            return actions.add_key(
+                session, role=None if machine else role, machine=machine, name="a test's key", actor="tests"
+            )
+
+    def person(self, name: str, role: str, password: str = "correct horse battery") -> str:
+        """A new person who may sign in; the answer is the password."""
+        from app.people import actions
+
+        with self.database.begin() as session:
+            actions.add_person(session, name=name, role=role, password=password, actor="tests")
+        return password
+
+    def kill(self) -> None:
+        """SIGKILL: no time to finish anything."""
+        self.process.kill()
+        self.process.wait()
+
+    def stop(self) -> int:
+        """SIGTERM, as a service manager ends it; the exit status."""
+        self.process.terminate()
+        return self.process.wait(30)
+
+    def restart(self) -> None:
+        """After ``kill`` or ``stop``: the same address, the same database."""
+        self.process = self.start()
+
+    def close(self) -> None:
+        for client in self._clients:
+            client.close()
+        if self.process.poll() is None:
+            self.process.terminate()
+            try:
+                self.process.wait(15)
+            except subprocess.TimeoutExpired:
+                self.kill()
+
+
+def free_port() -> int:
+    """A loopback port that nobody listens on at this moment."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def wait_ready(url: str, process: subprocess.Popen[bytes], stderr: Path, seconds: float = 60) -> None:
+    """Until ``/health/ready`` says 200."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            pytest.fail(f"the server ended with {process.returncode}:\n{stderr.read_text()}")
+        try:
+            if httpx.get(f"{url}/health/ready", timeout=5).status_code == 200:
+                return
+        except httpx.TransportError:
+            pass
+        time.sleep(0.05)
+    process.send_signal(signal.SIGKILL)
+    pytest.fail(f"the server was not ready after {seconds} s:\n{stderr.read_text()}")
+
+
+RunServer = Callable[..., AbstractContextManager[Server]]
+
+
+@pytest.fixture(scope="session")
+def run_server(new_database: NewDatabase, tmp_path_factory: pytest.TempPathFactory) -> RunServer:
+    """``with run_server() as server``: a server on a fresh database; ``run_server(url, workers=2)`` on one that exists."""
+
+    @contextmanager
+    def run(database_url: str | None = None, **options: object) -> Iterator[Server]:
+        own = database_url is None
+        url = new_database() if database_url is None else database_url
+        stderr, port = tmp_path_factory.mktemp("server") / "stderr", free_port()
+        command = [sys.executable, "-m", "app", "serve", "--port", str(port), "--database-url", url]
+        for option, value in options.items():
+            command += [f"--{option.replace('_', '-')}", str(value)]
+
+        def start() -> subprocess.Popen[bytes]:
+            with stderr.open("ab") as log:
+                process = subprocess.Popen(command, cwd=HOUSE, stdout=log, stderr=log, stdin=subprocess.DEVNULL)
+            wait_ready(f"http://127.0.0.1:{port}", process, stderr)
+            return process
+
+        server = Server(f"http://127.0.0.1:{port}", Database(url, pool_size=2), start(), start, stderr)
+        try:
+            yield server
+        finally:
+            server.close()
+            server.database.close()
+            if own:
+                drop_database(url)
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def server(run_server: RunServer) -> Iterator[Server]:
+    """A server for the tests of one file, on a database of its own."""
+    with run_server() as running:
+        yield running
+
+
+# --- the browser
+
+
+@pytest.fixture(scope="session")
+def playwright() -> Iterator[Playwright]:
+    with sync_playwright() as running:
+        yield running
+
+
+@pytest.fixture(scope="session")
+def browser(playwright: Playwright) -> Iterator[Browser]:
+    """Chromium: Debian's where there is one, else Playwright's own."""
+    found = next(filter(None, map(shutil.which, ["chromium", "chromium-browser", "google-chrome"])), None)
+    running = playwright.chromium.launch(executable_path=found, args=BROWSER_OPTIONS)
+    yield running
+    running.close()
+
+
+@pytest.fixture
+def complaints() -> list[str]:
+    """What the page did that no page may do. A test that provokes an error on purpose looks at it and clears it."""
+    return []
+
+
+@pytest.fixture
+def page(browser: Browser, server: Server, complaints: list[str]) -> Iterator[Page]:
+    """A page of the server; console errors and requests to any other host fail the test."""
+    host = urlsplit(server.url).netloc
+
+    def look(request: Request) -> None:
+        parts = urlsplit(request.url)
+        if parts.scheme not in {"data", "blob", "about"} and parts.netloc != host:
+            complaints.append(f"request to a foreign host: {request.url}")
+
+    context = browser.new_context(base_url=server.url, viewport={"width": 1280, "height": 800}, locale="en-GB")
+    context.on("request", look)
+    opened = context.new_page()
+    opened.set_default_timeout(15_000)
+    opened.on("pageerror", lambda error: complaints.append(f"uncaught in {opened.url}: {error}"))
+    opened.on(
+        "console",
+        lambda message: (
+            complaints.append(f"console in {opened.url}: {message.text}") if message.type == "error" else None
+        ),
+    )
+    yield opened
+    context.close()
+    assert not complaints, "\n".join(complaints)

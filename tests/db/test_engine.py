@@ -1,0 +1,52 @@
+from datetime import UTC, datetime, timedelta, timezone
+
+import psycopg
+import pytest
+from sqlalchemy import text
+from sqlalchemy.exc import StatementError
+
+from app.db.engine import Database, psycopg_url
+from app.db.types import UtcTime
+
+
+@pytest.mark.parametrize("scheme", ["postgresql", "postgres", "postgresql+psycopg"])
+def test_every_way_of_writing_an_address_means_psycopg(scheme: str) -> None:
+    url = psycopg_url(f"{scheme}://me:p%40ss@db.example:5433/inband?sslmode=require")
+    assert url.render_as_string(hide_password=False) == (
+        "postgresql+psycopg://me:p%40ss@db.example:5433/inband?sslmode=require"
+    )
+
+
+def test_what_a_block_does_is_committed_or_undone_as_one(database: Database) -> None:
+    with database.begin() as session:
+        session.execute(text("CREATE TABLE note (words text)"))
+        session.execute(text("INSERT INTO note VALUES ('kept')"))
+    with pytest.raises(ZeroDivisionError), database.begin() as session:
+        session.execute(text("INSERT INTO note VALUES ('undone')"))
+        raise ZeroDivisionError
+    with psycopg.connect(database.dsn) as connection:
+        assert connection.execute("SELECT words FROM note").fetchall() == [("kept",)]
+
+
+def test_times_come_back_in_utc_and_need_an_offset(database: Database) -> None:
+    from sqlalchemy import bindparam, select
+
+    noon = datetime(2026, 11, 21, 12, tzinfo=timezone(timedelta(hours=1)))
+    with database.begin() as session:
+        back = session.scalar(select(bindparam("at", noon, UtcTime)))
+        assert back == noon
+        assert back is not None
+        assert back.tzinfo is UTC
+        with pytest.raises(StatementError, match="without offset"):
+            session.scalar(select(bindparam("at", noon.replace(tzinfo=None), UtcTime)))
+
+
+def test_a_connection_that_broke_is_replaced(database: Database) -> None:
+    with database.begin() as session:
+        session.execute(text("SELECT 1"))
+    with psycopg.connect(database.dsn, autocommit=True) as other:
+        other.execute(
+            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> pg_backend_pid() AND datname = current_database()"
+        )
+    with database.begin() as session:
+        assert session.scalar(text("SELECT 1")) == 1
