@@ -49,7 +49,7 @@ def settings_from(**options: Any) -> Settings:
 
 
 @contextmanager
-def database_url(settings: Settings) -> Iterator[str]:
+def reachable(settings: Settings) -> Iterator[str]:
     """Where the database is, as long as the block runs: the one that is named, else the embedded one."""
     if settings.database_url is not None:
         yield settings.database_url
@@ -61,7 +61,7 @@ def database_url(settings: Settings) -> Iterator[str]:
 @contextmanager
 def migrated(settings: Settings) -> Iterator[Database]:
     """The database, with the schema of this program."""
-    with database_url(settings) as url:
+    with reachable(settings) as url:
         upgrade(url)
         database = Database(url, pool_size=2, application_name="inband command")
         try:

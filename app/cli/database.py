@@ -6,15 +6,15 @@ import typer
 from sqlalchemy import text
 
 from app import __version__
-from app.cli.base import DatabaseUrl, DataDir, cli, database_url, explain, people, say, settings_from
+from app.cli.base import DatabaseUrl, DataDir, cli, explain, people, reachable, say, settings_from
 from app.db import migrate as migrations
 from app.db.engine import Database
 
 
 @cli.command()
-def migrate(data_dir: DataDir = None, database_url_: DatabaseUrl = None) -> None:
+def migrate(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
     """Bring the database to the schema of this program."""
-    with database_url(settings_from(data_dir=data_dir, database_url=database_url_)) as url:
+    with reachable(settings_from(data_dir=data_dir, database_url=database_url)) as url:
         done = migrations.upgrade(url)
         for each in done:
             say(f"migrated: {each}")
@@ -23,16 +23,16 @@ def migrate(data_dir: DataDir = None, database_url_: DatabaseUrl = None) -> None
 
 
 @cli.command()
-def check(data_dir: DataDir = None, database_url_: DatabaseUrl = None) -> None:
+def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
     """Look at configuration, database and migrations, and say what is wrong and what to do. Changes nothing."""
     try:
-        settings = settings_from(data_dir=data_dir, database_url=database_url_)
+        settings = settings_from(data_dir=data_dir, database_url=database_url)
         _well("Inband", f"{__version__}, Python {platform.python_version()}")
         _well("configuration", f"{settings.address}, {settings.workers} worker(s)")
         if settings.database_url is None and not (settings.data_dir / "postgres").exists():
             _well("database", f"none yet in {settings.data_dir}; `inband serve` makes it")
             return
-        with database_url(settings) as url:
+        with reachable(settings) as url:
             database = Database(url, pool_size=1)
             with database.begin() as session:
                 version, size = session.execute(

@@ -1,0 +1,64 @@
+# make run     the demonstration plant at http://127.0.0.1:8000
+# make test    lint, then every test on a real PostgreSQL and in a real browser; ARGS="-k name" for some of them
+# make lint    style, types and the walls between the parts of the house
+# make bench   the benchmarks; each prints ratios
+# make clean   remove what make has made; no data
+
+SHELL := /bin/sh
+.SHELLFLAGS := -eu -c
+.DELETE_ON_ERROR:
+.PHONY: run test lint bench clean
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input --root-user-action ignore -c constraints.txt
+# The first Python that is new enough; `make PYTHON=...` knows better.
+PYTHON ?= $(shell for each in python3 python3.14 python3.13 python3.12 python3.11; do \
+	$$each -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$each; break; }; done)
+
+run: $(VENV)/installed
+	@$(BIN)/inband demo
+
+test: lint $(VENV)/browser
+	@$(BIN)/pytest -n auto $(ARGS)
+
+lint: $(VENV)/installed-dev
+	@$(BIN)/ruff check --quiet
+	@$(BIN)/ruff format --check --quiet
+	@$(BIN)/mypy --no-error-summary
+	@$(BIN)/lint-imports > $(VENV)/lint-imports.txt || { cat $(VENV)/lint-imports.txt; exit 1; }
+
+bench: $(VENV)/installed-dev
+	@for each in single batch chart; do $(BIN)/python -m bench.$$each; done
+
+clean:
+	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+
+$(BIN)/python:
+	@test -n "$(PYTHON)" || { echo "Inband needs Python 3.11 or newer, and there is none on the PATH. Install one, or say where it is: make PYTHON=/path/to/python3" >&2; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "This Python cannot make virtual environments. On Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
+	@echo "Making the Python environment in $(VENV) (once; needs the network) ..." >&2
+	@$(PYTHON) -m venv $(VENV)
+
+# The build backend comes from the constraints too, so nothing unpinned is fetched.
+$(VENV)/installed: pyproject.toml constraints.txt | $(BIN)/python
+	@$(PIP) hatchling editables
+	@$(PIP) --no-build-isolation -e .
+	@touch $@
+
+$(VENV)/installed-dev: pyproject.toml constraints.txt | $(BIN)/python
+	@$(PIP) hatchling editables
+	@$(PIP) --no-build-isolation -e '.[dev]'
+	@touch $(VENV)/installed $@
+
+# A browser for the tests: one that is installed, else Debian's where we may install it, else Playwright's own.
+$(VENV)/browser: | $(VENV)/installed-dev
+	@for each in chromium chromium-browser google-chrome; do \
+		if $$each --version > $@ 2>/dev/null; then exit 0; fi; done; \
+	echo "Installing Chromium for the tests (once) ..." >&2; \
+	if test "$$(id -u)" = 0; then as_root=; else as_root="sudo -n"; fi; \
+	if command -v apt-get >/dev/null && $$as_root true 2>/dev/null \
+		&& $$as_root apt-get update -qq && $$as_root env DEBIAN_FRONTEND=noninteractive \
+			apt-get install -y -qq --no-install-recommends chromium fonts-liberation >/dev/null \
+		&& chromium --version > $@ 2>/dev/null; then exit 0; fi; \
+	$(BIN)/playwright install chromium && echo "Playwright's own" > $@
