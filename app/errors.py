@@ -4,12 +4,14 @@
     ├── NotSignedIn        401  no key or session, or an unknown one
     ├── NotAllowed         403  known, but not yours to do
     ├── NotFound           404
+    ├── MethodNotAllowed   405  with Allow
     ├── Conflict           409  the state of things does not permit it
     ├── TooLarge           413
     ├── Invalid            422  the payload; `errors` names each field
     ├── TooManyRequests    429  with Retry-After
     ├── DatabaseAway       503  with Retry-After; nothing was stored
-    └── OutcomeUnknown     503  the database went away during the commit; send again with the same key
+    ├── OutcomeUnknown     503  the database went away during the commit; send again with the same key
+    └── Unexpected         500  an error nobody foresaw; told by the number under which it was logged
 
 Each carries what is wrong (`detail`), where (`errors`) and what to do about it (`what_to_do`), in words
 that a machinist understands. The web layer makes RFC 9457 problem documents or problem pages of them.
@@ -97,6 +99,19 @@ class NotFound(InbandError):
     title = "Not found"
 
 
+class MethodNotAllowed(InbandError):
+    """The address is right, the method is not."""
+
+    status = 405
+    kind = "method-not-allowed"
+    title = "Method not allowed"
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """Say which methods are."""
+        return {"Allow": str(self.more.get("allowed", ""))}
+
+
 class Conflict(InbandError):
     """The present state does not permit it: taken key, decided correction, acknowledged alarm."""
 
@@ -157,3 +172,10 @@ class OutcomeUnknown(InbandError):
             "Send it again with the same key: if it was stored you get its answer, if not it is stored now.",
             retry_after=2,
         )
+
+
+class Unexpected(InbandError):
+    """An error that nobody foresaw. Its trace is in the log, under `incident`."""
+
+    kind = "unexpected"
+    title = "Something went wrong on the server"

@@ -3,16 +3,19 @@
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
 
 from app.db.engine import Database
+from app.people.keys import KeyRing
 from app.settings import Settings
+from app.web.limits import BodyLimit
+from app.web.problems import add_problem_handlers
 from app.web.security import SecurityHeaders
 from app.web.templates import assets
 
 # Each part of the shop floor brings its JSON routes (api) and its pages.
-ROUTERS: tuple[str, ...] = ()
+ROUTERS: tuple[APIRouter, ...] = ()
 
 
 def create_app(settings: Settings | None = None) -> ASGIApp:
@@ -30,5 +33,10 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
     app = FastAPI(title="Inband", version="1", lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
     app.state.settings = settings
     app.state.database = database
+    app.state.key_ring = KeyRing(database)
+    add_problem_handlers(app)
+    app.add_middleware(BodyLimit)
+    for router in ROUTERS:
+        app.include_router(router)
     app.mount("/static", assets())
     return SecurityHeaders(app)

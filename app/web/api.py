@@ -1,0 +1,96 @@
+"""What all JSON routes have in common: strict bodies, and every error described in the OpenAPI document."""
+
+from typing import Any
+
+from fastapi import APIRouter
+from fastapi.routing import APIRoute
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.errors import (
+    Conflict,
+    DatabaseAway,
+    FieldError,
+    InbandError,
+    Invalid,
+    NotAllowed,
+    NotFound,
+    NotSignedIn,
+    TooLarge,
+    TooManyRequests,
+)
+from app.web.json_bodies import JsonRoute
+from app.web.problems import PROBLEM_JSON
+
+BASE = "/api/v1"
+
+
+class WrongField(BaseModel):
+    """What is wrong with one field."""
+
+    field: str
+    message: str
+
+
+class Problem(BaseModel):
+    """RFC 9457: what went wrong, where, and what to do about it."""
+
+    model_config = ConfigDict(extra="allow")
+
+    type: str = Field(examples=["urn:inband:problem:invalid"])
+    title: str
+    status: int
+    detail: str
+    errors: list[WrongField] = []
+    what_to_do: str | None = None
+
+
+def _error(error: InbandError) -> dict[str, Any]:
+    return {
+        "model": Problem,
+        "description": error.title,
+        "content": {PROBLEM_JSON: {"example": error.as_problem()}},
+    }
+
+
+EVERY_ERROR: dict[int | str, dict[str, Any]] = {
+    error.status: _error(error)
+    for error in (
+        NotSignedIn("This key is not known, or was revoked.", "Ask an administrator for a new key."),
+        NotAllowed("This needs the role engineer; ana has the role operator.", "Ask an administrator for the role."),
+        NotFound("There is no machine 'lathe-9'.", "Check the key; GET /api/v1/machines lists them."),
+        Conflict("There is a machine 'lathe-1' already.", "Choose another key."),
+        TooLarge("The request is larger than the 1 MB that are taken here.", "Send it in several smaller requests."),
+        Invalid(
+            "parameters.averaging_limit: R34 averaging limit 0.0090 mm must not be larger than R35/2 = 0.0080 mm.",
+            "Correct the named fields and send it again.",
+            errors=[
+                FieldError(
+                    "parameters.averaging_limit",
+                    "R34 averaging limit 0.0090 mm must not be larger than R35/2 = 0.0080 mm.",
+                )
+            ],
+        ),
+        TooManyRequests("Too many sign-ins have failed.", "Wait for 30 seconds.", retry_after=30),
+        DatabaseAway(),
+    )
+}
+
+
+def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """For a route's ``responses=``: these errors, and those that any route may answer (401, 403, 422, 503)."""
+    return {status: EVERY_ERROR[status] for status in sorted({401, 403, 422, 503, *statuses})}
+
+
+def _operation_id(route: APIRoute) -> str:
+    return route.name
+
+
+def api_router(tag: str) -> APIRouter:
+    """A router for JSON routes below the base path. The name of a route's function is its operation id."""
+    return APIRouter(
+        prefix=BASE,
+        tags=[tag],
+        route_class=JsonRoute,
+        generate_unique_id_function=_operation_id,
+        responses=problems(),
+    )

@@ -1,0 +1,72 @@
+"""The kinds of text and number that come in from outside, the same at every door.
+
+Text is trimmed and holds no control characters: PostgreSQL cannot store U+0000, and nobody can read the others.
+Half surrogates are refused by pydantic itself.
+"""
+
+import re
+import unicodedata
+from typing import Annotated, Generic, TypeVar
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic_core import PydanticCustomError
+
+SLUG = r"[a-z0-9][a-z0-9._-]{0,63}"
+_SLUG = re.compile(SLUG)
+LARGEST_ID = 2**63 - 1
+Item = TypeVar("Item")
+
+
+def is_slug(text: str) -> bool:
+    """Whether this can be the key of a machine or characteristic."""
+    return _SLUG.fullmatch(text) is not None
+
+
+def _slug(text: str) -> str:
+    if not is_slug(text):
+        raise PydanticCustomError("slug", "not a key")
+    return text
+
+
+def _readable(text: str) -> str:
+    for character in text:
+        if unicodedata.category(character) in {"Cc", "Cs"} and character not in "\n\t":
+            raise PydanticCustomError("control_character", "control character", {"code": f"U+{ord(character):04X}"})
+    return text
+
+
+def _one_line(text: str) -> str:
+    if "\n" in text or "\t" in text:
+        raise PydanticCustomError("one_line", "one line")
+    return _readable(text)
+
+
+Slug = Annotated[str, AfterValidator(_slug), Field(json_schema_extra={"pattern": f"^{SLUG}$", "maxLength": 64})]
+"""A key that people choose and programs use in addresses."""
+
+Text200 = Annotated[
+    str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200), AfterValidator(_one_line)
+]
+"""A name: one line, 1 to 200 characters."""
+
+Reason = Annotated[
+    str, StringConstraints(strip_whitespace=True, min_length=1, max_length=1000), AfterValidator(_readable)
+]
+"""Why somebody did something: 1 to 1000 characters."""
+
+Limit = Annotated[int, Field(ge=1, le=1000, description="How many items at most.")]
+Cursor = Annotated[int, Field(ge=0, le=LARGEST_ID)]
+"""A cursor that is the number of the last item seen."""
+
+
+class Body(BaseModel):
+    """What comes in as JSON: fields that are not known are named, not ignored."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class Page(BaseModel, Generic[Item]):
+    """One page of a list; ``next`` is the cursor of the following one."""
+
+    items: list[Item]
+    next: str | None = None

@@ -1,0 +1,132 @@
+"""JSON bodies, read strictly: what two readers could take differently is refused, with the field named.
+
+Python's reader takes NaN, doubled keys, half surrogates and numbers beyond any float; PostgreSQL takes no U+0000.
+"""
+
+import json
+from collections.abc import Callable, Coroutine
+from math import isfinite
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+
+from app.errors import FieldError, Invalid
+from app.web.i18n import _
+from app.web.validation import field_path
+
+DEEPEST = 20
+"""Nothing here has lists in lists deeper than three."""
+
+
+def read_json(body: bytes, content_type: str | None) -> Any:
+    """The value of a JSON body.
+
+    Raises `Invalid` for anything that is not JSON, is not UTF-8, or has no one meaning.
+    """
+    media_type = (content_type or "").partition(";")[0].strip().lower()
+    if media_type != "application/json" and not (
+        media_type.startswith("application/") and media_type.endswith("+json")
+    ):
+        raise _refused(
+            "Content-Type",
+            _("must be application/json"),
+            _("Send JSON, with the header Content-Type: application/json (curl: -H 'Content-Type: application/json')."),
+        )
+    try:
+        value = json.loads(body.decode("utf-8"), object_pairs_hook=_unique)
+    except UnicodeDecodeError as error:
+        raise _refused(
+            "body", _("is not UTF-8 text: byte {n} cannot be read").format(n=error.start), _("Send JSON in UTF-8.")
+        ) from None
+    except json.JSONDecodeError as error:
+        raise _refused(
+            "body",
+            _("is not JSON: line {line}, column {column}: {message}").format(
+                line=error.lineno, column=error.colno, message=error.msg
+            ),
+            _("Correct the JSON at that place."),
+        ) from None
+    except RecursionError:
+        raise _refused("body", _("is nested too deeply"), None) from None
+    except ValueError as error:  # a whole number of thousands of digits, or a doubled key
+        raise _refused(
+            "body", str(error) if isinstance(error, _DoubledError) else _("holds too large a number"), None
+        ) from None
+    problems: list[FieldError] = []
+    _look(value, (), problems)
+    if problems:
+        raise Invalid(_("The request holds values that cannot be used."), errors=problems)
+    return value
+
+
+def _refused(field: str, message: str, what_to_do: str | None) -> Invalid:
+    return Invalid(_("The request is not usable JSON."), what_to_do, errors=[FieldError(field, message)])
+
+
+class _DoubledError(ValueError):
+    pass
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    made = dict(pairs)
+    if len(made) != len(pairs):
+        names = [name for name, _value in pairs]
+        doubled = next(name for name in names if names.count(name) > 1)
+        raise _DoubledError(_("says {name} twice; say it once").format(name=json.dumps(doubled)))
+    return made
+
+
+def _look(value: Any, path: tuple[str | int, ...], problems: list[FieldError]) -> None:
+    """Note everything in the value that cannot be stored or compared."""
+    if len(path) > DEEPEST:
+        problems.append(FieldError("body", _("is nested too deeply")))
+    elif isinstance(value, dict):
+        for name, item in value.items():
+            wrong = _wrong_text(name)
+            if wrong:
+                problems.append(FieldError(field_path(("body", *path)), wrong))
+            else:
+                _look(item, (*path, name), problems)
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            _look(item, (*path, index), problems)
+    elif isinstance(value, float) and not isfinite(value):
+        problems.append(FieldError(field_path(("body", *path)), _("must be a finite number")))
+    elif isinstance(value, str) and (wrong := _wrong_text(value)):
+        problems.append(FieldError(field_path(("body", *path)), wrong))
+
+
+def _wrong_text(text: str) -> str | None:
+    if "\0" in text:
+        return _("holds the character U+0000, which cannot be stored; remove it")
+    if any("\ud800" <= character <= "\udfff" for character in text):
+        return _("holds half a character (a lone surrogate); send complete Unicode text")
+    return None
+
+
+class _Read(Request):
+    """A request whose JSON has been read already."""
+
+    value: Any = None
+
+    async def json(self) -> Any:
+        return self.value
+
+
+class JsonRoute(APIRoute):
+    """A route whose JSON body, if it takes one, is read by `read_json`."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        handle = super().get_route_handler()
+
+        async def handle_strictly(request: Request) -> Response:
+            if self.body_field is None:
+                return await handle(request)
+            read = _Read(request.scope, request.receive)
+            body = await read.body()
+            if body:
+                read.value = read_json(body, request.headers.get("content-type"))
+            return await handle(read)
+
+        return handle_strictly

@@ -1,0 +1,99 @@
+"""What pydantic found wrong with a request, in words that a machinist understands."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from app.errors import FieldError, Invalid
+from app.web.i18n import _
+
+
+def field_path(location: Sequence[str | int]) -> str:
+    """``("body", "parameters", "zero_range")`` is `parameters.zero_range`; list items are `[17].measured`."""
+    path = ""
+    for step in location[1:] if location and location[0] in {"body", "query", "path", "header"} else location:
+        path += f"[{step}]" if isinstance(step, int) else f".{step}" if path else str(step)
+    return path or "body"
+
+
+def field_errors(errors: Iterable[Mapping[str, Any]]) -> list[FieldError]:
+    """One sentence for each thing that is wrong."""
+    return [FieldError(field_path(error["loc"]), message(error)) for error in errors]
+
+
+def message(error: Mapping[str, Any]) -> str:
+    """The sentence for one of pydantic's errors."""
+    kind, context = str(error["type"]), error.get("ctx", {})
+    if kind == "missing" and tuple(error["loc"]) == ("body",):
+        return _("is missing: send a JSON object with the header Content-Type: application/json")
+    simple = {
+        "missing": _("is missing"),
+        "extra_forbidden": _("is not a field of this request; check the spelling"),
+        "string_type": _("must be text in quotation marks"),
+        "string_unicode": _("holds half a character (a lone surrogate); send complete Unicode text"),
+        "slug": _(
+            "must be a key of 1 to 64 characters: small letters a-z, digits, point, hyphen and underscore, "
+            "beginning with a letter or digit, for example shaft-d40"
+        ),
+        "one_line": _("must be one line of text"),
+        "int_type": _("must be a whole number"),
+        "int_parsing": _("must be a whole number"),
+        "int_parsing_size": _("is too large a number"),
+        "int_from_float": _("must be a whole number"),
+        "float_type": _("must be a number"),
+        "float_parsing": _("must be a number with a decimal point, for example 0.0053"),
+        "finite_number": _("must be a finite number"),
+        "bool_type": _("must be true or false"),
+        "bool_parsing": _("must be true or false"),
+        "dict_type": _("must be a JSON object: {...}"),
+        "mapping_type": _("must be a JSON object: {...}"),
+        "model_attributes_type": _("must be a JSON object: {...}"),
+        "model_type": _("must be a JSON object: {...}"),
+        "list_type": _("must be a JSON list: [...]"),
+        "timezone_aware": _("must say its offset from UTC, for example 2026-11-21T08:15:02+01:00"),
+    }.get(kind)
+    if simple is not None:
+        return simple
+    if kind.startswith(("datetime", "date", "time")):
+        return _("must be a time with its offset from UTC, for example 2026-11-21T08:15:02+01:00")
+    if kind in {"enum", "literal_error"}:
+        return _("must be one of {choices}").format(choices=str(context.get("expected", "")).replace("'", ""))
+    return _with_values(kind, context) or str(error.get("msg", kind))
+
+
+def _with_values(kind: str, context: Mapping[str, Any]) -> str | None:
+    sentences = {
+        "string_too_short": (
+            _("must not be empty")
+            if context.get("min_length") == 1
+            else _("must have at least {min_length} characters")
+        ),
+        "string_too_long": _("must have at most {max_length} characters"),
+        "control_character": _("holds a control character ({code}), which cannot be read or stored; remove it"),
+        "greater_than": _("must be greater than {gt}"),
+        "greater_than_equal": _("must be at least {ge}"),
+        "less_than": _("must be less than {lt}"),
+        "less_than_equal": _("must be at most {le}"),
+        "too_long": _("must have at most {max_length} items, not {actual_length}"),
+        "too_short": _("must have at least {min_length} items"),
+    }
+    sentence = sentences.get(kind)
+    return None if sentence is None else sentence.format(**context)
+
+
+def checked(kind: Any, value: Any, field: str) -> Any:
+    """The value as this annotated type (`Text200`, `Reason`, …). Raises `Invalid` that names the field."""
+    try:
+        return _adapter(kind).validate_python(value)
+    except ValidationError as error:
+        errors = [FieldError(field, message(found)) for found in error.errors()]
+        raise Invalid(
+            f"{field}: {errors[0].message}", _("Correct the named field and send it again."), errors=errors
+        ) from None
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
