@@ -1,0 +1,45 @@
+"""The wall that import-linter cannot draw: parts of the shop floor meet only through each other's queries and actions."""
+
+import grimp
+
+HOUSE = {"cli", "core", "db", "errors", "formats", "main", "settings", "web", "__main__"}  # not parts of the shop floor
+OPEN = {"queries", "actions"}
+EDGE = {"api", "pages", "schemas", "figures"}  # these take no tables; what lies behind a door (readings/store.py) may
+
+
+def crossings(graph: grimp.ImportGraph) -> list[str]:
+    found = []
+    for importer in sorted(graph.find_descendants("app")):
+        part, _, module = importer.removeprefix("app.").partition(".")
+        if part in HOUSE:
+            continue
+        for imported in sorted(graph.find_modules_directly_imported_by(importer)):
+            other, _, door = imported.removeprefix("app.").partition(".")
+            if not imported.startswith("app.") or other in HOUSE | {part}:
+                continue
+            # Whole packages (`from app.people import queries` shows as app.people.queries) are their front doors.
+            if door in OPEN or (door == "tables" and module.partition(".")[0] not in EDGE):
+                continue
+            found.append(f"{importer} imports {imported}")
+    return found
+
+
+def test_parts_meet_only_through_queries_and_actions() -> None:
+    assert crossings(grimp.build_graph("app", cache_dir=None)) == []
+
+
+def test_a_hole_in_the_wall_is_seen() -> None:
+    graph = grimp.ImportGraph()
+    for module in (
+        "app",
+        "app.alarms",
+        "app.alarms.api",
+        "app.machines",
+        "app.machines.queries",
+        "app.machines.tables",
+    ):
+        graph.add_module(module)
+    graph.add_import(importer="app.alarms.api", imported="app.machines.queries")
+    assert crossings(graph) == []
+    graph.add_import(importer="app.alarms.api", imported="app.machines.tables")
+    assert crossings(graph) == ["app.alarms.api imports app.machines.tables"]
