@@ -31,10 +31,10 @@ def signed(value: float | None, decimals: int = 1) -> str:
 
 
 def um(deviation_mm: float | None, decimals: int = 1) -> str:
-    """A deviation in µm with its sign.
+    r"""A deviation in µm with its sign.
 
     >>> um(0.0061), um(-0.3, 0), um(None)
-    ('+6.1\\xa0µm', '−300\\xa0µm', '–')
+    ('+6.1\xa0µm', '−300\xa0µm', '–')
     """
     if deviation_mm is None:
         return NOTHING
@@ -42,10 +42,10 @@ def um(deviation_mm: float | None, decimals: int = 1) -> str:
 
 
 def um_limit(limit_mm: float) -> str:
-    """A limit in µm, both sides at once and no more decimals than it needs, in mm from 1 mm on.
+    r"""A limit in µm, both sides at once and no more decimals than it needs, in mm from 1 mm on.
 
     >>> um_limit(0.0053), um_limit(0.3), um_limit(1.0)
-    ('±5.3\\xa0µm', '±300\\xa0µm', '±1\\xa0mm')
+    ('±5.3\xa0µm', '±300\xa0µm', '±1\xa0mm')
     """
     if limit_mm >= 1:
         return f"{PLUS_MINUS}{limit_mm:.6g}{NO_BREAK_SPACE}mm"
@@ -53,10 +53,10 @@ def um_limit(limit_mm: float) -> str:
 
 
 def mm(size_mm: float | None, decimals: int = 4) -> str:
-    """A size in mm.
+    r"""A size in mm.
 
     >>> mm(39.9981)
-    '39.9981\\xa0mm'
+    '39.9981\xa0mm'
     """
     if size_mm is None:
         return NOTHING
@@ -66,7 +66,7 @@ def mm(size_mm: float | None, decimals: int = 4) -> str:
 def when(moment: datetime | None, style: str = "seconds") -> Markup:
     """A moment; the browser rewrites it in the reader's own time zone (times.js). Style: `seconds`, `minutes` or `date`."""
     if moment is None:
-        return Markup(NOTHING)
+        return Markup("–")
     utc = moment.astimezone(UTC)
     pattern = {"seconds": "d MMM y HH:mm:ss", "minutes": "d MMM y HH:mm", "date": "d MMM y"}[style]
     text = format_datetime(utc, pattern, locale=current_locale()) + ("" if style == "date" else " UTC")
@@ -94,7 +94,7 @@ def seconds_in_words(seconds: float) -> str:
 def ago(moment: datetime | None, now: datetime | None = None) -> Markup:
     """How long ago a moment was; the browser keeps it going (times.js)."""
     if moment is None:
-        return Markup(NOTHING)
+        return Markup("–")
     age = ((now or datetime.now(UTC)) - moment).total_seconds()
     return Markup('<time-ago datetime="{}">{}</time-ago>').format(
         moment.astimezone(UTC).isoformat(), escape(_("{age} ago").format(age=seconds_in_words(age)))

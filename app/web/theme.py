@@ -67,7 +67,7 @@ PALETTES: dict[ThemeName, Palette] = {
     ),
 }
 
-# Plotly's marker symbols; the icons of the badges (frontend/templates/icons.html) have the same outlines.
+# The same shapes for Plotly (its symbols) and for badges and small pictures (paths in a 24 × 24 box).
 ZONE_SYMBOLS = {
     "zero": "circle",
     "average": "diamond",
@@ -76,6 +76,25 @@ ZONE_SYMBOLS = {
     "undersize": "triangle-down",
     "wear": "hexagon2",
     "probe_fault": "x",
+}
+ZONE_OUTLINES = {
+    "zero": "M12 6a6 6 0 1 0 0 12a6 6 0 0 0 0-12z",
+    "average": "M12 3.5 20.5 12 12 20.5 3.5 12z",
+    "full": "M5 5h14v14H5z",
+    "oversize": "M12 3 22 20H2z",
+    "undersize": "M12 21 2 4h20z",
+    "wear": "M7 3h10l5 9-5 9H7l-5-9z",
+    "probe_fault": "M7 2 12 7l5-5 5 5-5 5 5 5-5 5-5-5-5 5-5-5 5-5-5-5z",
+}
+# How urgent a zone is: the tones of the style sheet.
+ZONE_TONES = {
+    "zero": "steady",
+    "average": "steady",
+    "full": "steady",
+    "oversize": "attention",
+    "undersize": "attention",
+    "wear": "wear",
+    "probe_fault": "stop",
 }
 
 
@@ -92,14 +111,10 @@ def zone_name(zone: str) -> str:
     }.get(zone, zone)
 
 
-def zone_colour(zone: str, palette: Palette) -> str:
+def zone_colour(zone: str, colours: Palette) -> str:
     """Grey inside the tolerance; a colour where someone is needed."""
-    return {
-        "oversize": palette.attention,
-        "undersize": palette.attention,
-        "wear": palette.wear,
-        "probe_fault": palette.stop,
-    }.get(zone, palette.steady)
+    tone: str = getattr(colours, ZONE_TONES.get(zone, "steady"))
+    return tone
 
 
 def palette(theme: ThemeName) -> Palette:

@@ -1,0 +1,175 @@
+"""What is written and drawn about the bands: their grounds, the limits above and below, and the words at the right."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from app.characteristics.figures.scale import Band, Scale, ZoneScale, bands
+from app.core.zones import HasLimits
+from app.web.i18n import _
+from app.web.numbers import MINUS, NO_BREAK_SPACE
+from app.web.theme import Palette
+
+# In the linear scale close limits would write over each other: the least distance as a share of the whole height.
+LEAST_DISTANCE = 0.046
+
+
+def limit_title(limit: str) -> str:
+    """The name of a limit in the manual."""
+    return {
+        "R33": _("zero compensation"),
+        "R34": _("⅔ of the tolerance"),
+        "R35/2": _("tolerance"),
+        "R37": _("dimensional difference"),
+        "R36": _("safe area"),
+    }[limit]
+
+
+def band_text(band: Band, sign: int) -> str:
+    """What happens in a band, above (+1) or below (-1) the target, in the words of the manual's diagram."""
+    return {
+        "zero": _("averaging is stored"),
+        "average": _("averaging and correction"),
+        "full": _("correction of current deviation"),
+        "out_of_tolerance": _("correction of current deviation, alarm “oversize”")
+        if sign > 0
+        else _("correction of current deviation, alarm “undersize”"),
+        "wear": _("alarm “permissible dimensional difference overrun”"),
+        "probe_fault": _("alarm “safe area overrun”"),
+    }[band.name]
+
+
+def band_shapes(limits: HasLimits, ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+    """The grounds: quiet inside the tolerance, a breath of colour outside."""
+    return [
+        {
+            "type": "rect",
+            "layer": "below",
+            "xref": "paper",
+            "x0": 0,
+            "x1": 1,
+            "yref": "y",
+            "y0": sign * _edge(band.lower, ruler),
+            "y1": sign * (ruler.extent if band.upper is None else _edge(band.upper, ruler)),
+            "fillcolor": colours.bands[band.number],
+            "line": {"width": 0},
+        }
+        for band in bands(limits)
+        for sign in (1, -1)
+        if _edge(band.lower, ruler) < ruler.extent
+    ]
+
+
+def limit_lines(limits: HasLimits, ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+    """The limits, the tolerance the strongest, and the target, dashed."""
+    lines = [_line(0, colours.quiet, 1, "4px,4px")]
+    for band in bands(limits):
+        if not band.limits or not ruler.fits(band.lower):
+            continue
+        colour, width = (colours.ink, 1.75) if "R35/2" in band.limits else (colours.faint, 1.0)
+        edge = _edge(band.lower, ruler)
+        lines += [_line(y, colour, width, "solid") for y in (edge, -edge)]
+    return lines
+
+
+def _line(y: float, colour: str, width: float, dash: str) -> dict[str, Any]:
+    return {
+        "type": "line",
+        "layer": "below",
+        "xref": "paper",
+        "x0": 0,
+        "x1": 1,
+        "yref": "y",
+        "y0": y,
+        "y1": y,
+        "line": {"color": colour, "width": width, "dash": dash},
+    }
+
+
+def limit_labels(limits: HasLimits, ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+    """At the right: on each limit its name, value and title; in each band what happens there."""
+    found = bands(limits)
+    height = 2 * ruler.extent
+    notes: list[dict[str, Any]] = [
+        _note(0, f"<b>{_('target')}</b>" if not isinstance(ruler, ZoneScale) else "", colours.quiet, 12)
+    ]
+    for sign in (1, -1):
+        written = 0.0 if not isinstance(ruler, ZoneScale) else -height
+        for band in found:
+            lower = _edge(band.lower, ruler)
+            if band.limits and ruler.fits(band.lower):
+                strong = "R35/2" in band.limits
+                place = max(lower, written + LEAST_DISTANCE * height)
+                written = place
+                names = " = ".join(band.limits)
+                title = limit_title(band.limits[-1])
+                ink = colours.ink if strong else colours.quiet
+                notes.append(
+                    _note(sign * place, f"<b>{names}  {_signed_limit(sign * band.lower)}</b>  {title}", ink, 12)
+                )
+            elif band.limits:
+                continue
+            upper = ruler.extent if band.upper is None else _edge(band.upper, ruler)
+            room = (upper - max(lower, written)) / height
+            if isinstance(ruler, ZoneScale):
+                if band.number > 0:
+                    notes.append(_note(sign * (lower + upper) / 2, band_text(band, sign), _ink(band, colours), 12))
+                elif sign > 0:
+                    notes.append(_note(0, band_text(band, sign), colours.quiet, 12))
+            elif room > 1.6 * LEAST_DISTANCE and band.number > 0:
+                place = max((max(lower, written) + upper) / 2, written + LEAST_DISTANCE * height)
+                written = place
+                notes.append(_note(sign * place, band_text(band, sign), _ink(band, colours), 12))
+    return [note for note in notes if note["text"]]
+
+
+def _ink(band: Band, colours: Palette) -> str:
+    return {"out_of_tolerance": colours.attention, "wear": colours.wear, "probe_fault": colours.stop}.get(
+        band.name, colours.quiet
+    )
+
+
+def _note(y: float, text: str, colour: str, size: int) -> dict[str, Any]:
+    return {
+        "xref": "paper",
+        "x": 1,
+        "xanchor": "left",
+        "xshift": 8,
+        "yref": "y",
+        "y": y,
+        "yanchor": "middle",
+        "text": text,
+        "showarrow": False,
+        "align": "left",
+        "font": {"size": size, "color": colour},
+    }
+
+
+def _signed_limit(deviation: float) -> str:
+    sign = MINUS if deviation < 0 else "+"
+    size = abs(deviation)
+    if size >= 1:
+        return f"{sign}{size:.6g}{NO_BREAK_SPACE}mm"
+    return f"{sign}{size * 1000:.6g}{NO_BREAK_SPACE}µm"
+
+
+def size_ticks(limits: HasLimits, ruler: Scale, centre: float | None) -> tuple[list[float], list[str]]:
+    """Places and words of the left axis: the sizes (mm) at target and limits, or the deviations if the centre is not known."""
+    ticks: list[float] = []
+    words: list[str] = []
+    least = LEAST_DISTANCE * 2 * ruler.extent
+    for band in bands(limits):
+        place = _edge(band.lower, ruler)
+        if not ruler.fits(band.lower) or (band.limits and ticks and place - max(ticks) < least):
+            continue
+        for sign in (1,) if band.number == 0 else (1, -1):
+            deviation = sign * band.lower
+            ticks.append(sign * place)
+            text = _signed_limit(deviation) if centre is None else f"{centre + deviation:.4f}"
+            words.append(f"<b>{text}</b>" if band.number == 0 or "R35/2" in band.limits else text)
+    return ticks, words
+
+
+def _edge(deviation: float, ruler: Scale) -> float:
+    """The place of a limit; a limit beyond the chart lies at its edge."""
+    return ruler.position(deviation) if ruler.fits(deviation) else ruler.extent

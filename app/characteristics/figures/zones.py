@@ -1,0 +1,342 @@
+"""The zone chart: what came in, how it was judged, what was done about it.
+
+From top to bottom: a lane of events (alarms, tool changes), the bands with the readings and the running average, a lane with
+the sum of the corrections. At the left the sizes at the limits, at the right each limit with its name and value and, in the
+band that begins there, what happens in it – as in the diagram of the cycles' manual.
+
+Nothing is only in a hover text: the list below the chart says everything too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from app.characteristics.figures.labels import band_shapes, limit_labels, limit_lines, size_ticks
+from app.characteristics.figures.lanes import Mark, Step, event_lane, offset_lane
+from app.characteristics.figures.scale import Scale, ScaleName, TrueScale, ZoneScale
+from app.core.zones import HasLimits, Limits, classify
+from app.web.i18n import _
+from app.web.numbers import um
+from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, layout, palette, zone_colour, zone_name
+
+__all__ = ["Block", "Mark", "Point", "Step", "zone_chart"]
+
+EVENTS, READINGS, OFFSETS = [0.925, 1.0], [0.2, 0.915], [0.0, 0.15]  # of the height, from the bottom
+
+
+@dataclass(frozen=True)
+class Point:
+    """One reading; lengths in mm. `average` is M after it, None where there is no memory. `link` opens it."""
+
+    sequence: int
+    deviation: float
+    zone: str
+    average: float | None = None
+    at: datetime | None = None
+    excluded: bool = False
+    link: str | None = None
+
+
+@dataclass(frozen=True)
+class Block:
+    """Many readings in one: for charts of more than can be drawn. `link` opens its part of the chart; mm."""
+
+    first: int
+    last: int
+    minimum: float
+    maximum: float
+    mean: float
+    average: float | None = None
+    link: str | None = None
+
+    @property
+    def middle(self) -> float:
+        return (self.first + self.last) / 2
+
+
+def zone_chart(
+    points: Sequence[Point],
+    limits: HasLimits,
+    *,
+    blocks: Sequence[Block] = (),
+    steps: Sequence[Step] = (),
+    marks: Sequence[Mark] = (),
+    scale: ScaleName = "zones",
+    theme: ThemeName = "light",
+    centre: float | None = None,
+    total_before: float = 0.0,
+) -> dict[str, Any]:
+    """The figure.
+
+    points: readings by ascending sequence. blocks: older ones, thinned; every block's extremes are drawn.
+    steps: corrections by ascending sequence of the reading that caused them; total_before: their sum before the first (mm).
+    marks: alarms and tool changes. centre: the size (mm) at deviation 0, target + empirical value, for the sizes at the left.
+    """
+    colours = palette(theme)
+    ruler: Scale
+    if scale == "zones":
+        ruler = ZoneScale.of(limits)
+    else:
+        ends = [end for block in blocks for end in (block.minimum, block.maximum)]
+        ruler = TrueScale.of(limits, [*(point.deviation for point in points), *ends])
+    first = min([block.first for block in blocks] + [point.sequence for point in points], default=1)
+    last = max([block.last for block in blocks] + [point.sequence for point in points], default=first + 9)
+    room = max((last - first) * 0.02, 0.6)
+    span = (first - room, last + room * 1.5)
+
+    traces = [
+        *_envelope(blocks, ruler, Limits.of(limits), colours),
+        *_average(blocks, points, ruler, colours),
+        *_readings(points, ruler, colours),
+        *_latest(points, ruler, colours),
+    ]
+    events, event_notes, event_lines = event_lane(marks, span, colours)
+    offsets, offset_notes = offset_lane(steps, marks, span, total_before, colours)
+    notes = [*limit_labels(limits, ruler, colours), *event_notes, *offset_notes]
+    if not points and not blocks:
+        notes.append(
+            {
+                "xref": "paper",
+                "yref": "y",
+                "x": 0.5,
+                "y": 0,
+                "text": f"<b>{_('No readings yet')}</b>",
+                "showarrow": False,
+                "bgcolor": colours.surface,
+                "borderpad": 6,
+                "font": {"size": 15, "color": colours.quiet},
+            }
+        )
+    ticks, words = size_ticks(limits, ruler, centre)
+    return {
+        "data": [*traces, *events, *offsets],
+        "layout": layout(
+            theme,
+            margin={"l": 84, "r": 262, "t": 34, "b": 48},
+            hoverdistance=24,
+            showlegend=True,
+            legend={
+                "orientation": "h",
+                "x": 0,
+                "xanchor": "left",
+                "y": 1.008,
+                "yanchor": "bottom",
+                "font": {"size": 13, "color": colours.quiet},
+                "bgcolor": "rgba(0,0,0,0)",
+                "itemclick": False,
+                "itemdoubleclick": False,
+            },
+            xaxis={
+                "range": list(span),
+                "anchor": "y3",
+                "title": {"text": _("Reading number"), "font": {"size": 13, "color": colours.quiet}, "standoff": 6},
+                "tickformat": "d",
+                "showgrid": False,
+                "showline": True,
+                **({"dtick": 1} if last - first <= 12 else {"nticks": 9}),
+            },
+            yaxis={
+                "domain": READINGS,
+                "range": [-ruler.extent, ruler.extent],
+                "fixedrange": True,
+                "showgrid": False,
+                "tickmode": "array",
+                "tickvals": ticks,
+                "ticktext": words,
+                "tickfont": {"size": 12, "color": colours.quiet},
+            },
+            yaxis2=_lane(EVENTS, [-1, 1], colours, showticklabels=False),
+            yaxis3=_lane(
+                OFFSETS,
+                None,
+                colours,
+                nticks=3,
+                tickformat="+.1f",
+                gridcolor=colours.grid,
+                showgrid=True,
+                zeroline=True,
+                zerolinecolor=colours.faint,
+                title={"text": _("Σ correction, µm"), "font": {"size": 12, "color": colours.quiet}, "standoff": 4},
+            ),
+            shapes=[*band_shapes(limits, ruler, colours), *limit_lines(limits, ruler, colours), *event_lines],
+            annotations=notes,
+        ),
+    }
+
+
+def _lane(domain: list[float], extent: list[float] | None, colours: Palette, **more: Any) -> dict[str, Any]:
+    lane: dict[str, Any] = {
+        "domain": domain,
+        "fixedrange": True,
+        "color": colours.quiet,
+        "anchor": "x",
+        "zeroline": False,
+    }
+    lane |= {"showgrid": False, "ticks": "", "tickfont": {"size": 11}}
+    return lane | ({"range": extent} if extent else {}) | more
+
+
+def _hover(point: Point) -> str:
+    lines = [f"<b>{_('Reading {n}').format(n=point.sequence)}</b>", f"{um(point.deviation)} · {zone_name(point.zone)}"]
+    if point.average is not None:
+        lines.append(_("running average {average}").format(average=um(point.average, 2)))
+    if point.excluded:
+        lines.append(_("excluded from statistics"))
+    if point.at is not None:
+        lines.append(f"{point.at:%Y-%m-%d %H:%M:%S %Z}".strip())
+    return "<br>".join(lines)
+
+
+def _readings(points: Sequence[Point], ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+    """Every reading: the shape of its zone; hollow if excluded; at the edge with its value if it lies beyond."""
+    if not points:
+        return []
+    small = 8 if len(points) <= 120 else 6 if len(points) <= 400 else 4
+    calm = {"zero", "average", "full"}
+    colour = [zone_colour(point.zone, colours) for point in points]
+    return [
+        {
+            "type": "scatter",
+            "mode": "lines+markers",
+            "name": _("Reading"),
+            "meta": "readings",
+            "x": [point.sequence for point in points],
+            "y": [ruler.position(point.deviation) for point in points],
+            "line": {"width": 1, "color": colours.faint},
+            "marker": {
+                "symbol": [
+                    ZONE_SYMBOLS.get(point.zone, "circle") + ("-open" if point.excluded else "") for point in points
+                ],
+                "size": [small if point.zone in calm else max(small + 3, 10) for point in points],
+                "color": colour,
+                "line": {
+                    "width": [1.5 if point.excluded else 0.75 for point in points],
+                    "color": [
+                        c if point.excluded else colours.surface for c, point in zip(colour, points, strict=True)
+                    ],
+                },
+                "opacity": 1,
+            },
+            "customdata": [point.link for point in points],
+            "text": [_hover(point) for point in points],
+            "hovertemplate": "%{text}<extra></extra>",
+            "cliponaxis": False,
+        }
+    ]
+
+
+def _latest(points: Sequence[Point], ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+    """A ring about the newest reading, found from two metres away."""
+    if not points:
+        return []
+    point = points[-1]
+    return [
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": _("Newest"),
+            "meta": "newest",
+            "x": [point.sequence],
+            "y": [ruler.position(point.deviation)],
+            "marker": {
+                "symbol": "circle-open",
+                "size": 20,
+                "color": zone_colour(point.zone, colours),
+                "line": {"width": 2.5},
+            },
+            "hoverinfo": "skip",
+            "cliponaxis": False,
+        }
+    ]
+
+
+def _average(blocks: Sequence[Block], points: Sequence[Point], ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+    """M, as it stood after each reading; a gap where there was no memory."""
+    course = [(block.middle, block.average) for block in blocks] + [(point.sequence, point.average) for point in points]
+    if all(value is None for _x, value in course):
+        return []
+    return [
+        {
+            "type": "scatter",
+            "mode": "lines",
+            "name": _("Running average M"),
+            "meta": "average",
+            "x": [x for x, _value in course],
+            "y": [None if value is None else ruler.position(value) for _x, value in course],
+            "line": {"width": 2.5, "color": colours.average, "shape": "hv" if len(course) <= 400 else "linear"},
+            "hoverinfo": "skip",
+        }
+    ]
+
+
+def _envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits, colours: Palette) -> list[dict[str, Any]]:
+    """Smallest and largest reading of every block, filled between; extremes that need someone keep their shapes."""
+    if not blocks:
+        return []
+    x = [block.middle for block in blocks]
+    text = [
+        "<br>".join(
+            (
+                f"<b>{_('Readings {first} to {last}').format(first=block.first, last=block.last)}</b>",
+                _("largest {value}").format(value=um(block.maximum)),
+                _("mean {value}").format(value=um(block.mean)),
+                _("smallest {value}").format(value=um(block.minimum)),
+            )
+        )
+        for block in blocks
+    ]
+    edge = {"width": 1, "color": colours.steady, "shape": "hvh"}
+    common = {"type": "scatter", "mode": "lines", "x": x, "customdata": [block.link for block in blocks], "text": text}
+    common |= {"hovertemplate": "%{text}<extra></extra>"}
+    lower = common | {
+        "y": [ruler.position(b.minimum) for b in blocks],
+        "line": edge,
+        "showlegend": False,
+        "meta": "minimum",
+    }
+    upper = common | {
+        "y": [ruler.position(b.maximum) for b in blocks],
+        "line": edge,
+        "fill": "tonexty",
+        "fillcolor": _see_through(colours.steady),
+        "name": _("Smallest to largest"),
+        "meta": "maximum",
+    }
+    mean = common | {
+        "y": [ruler.position(b.mean) for b in blocks],
+        "line": {"width": 1.5, "color": colours.steady},
+        "name": _("Mean"),
+        "meta": "mean",
+    }
+    extremes = [
+        (block, value, zone)
+        for block in blocks
+        for value in dict.fromkeys((block.minimum, block.maximum))
+        if (zone := classify(value, edges)) not in {"zero", "average", "full"}
+    ]
+    marks = {
+        "type": "scatter",
+        "mode": "markers",
+        "meta": "extremes",
+        "x": [block.middle for block, _value, _zone in extremes],
+        "y": [ruler.position(value) for _block, value, _zone in extremes],
+        "marker": {
+            "symbol": [ZONE_SYMBOLS[zone] for _block, _value, zone in extremes],
+            "size": 9,
+            "color": [zone_colour(zone, colours) for _block, _value, zone in extremes],
+        },
+        "customdata": [block.link for block, _value, _zone in extremes],
+        "text": [f"<b>{um(value)}</b> · {zone_name(zone)}" for _block, value, zone in extremes],
+        "hovertemplate": "%{text}<extra></extra>",
+        "showlegend": False,
+        "cliponaxis": False,
+    }
+    return [lower, upper, mean, *([marks] if extremes else [])]
+
+
+def _see_through(colour: str, share: float = 0.28) -> str:
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{share})"
