@@ -1,0 +1,31 @@
+"""Telling everybody what changed: one row per transaction in the journal, and a NOTIFY that wakes the listeners.
+
+The number of an event is taken under a lock that is held until the commit, so numbers come in the order of the
+commits and a client that saw number n has missed nothing before it.
+"""
+
+from typing import Any
+
+import msgspec
+from sqlalchemy import text
+from sqlalchemy.orm import Session
+
+CHANNEL = "inband"
+
+# psycopg placeholders; the writer of readings sends the same statement over its own connection.
+PUBLISH = f"""
+WITH held AS MATERIALIZED (SELECT pg_advisory_xact_lock(7291, 1)),
+     written AS (INSERT INTO event (changes) SELECT %(changes)s::jsonb FROM held RETURNING id)
+SELECT pg_notify('{CHANNEL}', id::text) FROM written
+"""  # noqa: S608 - the channel is our own constant
+
+_PUBLISH = text(PUBLISH.replace("%(changes)s::jsonb", "CAST(:changes AS jsonb)"))
+
+
+def publish(session: Session, *changes: dict[str, Any]) -> None:
+    """Say what this transaction changes, e.g. ``{"kind": "alarm", "machine": "lathe-1", "characteristic": "shaft-d40"}``.
+
+    Call it last in a transaction: commits of other transactions that publish wait until this one ends.
+    """
+    session.flush()
+    session.execute(_PUBLISH, {"changes": msgspec.json.encode(changes).decode()})

@@ -1,0 +1,173 @@
+"""The door that single readings come in by: a thin ASGI route in front of the application.
+
+It does what the documented route `POST /api/v1/readings` (in `api.py`) says, for callers with a key, without the layers
+of a web framework between the socket and the writer. Everything else goes on to the application.
+"""
+
+from datetime import UTC, datetime
+from typing import Any
+
+import msgspec
+import psycopg
+from sqlalchemy.exc import OperationalError
+from starlette.concurrency import run_in_threadpool
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from app.db.engine import Database
+from app.errors import DatabaseAway, FieldError, InbandError, NotAllowed, NotFound, NotSignedIn, TooLarge
+from app.people.callers import Caller
+from app.people.keys import KeyRing
+from app.readings import queries
+from app.readings.answers import answer
+from app.readings.judge import Stored, Verdict
+from app.readings.records import Entry
+from app.readings.schemas import ReadingIn, decode_one
+from app.readings.writer import Outcome, Writer
+from app.web.i18n import _
+
+PATH = "/api/v1/readings"
+LARGEST_BODY = 256 * 1024
+_json = msgspec.json.Encoder()
+
+
+class Directory:
+    """Where each characteristic is kept. Neither its key nor its machine ever changes, so what is known stays known."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self._entries: dict[str, Entry] = {}
+
+    def known(self, characteristic: str) -> Entry | None:
+        """The entry if it has been looked up before."""
+        return self._entries.get(characteristic)
+
+    def look_up(self, characteristic: str) -> Entry:
+        """The entry, from the database if need be. Raises `NotFound`."""
+        entry = self._entries.get(characteristic)
+        if entry is None:
+            with self._database.begin() as session:
+                entry = queries.entry_of(session, characteristic)
+            if entry is None:
+                raise NotFound(
+                    _("There is no characteristic %(key)s.") % {"key": characteristic},
+                    _("Check the key under Set-up, or create the characteristic first."),
+                    errors=[FieldError("characteristic", _("There is no characteristic with this key."))],
+                )
+            self._entries[characteristic] = entry
+        return entry
+
+
+class ReadingsDoor:
+    """ASGI middleware: answers single readings that come with a key."""
+
+    def __init__(self, app: ASGIApp, keys: KeyRing, directory: Directory, writer: Writer, database: Database) -> None:
+        self.app = app
+        self.keys = keys
+        self.directory = directory
+        self.writer = writer
+        self.database = database
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http" or scope["path"] != PATH or scope["method"] != "POST":
+            await self.app(scope, receive, send)
+            return
+        secret = _bearer(scope)
+        if secret is None:
+            await self.app(scope, receive, send)
+            return
+        try:
+            status, body, headers = await self._take(secret, receive)
+        except InbandError as error:
+            status, body, headers = error.status, _json.encode(error.as_problem()), error.headers
+        except (psycopg.OperationalError, OperationalError):
+            away = DatabaseAway()
+            status, body, headers = away.status, _json.encode(away.as_problem()), away.headers
+        kind = b"application/json" if status < 400 else b"application/problem+json"  # noqa: PLR2004
+        await send(
+            {
+                "type": "http.response.start",
+                "status": status,
+                "headers": [
+                    (b"content-type", kind),
+                    (b"content-length", str(len(body)).encode()),
+                    *((name.lower().encode(), value.encode()) for name, value in headers.items()),
+                ],
+            }
+        )
+        await send({"type": "http.response.body", "body": body})
+
+    async def _take(self, secret: str, receive: Receive) -> tuple[int, bytes, dict[str, str]]:
+        caller = await self.keys.lookup(secret)
+        if caller is None:
+            raise NotSignedIn(
+                _("This key is not known, or was revoked."), _("Make a key for the machine under Set-up and send it.")
+            )
+        body = await _body(receive)
+        reading = decode_one(body, datetime.now(UTC))
+        status, value = await take(caller, reading, self.directory, self.writer, self.database)
+        return status, _json.encode(value), {}
+
+
+async def take(
+    caller: Caller, reading: ReadingIn, directory: Directory, writer: Writer, database: Database
+) -> tuple[int, dict[str, Any]]:
+    """Decide and store one reading: status and answer. Raises `InbandError`."""
+    entry = directory.known(reading.characteristic)
+    if entry is None:
+        entry = await run_in_threadpool(directory.look_up, reading.characteristic)
+    caller.must_at(entry.machine_id, "operator")
+    outcome = await writer.submit(entry, reading)
+    return await said(outcome, database)
+
+
+async def said(outcome: Outcome, database: Database) -> tuple[int, dict[str, Any]]:
+    """An outcome as status and answer: 201 for a new reading, 200 for one sent again. Raises what it refuses with."""
+    if isinstance(outcome, InbandError):
+        raise outcome
+    if isinstance(outcome, Stored):
+        return 200, await run_in_threadpool(_stored, database, outcome)
+    return 201, answer_of(outcome)
+
+
+def _stored(database: Database, stored: Stored) -> dict[str, Any]:
+    with database.begin() as session:
+        return queries.answer_of(session, stored.entry, stored.sequence)
+
+
+def answer_of(verdict: Verdict) -> dict[str, Any]:
+    """The answer to a reading that was stored just now."""
+    correction = verdict.correction
+    return answer(
+        verdict.stream.entry.characteristic,
+        verdict.record(),
+        verdict.parameters,
+        correction=(correction.tool_memory, correction.amount) if correction else None,
+        alarms=[(alarm.id or 0, alarm.kind) for alarm in verdict.alarms],
+    )
+
+
+def _bearer(scope: Scope) -> str | None:
+    for name, value in scope["headers"]:
+        if name == b"authorization":
+            scheme, _space, secret = value.decode("latin-1").partition(" ")
+            return secret.strip() if scheme.lower() == "bearer" else None
+    return None
+
+
+async def _body(receive: Receive) -> bytes:
+    parts: list[bytes] = []
+    size = 0
+    while True:
+        message = await receive()
+        if message["type"] == "http.disconnect":
+            raise NotAllowed(_("The connection was closed before the reading was complete."))
+        part = message.get("body", b"")
+        size += len(part)
+        if size > LARGEST_BODY:
+            raise TooLarge(
+                _("A single reading has at most %(limit)s kB.") % {"limit": LARGEST_BODY // 1024},
+                _("Send many readings to /api/v1/readings/batch."),
+            )
+        parts.append(part)
+        if not message.get("more_body"):
+            return parts[0] if len(parts) == 1 else b"".join(parts)

@@ -1,0 +1,458 @@
+"""Decide readings one after the other against what the database holds, in memory, and note what to write.
+
+`Ground` is what was loaded under the machines' locks. `judge` decides one reading on it with `app.core`, moves the
+ground along for the next one, and collects the rows to write. It does no I/O, so that single readings, batches and
+`inband replay` are decided by the same lines. A reading that is refused leaves the ground as it was.
+"""
+
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any, NamedTuple
+
+from app.core.acceptance import accepted
+from app.core.compensation import (
+    DECIMALS,
+    Action,
+    Decision,
+    Signal,
+    State,
+    decide,
+    deviation_of,
+    needs_approval,
+    outstanding_effect,
+)
+from app.core.parameters import Parameters
+from app.core.probing import TouchError, measured_value
+from app.errors import Conflict, FieldError, Invalid
+from app.offsets.tables import OUTSTANDING
+from app.readings.records import Entry, Record
+from app.readings.schemas import ReadingIn
+from app.readings.wording import touch_problem
+from app.web.i18n import _
+
+
+@dataclass(slots=True)
+class OpenAlarm:
+    """An active alarm; without an id until the writer has drawn one for it."""
+
+    machine_id: int
+    characteristic_id: int | None
+    tool_memory: int | None
+    kind: str
+    id: int | None = None
+    sequence: int | None = None
+    last_sequence: int | None = None
+    count: int = 0  # repetitions noted now, the first one included when it is new
+    new: bool = False
+    data: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class IssuedCorrection:
+    """A correction that is open, or was applied after a part under judgement was cut."""
+
+    machine_id: int
+    number: int
+    tool_memory: int
+    amount: float
+    status: str
+    characteristic_id: int = 0
+    sequence: int = 0
+    size_error: float = 0.0
+    applied_at: datetime | None = None
+    applied_by: str | None = None
+    offset_after: float | None = None
+    superseded_by: int | None = None
+    new: bool = False
+    changed: bool = False
+
+
+@dataclass(slots=True)
+class ToolState:
+    """One location of the tool memory, with its corrections in the order of their numbers."""
+
+    machine_id: int
+    number: int
+    offset: float
+    total: float
+    reset_at: datetime | None
+    corrections: list[IssuedCorrection] = field(default_factory=list)
+    changed: bool = False
+
+
+@dataclass(slots=True)
+class AverageState:
+    """One location of the average memory."""
+
+    machine_id: int
+    location: int
+    average: float
+    empirical_value: float
+    changed: bool = False
+
+
+@dataclass(slots=True)
+class StreamState:
+    """The running state of one characteristic."""
+
+    entry: Entry
+    sequence: int
+    version: int
+    parameters: Parameters
+    average: AverageState | None
+    tool: ToolState | None
+    paused_by: int | OpenAlarm | None
+    last_measured_at: datetime | None
+    alarms: dict[str, OpenAlarm] = field(default_factory=dict)
+    before: int = 0  # sequence when it was loaded
+    last: "Verdict | None" = None
+
+
+@dataclass(slots=True)
+class Step:
+    """A change of a tool offset to be written into its history."""
+
+    machine_id: int
+    number: int
+    at: datetime
+    offset_before: float
+    offset_after: float
+    correction: int
+    actor: str
+
+
+@dataclass(slots=True)
+class Ground:
+    """Everything the readings of one transaction are judged against, and what it comes to."""
+
+    streams: dict[int, StreamState] = field(default_factory=dict)
+    tools: dict[tuple[int, int], ToolState] = field(default_factory=dict)
+    averages: dict[tuple[int, int], AverageState] = field(default_factory=dict)
+    tool_alarms: dict[tuple[int, int, str], OpenAlarm] = field(default_factory=dict)
+    last_correction: dict[int, int] = field(default_factory=dict)
+    stored_keys: dict[tuple[int, str], tuple[int, float]] = field(default_factory=dict)
+    verdicts: "list[Verdict]" = field(default_factory=list)
+    by_key: "dict[tuple[int, str], Verdict]" = field(default_factory=dict)
+    issued: list[IssuedCorrection] = field(default_factory=list)
+    raised: list[OpenAlarm] = field(default_factory=list)
+    steps: list[Step] = field(default_factory=list)
+    touched_machines: set[int] = field(default_factory=set)
+
+
+@dataclass(slots=True)
+class Verdict:
+    """A decided reading, before its alarms have numbers."""
+
+    stream: StreamState
+    reading: ReadingIn
+    sequence: int
+    version: int
+    parameters: Parameters
+    measured: float
+    measured_at: datetime
+    received_at: datetime
+    late: bool
+    decision: Decision
+    outstanding: list[int]
+    correction: IssuedCorrection | None
+    paused_by: int | OpenAlarm | None
+    alarms: list[OpenAlarm]
+
+    def record(self) -> Record:
+        """The row to store; every alarm has its number by now."""
+        d, r, entry = self.decision, self.reading, self.stream.entry
+        paused_by = self.paused_by.id if isinstance(self.paused_by, OpenAlarm) else self.paused_by
+        return Record(
+            entry.machine_id,
+            entry.characteristic_id,
+            self.sequence,
+            self.measured,
+            d.deviation,
+            d.decided,
+            d.average_before,
+            d.average_after,
+            self.measured_at,
+            self.received_at,
+            r.machined_at,
+            self.version,
+            r.correction_in_effect,
+            self.correction.number if self.correction else None,
+            paused_by,
+            self.late,
+            d.zone.value,
+            d.action.value,
+            d.code.value,
+            r.key,
+            r.part,
+            self.outstanding or None,
+            [alarm.id or 0 for alarm in self.alarms] or None,
+        )
+
+
+class Stored(NamedTuple):
+    """The reading is in the record already: the same key with the same value was sent before."""
+
+    entry: Entry
+    sequence: int
+
+
+def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Verdict | Stored:
+    """Decide one reading and move the ground along.
+
+    Raises `Invalid` or `Conflict` when the reading cannot be taken; nothing has changed then.
+    """
+    stream = ground.streams[entry.characteristic_id]
+    parameters = stream.parameters
+    measured, sections = _measured(parameters, reading)
+    if reading.key is not None and (known := _known(ground, entry, reading.key, measured)):
+        return known
+    tool = stream.tool
+    in_effect = reading.correction_in_effect
+    if in_effect is not None and in_effect > ground.last_correction[entry.machine_id]:
+        raise Invalid(
+            _("Machine %(machine)s has no correction %(number)s; its last one is %(last)s.")
+            % {"machine": entry.machine, "number": in_effect, "last": ground.last_correction[entry.machine_id]},
+            _("Send the number of the last correction that the machine had applied when it cut this part."),
+            errors=[FieldError("correction_in_effect", _("There is no such correction yet."))],
+        )
+
+    sequence = stream.sequence + 1
+    measured_at = reading.measured_at or now
+    previous_tool = False
+    outstanding: list[IssuedCorrection] = []
+    if tool is not None:
+        if tool.corrections and in_effect is not None:
+            _confirm(ground, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
+        previous_tool = _cut_before_reset(tool, reading)
+        outstanding = [c for c in tool.corrections if _not_in_effect(c, tool, reading)]
+
+    average = stream.average
+    decision = decide(
+        parameters,
+        State(
+            average.average if average else 0.0,
+            _issued_total(tool) if parameters.max_total is not None else 0.0,
+            stream.paused_by is not None,
+        ),
+        deviation_of(measured, parameters.target, average.empirical_value if average else 0.0),
+        outstanding=outstanding_effect((c.amount for c in outstanding), parameters.factor) if outstanding else 0.0,
+        previous_tool=previous_tool,
+        accepted=parameters.accept_m == 1
+        or accepted(parameters, sections, average.empirical_value if average else 0.0),
+    )
+    paused_by = stream.paused_by
+    alarms = [_signal(ground, stream, signal, sequence, decision, now) for signal in decision.signals]
+    correction = None
+    if decision.amount is not None and tool is not None:
+        correction = _issue(ground, stream, tool, sequence, decision)
+
+    stream.sequence = sequence
+    if average is not None and average.average != decision.average_after:
+        average.average = decision.average_after
+        average.changed = True
+    if decision.action is Action.STOP and paused_by is None:
+        stream.paused_by = next(alarm for alarm in alarms if alarm.kind == Signal.PROBE_FAULT.value)
+    last = stream.last_measured_at
+    late = last is not None and measured_at < last
+    if not late:
+        stream.last_measured_at = measured_at
+    verdict = Verdict(
+        stream,
+        reading,
+        sequence,
+        stream.version,
+        parameters,
+        measured,
+        measured_at,
+        now,
+        late,
+        decision,
+        [c.number for c in outstanding],
+        correction,
+        paused_by,
+        alarms,
+    )
+    stream.last = verdict
+    ground.verdicts.append(verdict)
+    if reading.key is not None:
+        ground.by_key[entry.characteristic_id, reading.key] = verdict
+    return verdict
+
+
+def _measured(parameters: Parameters, reading: ReadingIn) -> tuple[float, tuple[float, ...]]:
+    """The value, and one value per section where the part is accepted by n of m."""
+    if reading.touches is None:
+        if parameters.accept_m > 1:
+            raise Invalid(
+                _("This characteristic is accepted by %(n)s of %(m)s sections, so it needs touches.")
+                % {"n": parameters.accept_n, "m": parameters.accept_m},
+                _("Send touches with one list per section in place of measured."),
+                errors=[FieldError("touches", _("Send one list of touches per section."))],
+            )
+        return float(reading.measured or 0.0), ()
+    try:
+        value = measured_value(parameters, reading.touches)
+    except TouchError as error:
+        message = touch_problem(error)
+        raise Invalid(
+            message,
+            _("Nothing was stored. Measure again, or correct points, repeats or path factor of the characteristic."),
+            errors=[FieldError("touches", message)],
+        ) from None
+    return value.value, value.points
+
+
+def _known(ground: Ground, entry: Entry, key: str, measured: float) -> Verdict | Stored | None:
+    """The first reading with this key, here or in the record; the same key with another value is refused."""
+    here = ground.by_key.get((entry.characteristic_id, key))
+    if here is not None:
+        sequence, value = here.sequence, here.measured
+    else:
+        stored = ground.stored_keys.get((entry.characteristic_id, key))
+        if stored is None:
+            return None
+        sequence, value = stored
+    if round(value - measured, DECIMALS) != 0:
+        raise Conflict(
+            _(
+                "Key %(key)s belongs to reading %(sequence)s of %(characteristic)s, which measured %(first)s mm, not %(now)s mm."
+            )
+            % {
+                "key": key,
+                "sequence": sequence,
+                "characteristic": entry.characteristic,
+                "first": value,
+                "now": measured,
+            },
+            _("A key names one reading for ever. Give the new reading a key of its own."),
+            errors=[FieldError("key", _("This key is taken by another value."))],
+        )
+    return here or Stored(entry, sequence)
+
+
+def _confirm(ground: Ground, stream: StreamState, tool: ToolState, in_effect: int, at: datetime) -> None:
+    """The machine says it cut with correction `in_effect`: this tool's pending ones up to it are applied."""
+    for correction in tool.corrections:
+        if correction.number > in_effect or correction.status != "pending":
+            continue
+        before = tool.offset
+        tool.offset = round(before + correction.amount, DECIMALS)
+        tool.total = round(tool.total + correction.amount, DECIMALS)
+        tool.changed = True
+        actor = f"reading {stream.entry.characteristic} {stream.sequence + 1}"
+        correction.status, correction.applied_at, correction.applied_by = "applied", at, actor
+        correction.offset_after, correction.changed = tool.offset, True
+        ground.steps.append(Step(tool.machine_id, tool.number, at, before, tool.offset, correction.number, actor))
+        ground.touched_machines.add(tool.machine_id)
+
+
+def _cut_before_reset(tool: ToolState, reading: ReadingIn) -> bool:
+    """Whether the part was cut before the tool was changed or its offset edited by hand.
+
+    Told by `machined_at`, or by a correction that was applied before that moment and was not yet in effect.
+    """
+    if tool.reset_at is None:
+        return False
+    if reading.machined_at is not None:
+        return reading.machined_at < tool.reset_at
+    if reading.correction_in_effect is None:
+        return False
+    return any(
+        c.status == "applied"
+        and c.number > reading.correction_in_effect
+        and c.applied_at is not None
+        and c.applied_at <= tool.reset_at
+        for c in tool.corrections
+    )
+
+
+def _not_in_effect(correction: IssuedCorrection, tool: ToolState, reading: ReadingIn) -> bool:
+    """Whether the part of this reading was cut without that correction, which has been issued since."""
+    if correction.status not in OUTSTANDING and correction.status != "applied":
+        return False
+    applied_at = correction.applied_at
+    if applied_at is not None and tool.reset_at is not None and applied_at <= tool.reset_at:
+        return False  # it went out with the tool, or was written over by hand
+    if reading.correction_in_effect is not None:
+        return correction.number > reading.correction_in_effect
+    if reading.machined_at is not None:
+        return applied_at is None or applied_at > reading.machined_at
+    return applied_at is None
+
+
+def _issued_total(tool: ToolState | None) -> float:
+    """Corrections of the tool since it was changed, those not yet applied included, mm."""
+    if tool is None:
+        return 0.0
+    return tool.total + sum(c.amount for c in tool.corrections if c.status in OUTSTANDING)
+
+
+def _issue(ground: Ground, stream: StreamState, tool: ToolState, sequence: int, decision: Decision) -> IssuedCorrection:
+    """Number the correction; whatever is held for this tool is superseded by it, so that they never add up."""
+    number = ground.last_correction[tool.machine_id] + 1
+    ground.last_correction[tool.machine_id] = number
+    ground.touched_machines.add(tool.machine_id)
+    for earlier in tool.corrections:
+        if earlier.status == "held":
+            earlier.status, earlier.superseded_by, earlier.changed = "superseded", number, True
+    if decision.action is Action.HOLD:
+        status = "held"
+    elif needs_approval(stream.parameters):
+        status = "awaiting_approval"
+    else:
+        status = "pending"
+    correction = IssuedCorrection(
+        tool.machine_id,
+        number,
+        tool.number,
+        decision.amount or 0.0,
+        status,
+        stream.entry.characteristic_id,
+        sequence,
+        decision.size_error or 0.0,
+        new=True,
+    )
+    tool.corrections.append(correction)
+    ground.issued.append(correction)
+    return correction
+
+
+LIMIT_OF = {Signal.TOOL_WORN: "wear_limit", Signal.PROBE_FAULT: "confidence_limit"}
+
+
+def _signal(
+    ground: Ground, stream: StreamState, signal: Signal, sequence: int, decision: Decision, now: datetime
+) -> OpenAlarm:
+    """Raise the alarm, or add to the one that is active for the same trouble."""
+    entry, parameters = stream.entry, stream.parameters
+    of_tool = signal is Signal.OFFSET_LIMIT and stream.tool is not None
+    if of_tool:
+        active = ground.tool_alarms.get((entry.machine_id, parameters.tool_memory, signal.value))
+    else:
+        active = stream.alarms.get(signal.value)
+    if active is None:
+        active = OpenAlarm(
+            entry.machine_id,
+            None if of_tool else entry.characteristic_id,
+            parameters.tool_memory or None,
+            signal.value,
+            sequence=sequence,
+            new=True,
+        )
+        ground.raised.append(active)
+        if of_tool:
+            ground.tool_alarms[entry.machine_id, parameters.tool_memory, signal.value] = active
+        else:
+            stream.alarms[signal.value] = active
+        limit = parameters.max_total if of_tool else getattr(parameters, LIMIT_OF.get(signal, ""), None)
+        active.data = {
+            "characteristic": entry.characteristic,
+            "deviation": decision.deviation,
+            "decided": decision.decided,
+            "limit": parameters.tolerance_width / 2 if limit is None else limit,
+        }
+    elif active.count == 0 and not active.new:
+        ground.raised.append(active)
+    active.count += 1
+    active.last_sequence = sequence
+    return active

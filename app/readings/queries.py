@@ -1,0 +1,141 @@
+"""Everything that is read of readings."""
+
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.alarms.tables import Alarm
+from app.characteristics import queries as characteristics
+from app.characteristics.tables import Characteristic
+from app.errors import NotFound
+from app.machines.tables import Machine
+from app.offsets.tables import Correction
+from app.readings.answers import answer
+from app.readings.records import Entry, Record
+from app.readings.tables import Exclusion, Reading, ReadingTouches
+from app.web.i18n import _
+
+COLUMNS = [getattr(Reading, name) for name in Record._fields]
+
+
+def entry_of(session: Session, characteristic: str) -> Entry | None:
+    """Where a characteristic is kept, by its key."""
+    row = session.execute(
+        select(Characteristic.machine_id, Machine.key, Characteristic.id, Characteristic.key)
+        .join(Machine, Machine.id == Characteristic.machine_id)
+        .where(Characteristic.key == characteristic)
+    ).one_or_none()
+    return Entry(*row) if row else None
+
+
+def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[str, Any]]:
+    """The stored readings as they were answered, with what has been said about them since (excluded)."""
+    if not records:
+        return []
+    numbers = [record.correction for record in records if record.correction is not None]
+    corrections: dict[int, tuple[int, float]] = {}
+    if numbers:
+        rows = session.execute(
+            select(Correction.number, Correction.tool_memory, Correction.amount).where(
+                Correction.machine_id == entry.machine_id, Correction.number.in_(numbers)
+            )
+        )
+        corrections = {number: (tool, amount) for number, tool, amount in rows}
+    alarm_ids = {number for record in records for number in record.alarms or ()}
+    kinds: dict[int, str] = {}
+    if alarm_ids:
+        found = session.execute(
+            select(Alarm.id, Alarm.kind).where(Alarm.machine_id == entry.machine_id, Alarm.id.in_(alarm_ids))
+        )
+        kinds = {number: kind for number, kind in found}
+    excluded = {
+        sequence: {"at": at, "by": actor, "reason": reason}
+        for sequence, at, actor, reason in session.execute(
+            select(Exclusion.sequence, Exclusion.at, Exclusion.actor, Exclusion.reason).where(
+                Exclusion.machine_id == entry.machine_id,
+                Exclusion.characteristic_id == entry.characteristic_id,
+                Exclusion.sequence.in_([record.sequence for record in records]),
+            )
+        )
+    }
+    return [
+        answer(
+            entry.characteristic,
+            record,
+            characteristics.parameters_of(
+                session, entry.machine_id, entry.characteristic_id, record.parameters_version
+            ),
+            correction=corrections.get(record.correction) if record.correction is not None else None,
+            alarms=[(number, kinds[number]) for number in record.alarms or () if number in kinds],
+        )
+        | {"excluded": excluded.get(record.sequence)}
+        for record in records
+    ]
+
+
+def record_of(session: Session, entry: Entry, sequence: int) -> Record:
+    """One stored reading. Raises `NotFound`."""
+    row = session.execute(
+        select(*COLUMNS).where(
+            Reading.machine_id == entry.machine_id,
+            Reading.characteristic_id == entry.characteristic_id,
+            Reading.sequence == sequence,
+        )
+    ).one_or_none()
+    if row is None:
+        raise NotFound(
+            _("Characteristic %(key)s has no reading %(sequence)s.")
+            % {"key": entry.characteristic, "sequence": sequence},
+            _("Readings are numbered 1, 2, 3 … without gaps; look at the list for the last one."),
+        )
+    return Record(*row)
+
+
+def answer_of(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
+    """The answer that this reading was given."""
+    made = answers(session, entry, [record_of(session, entry, sequence)])[0]
+    del made["excluded"]  # the first answer could not know it
+    return made
+
+
+def detail(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
+    """One reading with its touches and the full reason."""
+    record = record_of(session, entry, sequence)
+    touches = session.scalar(
+        select(ReadingTouches.touches).where(
+            ReadingTouches.machine_id == entry.machine_id,
+            ReadingTouches.characteristic_id == entry.characteristic_id,
+            ReadingTouches.sequence == sequence,
+        )
+    )
+    return answers(session, entry, [record])[0] | {
+        "touches": touches,
+        "machined_at": record.machined_at,
+        "correction_in_effect": record.correction_in_effect,
+    }
+
+
+def page(session: Session, entry: Entry, after: int, limit: int) -> list[Record]:
+    """Readings after a sequence number, oldest first."""
+    rows = session.execute(
+        select(*COLUMNS)
+        .where(
+            Reading.machine_id == entry.machine_id,
+            Reading.characteristic_id == entry.characteristic_id,
+            Reading.sequence > after,
+        )
+        .order_by(Reading.sequence)
+        .limit(limit)
+    )
+    return [Record(*row) for row in rows]
+
+
+def latest(session: Session, entry: Entry, before: int | None, limit: int) -> list[Record]:
+    """Readings before a sequence number (or the last ones), newest first."""
+    query = select(*COLUMNS).where(
+        Reading.machine_id == entry.machine_id, Reading.characteristic_id == entry.characteristic_id
+    )
+    if before is not None:
+        query = query.where(Reading.sequence < before)
+    return [Record(*row) for row in session.execute(query.order_by(Reading.sequence.desc()).limit(limit))]

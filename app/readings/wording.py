@@ -1,0 +1,148 @@
+"""The sentences about readings: why it was decided so, and what is wrong with touches."""
+
+from typing import Any
+
+from app.core.compensation import Code
+from app.core.parameters import Parameters
+from app.core.probing import TouchError
+from app.core.zones import Zone, nanometres, within_tolerance
+from app.readings.records import Record
+from app.web.i18n import _
+
+
+def um(length: float) -> str:
+    """A length in µm as it is read in a sentence, e.g. ``6.1 µm``; never finer than 1 nm."""
+    value = round(length * 1000, 3) + 0.0
+    text = f"{value:.1f}" if value == round(value, 1) else f"{value:.3f}".rstrip("0")
+    return f"{text} µm".replace("-", "\N{MINUS SIGN}")
+
+
+def reason(record: Record, parameters: Parameters, amount: float | None = None) -> dict[str, Any]:
+    """Code, sentence and notes on one decision; `amount` (mm) is that of the correction it led to, if any."""
+    notes = [code for code, applies in _notes(record, parameters, amount) if applies]
+    sentences = [_sentence(record, parameters), *(_note(code, record, parameters, amount) for code in notes)]
+    return {"code": record.code, "text": " ".join(sentences), "notes": notes}
+
+
+def _notes(record: Record, parameters: Parameters, amount: float | None) -> tuple[tuple[str, bool], ...]:
+    size_error = record.decided if record.zone != Zone.AVERAGE else _averaged(record, parameters)
+    return (
+        ("outstanding", record.outstanding is not None),
+        (
+            "part_out_of_tolerance",
+            record.zone in (Zone.ZERO, Zone.AVERAGE, Zone.FULL)
+            and not within_tolerance(record.deviation, parameters.limits),
+        ),
+        ("clamped", amount is not None and nanometres(abs(amount)) < nanometres(abs(parameters.factor * size_error))),
+        ("late", record.late),
+    )
+
+
+def _averaged(record: Record, parameters: Parameters) -> float:
+    from app.core.compensation import average_of
+
+    return average_of(record.average_before, record.decided, parameters.weighting_factor)
+
+
+def _sentence(record: Record, p: Parameters) -> str:
+    values = {
+        "deviation": um(record.decided),
+        "average": um(record.average_after),
+        "zero": um(p.zero_range),
+        "averaging": um(p.averaging_limit),
+        "tolerance": um(p.tolerance_width / 2),
+        "wear": um(p.wear_limit),
+        "confidence": um(p.confidence_limit),
+        "number": record.correction,
+        "alarm": record.paused_by,
+        "total": um(p.max_total or 0.0),
+        "n": p.accept_n,
+        "m": p.accept_m,
+    }
+    match record.code:
+        case Code.WITHIN_ZERO_RANGE:
+            text = _("Deviation %(deviation)s is within the zero range %(zero)s: no correction, the average is kept.")
+        case Code.AVERAGE_KEPT:
+            text = _(
+                "Deviation %(deviation)s is within the averaging limit %(averaging)s and the running average %(average)s "
+                "within the zero range %(zero)s: no correction, the average is kept."
+            )
+        case Code.AVERAGED_DEVIATION:
+            values["average"] = um(_averaged(record, p))
+            text = _("The running average %(average)s is beyond the zero range %(zero)s: corrected by the average.")
+        case Code.FULL_DEVIATION:
+            text = _("Deviation %(deviation)s is beyond the averaging limit %(averaging)s: corrected in full.")
+        case Code.OUT_OF_TOLERANCE:
+            text = _("Deviation %(deviation)s is beyond the tolerance ±%(tolerance)s: corrected in full.")
+        case Code.TOOL_WORN_HELD:
+            text = _(
+                "Deviation %(deviation)s has reached the dimensional difference %(wear)s: the tool is worn. "
+                "Correction %(number)s is held until somebody decides."
+            )
+        case Code.TOOL_WORN_RELEASED:
+            text = _(
+                "Deviation %(deviation)s has reached the dimensional difference %(wear)s: the tool is worn. "
+                "Corrected in full, as this characteristic is set to release."
+            )
+        case Code.PROBE_FAULT:
+            values["deviation"] = um(record.deviation)
+            text = _(
+                "Deviation %(deviation)s has reached the confidence interval %(confidence)s: the probe or the program is wrong. "
+                "The machine is told to stop, and compensation pauses until the alarm is acknowledged."
+            )
+        case Code.PAUSED:
+            text = _(
+                "Deviation %(deviation)s: compensation is paused by alarm %(alarm)s. Stored and judged, nothing is corrected."
+            )
+        case Code.MEASURE_ONLY:
+            text = _("Deviation %(deviation)s: this characteristic is only measured, nothing is corrected.")
+        case Code.BEFORE_TOOL_CHANGE:
+            text = _(
+                "Deviation %(deviation)s: the part was cut before the tool was changed or its offset edited by hand, "
+                "so it says nothing about the offset of now. Nothing is corrected."
+            )
+        case Code.OFFSET_LIMIT:
+            text = _(
+                "Deviation %(deviation)s asks for a correction, but the corrections of this tool would exceed %(total)s in all. "
+                "Nothing is corrected until the tool is changed."
+            )
+        case Code.REJECTED:
+            text = _(
+                "Fewer than %(n)s of %(m)s sections are within the tolerance: the part is rejected and corrects nothing."
+            )
+        case _:
+            text = record.code
+    return text % values
+
+
+def _note(code: str, record: Record, parameters: Parameters, amount: float | None) -> str:
+    match code:
+        case "outstanding":
+            numbers = ", ".join(map(str, record.outstanding or ()))
+            return _(
+                "The part was cut before correction %(numbers)s took effect: its deviation of %(raw)s counts as %(decided)s."
+            ) % {"numbers": numbers, "raw": um(record.deviation), "decided": um(record.decided)}
+        case "part_out_of_tolerance":
+            return _("The part itself is out of tolerance by its deviation of %(raw)s.") % {"raw": um(record.deviation)}
+        case "clamped":
+            return _("The correction is limited to the largest step %(step)s.") % {
+                "step": um(parameters.max_step or 0.0)
+            }
+        case _:
+            return _("It came late: a later measurement had arrived before it.")
+
+
+def touch_problem(error: TouchError) -> str:
+    """What is wrong with the touches, naming point and repeat."""
+    values = {"point": error.point, "repeat": error.repeat, "expected": error.expected, "got": error.got}
+    match error.code:
+        case "points":
+            text = _("%(got)s points came, %(expected)s are expected: one list of touches per point.")
+        case "repeats":
+            text = _("Point %(point)s has %(got)s touches, %(expected)s are expected (R27).")
+        case _:
+            text = _(
+                "Point %(point)s, repeat %(repeat)s: the touch at %(got)s mm lies more than %(expected)s mm (R28) "
+                "from the programmed dimension."
+            )
+    return text % values

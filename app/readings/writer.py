@@ -1,0 +1,204 @@
+"""Group commit: readings that arrive together are decided and stored together, and none is answered before the commit.
+
+One writer per process takes what is waiting, without gathering: while one transaction commits, the next readings
+collect. A reading that is refused fails alone. When the connection breaks, nothing of the open transaction is stored
+and it is done again; when it breaks during the commit, the database is asked how it ended (`pg_xact_status`), so that a
+reading is neither lost nor stored twice.
+"""
+
+import asyncio
+import logging
+from collections.abc import Sequence
+from contextlib import suppress
+from datetime import UTC, datetime
+from time import monotonic
+from typing import Any
+
+import psycopg
+from psycopg import AsyncConnection
+
+from app.db.engine import LIMITS
+from app.errors import DatabaseAway, InbandError, Invalid, OutcomeUnknown
+from app.readings.judge import Stored, Verdict, judge
+from app.readings.records import Entry
+from app.readings.schemas import MOST_ERRORS, ReadingIn
+from app.readings.store import Book, load, save
+from app.web.i18n import _
+
+log = logging.getLogger(__name__)
+
+Outcome = Verdict | Stored | InbandError
+MOST_AT_ONCE = 256
+MOST_WAITING = 20_000
+PATIENCE = 5.0  # s that a reading waits for a database that is away, before it is answered 503
+
+
+class CommitLost(Exception):
+    """The connection broke after COMMIT was sent; `transaction` tells the database which one is meant."""
+
+    def __init__(self, transaction: str, outcomes: list[Outcome]) -> None:
+        super().__init__(transaction)
+        self.transaction = transaction
+        self.outcomes = outcomes
+
+
+async def connect(dsn: str) -> AsyncConnection[Any]:
+    """A connection for readings: pipelines, statements prepared at their first use, transactions by our own word."""
+    return await AsyncConnection.connect(
+        dsn, autocommit=True, prepare_threshold=0, options=LIMITS, application_name="inband-readings", connect_timeout=5
+    )
+
+
+async def transact(
+    conn: AsyncConnection[Any], book: Book, wanted: Sequence[tuple[Entry, ReadingIn]], *, all_or_nothing: bool = False
+) -> list[Outcome]:
+    """Decide and store these readings in one transaction, in their order.
+
+    Raises `Invalid` naming each refused reading when it is all or nothing, `CommitLost`, and psycopg's errors.
+    """
+    ground, transaction = await load(conn, book, wanted)
+    now = datetime.now(UTC)
+    outcomes: list[Outcome] = []
+    for entry, reading in wanted:
+        try:
+            outcomes.append(judge(ground, entry, reading, now))
+        except InbandError as refusal:
+            outcomes.append(refusal)
+    if all_or_nothing:
+        refuse_all(outcomes)
+    if not ground.verdicts:
+        await conn.execute("ROLLBACK")
+        return outcomes
+    try:
+        await save(conn, ground)
+    except psycopg.OperationalError as error:
+        if conn.closed:
+            raise CommitLost(transaction, outcomes) from error
+        raise
+    return outcomes
+
+
+def refuse_all(outcomes: Sequence[Outcome]) -> None:
+    """Raise one error that names every refused reading by its position."""
+    refused = [(at, outcome) for at, outcome in enumerate(outcomes) if isinstance(outcome, InbandError)]
+    if not refused:
+        return
+    errors = [
+        error._replace(field=f"[{at}].{error.field}")
+        for at, refusal in refused[:MOST_ERRORS]
+        for error in refusal.errors
+    ]
+    kinds = {type(refusal) for _, refusal in refused}
+    kind = kinds.pop() if len(kinds) == 1 else Invalid
+    raise kind(
+        _("%(count)s of %(all)s readings cannot be taken; the first is number %(first)s: %(detail)s")
+        % {"count": len(refused), "all": len(outcomes), "first": refused[0][0], "detail": refused[0][1].detail},
+        _("Nothing of this batch was stored. Correct what is named under errors and send the batch again."),
+        errors=errors,
+    )
+
+
+class Writer:
+    """The one who stores the single readings of a process."""
+
+    def __init__(self, dsn: str) -> None:
+        self.dsn = dsn
+        self.book: Book = {}
+        self._waiting: list[tuple[Entry, ReadingIn, asyncio.Future[Outcome]]] = []
+        self._wake = asyncio.Event()
+        self._conn: AsyncConnection[Any] | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    def start(self) -> None:
+        """Begin to take readings; call it on the loop that serves requests."""
+        self._task = asyncio.get_running_loop().create_task(self._run(), name="readings writer")
+
+    async def stop(self) -> None:
+        """Store what is waiting, then end."""
+        while self._waiting:
+            await asyncio.sleep(0.01)
+        if self._task:
+            self._task.cancel()
+            with suppress(asyncio.CancelledError):
+                await self._task
+        if self._conn:
+            await self._conn.close()
+
+    def submit(self, entry: Entry, reading: ReadingIn) -> asyncio.Future[Outcome]:
+        """Hand a reading over; the future holds its outcome after the commit."""
+        if len(self._waiting) >= MOST_WAITING:
+            raise DatabaseAway(_("Too many readings are waiting to be stored. Nothing of this request was stored."))
+        future: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
+        self._waiting.append((entry, reading, future))
+        self._wake.set()
+        return future
+
+    async def _run(self) -> None:
+        while True:
+            await self._wake.wait()
+            batch, self._waiting = self._waiting[:MOST_AT_ONCE], self._waiting[MOST_AT_ONCE:]
+            if not self._waiting:
+                self._wake.clear()
+            if not batch:
+                continue
+            outcomes = await self._store([item[:2] for item in batch])
+            for (_entry, _reading, future), outcome in zip(batch, outcomes, strict=True):
+                if not future.done():  # the client may be gone; what it sent is stored all the same
+                    future.set_result(outcome)
+
+    async def _store(self, wanted: list[tuple[Entry, ReadingIn]]) -> list[Outcome]:
+        deadline = monotonic() + PATIENCE
+        pause = 0.02
+        while True:
+            try:
+                if self._conn is None or self._conn.closed:
+                    self._conn = await connect(self.dsn)
+                return await transact(self._conn, self.book, wanted)
+            except CommitLost as lost:
+                if (outcomes := await self._settle(lost, deadline)) is not None:
+                    return outcomes
+            except psycopg.OperationalError as error:
+                await self._roll_back()
+                if monotonic() + pause > deadline:
+                    log.warning("readings could not be stored, the database is away: %s", error)
+                    return [DatabaseAway()] * len(wanted)
+                await asyncio.sleep(pause)
+                pause = min(2 * pause, 0.5)
+            except Exception:
+                await self._roll_back()
+                if len(wanted) == 1:
+                    log.exception("a reading of %s could not be stored", wanted[0][0].characteristic)
+                    return [_unexpected()]
+                log.exception("%s readings together could not be stored; storing them one by one", len(wanted))
+                return [(await self._store([item]))[0] for item in wanted]
+
+    async def _roll_back(self) -> None:
+        if self._conn is not None and not self._conn.closed:
+            try:
+                await self._conn.execute("ROLLBACK")
+            except psycopg.Error:
+                await self._conn.close()
+
+    async def _settle(self, lost: CommitLost, deadline: float) -> list[Outcome] | None:
+        """How the commit ended: its outcomes if it is in the database, None if it must be done again."""
+        pause = 0.02
+        while True:
+            try:
+                self._conn = await connect(self.dsn)
+                cursor = await self._conn.execute("SELECT pg_xact_status(%s::xid8)", (lost.transaction,))
+                row = await cursor.fetchone()
+            except psycopg.OperationalError:
+                row = ("in progress",)
+            if row is None or row[0] != "in progress":
+                return lost.outcomes if row is not None and row[0] == "committed" else None
+            if monotonic() + pause > deadline:
+                return [OutcomeUnknown() if isinstance(o, Verdict) else o for o in lost.outcomes]
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, 0.5)
+
+
+def _unexpected() -> InbandError:
+    return InbandError(
+        _("This reading could not be stored because of a fault in the server. It was not stored."),
+        _("Keep the reading and tell whoever runs the server; its log names the fault."),
+    )
