@@ -6,7 +6,11 @@ from contextlib import asynccontextmanager
 from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
 
+from app.audit import api as audit
 from app.db.engine import Database
+from app.machines import api as machines
+from app.people import api as people
+from app.people import keys_api as keys
 from app.people.keys import KeyRing
 from app.settings import Settings
 from app.web.limits import BodyLimit
@@ -15,7 +19,12 @@ from app.web.security import SecurityHeaders
 from app.web.templates import assets
 
 # Each part of the shop floor brings its JSON routes (api) and its pages.
-ROUTERS: tuple[APIRouter, ...] = ()
+ROUTERS: tuple[APIRouter, ...] = (
+    machines.router,
+    people.router,
+    keys.router,
+    audit.router,
+)
 
 
 def create_app(settings: Settings | None = None) -> ASGIApp:

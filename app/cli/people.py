@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from app.cli.base import DatabaseUrl, DataDir, cli, migrated, say, settings_from
+from app.people import actions
 
 user = typer.Typer(help="People who sign in.", no_args_is_help=True)
 key = typer.Typer(help="Keys by which machines and programs call.", no_args_is_help=True)
@@ -47,8 +48,6 @@ def add_user(
         password = typer.prompt(f"Password for {name}", hide_input=True, confirmation_prompt=True, err=True)
     else:
         raise typer.BadParameter("there is no terminal to ask for a password; pipe it in with --password-stdin")
-    from app.people import actions
-
     with migrated(settings) as database, database.begin() as session:
         actions.add_person(session, name=name, role=role.value, password=password, actor=_actor())
     say(f"{name} may sign in at {settings.address} as {role.value}.")
@@ -69,13 +68,11 @@ def add_key(
     """Add a key and print its secret, this once."""
     if (role is None) == (machine is None):
         raise typer.BadParameter("say either --role ROLE or --machine MACHINE")
-    from app.people import actions
-
     with (
         migrated(settings_from(data_dir=data_dir, database_url=database_url)) as database,
         database.begin() as session,
     ):
-        secret = actions.add_key(
+        made = actions.add_key(
             session, role=role.value if role else None, machine=machine, name=name or "command line", actor=_actor()
         )
-    sys.stdout.write(f"{secret}\n")
+    sys.stdout.write(f"{made.secret}\n")

@@ -30,6 +30,7 @@ __all__ = [
     "Caller",
     "Engineer",
     "FormDep",
+    "KeyRing",
     "Operator",
     "SessionDep",
     "SettingsDep",

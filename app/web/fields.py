@@ -6,6 +6,7 @@ Half surrogates are refused by pydantic itself.
 
 import re
 import unicodedata
+from collections.abc import Callable, Sequence
 from typing import Annotated, Generic, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
@@ -14,6 +15,7 @@ from pydantic_core import PydanticCustomError
 SLUG = r"[a-z0-9][a-z0-9._-]{0,63}"
 _SLUG = re.compile(SLUG)
 LARGEST_ID = 2**63 - 1
+LARGEST_SERIAL = 2**31 - 1
 Item = TypeVar("Item")
 
 
@@ -70,3 +72,9 @@ class Page(BaseModel, Generic[Item]):
 
     items: list[Item]
     next: str | None = None
+
+
+def page_of(rows: Sequence[Item], limit: int, cursor: Callable[[Item], int | str]) -> Page[Item]:
+    """A page of at most ``limit``, made of one row more than that: if it is there, the list goes on."""
+    items = list(rows[:limit])
+    return Page(items=items, next=str(cursor(items[-1])) if len(rows) > limit else None)

@@ -1,0 +1,52 @@
+"""Which machines there are, and the one lock that orders everything that happens to a machine."""
+
+from collections.abc import Iterable, Sequence
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.errors import NotFound
+from app.machines.tables import Machine, MachineState
+from app.web.fields import is_slug
+from app.web.i18n import _
+
+
+def machine_named(session: Session, key: str) -> Machine:
+    """The machine with this key. Raises `NotFound`."""
+    found = session.scalars(select(Machine).where(Machine.key == key)).one_or_none() if is_slug(key) else None
+    if found is None:
+        raise NotFound(
+            _("There is no machine {key}.").format(key=repr(key[:64])),
+            _("Check the key; GET /api/v1/machines lists them."),
+        )
+    return found
+
+
+def key_is_taken(session: Session, key: str) -> bool:
+    return session.scalar(select(Machine.id).where(Machine.key == key)) is not None
+
+
+def machines(session: Session, after: str = "", limit: int = 1000, only: int | None = None) -> Sequence[Machine]:
+    """All machines by key; ``only`` this one for the key of a machine."""
+    query = select(Machine).where(Machine.key > after).order_by(Machine.key).limit(limit)
+    return session.scalars(query if only is None else query.where(Machine.id == only)).all()
+
+
+def machine_keys_by_id(session: Session) -> dict[int, str]:
+    """The keys of all machines by their ids."""
+    return {row.id: row.key for row in session.execute(select(Machine.id, Machine.key))}
+
+
+def lock_machines(session: Session, machine_ids: Iterable[int]) -> dict[int, MachineState]:
+    """Hold these machines until the transaction ends, always in the same order, and return their states.
+
+    Whoever changes anything of a machine (readings, corrections, tools, averages, alarms, parameters) does this first.
+    """
+    states = session.scalars(
+        select(MachineState)
+        .where(MachineState.machine_id.in_(sorted(set(machine_ids))))
+        .order_by(MachineState.machine_id)
+        .with_for_update()
+        .execution_options(populate_existing=True)
+    )
+    return {state.machine_id: state for state in states}
