@@ -57,6 +57,15 @@ class WearPolicy(StrEnum):
     RELEASE = "release"
 
 
+ENUMS: dict[str, type[StrEnum]] = {
+    "variant": Variant,
+    "axis": Axis,
+    "direction": Direction,
+    "mode": Mode,
+    "wear_policy": WearPolicy,
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
     """One complete, consistent set. Made by `read`; made directly, the caller vouches for it."""
@@ -110,6 +119,15 @@ class Parameters:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         values["accept"] = {"n": values.pop("accept_n"), "m": values.pop("accept_m")}
         return {name: value.value if isinstance(value, StrEnum) else value for name, value in values.items()}
+
+    @classmethod
+    def from_dict(cls, stored: Mapping[str, Any]) -> "Parameters":
+        """What `as_dict` wrote. It was checked when it was made, so old sets stay readable when rules change."""
+        values = dict(stored)
+        accept = values.pop("accept")
+        for name, enum in ENUMS.items():
+            values[name] = enum(values[name])
+        return cls(**values, accept_n=accept["n"], accept_m=accept["m"])
 
 
 class Kind(StrEnum):
@@ -240,9 +258,8 @@ def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
     problems.extend(_order(values))
     if problems:
         raise ParameterError(problems)
-    for name, enum in (("variant", Variant), ("axis", Axis), ("direction", Direction), ("mode", Mode)):
+    for name, enum in ENUMS.items():
         values[name] = enum(values[name])
-    values["wear_policy"] = WearPolicy(values["wear_policy"])
     return Parameters(**values), list(_unusual(values))
 
 
