@@ -163,7 +163,7 @@ class Server:
         with self.database.begin() as session:
             return actions.add_key(
                 session, role=None if machine else role, machine=machine, name="a test's key", actor="tests"
-            ).secret.secret
+            ).secret
 
     def person(self, name: str, role: str, password: str = "correct horse battery") -> str:
         """A new person who may sign in; the answer is the password."""

@@ -18,6 +18,7 @@ from uvicorn.supervisors import Multiprocess
 from app.cli.base import DatabaseUrl, DataDir, cli, migrated, say, settings_from
 from app.db.engine import Database
 from app.errors import InbandError
+from app.people import actions, queries
 from app.settings import Settings
 
 Host = Annotated[str | None, typer.Option(envvar="INBAND_HOST", help="Address to listen on.", show_default="127.0.0.1")]
@@ -35,9 +36,7 @@ def serve(
 ) -> None:
     """Run the server until Ctrl-C or SIGTERM."""
     settings = settings_from(host=host, port=port, data_dir=data_dir, workers=workers, database_url=database_url)
-    from importlib.util import find_spec
-
-    run(settings, prepare=invite_administrator if find_spec("app.people.actions") else None)
+    run(settings, prepare=invite_administrator)
 
 
 def run(
@@ -68,13 +67,11 @@ def run(
 
 def invite_administrator(database: Database, settings: Settings) -> None:
     """As long as nobody could set anything up, print a link by which one person becomes administrator, once."""
-    from app.people import actions, queries
-
     with database.begin() as session:
-        if queries.has_administrator(session):
+        if queries.active_admins(session):
             return
         token = actions.create_invitation(session, role="admin", actor="inband serve")
-    say("There is no administrator yet. Whoever opens this link first becomes one (it works once, for a day):")
+    say("There is no administrator yet. Whoever opens this link first becomes one (it works once, for a week):")
     say(f"  {settings.address}/invitation/{token}", style="bold")
 
 
