@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
+from itertools import pairwise
 from math import isfinite
 from typing import Any, NamedTuple
 
@@ -362,7 +363,7 @@ def _order(values: Mapping[str, Any]) -> Iterator[Problem]:
         ("wear_limit", "R37", values["wear_limit"]),
         ("confidence_limit", "R36", values["confidence_limit"]),
     )
-    for (_, inner, smaller), (name, outer, larger) in zip(chain, chain[1:], strict=False):
+    for (_, inner, smaller), (name, outer, larger) in pairwise(chain):
         strictly = inner == "R33"
         broken = nanometres(smaller) >= nanometres(larger) if strictly else nanometres(smaller) > nanometres(larger)
         if broken:

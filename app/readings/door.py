@@ -82,7 +82,7 @@ class ReadingsDoor:
         except (psycopg.OperationalError, OperationalError):
             away = DatabaseAway()
             status, body, headers = away.status, _json.encode(away.as_problem()), away.headers
-        kind = b"application/json" if status < 400 else b"application/problem+json"  # noqa: PLR2004
+        kind = b"application/json" if status < 400 else b"application/problem+json"
         await send(
             {
                 "type": "http.response.start",

@@ -241,7 +241,7 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
         or accepted(parameters, sections, average.empirical_value if average else 0.0),
     )
     paused_by = stream.paused_by
-    alarms = [_signal(ground, stream, signal, sequence, decision, now) for signal in decision.signals]
+    alarms = [_signal(ground, stream, signal, sequence, decision) for signal in decision.signals]
     correction = None
     if decision.amount is not None and tool is not None:
         correction = _issue(ground, stream, tool, sequence, decision)
@@ -420,9 +420,7 @@ def _issue(ground: Ground, stream: StreamState, tool: ToolState, sequence: int, 
 LIMIT_OF = {Signal.TOOL_WORN: "wear_limit", Signal.PROBE_FAULT: "confidence_limit"}
 
 
-def _signal(
-    ground: Ground, stream: StreamState, signal: Signal, sequence: int, decision: Decision, now: datetime
-) -> OpenAlarm:
+def _signal(ground: Ground, stream: StreamState, signal: Signal, sequence: int, decision: Decision) -> OpenAlarm:
     """Raise the alarm, or add to the one that is active for the same trouble."""
     entry, parameters = stream.entry, stream.parameters
     of_tool = signal is Signal.OFFSET_LIMIT and stream.tool is not None

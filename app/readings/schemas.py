@@ -183,7 +183,7 @@ def _number(value: Any) -> str | None:
         return _("This is not a finite number. A probe that did not trigger has no reading: do not send one.")
     if abs(value) > LARGEST_LENGTH:
         return _("%(value)g mm is longer than any machine. Lengths are in mm, not in µm or nm.") % {
-            "value": float(value) if abs(value) < 1e300 else float("inf")  # noqa: PLR2004
+            "value": float(value) if abs(value) < 1e300 else float("inf")
         }
     return None
 
@@ -236,7 +236,7 @@ def _touches(value: Any) -> str | None:
 
 
 def _correction_number(value: Any) -> str | None:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 2_147_483_647:  # noqa: PLR2004
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 2_147_483_647:
         return _("This is the number of the last correction the machine had applied: a whole number, 0 for none yet.")
     return None
 

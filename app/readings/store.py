@@ -199,9 +199,9 @@ async def load(conn: AsyncConnection[Any], book: Book, wanted: Sequence[tuple[En
         applied = await conn.execute(APPLIED_SINCE, (as_json(since),)) if since else None
         known = await conn.execute(KNOWN_KEYS, (as_json(keys),)) if keys else None
     ground = Ground()
-    transaction = ""
-    for machine_id, last_correction, transaction in await locks.fetchall():
-        ground.last_correction[machine_id] = last_correction
+    locked = await locks.fetchall()
+    transaction = locked[0][2]
+    ground.last_correction = {machine_id: last for machine_id, last, _transaction in locked}
     issued = {row[:2]: row for cursor in (corrections, applied) if cursor for row in await cursor.fetchall()}
     for row in await streams.fetchall():
         await _add_stream(conn, book, ground, entries[row[1]], row)

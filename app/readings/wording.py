@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from app.core.compensation import Code
+from app.core.compensation import Code, average_of
 from app.core.parameters import Parameters
 from app.core.probing import TouchError
 from app.core.zones import Zone, nanometres, within_tolerance
@@ -20,7 +20,7 @@ def um(length: float) -> str:
 def reason(record: Record, parameters: Parameters, amount: float | None = None) -> dict[str, Any]:
     """Code, sentence and notes on one decision; `amount` (mm) is that of the correction it led to, if any."""
     notes = [code for code, applies in _notes(record, parameters, amount) if applies]
-    sentences = [_sentence(record, parameters), *(_note(code, record, parameters, amount) for code in notes)]
+    sentences = [_sentence(record, parameters), *(_note(code, record, parameters) for code in notes)]
     return {"code": record.code, "text": " ".join(sentences), "notes": notes}
 
 
@@ -39,8 +39,6 @@ def _notes(record: Record, parameters: Parameters, amount: float | None) -> tupl
 
 
 def _averaged(record: Record, parameters: Parameters) -> float:
-    from app.core.compensation import average_of
-
     return average_of(record.average_before, record.decided, parameters.weighting_factor)
 
 
@@ -115,7 +113,7 @@ def _sentence(record: Record, p: Parameters) -> str:
     return text % values
 
 
-def _note(code: str, record: Record, parameters: Parameters, amount: float | None) -> str:
+def _note(code: str, record: Record, parameters: Parameters) -> str:
     match code:
         case "outstanding":
             numbers = ", ".join(map(str, record.outstanding or ()))

@@ -9,7 +9,6 @@ reading is neither lost nor stored twice.
 import asyncio
 import logging
 from collections.abc import Sequence
-from contextlib import suppress
 from datetime import UTC, datetime
 from time import monotonic
 from typing import Any
@@ -98,62 +97,28 @@ def refuse_all(outcomes: Sequence[Outcome]) -> None:
     )
 
 
-class Writer:
-    """The one who stores the single readings of a process."""
+class Keeper:
+    """Stores readings over one connection, and sees to it when the database goes away in the middle."""
 
-    def __init__(self, dsn: str) -> None:
+    def __init__(self, dsn: str, book: Book) -> None:
         self.dsn = dsn
-        self.book: Book = {}
-        self._waiting: list[tuple[Entry, ReadingIn, asyncio.Future[Outcome]]] = []
-        self._wake = asyncio.Event()
+        self.book = book
         self._conn: AsyncConnection[Any] | None = None
-        self._task: asyncio.Task[None] | None = None
 
-    def start(self) -> None:
-        """Begin to take readings; call it on the loop that serves requests."""
-        self._task = asyncio.get_running_loop().create_task(self._run(), name="readings writer")
-
-    async def stop(self) -> None:
-        """Store what is waiting, then end."""
-        while self._waiting:
-            await asyncio.sleep(0.01)
-        if self._task:
-            self._task.cancel()
-            with suppress(asyncio.CancelledError):
-                await self._task
-        if self._conn:
+    async def close(self) -> None:
+        """Give the connection back."""
+        if self._conn is not None:
             await self._conn.close()
 
-    def submit(self, entry: Entry, reading: ReadingIn) -> asyncio.Future[Outcome]:
-        """Hand a reading over; the future holds its outcome after the commit."""
-        if len(self._waiting) >= MOST_WAITING:
-            raise DatabaseAway(_("Too many readings are waiting to be stored. Nothing of this request was stored."))
-        future: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
-        self._waiting.append((entry, reading, future))
-        self._wake.set()
-        return future
-
-    async def _run(self) -> None:
-        while True:
-            await self._wake.wait()
-            batch, self._waiting = self._waiting[:MOST_AT_ONCE], self._waiting[MOST_AT_ONCE:]
-            if not self._waiting:
-                self._wake.clear()
-            if not batch:
-                continue
-            outcomes = await self._store([item[:2] for item in batch])
-            for (_entry, _reading, future), outcome in zip(batch, outcomes, strict=True):
-                if not future.done():  # the client may be gone; what it sent is stored all the same
-                    future.set_result(outcome)
-
-    async def _store(self, wanted: list[tuple[Entry, ReadingIn]]) -> list[Outcome]:
+    async def store(self, wanted: Sequence[tuple[Entry, ReadingIn]], *, all_or_nothing: bool = False) -> list[Outcome]:
+        """What becomes of each reading, after the commit. Raises only when it is all or nothing."""
         deadline = monotonic() + PATIENCE
         pause = 0.02
         while True:
             try:
                 if self._conn is None or self._conn.closed:
                     self._conn = await connect(self.dsn)
-                return await transact(self._conn, self.book, wanted)
+                return await transact(self._conn, self.book, wanted, all_or_nothing=all_or_nothing)
             except CommitLost as lost:
                 if (outcomes := await self._settle(lost, deadline)) is not None:
                     return outcomes
@@ -164,13 +129,18 @@ class Writer:
                     return [DatabaseAway()] * len(wanted)
                 await asyncio.sleep(pause)
                 pause = min(2 * pause, 0.5)
+            except InbandError:
+                await self._roll_back()
+                raise
             except Exception:
                 await self._roll_back()
+                if all_or_nothing:
+                    raise
                 if len(wanted) == 1:
                     log.exception("a reading of %s could not be stored", wanted[0][0].characteristic)
                     return [_unexpected()]
                 log.exception("%s readings together could not be stored; storing them one by one", len(wanted))
-                return [(await self._store([item]))[0] for item in wanted]
+                return [(await self.store([item]))[0] for item in wanted]
 
     async def _roll_back(self) -> None:
         if self._conn is not None and not self._conn.closed:
@@ -195,6 +165,67 @@ class Writer:
                 return [OutcomeUnknown() if isinstance(o, Verdict) else o for o in lost.outcomes]
             await asyncio.sleep(pause)
             pause = min(2 * pause, 0.5)
+
+
+def store_batch(dsn: str, book: Book, wanted: Sequence[tuple[Entry, ReadingIn]]) -> list[Outcome]:
+    """Store a batch, all or nothing, from a thread of its own: it would keep the loop of the single readings waiting."""
+
+    async def stored() -> list[Outcome]:
+        keeper = Keeper(dsn, book)
+        try:
+            return await keeper.store(wanted, all_or_nothing=True)
+        finally:
+            await keeper.close()
+
+    outcomes = asyncio.run(stored())
+    refuse_all(outcomes)
+    return outcomes
+
+
+class Writer:
+    """The one who stores the single readings of a process."""
+
+    def __init__(self, dsn: str) -> None:
+        self.book: Book = {}
+        self._keeper = Keeper(dsn, self.book)
+        self._waiting: list[tuple[Entry, ReadingIn, asyncio.Future[Outcome]]] = []
+        self._wake = asyncio.Event()
+        self._ending = False
+        self._task: asyncio.Task[None] | None = None
+
+    def start(self) -> None:
+        """Begin to take readings; call it on the loop that serves requests."""
+        self._task = asyncio.get_running_loop().create_task(self._run(), name="readings writer")
+
+    async def stop(self) -> None:
+        """Store what is waiting, then end."""
+        self._ending = True
+        self._wake.set()
+        if self._task:
+            await self._task
+        await self._keeper.close()
+
+    def submit(self, entry: Entry, reading: ReadingIn) -> asyncio.Future[Outcome]:
+        """Hand a reading over; the future holds its outcome after the commit."""
+        if len(self._waiting) >= MOST_WAITING:
+            raise DatabaseAway(_("Too many readings are waiting to be stored. Nothing of this request was stored."))
+        future: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
+        self._waiting.append((entry, reading, future))
+        self._wake.set()
+        return future
+
+    async def _run(self) -> None:
+        while self._waiting or not self._ending:
+            await self._wake.wait()
+            batch, self._waiting = self._waiting[:MOST_AT_ONCE], self._waiting[MOST_AT_ONCE:]
+            if not self._waiting:
+                self._wake.clear()
+            if not batch:
+                continue
+            outcomes = await self._keeper.store([item[:2] for item in batch])
+            for (_entry, _reading, future), outcome in zip(batch, outcomes, strict=True):
+                if not future.done():  # the client may be gone; what it sent is stored all the same
+                    future.set_result(outcome)
 
 
 def _unexpected() -> InbandError:

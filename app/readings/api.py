@@ -1,0 +1,213 @@
+"""JSON routes: pushing readings and looking them up. Single readings with a key are answered by `door.py`, which see."""
+
+from collections import Counter
+from datetime import UTC, datetime
+from typing import Annotated, Any, cast
+
+import msgspec
+from fastapi import APIRouter, Path, Query, Request, Response
+from pydantic import BaseModel
+from starlette.concurrency import run_in_threadpool
+
+from app.db.engine import Database
+from app.errors import FieldError, NotFound, TooLarge
+from app.readings import actions, queries
+from app.readings.answers import ReadingAnswer, ReadingDetail, ReadingRow
+from app.readings.door import Directory, answer_of, said, take
+from app.readings.judge import Stored, Verdict
+from app.readings.records import Entry
+from app.readings.schemas import ReadingIn, decode_many, decode_one
+from app.readings.writer import Outcome, Writer, store_batch
+from app.web.api import BASE, api_router, problems
+from app.web.deps import AnyCaller, Operator, SessionDep
+from app.web.fields import Body, Limit, Page, Reason, page_of
+from app.web.i18n import _
+
+MOST_IN_BATCH = 10_000
+NDJSON = "application/x-ndjson"
+EXAMPLE = {
+    "characteristic": "shaft-d40",
+    "measured": 39.9981,
+    "measured_at": "2026-11-21T08:15:02.120+01:00",
+    "part": "SN-000812",
+    "key": "lathe-1:000812:d40",
+    "correction_in_effect": 17,
+}
+(_schema,), _definitions = msgspec.json.schema_components((ReadingIn,), ref_template="#/components/schemas/{name}")
+SCHEMAS = _definitions
+_BODY = {"schema": _schema}
+
+# Bodies are read by our own strict decoder, so these routes do not use the JSON route class of the others.
+push = APIRouter(prefix=BASE, tags=["readings"], generate_unique_id_function=lambda route: route.name)
+router = api_router("readings")
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+Sequence = Annotated[int, Path(ge=1, le=2**63 - 1, description="Number of the reading: 1, 2, 3 … without gaps.")]
+
+
+class BatchCounts(BaseModel):
+    """What became of a batch. `items` only with `decisions=true`: each as a single reading is answered."""
+
+    stored: int
+    repeated: int
+    zones: dict[str, int]
+    corrections: int
+    alarms: int
+    items: list[ReadingAnswer] | None = None
+
+
+class ExcludeIn(Body):
+    """Why a reading is taken out of the statistics."""
+
+    reason: Reason
+
+
+def _here(request: Request) -> tuple[Directory, Writer, Database]:
+    state = request.app.state
+    return state.directory, state.writer, state.database
+
+
+@push.post(
+    "/readings",
+    status_code=201,
+    response_model=None,
+    responses=problems(404, 409, 413)
+    | {
+        200: {
+            "model": ReadingAnswer,
+            "description": "The key was sent before: the first answer, nothing happened twice",
+        },
+        201: {"model": ReadingAnswer, "description": "Decided and stored durably"},
+    },
+    openapi_extra={"requestBody": {"required": True, "content": {"application/json": _BODY | {"example": EXAMPLE}}}},
+)
+async def push_reading(request: Request, caller: AnyCaller) -> Response:
+    """Push one reading; the answer is given after the commit and says what was decided and why.
+
+    `touches` may stand in place of `measured`: one list per point, each with its repeats. `correction_in_effect` is the
+    number of the last correction that the machine had applied when it cut this part; `machined_at` may say it by time.
+    """
+    reading = decode_one(await request.body(), datetime.now(UTC))
+    status, value = await take(caller, reading, *_here(request))
+    return Response(msgspec.json.encode(value), status, media_type="application/json")
+
+
+@push.post(
+    "/readings/batch",
+    status_code=201,
+    response_model=None,
+    responses=problems(404, 409, 413) | {201: {"model": BatchCounts, "description": "All of them are stored"}},
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {
+                "application/json": {"schema": {"type": "array", "items": _schema}, "example": [EXAMPLE]},
+                NDJSON: {"schema": _schema},
+            },
+        }
+    },
+)
+async def push_batch(
+    request: Request,
+    caller: AnyCaller,
+    decisions: Annotated[bool, Query(description="Answer with every decision, not only with counts.")] = False,
+) -> Response:
+    """Push up to 10,000 readings as a JSON list or NDJSON: decided in the given order, all or nothing."""
+    directory, writer, database = _here(request)
+    body = await request.body()
+    lines = request.headers.get("content-type", "").partition(";")[0].strip().lower() == NDJSON
+
+    def stored() -> tuple[list[Outcome], bytes]:
+        wanted = _looked_up(directory, decode_many(body, datetime.now(UTC), lines=lines))
+        for entry in {entry.machine_id: entry for entry, _reading in wanted}.values():
+            caller.must_at(entry.machine_id, "operator")
+        outcomes = store_batch(database.dsn, writer.book, wanted) if wanted else []
+        return outcomes, msgspec.json.encode(_counts(outcomes))
+
+    outcomes, counts = await run_in_threadpool(stored)
+    if decisions:
+        items = [
+            (await said(outcome, database))[1] if isinstance(outcome, Stored) else answer_of(cast("Verdict", outcome))
+            for outcome in outcomes
+        ]
+        counts = msgspec.json.encode(_counts(outcomes) | {"items": items})
+    return Response(counts, 201, media_type="application/json")
+
+
+def _looked_up(directory: Directory, readings: list[ReadingIn]) -> list[tuple[Entry, ReadingIn]]:
+    if len(readings) > MOST_IN_BATCH:
+        raise TooLarge(
+            _("A batch has at most %(most)s readings; this one has %(count)s.")
+            % {"most": MOST_IN_BATCH, "count": len(readings)},
+            _("Send it in several batches. Nothing of this one was stored."),
+        )
+    entries: dict[str, Entry] = {}
+    errors: list[FieldError] = []
+    for at, reading in enumerate(readings):
+        if reading.characteristic in entries:
+            continue
+        try:
+            entries[reading.characteristic] = directory.look_up(reading.characteristic)
+        except NotFound as error:
+            errors.append(FieldError(f"[{at}].characteristic", error.detail))
+    if errors:
+        raise NotFound(
+            errors[0].message,
+            _("Create the characteristic first, or correct its key. Nothing of this batch was stored."),
+            errors=errors[:100],
+        )
+    return [(entries[reading.characteristic], reading) for reading in readings]
+
+
+def _counts(outcomes: list[Outcome]) -> dict[str, Any]:
+    new = [outcome for outcome in {id(o): o for o in outcomes}.values() if isinstance(outcome, Verdict)]
+    return {
+        "stored": len(new),
+        "repeated": len(outcomes) - len(new),
+        "zones": Counter(verdict.decision.zone.value for verdict in new),
+        "corrections": sum(verdict.correction is not None for verdict in new),
+        "alarms": len({id(alarm) for verdict in new for alarm in verdict.alarms if alarm.new}),
+    }
+
+
+def _entry(session: SessionDep, caller: AnyCaller, characteristic: str) -> Entry:
+    entry = queries.entry_of(session, characteristic)
+    if entry is None:
+        raise NotFound(
+            _("There is no characteristic %(key)s.") % {"key": characteristic},
+            _("Check the key; GET /api/v1/characteristics lists them all."),
+        )
+    caller.must_at(entry.machine_id, "viewer")
+    return entry
+
+
+@router.get("/readings", responses=problems(404))
+def list_readings(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: Annotated[str, Query(description="The key of the characteristic.", examples=["shaft-d40"])],
+    after: Annotated[int, Query(ge=0, le=2**63 - 1, description="Cursor: readings after this number.")] = 0,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[ReadingRow]:
+    """The readings of a characteristic in the order of their arrival."""
+    entry = _entry(session, caller, characteristic)
+    rows = queries.answers(session, entry, queries.page(session, entry, after, limit + 1))
+    return page_of([ReadingRow.model_validate(row) for row in rows], limit, lambda row: row.sequence)
+
+
+@router.get("/readings/{characteristic}/{sequence}", responses=problems(404))
+def get_reading(
+    session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, sequence: Sequence
+) -> ReadingDetail:
+    """One reading with its touches and the full reason."""
+    entry = _entry(session, caller, characteristic)
+    return ReadingDetail.model_validate(queries.detail(session, entry, sequence))
+
+
+@router.post("/readings/{characteristic}/{sequence}/exclude", responses=problems(404, 409))
+def exclude_reading(
+    session: SessionDep, caller: Operator, characteristic: CharacteristicKey, sequence: Sequence, exclusion: ExcludeIn
+) -> ReadingDetail:
+    """Take a reading out of the statistics, never out of the record."""
+    entry = _entry(session, caller, characteristic)
+    actions.exclude(session, entry, sequence, caller.name, exclusion.reason)
+    return ReadingDetail.model_validate(queries.detail(session, entry, sequence))

@@ -1,0 +1,88 @@
+"""For those who run the server: is it alive, is it ready, and what does it count."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from fastapi import APIRouter, Request
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, GCCollector, PlatformCollector, ProcessCollector
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.exposition import generate_latest
+from prometheus_client.registry import Collector
+from sqlalchemy import text
+from starlette.responses import Response
+
+from app.db.engine import Database
+
+router = APIRouter(tags=["health"])
+
+
+@router.get("/health/live")
+def live() -> dict[str, str]:
+    """The process answers."""
+    return {"status": "live"}
+
+
+@router.get("/health/ready", responses={503: {"description": "The database cannot be reached"}})
+def ready(request: Request) -> dict[str, str]:
+    """The process answers and reaches its database."""
+    database: Database = request.app.state.database
+    with database.begin() as session:
+        session.execute(text("SELECT 1"))
+    return {"status": "ready"}
+
+
+@router.get("/metrics", response_class=Response)
+def metrics(request: Request) -> Response:
+    """Prometheus metrics. What is counted is asked of the database, so every process answers the same."""
+    return Response(generate_latest(request.app.state.metrics), media_type=CONTENT_TYPE_LATEST)
+
+
+class Plant(Collector):
+    """Readings, corrections and alarms, counted by the database at the moment of asking."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def collect(self) -> Iterable[Metric]:
+        readings = CounterMetricFamily("inband_readings", "Readings stored.", labels=["machine"])
+        latest = GaugeMetricFamily(
+            "inband_last_reading_timestamp_seconds", "When the last reading came in.", labels=["machine"]
+        )
+        corrections = GaugeMetricFamily("inband_corrections", "Corrections by status.", labels=["machine", "status"])
+        alarms = GaugeMetricFamily(
+            "inband_active_alarms", "Alarms nobody has acknowledged.", labels=["machine", "kind"]
+        )
+        with self._database.begin() as session:
+            for machine, count, at in session.execute(text(_READINGS)):
+                readings.add_metric([machine], count)
+                if at is not None:
+                    latest.add_metric([machine], float(at))
+            for machine, status, count in session.execute(text(_CORRECTIONS)):
+                corrections.add_metric([machine, status], count)
+            for machine, kind, count in session.execute(text(_ALARMS)):
+                alarms.add_metric([machine, kind], count)
+        return readings, latest, corrections, alarms
+
+
+_READINGS = """
+SELECT m.key, coalesce(sum(s.sequence), 0), extract(epoch FROM max(s.last_received_at))
+FROM machine m LEFT JOIN stream s ON s.machine_id = m.id GROUP BY m.key
+"""
+_CORRECTIONS = """
+SELECT m.key, c.status, count(*) FROM correction c JOIN machine m ON m.id = c.machine_id
+WHERE c.status IN ('held', 'awaiting_approval', 'pending') GROUP BY 1, 2
+"""
+_ALARMS = """
+SELECT m.key, a.kind, count(*) FROM alarm a JOIN machine m ON m.id = a.machine_id
+WHERE a.acknowledged_at IS NULL GROUP BY 1, 2
+"""
+
+
+def registry(database: Database) -> Any:
+    """The metrics of one application: those of the plant, and those of its process."""
+    made = CollectorRegistry()
+    made.register(Plant(database))
+    ProcessCollector(registry=made)
+    PlatformCollector(registry=made)
+    GCCollector(registry=made)
+    return made
