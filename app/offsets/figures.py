@@ -9,7 +9,7 @@ from typing import Any
 
 from app.web.i18n import _
 from app.web.numbers import um
-from app.web.theme import ThemeName, layout, palette
+from app.web.theme import ThemeName, date_axis, layout, palette
 
 SYMBOLS = {"correction": "circle", "edit": "square", "change": "triangle-down", "reported": "diamond"}
 
@@ -93,7 +93,7 @@ def offset_figure(changes: Sequence[OffsetChange], *, theme: ThemeName = "light"
                 "itemclick": False,
                 "itemdoubleclick": False,
             },
-            xaxis={"type": "date", "showgrid": False, "showline": True},
+            xaxis=date_axis(),
             yaxis={
                 "tickformat": "+.4f",
                 "nticks": 6,

@@ -12,7 +12,7 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
@@ -59,7 +59,7 @@ def chosen_theme(request: Request) -> str:
     return chosen if chosen in ("light", "dark") else "auto"
 
 
-def render(request: Request, template: str, **context: Any) -> str:
+def render(request: Request, template: str | Template, **context: Any) -> str:
     """The text of a template for this request."""
     state = request.state
     language = i18n.negotiate(request.headers.get("accept-language"))
@@ -84,7 +84,7 @@ def render(request: Request, template: str, **context: Any) -> str:
 
 def page(
     request: Request,
-    template: str,
+    template: str | Template,
     *,
     status: int = HTTPStatus.OK,
     headers: dict[str, str] | None = None,

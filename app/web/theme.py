@@ -48,7 +48,7 @@ PALETTES: dict[ThemeName, Palette] = {
         stop="#c00f1e",
         waiting="#155fa8",
         correction="#155fa8",
-        bands=("#fbfbfa", "#f0f2f2", "#e4e7e8", "#f6e9dc", "#f0e2f0", "#f6dede"),
+        bands=("#fbfbfa", "#f0f2f2", "#e4e7e8", "#f7efe6", "#f3ebf4", "#f8e9e9"),
     ),
     "dark": Palette(
         surface="#1b2024",
@@ -63,7 +63,7 @@ PALETTES: dict[ThemeName, Palette] = {
         stop="#ff6b6b",
         waiting="#74b6f2",
         correction="#74b6f2",
-        bands=("#1b2024", "#22282d", "#2b3238", "#392d21", "#35273a", "#3d2528"),
+        bands=("#1b2024", "#22282d", "#2b3238", "#2e2820", "#2b2330", "#322224"),
     ),
 }
 
@@ -154,10 +154,25 @@ def layout(theme: ThemeName, **more: Any) -> dict[str, Any]:
         },
         "dragmode": "zoom",
         "uirevision": "keep",
-        "separators": ". ",
+        "separators": ".\N{NARROW NO-BREAK SPACE}",
         "xaxis": dict(axis),
         "yaxis": dict(axis),
     }
     for key, value in more.items():
         base[key] = base[key] | value if isinstance(base.get(key), dict) and isinstance(value, dict) else value
     return base
+
+
+def date_axis(**more: Any) -> dict[str, Any]:
+    """An axis of time: 24 hours, day before month. Moments carry their offset; plotly-chart.js shows them in local time."""
+    day = 86_400_000
+    return {
+        "type": "date",
+        "showgrid": False,
+        "showline": True,
+        "tickformatstops": [
+            {"dtickrange": [None, 59_999], "value": "%H:%M:%S\n%-d %b %Y"},
+            {"dtickrange": [60_000, day - 1], "value": "%H:%M\n%-d %b %Y"},
+            {"dtickrange": [day, None], "value": "%-d %b\n%Y"},
+        ],
+    } | more

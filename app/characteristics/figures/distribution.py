@@ -11,7 +11,7 @@ from typing import Any
 from app.core.zones import HasLimits
 from app.web.i18n import _
 from app.web.numbers import mm, um
-from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, layout, palette, zone_colour, zone_name
+from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, date_axis, layout, palette, zone_colour, zone_name
 
 BARS_PER_SIDE = 15  # whole bars between target and tolerance limit, so that the limits fall between bars
 REACH = 1.4  # the histogram ends at so many times the tolerance; what lies further out is in the two end bars
@@ -157,7 +157,7 @@ def run_figure(
         "layout": layout(
             theme,
             margin={"l": 92, "r": 110},
-            xaxis={"type": "date", "showgrid": False, "showline": True},
+            xaxis=date_axis(),
             yaxis={"tickformat": ".4f", "nticks": 6},
             shapes=[
                 {

@@ -90,19 +90,18 @@ def sparkline(deviations: Sequence[float], limits: HasLimits) -> Markup:
     ]
     if points:
         parts.append(f'<polyline class="line" points="{" ".join(f"{px:.1f},{py:.1f}" for px, py in points)}"/>')
+        # Dots are lines of no length with wide ends: they stay round however the picture is stretched.
         parts += [
-            f'<path class="outside" d="M{px - 4:.1f} {py + 3.5:.1f}h8l-4-7z"/>'
-            if d > 0
-            else f'<path class="outside" d="M{px - 4:.1f} {py - 3.5:.1f}h8l-4 7z"/>'
+            f'<path class="outside" d="M{px:.1f} {py:.1f}h0"/>'
             for (px, py), d in zip(points, deviations, strict=True)
             if abs(d) > tolerance + 5e-7
         ]
-        parts.append(f'<circle class="last" cx="{points[-1][0]:.1f}" cy="{points[-1][1]:.1f}" r="3"/>')
+        parts.append(f'<path class="last" d="M{points[-1][0]:.1f} {points[-1][1]:.1f}h0"/>')
         label = _("Trend of the last {n} deviations, from {first} to {last}").format(
             n=len(deviations), first=um(deviations[0]), last=um(deviations[-1])
         )
     else:
         label = _("No reading yet")
     return Markup(  # noqa: S704 - as above
-        f'<svg class="sparkline" viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(label)}">{"".join(parts)}</svg>'
+        f'<svg class="sparkline" viewBox="0 0 {width:g} {height:g}" preserveAspectRatio="none" role="img" aria-label="{escape(label)}">{"".join(parts)}</svg>'
     )

@@ -113,20 +113,14 @@ def limit_labels(limits: HasLimits, ruler: Scale, colours: Palette) -> list[dict
             room = (upper - max(lower, written)) / height
             if isinstance(ruler, ZoneScale):
                 if band.number > 0:
-                    notes.append(_note(sign * (lower + upper) / 2, band_text(band, sign), _ink(band, colours), 12))
+                    notes.append(_note(sign * (lower + upper) / 2, band_text(band, sign), colours.quiet, 12))
                 elif sign > 0:
                     notes.append(_note(0, band_text(band, sign), colours.quiet, 12))
             elif room > 1.6 * LEAST_DISTANCE and band.number > 0:
                 place = max((max(lower, written) + upper) / 2, written + LEAST_DISTANCE * height)
                 written = place
-                notes.append(_note(sign * place, band_text(band, sign), _ink(band, colours), 12))
+                notes.append(_note(sign * place, band_text(band, sign), colours.quiet, 12))
     return [note for note in notes if note["text"]]
-
-
-def _ink(band: Band, colours: Palette) -> str:
-    return {"out_of_tolerance": colours.attention, "wear": colours.wear, "probe_fault": colours.stop}.get(
-        band.name, colours.quiet
-    )
 
 
 def _note(y: float, text: str, colour: str, size: int) -> dict[str, Any]:

@@ -23,8 +23,11 @@ STEP_SYMBOLS = {
     "rejected": "x-thin-open",
     "superseded": "line-ew-open",
 }
-# How much of the width one letter of an event takes, about: words that would run into each other are left to the shapes.
-LETTER = 0.0105
+LETTER = (
+    6.5  # pixels that a letter of an event takes, about: words that would run into each other are left to the shapes
+)
+RIGHT_ROOM = 200  # pixels that a word may reach out beside the readings
+UPPER, LOWER = 0.5, -0.5  # rows of the events
 
 
 @dataclass(frozen=True)
@@ -69,12 +72,32 @@ def _alarm_symbol(kind: str) -> str:
     return ZONE_SYMBOLS.get(kind, "star-triangle-up")
 
 
+def _rows(marks: Sequence[Mark], span: tuple[float, float], pixels: int) -> list[tuple[Mark, float, bool]]:
+    """Each mark with its row and whether its word is written: two rows, and a word gives way to the next mark's shape."""
+    places: list[tuple[Mark, float, bool]] = []
+    latest = {UPPER: -1, LOWER: -1}  # index of the last mark in the row
+    end = {UPPER: -1.0, LOWER: -1.0}  # where its word ends, px
+    for mark in sorted(marks, key=lambda mark: mark.sequence):
+        start = (mark.sequence - span[0]) / (span[1] - span[0]) * pixels - 8
+        row = UPPER if end[UPPER] <= start else min(end, key=lambda row: end[row])
+        if end[row] > start:
+            before, _row, _written = places[latest[row]]
+            places[latest[row]] = (before, row, False)
+        stop = start + 20 + LETTER * len(mark.text)
+        written = stop < pixels + RIGHT_ROOM
+        latest[row], end[row] = len(places), stop if written else start + 18
+        places.append((mark, row, written))
+    return places
+
+
 def event_lane(
-    marks: Sequence[Mark], span: tuple[float, float], colours: Palette
+    marks: Sequence[Mark], span: tuple[float, float], pixels: int, colours: Palette
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]], list[dict[str, Any]]]:
     """Traces, words and vertical lines (tool changes, edits) of the events. A word is left out where it would not fit."""
     if not marks:
         return [], [], []
+    places = _rows(marks, span, pixels)
+    marks = [mark for mark, _row, _written in places]
     trace = {
         "type": "scatter",
         "mode": "markers",
@@ -82,7 +105,7 @@ def event_lane(
         "meta": "events",
         "showlegend": False,
         "x": [mark.sequence for mark in marks],
-        "y": [0] * len(marks),
+        "y": [row for _mark, row, _written in places],
         "yaxis": "y2",
         "marker": {
             "symbol": [_alarm_symbol(mark.kind) for mark in marks],
@@ -95,28 +118,22 @@ def event_lane(
         "hovertemplate": "%{text}<extra></extra>",
         "cliponaxis": False,
     }
-    width = span[1] - span[0]
-    words = []
-    ordered = sorted(marks, key=lambda mark: mark.sequence)
-    for place, mark in enumerate(ordered):
-        start = (mark.sequence - span[0]) / width
-        end = start + 0.02 + LETTER * len(mark.text)
-        following = (ordered[place + 1].sequence - span[0]) / width if place + 1 < len(ordered) else 1.02
-        if end <= following:
-            words.append(
-                {
-                    "xref": "x",
-                    "x": mark.sequence,
-                    "xanchor": "left",
-                    "xshift": 9,
-                    "yref": "y2",
-                    "y": 0,
-                    "yanchor": "middle",
-                    "text": f"<b>{mark.text}</b>" if mark.active else mark.text,
-                    "showarrow": False,
-                    "font": {"size": 12, "color": _alarm_colour(mark.kind, colours)},
-                }
-            )
+    words = [
+        {
+            "xref": "x",
+            "x": mark.sequence,
+            "xanchor": "left",
+            "xshift": 9,
+            "yref": "y2",
+            "y": row,
+            "yanchor": "middle",
+            "text": f"<b>{mark.text}</b>" if mark.active else mark.text,
+            "showarrow": False,
+            "font": {"size": 12, "color": _alarm_colour(mark.kind, colours)},
+        }
+        for mark, row, written in places
+        if written
+    ]
     lines = [
         {
             "type": "line",
@@ -179,7 +196,7 @@ def offset_lane(
         "yaxis": "y3",
         "marker": {
             "symbol": [STEP_SYMBOLS.get(step.status, "circle") for step, _total in at],
-            "size": 8 if len(at) <= 60 else 5,
+            "size": 8 if len(at) <= 30 else 6,
             "color": [colours.wear if step.status == "held" else colour for step, _total in at],
             "line": {"width": 1.5, "color": [colours.wear if step.status == "held" else colour for step, _total in at]},
         },

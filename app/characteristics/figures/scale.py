@@ -125,10 +125,10 @@ class TrueScale:
 
     @classmethod
     def of(cls, limits: HasLimits, deviations: Sequence[float] = ()) -> TrueScale:
-        """Around the tolerance: a little beyond it, further if the readings need it, at most three times as far."""
+        """Around the tolerance: a little beyond it, further for readings that are not much further out."""
         tolerance = max(nanometres(limits.tolerance_width / 2), nanometres(limits.averaging_limit), 1) / 1000
-        furthest = max((abs(deviation) * 1000 for deviation in deviations), default=0.0)
-        return cls(tolerance * min(3.0, max(1.35, 1.1 * furthest / tolerance)))
+        near = (size for size in (abs(deviation) * 1000 for deviation in deviations) if size <= 2.75 * tolerance)
+        return cls(max(1.35 * tolerance, 1.1 * max(near, default=0.0)))
 
     def position(self, deviation: float) -> float:
         return max(-self.extent, min(self.extent, deviation * 1000))

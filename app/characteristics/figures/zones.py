@@ -24,7 +24,9 @@ from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, layout, palette, zon
 
 __all__ = ["Block", "Mark", "Point", "Step", "zone_chart"]
 
-EVENTS, READINGS, OFFSETS = [0.925, 1.0], [0.2, 0.915], [0.0, 0.15]  # of the height, from the bottom
+LEFT, RIGHT = 92, 274  # pixels beside the readings
+MARGINS = LEFT + RIGHT
+EVENTS, READINGS, OFFSETS = [0.915, 1.0], [0.18, 0.91], [0.0, 0.14]  # of the height, from the bottom
 
 
 @dataclass(frozen=True)
@@ -68,12 +70,14 @@ def zone_chart(
     theme: ThemeName = "light",
     centre: float | None = None,
     total_before: float = 0.0,
+    width: int = 1240,
 ) -> dict[str, Any]:
     """The figure.
 
     points: readings by ascending sequence. blocks: older ones, thinned; every block's extremes are drawn.
     steps: corrections by ascending sequence of the reading that caused them; total_before: their sum before the first (mm).
     marks: alarms and tool changes. centre: the size (mm) at deviation 0, target + empirical value, for the sizes at the left.
+    width: of the chart in pixels, about: decides which words have room.
     """
     colours = palette(theme)
     ruler: Scale
@@ -93,10 +97,14 @@ def zone_chart(
         *_readings(points, ruler, colours),
         *_latest(points, ruler, colours),
     ]
-    events, event_notes, event_lines = event_lane(marks, span, colours)
+    events, event_notes, event_lines = event_lane(marks, span, max(width - MARGINS, 200), colours)
     offsets, offset_notes = offset_lane(steps, marks, span, total_before, colours)
-    notes = [*limit_labels(limits, ruler, colours), *event_notes, *offset_notes]
+    notes = [*limit_labels(limits, ruler, colours), *event_notes, *offset_notes, *_beyond(points, ruler, colours)]
     if not points and not blocks:
+        # Without a trace of its own plotly would not know where the axis of the readings is.
+        traces.append(
+            {"type": "scatter", "x": [first], "y": [0], "opacity": 0, "showlegend": False, "hoverinfo": "skip"}
+        )
         notes.append(
             {
                 "xref": "paper",
@@ -115,7 +123,7 @@ def zone_chart(
         "data": [*traces, *events, *offsets],
         "layout": layout(
             theme,
-            margin={"l": 84, "r": 262, "t": 34, "b": 48},
+            margin={"l": LEFT, "r": RIGHT, "t": 34, "b": 48},
             hoverdistance=24,
             showlegend=True,
             legend={
@@ -133,7 +141,7 @@ def zone_chart(
                 "range": list(span),
                 "anchor": "y3",
                 "title": {"text": _("Reading number"), "font": {"size": 13, "color": colours.quiet}, "standoff": 6},
-                "tickformat": "d",
+                "tickformat": ",d",
                 "showgrid": False,
                 "showline": True,
                 **({"dtick": 1} if last - first <= 12 else {"nticks": 9}),
@@ -147,6 +155,11 @@ def zone_chart(
                 "tickvals": ticks,
                 "ticktext": words,
                 "tickfont": {"size": 12, "color": colours.quiet},
+                "title": {
+                    "text": _("Deviation") if centre is None else _("Size, mm"),
+                    "font": {"size": 12, "color": colours.quiet},
+                    "standoff": 4,
+                },
             },
             yaxis2=_lane(EVENTS, [-1, 1], colours, showticklabels=False),
             yaxis3=_lane(
@@ -194,15 +207,16 @@ def _readings(points: Sequence[Point], ruler: Scale, colours: Palette) -> list[d
     """Every reading: the shape of its zone; hollow if excluded; at the edge with its value if it lies beyond."""
     if not points:
         return []
-    small = 8 if len(points) <= 120 else 6 if len(points) <= 400 else 4
+    small = 9 if len(points) <= 120 else 7 if len(points) <= 400 else 4
     calm = {"zero", "average", "full"}
     colour = [zone_colour(point.zone, colours) for point in points]
     return [
         {
             "type": "scatter",
-            "mode": "lines+markers",
+            "mode": "lines+markers" if len(points) <= 120 else "markers",  # a line through many only hides them
             "name": _("Reading"),
             "meta": "readings",
+            "legendrank": 1,
             "x": [point.sequence for point in points],
             "y": [ruler.position(point.deviation) for point in points],
             "line": {"width": 1, "color": colours.faint},
@@ -225,6 +239,21 @@ def _readings(points: Sequence[Point], ruler: Scale, colours: Palette) -> list[d
             "hovertemplate": "%{text}<extra></extra>",
             "cliponaxis": False,
         }
+    ]
+
+
+def _beyond(points: Sequence[Point], ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+    """The values of readings drawn at the edge because they lie further out; of many, the last ones."""
+    return [
+        {
+            "x": point.sequence,
+            "y": ruler.position(point.deviation),
+            "yshift": -14 if point.deviation > 0 else 14,
+            "text": f"<b>{um(point.deviation, 0)}</b>",
+            "showarrow": False,
+            "font": {"size": 12, "color": zone_colour(point.zone, colours)},
+        }
+        for point in [point for point in points if not ruler.fits(point.deviation)][-8:]
     ]
 
 
@@ -255,7 +284,10 @@ def _latest(points: Sequence[Point], ruler: Scale, colours: Palette) -> list[dic
 
 def _average(blocks: Sequence[Block], points: Sequence[Point], ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
     """M, as it stood after each reading; a gap where there was no memory."""
-    course = [(block.middle, block.average) for block in blocks] + [(point.sequence, point.average) for point in points]
+    # Of very many readings M at the end of each block would be noise: the mean of the block says more.
+    course = [(block.middle, block.average) for block in blocks if len(blocks) <= 150] + [
+        (point.sequence, point.average) for point in points
+    ]
     if all(value is None for _x, value in course):
         return []
     return [
@@ -266,7 +298,7 @@ def _average(blocks: Sequence[Block], points: Sequence[Point], ruler: Scale, col
             "meta": "average",
             "x": [x for x, _value in course],
             "y": [None if value is None else ruler.position(value) for _x, value in course],
-            "line": {"width": 2.5, "color": colours.average, "shape": "hv" if len(course) <= 400 else "linear"},
+            "line": {"width": 1.75, "color": colours.average, "shape": "hv" if len(course) <= 400 else "linear"},
             "hoverinfo": "skip",
         }
     ]
@@ -288,7 +320,7 @@ def _envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits, colours: Pal
         )
         for block in blocks
     ]
-    edge = {"width": 1, "color": colours.steady, "shape": "hvh"}
+    edge = {"width": 1, "color": _see_through(colours.steady, 0.5), "shape": "hvh"}
     common = {"type": "scatter", "mode": "lines", "x": x, "customdata": [block.link for block in blocks], "text": text}
     common |= {"hovertemplate": "%{text}<extra></extra>"}
     lower = common | {
@@ -307,7 +339,7 @@ def _envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits, colours: Pal
     }
     mean = common | {
         "y": [ruler.position(b.mean) for b in blocks],
-        "line": {"width": 1.5, "color": colours.steady},
+        "line": {"width": 1.5, "color": colours.average},
         "name": _("Mean"),
         "meta": "mean",
     }

@@ -1,7 +1,8 @@
 // <plotly-chart src="URL of figure JSON" on="reading:shaft-d40 alarm" label="what it shows, in words"></plotly-chart>
 // A chart. Its size comes from CSS (class "zones" is the tall one).
 //
-//   src    answers {"data": […], "layout": {…}}; asked with ?theme=light|dark and again when the theme changes
+//   src    answers {"data": […], "layout": {…}}; asked with ?theme=light|dark&width=pixels, and again when the theme
+//          or the width changes
 //   on     live events (see live.js) after which it is fetched again, at most once a second; zoom is kept
 //   label  for those who cannot see it; what the chart shows must also stand in a list on the page
 //
@@ -9,7 +10,8 @@
 // first chart needs it. If fetching fails, the chart stays and says in words that it is old, and how old.
 //
 // Our policy forbids injected style sheets: plotly.css stands in for plotly's own, and empty elements with the ids of
-// the others tell plotly that they are there already (see app/web/assets.py).
+// the others tell plotly that they are there already (see app/web/assets.py). It forbids style attributes too; plotly
+// sets them for <b> and the like, so SVG elements take them as what they mean: the same declarations, set by script.
 
 import { coalesced } from "./coalesce.js";
 import { subscribe } from "./live.js";
@@ -38,6 +40,25 @@ function loadPlotly() {
   return loading;
 }
 
+// Plotly shows times as they are written: moments with an offset become the reader's wall clock.
+function wallClock(figure) {
+  if (figure.layout.xaxis?.type !== "date") return figure;
+  const local = (moment) => {
+    const date = new Date(moment);
+    return new Date(date.getTime() - date.getTimezoneOffset() * 60_000).toISOString().slice(0, -1);
+  };
+  for (const trace of figure.data) trace.x = trace.x?.map(local);
+  for (const shape of figure.layout.shapes ?? []) {
+    if (shape.xref !== "paper") Object.assign(shape, { x0: local(shape.x0), x1: local(shape.x1) });
+  }
+  return figure;
+}
+
+SVGElement.prototype.setAttribute = function setAttribute(name, value) {
+  if (name === "style") this.style.cssText = value;
+  else Element.prototype.setAttribute.call(this, name, value);
+};
+
 class PlotlyChart extends HTMLElement {
   static observedAttributes = ["src"];
 
@@ -49,11 +70,14 @@ class PlotlyChart extends HTMLElement {
     this.onTheme = () => this.refresh();
     document.addEventListener("themechange", this.onTheme);
     this.stop = subscribe(this.getAttribute("on"), () => this.refresh());
+    this.size = new ResizeObserver(() => this.drawn && Math.abs(this.clientWidth - this.width) > 40 && this.refresh());
+    this.size.observe(this);
     this.refresh();
   }
 
   disconnectedCallback() {
     this.stop?.();
+    this.size?.disconnect();
     document.removeEventListener("themechange", this.onTheme);
     clearInterval(this.clock);
     if (this.drawn) window.Plotly.purge(this.plot);
@@ -68,15 +92,17 @@ class PlotlyChart extends HTMLElement {
     try {
       const url = new URL(this.getAttribute("src"), location.href);
       url.searchParams.set("theme", theme());
+      url.searchParams.set("width", Math.round(this.clientWidth));
       const [Plotly, answer] = await Promise.all([loadPlotly(), fetch(url, { headers: { Accept: "application/json" } })]);
       if (!answer.ok) throw new Error(`${answer.status}`);
-      const figure = await answer.json();
+      const figure = wallClock(await answer.json());
       await document.fonts.ready; // letters are measured when drawn
       if (!this.isConnected) return;
       const touch = matchMedia("(pointer: coarse)").matches;
       await Plotly.react(this.plot, figure.data, { ...figure.layout, ...(touch && { dragmode: false }) }, CONFIG);
       if (!this.drawn) this.plot.on("plotly_click", (event) => this.open(event.points[0]));
       this.drawn = true;
+      this.width = this.clientWidth;
       this.fetched = Date.now();
       this.settle();
     } catch (error) {
