@@ -8,6 +8,7 @@ from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
 
 from app.audit import api as audit
+from app.characteristics import api as characteristics
 from app.db.engine import Database
 from app.machines import api as machines
 from app.people import api as people
@@ -27,6 +28,7 @@ from app.web.templates import assets
 # Each part of the shop floor brings its JSON routes (api) and its pages.
 ROUTERS: tuple[APIRouter, ...] = (
     machines.router,
+    characteristics.router,
     readings.push,
     readings.router,
     events_api.router,

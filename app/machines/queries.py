@@ -11,9 +11,14 @@ from app.web.fields import is_slug
 from app.web.i18n import _
 
 
+def find_machine(session: Session, key: str) -> Machine | None:
+    """The machine with this key, if there is one."""
+    return session.scalars(select(Machine).where(Machine.key == key)).one_or_none() if is_slug(key) else None
+
+
 def machine_named(session: Session, key: str) -> Machine:
     """The machine with this key. Raises `NotFound`."""
-    found = session.scalars(select(Machine).where(Machine.key == key)).one_or_none() if is_slug(key) else None
+    found = find_machine(session, key)
     if found is None:
         raise NotFound(
             _("There is no machine {key}.").format(key=repr(key[:64])),

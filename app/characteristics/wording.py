@@ -1,0 +1,213 @@
+"""Parameters in words: what each is called, what it does, and what is wrong with one, in the words of the shop floor."""
+
+from collections.abc import Iterable
+from math import isfinite
+from typing import Any
+
+from app.core.parameters import BY_NAME, Kind, Problem
+from app.errors import FieldError
+from app.web.i18n import _
+
+
+def label(name: str) -> str:
+    """What a parameter is called."""
+    return {
+        "tool_memory": _("Tool memory"),
+        "average_memory": _("Average memory"),
+        "variant": _("Measuring variant"),
+        "points": _("Measuring points"),
+        "repeats": _("Repeats per point"),
+        "index": _("Index angle or spacing"),
+        "wait": _("Wait after indexing"),
+        "axis": _("Measuring axis"),
+        "direction": _("Probing direction"),
+        "nominal": _("Nominal"),
+        "upper_deviation": _("Upper deviation"),
+        "lower_deviation": _("Lower deviation"),
+        "target": _("Target"),
+        "tolerance_width": _("Tolerance width"),
+        "zero_range": _("Zero range"),
+        "averaging_limit": _("Averaging limit"),
+        "wear_limit": _("Wear limit"),
+        "confidence_limit": _("Confidence limit"),
+        "weighting_factor": _("Weighting factor k"),
+        "path_factor": _("Path factor"),
+        "factor": _("Factor from size error to offset"),
+        "accept": _("Acceptance"),
+        "rejected_may_correct": _("A rejected part may correct"),
+        "mode": _("Mode"),
+        "wear_policy": _("Correction beyond the wear limit"),
+        "max_step": _("Largest single correction"),
+        "max_total": _("Largest sum of corrections per tool"),
+    }.get(name, name)
+
+
+def explanation(name: str) -> str | None:
+    """What a parameter does, in one or two short sentences; None where the name says it."""
+    return {
+        "tool_memory": _("Whose offset is corrected, 1 to 32. 0 measures only."),
+        "average_memory": _("Where the running average is kept, 1 to 20; may be shared. 0 keeps none."),
+        "points": _("For the variants with several points."),
+        "repeats": _("Touches at the same point; their mean counts. Usual: 1 to 10."),
+        "index": _("Degrees between points, or mm along Z."),
+        "wait": _("Seconds before measuring goes on."),
+        "target": _("Aimed at: the middle of the tolerance."),
+        "tolerance_width": _("Upper minus lower limit."),
+        "zero_range": _("Up to here a deviation is scatter: nothing is corrected."),
+        "averaging_limit": _("Up to here the running average decides. Empty: a third of the tolerance."),
+        "wear_limit": _("From here on the tool is worn: an operator decides."),
+        "confidence_limit": _("From here on probe or program is wrong: the machine stops."),
+        "weighting_factor": _(
+            "1 takes the last reading whole; larger follows slower and scatters less. Usual: 1 to 4."
+        ),
+        "path_factor": _("The touch is expected within ± this many mm of the target. Usual: 1 to 10."),
+        "max_step": _("A larger correction is cut to this. Empty: no limit."),
+        "max_total": _("Beyond it nothing is corrected and an alarm is raised. Empty: no limit."),
+        "rejected_may_correct": _("A part outside n of m also corrects the tool."),
+    }.get(name)
+
+
+def choice(name: str, value: str) -> str:
+    """One of the choices of a parameter."""
+    return {
+        "variant": {
+            "single": _("One point"),
+            "indexed": _("One point, part indexed"),
+            "round": _("Several points round the part"),
+            "along": _("Several points along the part"),
+            "two_point": _("Two points (width, bore)"),
+        },
+        "axis": {"X": "X", "Y": "Y", "Z": "Z"},
+        "direction": {"positive": _("Positive (+)"), "negative": _("Negative (−)")},
+        "mode": {
+            "automatic": _("Automatic: the machine fetches each correction"),
+            "approval": _("Approval: a person releases each correction"),
+            "measure_only": _("Measure only: nothing is corrected"),
+        },
+        "wear_policy": {
+            "hold": _("Held until the operator decides"),
+            "release": _("Released at once"),
+        },
+    }.get(name, {}).get(value, value)
+
+
+def millimetres(value: float) -> str:
+    """A limit as it is written in sentences: at least four decimals, none hidden.
+
+    >>> millimetres(0.009), millimetres(0.0053333)
+    ('0.0090 mm', '0.0053333 mm')
+    """
+    whole, _point, decimals = f"{value:.9f}".partition(".")
+    return f"{whole}.{decimals.rstrip('0').ljust(4, '0')} mm"
+
+
+def named(name: str) -> str:
+    """A parameter as sentences name it: `R34 averaging limit`."""
+    field = BY_NAME.get(name)
+    words = label(name)
+    words = words[:1].lower() + words[1:]
+    return f"{field.r} {words}" if field is not None and field.r else words
+
+
+def field_errors(problems: Iterable[Problem]) -> list[FieldError]:
+    """Everything that is wrong, each at the field where one can change it."""
+    return [FieldError(f"parameters.{_where(problem)}", sentence(problem)) for problem in problems]
+
+
+def _where(problem: Problem) -> str:
+    # The tolerance is given by the drawing: if R34 does not fit into it, R34 is what gives way.
+    return "averaging_limit" if (problem.field, problem.code) == ("tolerance_width", "order") else problem.field
+
+
+def sentence(problem: Problem) -> str:
+    """What is wrong and what to do."""
+    data, name = problem.data, named(problem.field)
+    if problem.code == "order":
+        return _order(data)
+    if problem.code in {"range", "source_range"}:
+        return _range(problem, name)
+    return {
+        "required": _("{name} is missing; say it").format(name=name),
+        "unknown": _("There is no parameter {name}; check the spelling or the R number").format(
+            name=problem.field[:64]
+        ),
+        "twice": _("{name} is said twice, also as {other}; say it once").format(
+            name=problem.field[:64], other=data.get("other")
+        ),
+        "not_a_number": _("{name} must be a finite number, in mm with a decimal point where it is a length").format(
+            name=name
+        ),
+        "not_whole": _("{name} must be a whole number").format(name=name),
+        "not_a_choice": _("{name} must be one of {choices}").format(
+            name=name, choices=", ".join(data.get("choices", ()))
+        ),
+        "not_yes_no": _("{name} must be true or false").format(name=name),
+        "target_missing": _(
+            "The size is missing: say R42 nominal with R40 and R41 deviations, or R32 target with R35 tolerance width"
+        ),
+        "target_twice": _target_twice(problem, name),
+        "tolerance_sign": _(
+            "R40 upper deviation must be greater than R41 lower deviation; check the signs (h6 is 0 and −0.016)"
+        ),
+        "sign_missing": _(
+            "The factor is missing: it says which way the offset acts. Lathe diameter −1, radius −0.5, length −1; "
+            "milling radius −0.5 outside, +0.5 inside"
+        ),
+        "factor_zero": _("The factor must not be 0: nothing would ever be corrected. To only measure, set R10 to 0"),
+        "accept": _('Acceptance must be {"n": n, "m": m} with whole numbers, 1 ≤ n ≤ m ≤ 100, for example 2 of 3'),
+    }.get(problem.code, problem.code)
+
+
+def _order(data: dict[str, Any]) -> str:
+    names = {
+        "R33": _("R33 zero range"),
+        "R34": _("R34 averaging limit"),
+        "R35/2": "R35/2",
+        "R37": _("R37 wear limit"),
+        "R36": _("R36 confidence limit"),
+    }
+    values = {
+        "inner": names[data["inner"]],
+        "outer": names[data["outer"]],
+        "smaller": millimetres(data["smaller"]),
+        "larger": millimetres(data["larger"]),
+    }
+    if data["outer"] == "R35/2":
+        return _(
+            "{inner} {smaller} must not be larger than R35/2 = {larger}; lower it, or leave it empty for a third of the "
+            "tolerance"
+        ).format(**values)
+    if data["inner"] == "R35/2":
+        return _("{outer} {larger} must not be smaller than R35/2 = {smaller}; raise it").format(**values)
+    if data["strict"]:
+        return _("{inner} {smaller} must be smaller than {outer} {larger}; lower the one or raise the other").format(
+            **values
+        )
+    return _("{inner} {smaller} must not be larger than {outer} {larger}; lower the one or raise the other").format(
+        **values
+    )
+
+
+def _range(problem: Problem, name: str) -> str:
+    field = BY_NAME[problem.field]
+    value, lowest, highest = (problem.data[key] for key in ("value", "lowest", "highest"))
+    unit = " mm" if field.kind is Kind.LENGTH else ""
+    values = {
+        "name": name,
+        "value": f"{value:.10g}{unit}" if isfinite(value) else str(value),
+        "lowest": f"{lowest:.10g}",
+        "highest": f"{highest:.10g}{unit}",
+    }
+    if problem.warning:
+        return _(
+            "{name} {value} is unusual: {lowest} to {highest} is the control's range. Check the unit (mm)."
+        ).format(**values)
+    return _("{name} must lie between {lowest} and {highest}, not {value}").format(**values)
+
+
+def _target_twice(problem: Problem, name: str) -> str:
+    if problem.code != "target_twice":
+        return ""
+    return _(
+        "{name} {value} does not agree with nominal and deviations, which give {computed}; say only one of the two"
+    ).format(name=name, value=millimetres(problem.data["value"]), computed=millimetres(problem.data["computed"]))
