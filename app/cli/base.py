@@ -77,7 +77,7 @@ def explain(error: Exception) -> tuple[str | None, int]:
             lines = [_setting(problem) for problem in error.errors(include_url=False, include_input=False)]
             return "\n".join(lines), 2
         case InbandError():
-            fields = [f"  {each.field}: {each.message}" for each in error.errors]
+            fields = [f"  {each.field}: {each.message}" for each in error.errors if each.message not in error.detail]
             return "\n".join([error.detail, *fields, *([error.what_to_do] if error.what_to_do else [])]), 1
         case EmbeddedServerError() | MigrationError():
             return str(error), 1

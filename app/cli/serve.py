@@ -13,6 +13,8 @@ from typing import Annotated
 import httpx
 import typer
 import uvicorn
+from starlette.types import ASGIApp
+from uvicorn.config import STARTUP_FAILURE
 from uvicorn.supervisors import Multiprocess
 
 from app.cli.base import DatabaseUrl, DataDir, cli, migrated, say, settings_from
@@ -77,7 +79,7 @@ def invite_administrator(database: Database, settings: Settings) -> None:
 
 def _serve(settings: Settings, listening: socket.socket) -> None:
     config = uvicorn.Config(
-        "app.main:create_app",
+        "app.main:create_app" if settings.workers == 1 else "app.cli.serve:create_worker",
         factory=True,
         host=settings.host,
         port=settings.port,
@@ -94,7 +96,10 @@ def _serve(settings: Settings, listening: socket.socket) -> None:
     )
     server = uvicorn.Server(config)
     if settings.workers > 1:
-        Multiprocess(config, [listening]).run()
+        workers = Multiprocess(config, [listening])
+        workers.run()
+        if any(process.exitcode == STARTUP_FAILURE for process in workers.processes):
+            raise InbandError("The server did not start; the reason stands above.")
         return
     try:
         server.run(sockets=[listening])
@@ -102,6 +107,21 @@ def _serve(settings: Settings, listening: socket.socket) -> None:
         return
     if not server.started:
         raise InbandError("The server did not start; the reason stands above.")
+
+
+def create_worker() -> ASGIApp:
+    """The application in one of several processes; it ends when the parent, which keeps the database, is killed."""
+    from app.main import create_app
+
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=watch, daemon=True).start()
+    return create_app()
 
 
 def _listen(settings: Settings) -> socket.socket:
