@@ -1,0 +1,160 @@
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import mkdtemp
+
+import httpx
+import pytest
+
+from app.db.embedded import EmbeddedServer
+from app.settings import HOUSE
+from tests.conftest import NewDatabase, RunServer, Server, free_port, wait_ready
+
+
+def inband(*arguments: str, typed: str = "", **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "app", *arguments],
+        cwd=HOUSE, env=os.environ | environment, input=typed, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def data_dir() -> Iterator[Path]:
+    home = Path(mkdtemp(prefix="inband-test-"))
+    yield home / "data"
+    if (pid := EmbeddedServer(home / "data").pid) is not None:
+        os.kill(pid, signal.SIGKILL)
+    shutil.rmtree(home)
+
+
+def test_a_fresh_start_on_the_embedded_database(data_dir: Path, tmp_path: Path) -> None:
+    port, stderr = free_port(), tmp_path / "stderr"
+    where = ["--data-dir", str(data_dir)]
+    command = [sys.executable, "-m", "app", "serve", "--port", str(port), *where]
+    with (
+        stderr.open("wb") as log,
+        subprocess.Popen(command, cwd=HOUSE, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log) as process,
+        ExitStack() as end,
+    ):
+        end.callback(process.kill)
+        wait_ready(f"http://127.0.0.1:{port}", process, stderr)
+        link = re.search(r"http://127\.0\.0\.1:\d+/invitation/\S+", stderr.read_text())
+        assert link is not None, "no administrator yet, so there is an invitation"
+        assert httpx.get(link.group(), follow_redirects=True).status_code == 200
+
+        # both work while the server runs, and what is meant for programs is alone on standard output
+        added = inband(
+            "user", "add", "anna", "--role", "admin", "--password-stdin", *where, typed="horse battery staple\n"
+        )
+        assert (added.returncode, added.stdout) == (0, "")
+        assert "anna may sign in" in added.stderr
+        key = inband("key", "add", "--role", "viewer", "--name", "a screen", *where)
+        assert (key.returncode, key.stderr) == (0, "")
+        headers = {"Authorization": f"Bearer {key.stdout.rstrip()}"}
+        assert httpx.get(f"http://127.0.0.1:{port}/api/v1/machines", headers=headers).json()["items"] == []
+
+        postgres = EmbeddedServer(data_dir).pid
+        process.send_signal(signal.SIGTERM)
+        out, _ = process.communicate(timeout=30)
+        assert (process.returncode, out) == (0, b"")
+        assert postgres is not None
+        assert EmbeddedServer(data_dir).pid is None
+        assert "Traceback" not in stderr.read_text()
+
+    checked = inband("check", *where)
+    assert checked.returncode == 0, checked.stderr
+    assert "embedded in" in checked.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("workers", [1, 2])
+def test_it_ends_in_order(run_server: RunServer, workers: int, number: signal.Signals) -> None:
+    with run_server(workers=workers) as server:
+        server.process.send_signal(number)
+        assert server.process.wait(20) == 0
+        assert "Traceback" not in server.stderr.read_text()
+
+
+def test_workers_end_when_their_parent_is_killed(run_server: RunServer) -> None:
+    with run_server(workers=2) as server:
+        server.kill()
+        port = int(server.url.rpartition(":")[2])
+        for _ in range(200):
+            try:
+                socket.create_connection(("127.0.0.1", port), timeout=0.1).close()
+            except OSError:
+                break
+            signal.sigtimedwait([], 0.05)
+        else:
+            pytest.fail("somebody still listens")
+        server.restart()
+
+
+def test_two_workers_serve(run_server: RunServer) -> None:
+    with run_server(workers=2) as server:
+        key = server.key("viewer")
+        assert server.client(key).get("/api/v1/machines").status_code == 200
+
+
+def test_a_taken_port_is_said_before_anything_is_begun(server: Server, data_dir: Path) -> None:
+    done = inband("serve", "--port", server.url.rpartition(":")[2], "--data-dir", str(data_dir))
+    assert done.returncode == 1
+    assert "taken by another program" in done.stderr
+    assert not data_dir.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--host", "0.0.0.0"], "INBAND_PUBLIC_URL"),
+        (["--port", "70000"], "--port / INBAND_PORT"),
+        (["--workers", "0"], "--workers / INBAND_WORKERS"),
+        (["--data-dir", "/"], "--data-dir / INBAND_DATA_DIR"),
+        (["--database-url", "sqlite:///inband.db"], "PostgreSQL only"),
+        (["--database-url", "postgresql://me:hunter2@db.example"], "names no database"),
+        (["--wrong"], "No such option"),
+    ],
+)
+def test_wrong_use_is_refused_with_status_2(arguments: list[str], words: str) -> None:
+    done = inband("serve", *arguments)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert done.stdout == ""
+    assert "hunter2" not in done.stderr
+
+
+def test_every_option_has_its_variable(new_database: NewDatabase) -> None:
+    url = new_database()
+    done = inband("check", INBAND_DATABASE_URL=url, INBAND_PORT="8123")
+    assert done.returncode == 0, done.stderr
+    assert "your own server" in done.stderr
+    assert "8123" in done.stderr
+
+
+def test_check_says_what_is_wrong() -> None:
+    done = inband("check", "--database-url", f"postgresql://me@127.0.0.1:{free_port()}/inband")
+    assert done.returncode == 1
+    assert "INBAND_DATABASE_URL" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_key_is_for_a_role_or_a_machine(new_database: NewDatabase) -> None:
+    url = new_database()
+    assert inband("key", "add", "--database-url", url).returncode == 2
+    assert inband("key", "add", "--database-url", url, "--role", "admin", "--machine", "lathe-1").returncode == 2
+    missing = inband("key", "add", "--database-url", url, "--machine", "lathe-1")
+    assert (missing.returncode, missing.stdout) == (1, "")
+    assert "lathe-1" in missing.stderr
+
+
+def test_a_password_is_never_invented(new_database: NewDatabase) -> None:
+    done = inband("user", "add", "anna", "--role", "admin", "--database-url", new_database())
+    assert done.returncode == 2
+    assert "--password-stdin" in done.stderr

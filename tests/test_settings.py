@@ -1,0 +1,50 @@
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from app.settings import Settings
+
+
+def test_from_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("INBAND_PORT", "9000")
+    monkeypatch.setenv("INBAND_DATA_DIR", str(tmp_path))
+    monkeypatch.setenv("INBAND_PUBLIC_URL", "")
+    assert (Settings().port, Settings().data_dir, Settings().public_url) == (9000, tmp_path, None)
+    assert Settings(port=9001).port == 9001
+
+
+def test_the_data_folder_follows_xdg(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    assert Settings().data_dir == tmp_path / "inband"
+
+
+def test_every_field_is_described() -> None:
+    assert [name for name, field in Settings.model_fields.items() if not field.description] == []
+
+
+def test_listening_to_the_network_needs_https_or_a_decision() -> None:
+    with pytest.raises(ValidationError, match="INBAND_ALLOW_PLAIN_HTTP"):
+        Settings(host="192.0.2.1")
+    with pytest.raises(ValidationError, match="INBAND_ALLOW_PLAIN_HTTP"):
+        Settings(host="0.0.0.0", public_url="http://inband.example")
+    behind_a_proxy = Settings(host="0.0.0.0", public_url="https://inband.example/")
+    assert behind_a_proxy.secure_cookies
+    assert behind_a_proxy.address == "https://inband.example"
+    closed_network = Settings(host="0.0.0.0", allow_plain_http=True)
+    assert not closed_network.secure_cookies
+    assert closed_network.address == "http://127.0.0.1:8000"
+    assert Settings(host="::1").address == "http://[::1]:8000"
+
+
+def test_a_password_in_an_address_is_never_repeated() -> None:
+    with pytest.raises(ValidationError) as refused:
+        Settings(database_url="postgresql://me:hunter2@db.example")
+    assert "hunter2" not in str(refused.value)
+    assert "hunter2" not in repr(Settings(database_url="postgresql://me:hunter2@db.example/inband"))
+
+
+@pytest.mark.parametrize("url", ["https://inband.example/sub", "inband.example", "ftp://inband.example"])
+def test_the_public_address_is_an_origin(url: str) -> None:
+    with pytest.raises(ValidationError, match="without a path"):
+        Settings(public_url=url)
