@@ -121,16 +121,23 @@ def _name_of(raw: str) -> str:
     return "variant" if raw.upper() == TWO_POINT_SWITCH else BY_R.get(raw.upper(), raw)
 
 
-def _read(given: Mapping[str, Any]) -> Parameters:
+def _read(given: Mapping[str, Any], *, reason_missing: bool = False) -> Parameters:
+    """Raises `Invalid` with everything that is wrong at once."""
+    errors: list[FieldError] = []
     try:
-        return read(given)[0]
+        parameters = read(given)[0]
     except ParameterError as error:
         errors = wording.field_errors(error.problems)
+    if reason_missing:
+        wrong = _("is required when parameters change: say why, for those who read it in a year")
+        errors.append(FieldError("reason", wrong))
+    if errors:
         raise Invalid(
             "; ".join(f"{field}: {message}" for field, message in errors[:3]),
-            _("Correct the named parameters and send them again; nothing was changed."),
+            _("Correct the named fields and send them again; nothing was changed."),
             errors=errors,
-        ) from None
+        )
+    return parameters
 
 
 def _refuse_moving(standing: Standing, change: CharacteristicChange) -> None:
@@ -164,10 +171,7 @@ def _change_parameters(
 ) -> tuple[Standing, list[dict[str, Any]]]:
     """Under the machine's lock. Returns how things stand now, and what to tell everybody."""
     characteristic, machine, version = standing
-    if not reason:
-        wrong = _("is required when parameters change: say why, for those who read it in a year")
-        raise Invalid(f"reason: {wrong}", errors=[FieldError("reason", wrong)])
-    old, new = standing.parameters, _read(merged(version.parameters, given))
+    old, new = standing.parameters, _read(merged(version.parameters, given), reason_missing=not reason)
     if new == old:
         return standing, []
     made = _new_version(characteristic, version.version + 1, new, actor, reason)

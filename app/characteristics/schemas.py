@@ -190,7 +190,7 @@ def characteristic_out(standing: queries.Standing) -> CharacteristicOut:
         machine=machine.key,
         part=characteristic.part,
         unit=characteristic.unit,
-        parameters=version.parameters,
+        parameters=wording.in_order(version.parameters),
         parameters_version=version.version,
         created_at=characteristic.created_at,
         warnings=[Warned(field=field, message=message) for field, message in warnings_of(standing.parameters)],
@@ -203,5 +203,5 @@ def version_out(version: ParametersVersion) -> VersionOut:
         at=version.created_at,
         by=version.created_by,
         reason=version.reason,
-        parameters=version.parameters,
+        parameters=wording.in_order(version.parameters),
     )

@@ -1,6 +1,6 @@
 """Parameters in words: what each is called, what it does, and what is wrong with one, in the words of the shop floor."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import Any
 
@@ -107,6 +107,11 @@ def named(name: str) -> str:
     words = label(name)
     words = words[:1].lower() + words[1:]
     return f"{field.r} {words}" if field is not None and field.r else words
+
+
+def in_order(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """The set in the order of the table, which PostgreSQL does not keep."""
+    return {name: parameters[name] for name in (*BY_NAME, "accept") if name in parameters}
 
 
 def field_errors(problems: Iterable[Problem]) -> list[FieldError]:
