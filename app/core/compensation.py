@@ -230,14 +230,20 @@ def decide(
         size_error, code, after, without = decided, Code.OUT_OF_TOLERANCE, 0.0, before
 
     amount = round(parameters.factor * size_error, DECIMALS) + 0.0
-    clamped = parameters.max_step is not None and nanometres(abs(amount)) > nanometres(parameters.max_step)
+    clamped = parameters.max_step is not None and abs(amount) > parameters.max_step
     if clamped and parameters.max_step is not None:
         amount = parameters.max_step if amount > 0 else -parameters.max_step
-    if parameters.max_total is not None and nanometres(abs(state.total + amount)) > nanometres(parameters.max_total):
+    if parameters.max_total is not None and _exceeds(state.total, amount, parameters.max_total):
         signals.append(Signal.OFFSET_LIMIT)
         return verdict(Action.NONE, Code.OFFSET_LIMIT, without)
     action = Action.HOLD if code is Code.TOOL_WORN_HELD else Action.CORRECT
     return verdict(action, code, after, size_error, amount, clamped)
+
+
+def _exceeds(total: float, amount: float, limit: float) -> bool:
+    """Whether a correction takes the sum beyond its limit. One that leads back towards zero never does."""
+    after = abs(nanometres(total + amount))
+    return after > nanometres(limit) and after > abs(nanometres(total))
 
 
 def needs_approval(parameters: Parameters) -> bool:

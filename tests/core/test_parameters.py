@@ -1,0 +1,133 @@
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.core.parameters import BY_R, FIELDS, ParameterError, Parameters, Variant, read
+from tests.core.conftest import SHAFT
+
+
+def problems(given_values: dict[str, Any]) -> dict[str, str]:
+    with pytest.raises(ParameterError) as caught:
+        read(given_values)
+    return {problem.field: problem.code for problem in caught.value.problems}
+
+
+def test_every_r_number_says_the_same_as_its_name() -> None:
+    numbers = {name: r for r, name in BY_R.items()}
+    by_name, _warnings = read(SHAFT)
+    by_number, _warnings = read({numbers.get(name, name): value for name, value in SHAFT.items()})
+    lower_case, _warnings = read({numbers.get(name, name).lower(): value for name, value in SHAFT.items()})
+    assert by_name == by_number == lower_case
+
+
+def test_codes_of_the_control_are_understood() -> None:
+    parameters, _warnings = read(SHAFT | {"R25": 1, "R30": 2, "R31": 1, "R23": 2})
+    assert (parameters.variant.value, parameters.axis.value, parameters.direction.value) == ("indexed", "Z", "negative")
+    assert read(SHAFT | {"R24": 1})[0].variant is Variant.TWO_POINT
+    assert read(SHAFT | {"R24": 0})[0].variant is Variant.SINGLE
+
+
+def test_target_with_width_stands_in_place_of_nominal_and_deviations() -> None:
+    drawing = {
+        name: value for name, value in SHAFT.items() if name not in ("nominal", "upper_deviation", "lower_deviation")
+    }
+    parameters, _warnings = read(drawing | {"target": 39.992, "R35": 0.016})
+    assert (parameters.target, parameters.tolerance_width) == (39.992, 0.016)
+    assert problems(drawing) == {"nominal": "target_missing"}
+    assert problems(drawing | {"target": 39.992}) == {"tolerance_width": "required"}
+    assert problems(SHAFT | {"target": 39.9}) == {"target": "target_twice"}
+    assert read(SHAFT | {"target": 39.992, "tolerance_width": 0.016})[0].target == 39.992
+
+
+def test_the_averaging_limit_is_two_thirds_of_half_the_tolerance_by_default() -> None:
+    values = {name: value for name, value in SHAFT.items() if name != "averaging_limit"}
+    assert read(values)[0].averaging_limit == pytest.approx(0.016 / 3)
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"zero_range": 0.0053}, "averaging_limit"),
+        ({"zero_range": 0.006}, "averaging_limit"),
+        ({"averaging_limit": 0.0081}, "tolerance_width"),
+        ({"wear_limit": 0.0079}, "wear_limit"),
+        ({"confidence_limit": 0.29}, "confidence_limit"),
+    ],
+)
+def test_a_set_that_breaks_the_order_is_refused_naming_the_pair(change: dict[str, Any], field: str) -> None:
+    assert problems(SHAFT | change) == {field: "order"}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"averaging_limit": 0.008},
+        {"wear_limit": 0.008, "confidence_limit": 0.008},
+        {"zero_range": 0},
+        {"zero_range": 0.005299},
+    ],
+)
+def test_equal_is_allowed_where_the_order_says_so(change: dict[str, Any]) -> None:
+    read(SHAFT | change)
+
+
+def test_ranges_of_the_source_warn_and_do_not_refuse() -> None:
+    _parameters, warnings = read(SHAFT | {"weighting_factor": 8, "confidence_limit": 5, "wear_limit": 0.2})
+    assert {warning.field for warning in warnings} == {"weighting_factor", "confidence_limit", "wear_limit"}
+    assert all(warning.warning for warning in warnings)
+    assert read(SHAFT)[1] == []
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf"), "0.001", True, [], {}, 10**400, 1e300])
+@pytest.mark.parametrize("field", [field.name for field in FIELDS if field.name != "rejected_may_correct"])
+def test_what_is_no_number_or_choice_is_refused_at_its_field(field: str, bad: Any) -> None:
+    assert field in problems(SHAFT | {field: bad})
+
+
+def test_everything_that_is_wrong_is_said_at_once() -> None:
+    found = problems({"R33": "x", "mode": "auto", "colour": 1, "R10": 40, "R11": 2.5, "accept": {"n": 3, "m": 2}})
+    assert found == {
+        "zero_range": "not_a_number",
+        "mode": "not_a_choice",
+        "colour": "unknown",
+        "tool_memory": "range",
+        "average_memory": "not_whole",
+        "accept": "accept",
+        "wear_limit": "required",
+        "confidence_limit": "required",
+        "nominal": "target_missing",
+    }
+
+
+def test_a_parameter_may_not_come_under_two_names() -> None:
+    assert problems(SHAFT | {"R33": 0.001}) == {"R33": "twice"}
+
+
+def test_the_sign_of_a_correction_is_never_guessed() -> None:
+    values = {name: value for name, value in SHAFT.items() if name != "factor"}
+    assert problems(values) == {"factor": "sign_missing"}
+    assert problems(SHAFT | {"factor": 0}) == {"factor": "factor_zero"}
+    read(values | {"tool_memory": 0})
+    read(values | {"mode": "measure_only"})
+
+
+def test_a_tolerance_needs_a_width() -> None:
+    assert problems(SHAFT | {"upper_deviation": -0.016}) == {"upper_deviation": "tolerance_sign"}
+    assert problems(SHAFT | {"upper_deviation": -0.02}) == {"upper_deviation": "tolerance_sign"}
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from([*SHAFT, "R35", "accept", "mode"]),
+        st.none() | st.floats() | st.integers() | st.text(max_size=3),
+    )
+)
+def test_whatever_comes_is_a_parameter_set_or_a_list_of_problems(changes: dict[str, Any]) -> None:
+    try:
+        parameters, _warnings = read(SHAFT | changes)
+    except ParameterError as error:
+        assert error.problems  # noqa: PT017 - either outcome is right
+    else:
+        assert Parameters.from_dict(parameters.as_dict()) == parameters
