@@ -30,6 +30,7 @@ def test_a_page_may_not_complain_nor_call_elsewhere(page: Page, server: Server, 
     page.evaluate("setTimeout(() => { throw new Error('uncaught') })")
     page.wait_for_timeout(200)
     page.goto(elsewhere := f"{server.url}/health/live".replace("127.0.0.1", "localhost"))
+    page.goto("about:blank")
     found = "\n".join(complaints)
     complaints.clear()
     assert "broken" in found
