@@ -1,0 +1,11 @@
+"""The demonstration plant: two lathes and a milling machine that wear, warm up, scatter and now and then break something.
+
+    plant.py       which machines, tools and features there are, and how a feature answers to its tool's offset
+    simulation.py  the physics: pure, seeded, without a clock; it knows nothing of the server
+    client.py      the public REST API as a machine's gateway would call it, patient when the server is away
+    running.py     one machine in its loop: cut, measure, report, fetch corrections, apply them, confirm
+    people.py      who signs in, and the simulated operator who steps in when nobody else does
+    cli.py         the command `inband demo`
+
+It talks to the server only through its public API: what it can do, a real machine can do.
+"""
