@@ -35,7 +35,8 @@ from pathlib import Path
 
 import psycopg
 
-from app.db.run_as import PATH, RunAsError, run_as, system_user
+from app.db.locks import LockError, exclusive, open_lock
+from app.db.run_as import PATH, RunAsError, give, run_as, system_user
 
 MAJOR = "18"
 NAME = "inband"  # of the database and of its role
@@ -43,6 +44,7 @@ SYSTEM_USER = "inband-postgres"
 PORT = "5432"  # only names the socket file
 PATIENCE = 600.0  # seconds: recovery after a crash may take its time
 PROC = Path("/proc")
+NO_PROCESS = 2**31 - 2  # a process number that no system gives out
 ROOM = 200 * 2**20  # bytes a new cluster wants before it is begun
 
 ENVIRONMENT = {"PATH": PATH, "LC_ALL": "C", "TZ": "UTC"}
@@ -107,7 +109,7 @@ class EmbeddedServer:
         try:
             with self._alone():
                 if self._users_lock is None:
-                    self._users_lock = self._open_lock("users.lock")
+                    self._users_lock = open_lock(self.data_dir / "users.lock")
                     fcntl.flock(self._users_lock, fcntl.LOCK_SH)
                 self._clean()
                 if not self.cluster.exists():
@@ -117,7 +119,7 @@ class EmbeddedServer:
                     self._launch()
                 self._await()
                 self._make_database()
-        except RunAsError as error:
+        except (RunAsError, LockError) as error:
             self._leave()
             raise EmbeddedServerError(
                 f"{error} Or set INBAND_DATABASE_URL to a PostgreSQL server of your own."
@@ -143,39 +145,17 @@ class EmbeddedServer:
 
     # --- who may do what when
 
-    def _open_lock(self, name: str) -> int:
-        try:
-            lock = os.open(self.data_dir / name, os.O_RDWR | os.O_CREAT, 0o600)
-        except OSError as error:
-            raise EmbeddedServerError(
-                f"{self.data_dir} cannot be written ({error.strerror}). Run Inband as the user the folder belongs to, "
-                "or choose another with --data-dir."
-            ) from None
-        if os.geteuid() == 0:  # sudo in somebody's data directory must not lock them out
-            owner = self.data_dir.stat()
-            os.fchown(lock, owner.st_uid, owner.st_gid)
-        return lock
-
     @contextmanager
     def _alone(self) -> Iterator[None]:
         """Nobody else starts or stops this server meanwhile. An unlucky second waits for the first one's initdb."""
-        lock = self._open_lock("start.lock")
         try:
-            deadline = time.monotonic() + PATIENCE
-            while True:
-                try:
-                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    break
-                except BlockingIOError:
-                    if time.monotonic() > deadline:
-                        raise EmbeddedServerError(
-                            f"another process has been starting or stopping the database in {self.data_dir} for "
-                            f"{PATIENCE / 60:.0f} minutes. See {self.log}, end that process and try again."
-                        ) from None
-                    time.sleep(0.05)
-            yield
-        finally:
-            os.close(lock)
+            with exclusive(self.data_dir / "start.lock", PATIENCE):
+                yield
+        except TimeoutError:
+            raise EmbeddedServerError(
+                f"another process has been starting or stopping the database in {self.data_dir} for "
+                f"{PATIENCE / 60:.0f} minutes. See {self.log}, end that process and try again."
+            ) from None
 
     def _leave(self) -> None:
         if self._users_lock is not None:
@@ -188,10 +168,16 @@ class EmbeddedServer:
         """Remove what a killed first start left, and the pid file whose number now belongs to some other program."""
         for leftover in self.data_dir.glob("postgres.new-*"):
             shutil.rmtree(leftover, ignore_errors=True)
-        if self.pid is None and (PROC / "self").exists():
-            (self.cluster / "postmaster.pid").unlink(missing_ok=True)
-            for file in (f".s.PGSQL.{PORT}", f".s.PGSQL.{PORT}.lock"):
-                (self._socket_dir() / file).unlink(missing_ok=True)
+        if self.pid is not None:
+            return
+        pid_file = self.cluster / "postmaster.pid"
+        with contextlib.suppress(OSError, ValueError):
+            first, rest = pid_file.read_text().split("\n", 1)
+            if (PROC / first).exists():  # the server would take that program for itself and refuse to start
+                # The rest stays: by it the server sees whether children of the dead one still write.
+                pid_file.write_text(f"{NO_PROCESS}\n{rest}")
+        for file in (f".s.PGSQL.{PORT}", f".s.PGSQL.{PORT}.lock"):
+            (self._socket_dir() / file).unlink(missing_ok=True)
 
     def _initdb(self) -> None:
         """Make the cluster beside its place and move it there when it is whole."""
@@ -201,7 +187,7 @@ class EmbeddedServer:
                 "Make room or choose another folder with --data-dir."
             )
         new = Path(tempfile.mkdtemp(prefix="postgres.new-", dir=self.data_dir))
-        _give(new, self._owner())
+        give(new, self._owner())
         done = subprocess.run(  # noqa: S603 - our own words
             [
                 *self._as(self._owner()), str(binary("initdb")), "--pgdata", str(new), "--username", NAME,
@@ -248,6 +234,17 @@ class EmbeddedServer:
     # --- the process
 
     def _launch(self) -> None:
+        """Start it. Where a server was killed, its children may need a moment to notice; till then it does not start."""
+        for patience in (0.2, 1, 5, None):
+            try:
+                self._spawn()
+                break
+            except EmbeddedServerError as error:
+                if patience is None or "pre-existing shared memory" not in str(error):
+                    raise
+                time.sleep(patience)
+
+    def _spawn(self) -> None:
         owner, settings = self._owner(), dict(self.options)
         settings |= {
             "listen_addresses": "",
@@ -256,8 +253,8 @@ class EmbeddedServer:
             "port": PORT,
         }
         if self.cluster.stat().st_uid != owner.pw_uid:  # a backup that root copied back
-            _give(self.cluster, owner, recursive=True)
-        _give(self._socket_dir(), owner)
+            give(self.cluster, owner, recursive=True)
+        give(self._socket_dir(), owner)
         if self.log.exists() and self.log.stat().st_size > 10 * 2**20:
             self.log.replace(self.log.with_suffix(".log.1"))
         self._log_begins = self.log.stat().st_size if self.log.exists() else 0
@@ -354,12 +351,6 @@ def _make_private(path: Path, mode: int = 0o700) -> None:
         raise EmbeddedServerError(
             f"the folder {path} cannot be made ({error.strerror}). Choose another with --data-dir."
         ) from None
-
-
-def _give(path: Path, owner: pwd.struct_passwd, *, recursive: bool = False) -> None:
-    if os.geteuid() == 0:
-        for each in [path, *(path.rglob("*") if recursive else [])]:
-            os.chown(each, owner.pw_uid, owner.pw_gid, follow_symlinks=False)
 
 
 def _is_postgres(pid: int, cluster: Path) -> bool:

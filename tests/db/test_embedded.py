@@ -4,6 +4,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -194,6 +195,24 @@ def test_a_pid_file_whose_number_now_belongs_to_another_program_is_stale(folder:
     (folder / "data/postgres/postmaster.pid").write_text(f"{os.getpid()}\n{folder}/data/postgres\n0\n5432\n")
     with EmbeddedServer(folder / "data") as url:
         psycopg.connect(url).close()
+
+
+def test_children_of_a_killed_server_may_not_write_beside_the_next_one(folder: Path) -> None:
+    killed = start(folder / "data")
+    url, pid = url_and_pid(killed)
+    connection = psycopg.connect(url, autocommit=True)
+    child = connection.info.backend_pid
+    os.kill(child, signal.SIGSTOP)  # a backend too busy to notice
+    killed.kill()
+    killed.communicate()
+    os.kill(pid, signal.SIGKILL)
+    assert until(lambda: not runs(pid))
+    threading.Timer(0.8, os.kill, [child, signal.SIGKILL]).start()
+    with EmbeddedServer(folder / "data") as again:
+        assert not runs(child)
+        assert "pre-existing shared memory block" in (folder / "data/postgres.log").read_text()
+        psycopg.connect(again).close()
+    connection.close()
 
 
 def test_ctrl_c_in_the_terminal_does_not_reach_the_server(folder: Path) -> None:
