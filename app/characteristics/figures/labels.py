@@ -86,12 +86,12 @@ def _line(y: float, colour: str, width: float, dash: str) -> dict[str, Any]:
     }
 
 
-def limit_labels(limits: HasLimits, ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+def limit_labels(limits: HasLimits, ruler: Scale, colours: Palette, size: int) -> list[dict[str, Any]]:
     """At the right: on each limit its name, value and title; in each band what happens there."""
     found = bands(limits)
     height = 2 * ruler.extent
     notes: list[dict[str, Any]] = [
-        _note(0, f"<b>{_('target')}</b>" if not isinstance(ruler, ZoneScale) else "", colours.quiet, 12)
+        _note(0, f"<b>{_('target')}</b>" if not isinstance(ruler, ZoneScale) else "", colours.quiet, size)
     ]
     for sign in (1, -1):
         written = 0.0 if not isinstance(ruler, ZoneScale) else -height
@@ -105,7 +105,7 @@ def limit_labels(limits: HasLimits, ruler: Scale, colours: Palette) -> list[dict
                 title = limit_title(band.limits[-1])
                 ink = colours.ink if strong else colours.quiet
                 notes.append(
-                    _note(sign * place, f"<b>{names}  {_signed_limit(sign * band.lower)}</b>  {title}", ink, 12)
+                    _note(sign * place, f"<b>{names}  {_signed_limit(sign * band.lower)}</b>  {title}", ink, size)
                 )
             elif band.limits:
                 continue
@@ -113,13 +113,13 @@ def limit_labels(limits: HasLimits, ruler: Scale, colours: Palette) -> list[dict
             room = (upper - max(lower, written)) / height
             if isinstance(ruler, ZoneScale):
                 if band.number > 0:
-                    notes.append(_note(sign * (lower + upper) / 2, band_text(band, sign), colours.quiet, 12))
+                    notes.append(_note(sign * (lower + upper) / 2, band_text(band, sign), colours.quiet, size))
                 elif sign > 0:
-                    notes.append(_note(0, band_text(band, sign), colours.quiet, 12))
+                    notes.append(_note(0, band_text(band, sign), colours.quiet, size))
             elif room > 1.6 * LEAST_DISTANCE and band.number > 0:
                 place = max((max(lower, written) + upper) / 2, written + LEAST_DISTANCE * height)
                 written = place
-                notes.append(_note(sign * place, band_text(band, sign), colours.quiet, 12))
+                notes.append(_note(sign * place, band_text(band, sign), colours.quiet, size))
     return [note for note in notes if note["text"]]
 
 

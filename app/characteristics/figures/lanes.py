@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 from app.web.i18n import _
@@ -76,7 +77,7 @@ def _rows(marks: Sequence[Mark], span: tuple[float, float], pixels: int) -> list
     """Each mark with its row and whether its word is written: two rows, and a word gives way to the next mark's shape."""
     places: list[tuple[Mark, float, bool]] = []
     latest = {UPPER: -1, LOWER: -1}  # index of the last mark in the row
-    end = {UPPER: -1.0, LOWER: -1.0}  # where its word ends, px
+    end = {UPPER: -inf, LOWER: -inf}  # where its word ends, px
     for mark in sorted(marks, key=lambda mark: mark.sequence):
         start = (mark.sequence - span[0]) / (span[1] - span[0]) * pixels - 8
         row = UPPER if end[UPPER] <= start else min(end, key=lambda row: end[row])
@@ -94,6 +95,7 @@ def event_lane(
     marks: Sequence[Mark], span: tuple[float, float], pixels: int, colours: Palette
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]], list[dict[str, Any]]]:
     """Traces, words and vertical lines (tool changes, edits) of the events. A word is left out where it would not fit."""
+    marks = [mark for mark in marks if span[0] <= mark.sequence <= span[1]]
     if not marks:
         return [], [], []
     places = _rows(marks, span, pixels)
@@ -160,13 +162,16 @@ def offset_lane(
     events += [(mark.sequence, 0, None) for mark in marks if mark.kind == TOOL_CHANGE]
     total = total_before
     x: list[float] = [span[0]]
-    y: list[float] = [total * 1000]
+    y: list[float] = [round(total * 1000, 6)]
     at: list[tuple[Step, float]] = []
     for sequence, _order, step in sorted(events, key=lambda event: event[:2]):
         if step is None:
             total = 0.0
         elif step.status in COUNTED:
             total += step.amount
+        if sequence < span[0]:  # counts, but lies before what is shown
+            y[0] = round(total * 1000, 6)
+            continue
         x.append(sequence)
         y.append(round(total * 1000, 6))
         if step is not None:

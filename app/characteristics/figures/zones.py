@@ -24,8 +24,7 @@ from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, layout, palette, zon
 
 __all__ = ["Block", "Mark", "Point", "Step", "zone_chart"]
 
-LEFT, RIGHT = 92, 274  # pixels beside the readings
-MARGINS = LEFT + RIGHT
+WIDE = 1500  # pixels from which on there is room for larger letters
 EVENTS, READINGS, OFFSETS = [0.915, 1.0], [0.18, 0.91], [0.0, 0.14]  # of the height, from the bottom
 
 
@@ -86,6 +85,7 @@ def zone_chart(
     else:
         ends = [end for block in blocks for end in (block.minimum, block.maximum)]
         ruler = TrueScale.of(limits, [*(point.deviation for point in points), *ends])
+    letters, left, right = (14, 104, 322) if width >= WIDE else (12, 92, 274)
     first = min([block.first for block in blocks] + [point.sequence for point in points], default=1)
     last = max([block.last for block in blocks] + [point.sequence for point in points], default=first + 9)
     room = max((last - first) * 0.02, 0.6)
@@ -97,9 +97,14 @@ def zone_chart(
         *_readings(points, ruler, colours),
         *_latest(points, ruler, colours),
     ]
-    events, event_notes, event_lines = event_lane(marks, span, max(width - MARGINS, 200), colours)
+    events, event_notes, event_lines = event_lane(marks, span, max(width - left - right, 200), colours)
     offsets, offset_notes = offset_lane(steps, marks, span, total_before, colours)
-    notes = [*limit_labels(limits, ruler, colours), *event_notes, *offset_notes, *_beyond(points, ruler, colours)]
+    notes = [
+        *limit_labels(limits, ruler, colours, letters),
+        *event_notes,
+        *offset_notes,
+        *_beyond(points, ruler, colours),
+    ]
     if not points and not blocks:
         # Without a trace of its own plotly would not know where the axis of the readings is.
         traces.append(
@@ -123,7 +128,7 @@ def zone_chart(
         "data": [*traces, *events, *offsets],
         "layout": layout(
             theme,
-            margin={"l": LEFT, "r": RIGHT, "t": 34, "b": 48},
+            margin={"l": left, "r": right, "t": 34, "b": 48},
             hoverdistance=24,
             showlegend=True,
             legend={
@@ -154,7 +159,7 @@ def zone_chart(
                 "tickmode": "array",
                 "tickvals": ticks,
                 "ticktext": words,
-                "tickfont": {"size": 12, "color": colours.quiet},
+                "tickfont": {"size": letters, "color": colours.quiet},
                 "title": {
                     "text": _("Deviation") if centre is None else _("Size, mm"),
                     "font": {"size": 12, "color": colours.quiet},
