@@ -229,7 +229,7 @@ def _readings(points: Sequence[Point], ruler: Scale, colours: Palette) -> list[d
                 "symbol": [
                     ZONE_SYMBOLS.get(point.zone, "circle") + ("-open" if point.excluded else "") for point in points
                 ],
-                "size": [small if point.zone in calm else max(small + 3, 10) for point in points],
+                "size": [small if point.zone in calm else max(small + 4, 12) for point in points],
                 "color": colour,
                 "line": {
                     "width": [1.5 if point.excluded else 0.75 for point in points],
