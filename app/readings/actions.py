@@ -1,5 +1,7 @@
 """What people do to readings after the fact. The readings themselves are written by the writer alone."""
 
+from collections.abc import Sequence
+
 from sqlalchemy import select
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.orm import Session
@@ -69,4 +71,43 @@ def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: s
             "excluded": True,
         },
     )
+    return made
+
+
+def exclude_all(session: Session, entry: Entry, sequences: Sequence[int], actor: str, reason: str) -> list[int]:
+    """Take several readings of one characteristic out of the statistics at once; those excluded already are left alone.
+
+    Returns the ones that were excluded now.
+    """
+    at = {"machine_id": entry.machine_id, "characteristic_id": entry.characteristic_id}
+    made = sorted(
+        session.scalars(
+            insert(Exclusion)
+            .values([{**at, "sequence": sequence, "actor": actor, "reason": reason} for sequence in sequences])
+            .on_conflict_do_nothing()
+            .returning(Exclusion.sequence)
+        )
+        if sequences
+        else ()
+    )
+    if made:
+        audit.record(
+            session,
+            actor,
+            "exclude",
+            f"reading {entry.characteristic}",
+            before={"excluded": False},
+            after={"excluded": True, "sequences": made},
+            why=reason,
+        )
+        publish(
+            session,
+            {
+                "kind": "reading",
+                "machine": entry.machine,
+                "characteristic": entry.characteristic,
+                "sequence": made[-1],
+                "excluded": True,
+            },
+        )
     return made

@@ -1,8 +1,9 @@
 """Everything that is read of readings."""
 
+from collections.abc import Iterable
 from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import select, tuple_
 from sqlalchemy.orm import Session
 
 from app.alarms.tables import Alarm
@@ -14,6 +15,7 @@ from app.offsets.tables import Correction
 from app.readings.answers import answer
 from app.readings.records import Entry, Record
 from app.readings.tables import Exclusion, Reading, ReadingTouches
+from app.readings.wording import reason
 from app.web.i18n import _
 
 COLUMNS = [getattr(Reading, name) for name in Record._fields]
@@ -139,3 +141,21 @@ def latest(session: Session, entry: Entry, before: int | None, limit: int) -> li
     if before is not None:
         query = query.where(Reading.sequence < before)
     return [Record(*row) for row in session.execute(query.order_by(Reading.sequence.desc()).limit(limit))]
+
+
+def reasons(
+    session: Session, machine_id: int, asked: Iterable[tuple[int, int, float]]
+) -> dict[tuple[int, int], dict[str, Any]]:
+    """Why corrections were issued: the reasons of the readings (characteristic id, sequence, amount in mm) behind them."""
+    amounts = {(characteristic_id, sequence): amount for characteristic_id, sequence, amount in asked}
+    rows = session.execute(
+        select(*COLUMNS).where(
+            Reading.machine_id == machine_id, tuple_(Reading.characteristic_id, Reading.sequence).in_(amounts)
+        )
+    )
+    found = {}
+    for record in (Record(*row) for row in rows):
+        at = (record.characteristic_id, record.sequence)
+        parameters = characteristics.parameters_of(session, machine_id, at[0], record.parameters_version)
+        found[at] = reason(record, parameters, amounts[at])
+    return found

@@ -1,0 +1,35 @@
+"""Raising alarms that do not come from a reading. Readings raise theirs in `app.readings`; people acknowledge in `acknowledging`."""
+
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.alarms.tables import Alarm
+
+
+def raise_for_tool(session: Session, machine_id: int, tool_memory: int, kind: str, data: dict[str, Any]) -> Alarm:
+    """Raise an alarm about a tool, or count one more if it is active already; the machine is locked.
+
+    The values of the last time are what its sentence says.
+    """
+    active = session.scalars(
+        select(Alarm)
+        .where(
+            Alarm.machine_id == machine_id,
+            Alarm.tool_memory == tool_memory,
+            Alarm.kind == kind,
+            Alarm.characteristic_id.is_(None),
+            Alarm.acknowledged_at.is_(None),
+        )
+        .execution_options(populate_existing=True)
+    ).one_or_none()
+    if active is None:
+        active = Alarm(machine_id=machine_id, tool_memory=tool_memory, kind=kind, data=data)
+        session.add(active)
+    else:
+        active.count += 1
+        active.last_at = func.clock_timestamp()
+        active.data = data
+    session.flush()
+    return active

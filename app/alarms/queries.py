@@ -1,0 +1,181 @@
+"""Which alarms there are. Never writes."""
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+from sqlalchemy import Select, func, select
+from sqlalchemy.orm import Session, aliased
+
+from app.alarms.tables import Alarm
+from app.characteristics.tables import Characteristic
+from app.errors import NotFound
+from app.machines.tables import Machine
+from app.offsets.tables import OPEN, Correction
+from app.readings.tables import Reading
+from app.web.fields import LARGEST_ID
+from app.web.i18n import _
+
+State = Literal["active", "acknowledged", "all"]
+KINDS = (
+    "oversize",
+    "undersize",
+    "tool_worn",
+    "probe_fault",
+    "acceptance",
+    "offset_limit",
+    "offset_differs",
+    "signal",
+)
+
+
+class AlarmRow(NamedTuple):
+    """An alarm with the names of what it is about, and the correction that is held because of it."""
+
+    alarm: Alarm
+    machine: Machine
+    characteristic: Characteristic | None
+    held: Correction | None
+
+
+def _rows() -> Select[Alarm, Machine, Characteristic, Correction]:
+    held = aliased(Correction)
+    return (
+        select(Alarm, Machine, Characteristic, held)
+        .join(Machine, Machine.id == Alarm.machine_id)
+        .outerjoin(
+            Characteristic,
+            (Characteristic.machine_id == Alarm.machine_id) & (Characteristic.id == Alarm.characteristic_id),
+        )
+        .outerjoin(  # a tool has one held correction at most: a newer one supersedes it
+            held,
+            (held.machine_id == Alarm.machine_id)
+            & (held.tool_memory == Alarm.tool_memory)
+            & (held.characteristic_id == Alarm.characteristic_id)
+            & (held.status == "held")
+            & (Alarm.kind == "tool_worn")
+            & Alarm.acknowledged_at.is_(None),
+        )
+        .execution_options(populate_existing=True)
+    )
+
+
+def alarm(session: Session, number: int) -> AlarmRow:
+    """One alarm by its number. Raises `NotFound`."""
+    row = session.execute(_rows().where(Alarm.id == number)).one_or_none() if 0 < number <= LARGEST_ID else None
+    if row is None:
+        raise NotFound(
+            _("There is no alarm {number}.").format(number=number),
+            _("Check the number; GET /api/v1/alarms lists them."),
+        )
+    return AlarmRow(*row)
+
+
+def alarms(
+    session: Session,
+    *,
+    state: State = "all",
+    machine_id: int | None = None,
+    characteristic: str | None = None,
+    kind: str | None = None,
+    after: int = 0,
+    limit: int = 100,
+) -> list[AlarmRow]:
+    """Alarms, oldest first."""
+    wanted = _filtered(state, machine_id).where(Alarm.id > after).order_by(Alarm.id).limit(limit)
+    if characteristic is not None:
+        wanted = wanted.where(Characteristic.key == characteristic)
+    if kind is not None:
+        wanted = wanted.where(Alarm.kind == kind)
+    return [AlarmRow(*row) for row in session.execute(wanted)]
+
+
+def _filtered(state: State, machine_id: int | None) -> Select[Alarm, Machine, Characteristic, Correction]:
+    wanted = _rows()
+    if machine_id is not None:
+        wanted = wanted.where(Alarm.machine_id == machine_id)
+    if state == "active":
+        wanted = wanted.where(Alarm.acknowledged_at.is_(None))
+    elif state == "acknowledged":
+        wanted = wanted.where(Alarm.acknowledged_at.is_not(None))
+    return wanted
+
+
+def history(
+    session: Session, *, machine_id: int | None = None, before: int | None = None, limit: int = 50
+) -> list[AlarmRow]:
+    """All alarms, newest first."""
+    wanted = _filtered("all", machine_id)
+    if before is not None:
+        wanted = wanted.where(Alarm.id < before)
+    return [AlarmRow(*row) for row in session.execute(wanted.order_by(Alarm.id.desc()).limit(limit))]
+
+
+def acknowledged_last(session: Session, *, machine_id: int | None = None, limit: int = 8) -> list[AlarmRow]:
+    """What was acknowledged last, the latest first."""
+    wanted = _filtered("acknowledged", machine_id).order_by(Alarm.acknowledged_at.desc(), Alarm.id.desc())
+    return [AlarmRow(*row) for row in session.execute(wanted.limit(limit))]
+
+
+def active_count(session: Session, machine_id: int | None = None) -> int:
+    """How many alarms are active."""
+    wanted = select(func.count()).select_from(Alarm).where(Alarm.acknowledged_at.is_(None))
+    return session.scalar(wanted if machine_id is None else wanted.where(Alarm.machine_id == machine_id)) or 0
+
+
+def active_by_machine(session: Session) -> dict[str, int]:
+    """How many alarms are active, by machine key."""
+    counted = func.count().label("active")
+    return {
+        row.key: row.active
+        for row in session.execute(
+            select(Machine.key, counted)
+            .join(Alarm, Alarm.machine_id == Machine.id)
+            .where(Alarm.acknowledged_at.is_(None))
+            .group_by(Machine.key)
+        )
+    }
+
+
+def readings_behind(session: Session, row: AlarmRow) -> tuple[str | None, list[int]]:
+    """The characteristic whose readings raised the alarm, and their sequence numbers.
+
+    An alarm about a tool (*offset limit*) names the characteristic that raised it first in its data.
+    """
+    found = row.alarm
+    key = row.characteristic.key if row.characteristic else found.data.get("characteristic")
+    if key is None or found.sequence is None:
+        return None, []
+    behind = (
+        select(Reading.sequence)
+        .join(
+            Characteristic,
+            (Characteristic.machine_id == Reading.machine_id) & (Characteristic.id == Reading.characteristic_id),
+        )
+        .where(
+            Characteristic.key == key,
+            Reading.machine_id == found.machine_id,
+            Reading.sequence >= found.sequence,
+            Reading.alarms.contains([found.id]),
+        )
+    )
+    if row.characteristic is not None:  # the last one of a tool's alarm may be of another characteristic
+        behind = behind.where(Reading.sequence <= (found.last_sequence or found.sequence))
+    return key, list(session.scalars(behind.order_by(Reading.sequence)))
+
+
+def corrections_of(
+    session: Session, machine_id: int, characteristic_id: int, sequences: Sequence[int]
+) -> list[Correction]:
+    """The corrections that these readings led to, as far as they are open or applied."""
+    return list(
+        session.scalars(
+            select(Correction)
+            .where(
+                Correction.machine_id == machine_id,
+                Correction.characteristic_id == characteristic_id,
+                Correction.sequence.in_(sequences),
+                Correction.status.in_((*OPEN, "applied")),
+            )
+            .order_by(Correction.number)
+        )
+    )

@@ -1,0 +1,327 @@
+"""What people and machines do to corrections, tool offsets and averages.
+
+Every verb locks the machine first, so of two who decide at once exactly one wins and the other is told so.
+Lengths are mm.
+"""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Any, Literal, NamedTuple
+
+from sqlalchemy import select, update
+from sqlalchemy.orm import Session
+
+from app.alarms import actions as alarms
+from app.alarms.tables import Alarm
+from app.audit.actions import record
+from app.characteristics.tables import Characteristic
+from app.core.compensation import DECIMALS
+from app.core.zones import nanometres
+from app.db.events import publish
+from app.errors import Conflict
+from app.machines.queries import lock_machines
+from app.machines.tables import Machine
+from app.offsets import queries, wording
+from app.offsets.queries import OFFSET_TOLERANCE
+from app.offsets.tables import OPEN, AverageMemory, Correction, Tool, ToolEvent
+from app.people.callers import Caller
+from app.readings.tables import Stream
+from app.web.i18n import _
+
+Verb = Literal["rejected", "approve", "release"]
+FROM: dict[str, tuple[str, ...]] = {"rejected": OPEN, "approve": ("awaiting_approval",), "release": ("held",)}
+INTO = {"rejected": "rejected", "approve": "pending", "release": "pending"}
+SAID = {"rejected": "correction rejected", "approve": "correction approved", "release": "correction released"}
+
+
+class Decided(NamedTuple):
+    """A correction after something was done to it, and what else is to be said about it."""
+
+    correction: Correction
+    note: str | None = None
+
+
+class Restarted(NamedTuple):
+    """A tool whose offset was set anew; open corrections fell, averages began again."""
+
+    tool: Tool
+    superseded: list[int]
+    averages: list[int]
+    parts: int
+
+
+def mark_applied(
+    session: Session,
+    machine: Machine,
+    number: int,
+    caller: Caller,
+    *,
+    offset_after: float | None = None,
+    applied_at: datetime | None = None,
+) -> Decided:
+    """A pending correction is in the offset now. Saying so twice is harmless.
+
+    A reported offset that differs from the expected one raises *offset differs* and becomes the known offset.
+    Raises `NotFound`; `Conflict` for a correction that is not pending, or when another offset is reported the second time.
+    """
+    correction = _locked(session, machine, number)
+    if correction.status == "applied":
+        _refuse_other_offset(correction, machine, offset_after)
+        return Decided(correction)
+    _must_be(correction, machine, "applied", ("pending",))
+    tool = queries.tool(session, machine, correction.tool_memory)
+    now = datetime.now(UTC)
+    at = min(now, applied_at or now)
+    before = tool.offset
+    expected = round(before + correction.amount, DECIMALS) + 0.0
+    tool.offset = expected if offset_after is None else round(offset_after, DECIMALS) + 0.0
+    tool.total = round(tool.total + correction.amount, DECIMALS) + 0.0
+    correction.status, correction.applied_at, correction.applied_by = "applied", at, caller.name
+    correction.offset_after = tool.offset
+    session.add(
+        ToolEvent(
+            machine_id=machine.id,
+            number=tool.number,
+            at=at,
+            kind="correction",
+            offset_before=before,
+            offset_after=tool.offset,
+            correction=number,
+            actor=caller.name,
+        )
+    )
+    if caller.kind != "machine":  # what a machine does all day stands in the history of its tools
+        _record_status(session, machine, correction, caller, "correction applied", "pending", None)
+    changes = [_correction_changed(session, machine, correction), _tool_changed(machine, tool.number)]
+    note = None
+    if abs(nanometres(tool.offset - expected)) > OFFSET_TOLERANCE:
+        alarm = alarms.raise_for_tool(
+            session,
+            machine.id,
+            tool.number,
+            "offset_differs",
+            {"correction": number, "expected": expected, "reported": tool.offset, "limit": OFFSET_TOLERANCE / 1e6},
+        )
+        changes.append(_alarm_raised(machine, alarm))
+        note = wording.offset_differs(alarm.id, expected, tool.offset)
+    publish(session, *changes)
+    return Decided(correction, note)
+
+
+def decide(session: Session, machine: Machine, number: int, verb: Verb, reason: str, caller: Caller) -> Decided:
+    """Reject a correction that is not applied yet, approve one that awaits it, or release a held one.
+
+    Raises `NotFound`; `Conflict` when the correction's status does not permit it.
+    """
+    correction = _locked(session, machine, number)
+    _must_be(correction, machine, verb, FROM[verb])
+    before = correction.status
+    correction.status, correction.reason = INTO[verb], reason
+    correction.decided_at, correction.decided_by = datetime.now(UTC), caller.name
+    _record_status(session, machine, correction, caller, SAID[verb], before, reason)
+    publish(session, _correction_changed(session, machine, correction))
+    alarm = _wear_alarm(session, correction) if before == "held" else None
+    return Decided(correction, None if alarm is None else wording.still_active(alarm))
+
+
+def edit_tool(session: Session, machine: Machine, number: int, offset: float, reason: str, caller: Caller) -> Restarted:
+    """Somebody has set the offset by hand and says what it is now.
+
+    Open corrections were computed for the offset before, so they are superseded; the averages of the characteristics on
+    this tool begin again at 0; parts cut before say nothing. Raises `NotFound`.
+    """
+    return _set_offset(session, machine, number, offset, reason, caller, "edit")
+
+
+def change_tool(
+    session: Session, machine: Machine, number: int, offset: float, reason: str, caller: Caller
+) -> Restarted:
+    """The tool was changed: all that `edit_tool` does, and its life and the sum of its corrections begin again.
+
+    Alarms about the old tool stay until somebody acknowledges them: a person was asked, and a person answers.
+    Raises `NotFound`.
+    """
+    return _set_offset(session, machine, number, offset, reason, caller, "change")
+
+
+def _set_offset(
+    session: Session,
+    machine: Machine,
+    number: int,
+    offset: float,
+    reason: str,
+    caller: Caller,
+    kind: Literal["edit", "change"],
+) -> Restarted:
+    lock_machines(session, [machine.id])
+    tool = queries.tool(session, machine, number)
+    now = datetime.now(UTC)
+    before = {"offset": tool.offset, "total": tool.total}
+    parts = queries.parts_cut(session, machine.id, number)
+    tool.offset, tool.reset_at = round(offset, DECIMALS) + 0.0, now
+    on_it = (Stream.machine_id == machine.id) & (Stream.tool_memory == number)
+    if kind == "change":
+        tool.total, tool.changed_at = 0.0, now
+        session.execute(
+            update(Stream)
+            .where(on_it)
+            .values(sequence_at_tool_change=Stream.sequence)
+            .execution_options(synchronize_session=False)
+        )
+    session.add(
+        ToolEvent(
+            machine_id=machine.id,
+            number=number,
+            at=now,
+            kind=kind,
+            offset_before=before["offset"],
+            offset_after=tool.offset,
+            parts=parts if kind == "change" else None,
+            actor=caller.name,
+            reason=reason,
+        )
+    )
+    fallen = _supersede(session, machine, number, now, caller, reason)
+    begun = _restart_averages(
+        session, machine, session.scalars(select(Stream.average_memory).where(on_it).distinct()).all(), now
+    )
+    after: dict[str, Any] = {"offset": tool.offset, "total": tool.total}
+    if fallen:
+        after["superseded"] = [correction.number for correction in fallen]
+    said = "tool changed" if kind == "change" else "offset edited"
+    record(session, caller.name, said, f"tool/{machine.key}/{number}", before, after, reason)
+    publish(
+        session,
+        _tool_changed(machine, number),
+        *(_correction_changed(session, machine, correction) for correction in fallen),
+        *(_average_changed(machine, location) for location in begun),
+    )
+    return Restarted(tool, [correction.number for correction in fallen], begun, parts)
+
+
+def set_empirical_value(
+    session: Session, machine: Machine, location: int, empirical_value: float, reason: str, caller: Caller
+) -> AverageMemory:
+    """Set what is taken off every measurement by the characteristics that use this location (R11); M begins again at 0.
+
+    Raises `NotFound`.
+    """
+    lock_machines(session, [machine.id])
+    memory = queries.average(session, machine, location)
+    before = {"empirical_value": memory.empirical_value, "average": memory.average}
+    memory.empirical_value = round(empirical_value, DECIMALS) + 0.0
+    _restart_averages(session, machine, [location], datetime.now(UTC))
+    session.refresh(memory)
+    after = {"empirical_value": memory.empirical_value, "average": memory.average}
+    subject = f"average/{machine.key}/{location}"
+    record(session, caller.name, "empirical value changed", subject, before, after, reason)
+    publish(session, _average_changed(machine, location))
+    return memory
+
+
+def _locked(session: Session, machine: Machine, number: int) -> Correction:
+    lock_machines(session, [machine.id])
+    return queries.correction(session, machine, number)
+
+
+def _must_be(correction: Correction, machine: Machine, verb: str, statuses: tuple[str, ...]) -> None:
+    if correction.status not in statuses:
+        detail, instead = wording.refused(correction, machine.key, verb)
+        raise Conflict(detail, instead, correction_status=correction.status)
+
+
+def _refuse_other_offset(correction: Correction, machine: Machine, offset_after: float | None) -> None:
+    known = correction.offset_after
+    if offset_after is None or known is None or abs(nanometres(offset_after - known)) <= OFFSET_TOLERANCE:
+        return
+    raise Conflict(
+        _(
+            "Correction {number} of {machine} was confirmed with the offset {known} mm already, not {reported} mm. Nothing was changed."
+        ).format(number=correction.number, machine=machine.key, known=known, reported=offset_after),
+        _("Tell the offset as it is now by a manual edit of tool {tool}.").format(tool=correction.tool_memory),
+        correction_status=correction.status,
+    )
+
+
+def _supersede(
+    session: Session, machine: Machine, number: int, now: datetime, caller: Caller, reason: str
+) -> Sequence[Correction]:
+    fallen = queries.open_corrections(session, machine, number)
+    for correction in fallen:
+        correction.status, correction.reason = "superseded", reason
+        correction.decided_at, correction.decided_by = now, caller.name
+    session.flush()
+    return fallen
+
+
+def _restart_averages(session: Session, machine: Machine, locations: Sequence[int], now: datetime) -> list[int]:
+    begun = session.scalars(
+        update(AverageMemory)
+        .where(AverageMemory.machine_id == machine.id, AverageMemory.location.in_(locations))
+        .values(average=0.0, updated_at=now)
+        .returning(AverageMemory.location)
+        .execution_options(synchronize_session=False)
+    )
+    return sorted(begun)
+
+
+def _wear_alarm(session: Session, correction: Correction) -> int | None:
+    return session.scalar(
+        select(Alarm.id).where(
+            Alarm.machine_id == correction.machine_id,
+            Alarm.characteristic_id == correction.characteristic_id,
+            Alarm.kind == "tool_worn",
+            Alarm.acknowledged_at.is_(None),
+        )
+    )
+
+
+def _record_status(
+    session: Session,
+    machine: Machine,
+    correction: Correction,
+    caller: Caller,
+    said: str,
+    before: str,
+    reason: str | None,
+) -> None:
+    subject = f"correction/{machine.key}/{correction.number}"
+    after: dict[str, Any] = {"status": correction.status}
+    if correction.offset_after is not None:
+        after["offset_after"] = correction.offset_after
+    record(session, caller.name, said, subject, {"status": before}, after, reason)
+
+
+def _correction_changed(session: Session, machine: Machine, correction: Correction) -> dict[str, Any]:
+    return {
+        "kind": "correction",
+        "machine": machine.key,
+        "characteristic": session.scalar(
+            select(Characteristic.key).where(
+                Characteristic.machine_id == machine.id, Characteristic.id == correction.characteristic_id
+            )
+        ),
+        "tool": correction.tool_memory,
+        "number": correction.number,
+        "status": correction.status,
+    }
+
+
+def _tool_changed(machine: Machine, number: int) -> dict[str, Any]:
+    return {"kind": "tool", "machine": machine.key, "tool": number}
+
+
+def _average_changed(machine: Machine, location: int) -> dict[str, Any]:
+    return {"kind": "average", "machine": machine.key, "average_memory": location}
+
+
+def _alarm_raised(machine: Machine, alarm: Alarm) -> dict[str, Any]:
+    return {
+        "kind": "alarm",
+        "machine": machine.key,
+        "characteristic": None,
+        "tool": alarm.tool_memory,
+        "id": alarm.id,
+        "alarm": alarm.kind,
+        "state": "active",
+    }

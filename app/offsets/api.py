@@ -1,0 +1,224 @@
+"""JSON routes: tool memory (R10), average memory (R11), and the life of corrections."""
+
+from typing import Annotated, Any
+
+from fastapi import Path, Query
+
+from app.machines.queries import machine_named
+from app.offsets import actions, queries, wording
+from app.offsets.figures import OffsetChange, offset_figure
+from app.offsets.schemas import (
+    AppliedIn,
+    AverageOut,
+    CorrectionOut,
+    DecisionIn,
+    EmpiricalValueIn,
+    Status,
+    ToolChange,
+    ToolEdit,
+    ToolOut,
+    ToolSet,
+    average_out,
+    correction_out,
+    tool_out,
+    tool_set,
+)
+from app.web.api import api_router, problems
+from app.web.deps import AnyCaller, Operator, SessionDep
+from app.web.fields import Cursor, Limit, Page, page_of
+from app.web.theme import theme_from
+
+router = api_router("offsets")
+MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
+R10 = Annotated[int, Path(description="Tool memory location R10, 1 to 32.", examples=[3])]
+R11 = Annotated[int, Path(description="Average memory location R11, 1 to 20.", examples=[5])]
+Number = Annotated[int, Path(description="Number of the correction; counts per machine.", examples=[18])]
+After = Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")]
+
+
+# --- tool memory
+
+
+@router.get("/machines/{machine}/tools", responses=problems(404))
+def list_tools(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineKey,
+    after: After = 0,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[ToolOut]:
+    """The tool memory: every location with its offset, the sum of corrections since the tool was changed, parts cut."""
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "viewer")
+    rows = queries.tools(session, found, after=after, limit=limit + 1)
+    return page_of([tool_out(row, found.key) for row in rows], limit, lambda tool: tool.tool_memory)
+
+
+@router.get("/machines/{machine}/tools/{tool}", responses=problems(404))
+def get_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10) -> ToolOut:
+    """One location of the tool memory."""
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "viewer")
+    queries.tool(session, found, tool)
+    return tool_out(queries.tools(session, found, only=tool)[0], found.key)
+
+
+@router.put("/machines/{machine}/tools/{tool}", responses=problems(404))
+def edit_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, edit: ToolEdit) -> ToolSet:
+    """Say what the offset was set to by hand.
+
+    Corrections that are still open were computed for the offset before: they are superseded. The running averages of the
+    characteristics on this tool begin again at 0, and parts cut before say nothing about the new offset.
+    """
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "operator")
+    done = actions.edit_tool(session, found, tool, edit.offset, edit.reason, caller)
+    return tool_set(queries.tools(session, found, only=tool)[0], found.key, done.superseded)
+
+
+@router.post("/machines/{machine}/tools/{tool}/change", responses=problems(404))
+def change_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, change: ToolChange) -> ToolSet:
+    """Say that the tool was changed.
+
+    As a manual edit; besides, its parts and the sum of its corrections begin again at 0. Alarms about the old tool stay
+    until somebody acknowledges them.
+    """
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "operator")
+    done = actions.change_tool(session, found, tool, change.offset, change.reason, caller)
+    return tool_set(queries.tools(session, found, only=tool)[0], found.key, done.superseded)
+
+
+@router.get("/machines/{machine}/tools/{tool}/figure", responses=problems(404))
+def tool_figure(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineKey,
+    tool: R10,
+    theme: Annotated[str | None, Query(description="`light` or `dark`", max_length=20)] = None,
+    limit: Annotated[Limit, Query()] = 500,
+) -> dict[str, Any]:
+    """The history of the offset as a Plotly figure: `{"data", "layout"}`."""
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "viewer")
+    queries.tool(session, found, tool)
+    steps = reversed(queries.steps(session, found, tool, limit=limit))
+    changes = [OffsetChange(step.event.at, step.event.offset_after, step.kind, wording.step(step)) for step in steps]
+    return offset_figure(changes, theme=theme_from(theme))
+
+
+# --- average memory
+
+
+@router.get("/machines/{machine}/averages", responses=problems(404))
+def list_averages(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineKey,
+    after: After = 0,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[AverageOut]:
+    """The average memory: running average and empirical value of every location."""
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "viewer")
+    rows = queries.averages(session, found, after=after, limit=limit + 1)
+    return page_of([average_out(row, found.key) for row in rows], limit, lambda average: average.average_memory)
+
+
+@router.get("/machines/{machine}/averages/{location}", responses=problems(404))
+def get_average(session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11) -> AverageOut:
+    """One location of the average memory."""
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "viewer")
+    queries.average(session, found, location)
+    return average_out(queries.averages(session, found, only=location)[0], found.key)
+
+
+@router.put("/machines/{machine}/averages/{location}", responses=problems(404))
+def set_empirical_value(
+    session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11, value: EmpiricalValueIn
+) -> AverageOut:
+    """Set the empirical value; the running average begins again at 0."""
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "operator")
+    actions.set_empirical_value(session, found, location, value.empirical_value, value.reason, caller)
+    return average_out(queries.averages(session, found, only=location)[0], found.key)
+
+
+# --- corrections
+
+
+@router.get("/machines/{machine}/corrections", responses=problems(404))
+def list_corrections(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineKey,
+    status: Annotated[list[Status], Query(description="Only these; may be given several times.")] = [],  # noqa: B006 - FastAPI copies it
+    tool_memory: Annotated[int | None, Query(description="Only those of this location R10.", ge=1, le=32)] = None,
+    after: After = 0,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[CorrectionOut]:
+    """Corrections, oldest first: the order in which a machine applies the pending ones."""
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "viewer")
+    rows = queries.corrections(
+        session, found, statuses=status, tool_memory=tool_memory, after=min(after, 2**31 - 1), limit=limit + 1
+    )
+    return page_of([correction_out(row) for row in rows], limit, lambda correction: correction.number)
+
+
+@router.get("/corrections/{machine}/{number}", responses=problems(404))
+def get_correction(session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number) -> CorrectionOut:
+    """One correction."""
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "viewer")
+    return correction_out(queries.row_of(session, found, queries.correction(session, found, number)))
+
+
+@router.post("/corrections/{machine}/{number}/applied", responses=problems(404, 409))
+def mark_applied(
+    session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number, applied: AppliedIn | None = None
+) -> CorrectionOut:
+    """Confirm that the correction is in the offset now. Confirming twice is harmless.
+
+    An `offset_after` that differs from `offset_expected` by more than 0.0005 mm raises the alarm *offset differs*; the
+    reported offset is the known one from then on.
+    """
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "operator")
+    given = applied or AppliedIn()
+    done = actions.mark_applied(
+        session, found, number, caller, offset_after=given.offset_after, applied_at=given.applied_at
+    )
+    return correction_out(queries.row_of(session, found, done.correction), done.note)
+
+
+@router.post("/corrections/{machine}/{number}/rejected", responses=problems(404, 409))
+def reject_correction(
+    session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number, decision: DecisionIn
+) -> CorrectionOut:
+    """It will not be applied: the machine refuses the offset, or a person decides against it."""
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "operator")
+    done = actions.decide(session, found, number, "rejected", decision.reason, caller)
+    return correction_out(queries.row_of(session, found, done.correction), done.note)
+
+
+@router.post("/corrections/{machine}/{number}/approve", responses=problems(404, 409))
+def approve_correction(
+    session: SessionDep, caller: Operator, machine: MachineKey, number: Number, decision: DecisionIn
+) -> CorrectionOut:
+    """A person approves a correction that awaits it; the machine may apply it then."""
+    found = machine_named(session, machine)
+    done = actions.decide(session, found, number, "approve", decision.reason, caller)
+    return correction_out(queries.row_of(session, found, done.correction), done.note)
+
+
+@router.post("/corrections/{machine}/{number}/release", responses=problems(404, 409))
+def release_correction(
+    session: SessionDep, caller: Operator, machine: MachineKey, number: Number, decision: DecisionIn
+) -> CorrectionOut:
+    """A person releases a held correction; the machine may apply it then. Its alarm stays until it is acknowledged."""
+    found = machine_named(session, machine)
+    done = actions.decide(session, found, number, "release", decision.reason, caller)
+    return correction_out(queries.row_of(session, found, done.correction), done.note)

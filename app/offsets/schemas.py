@@ -1,0 +1,304 @@
+"""Tool memory, averages and corrections as JSON. Lengths in mm."""
+
+from datetime import UTC, datetime, timedelta
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field, JsonValue
+from pydantic_core import PydanticCustomError
+
+from app.core.parameters import LARGEST_LENGTH
+from app.offsets import wording
+from app.offsets.queries import AverageRow, CorrectionRow, ToolRow
+from app.offsets.tables import Correction
+from app.web.fields import Body, Reason
+from app.web.i18n import _
+
+Status = Literal["held", "awaiting_approval", "pending", "applied", "rejected", "superseded"]
+EARLIEST = datetime(2000, 1, 1, tzinfo=UTC)
+AHEAD = timedelta(hours=24)
+
+
+def _written(value: Any) -> Any:
+    """A count of (milli)seconds is not a time here: nobody can tell which it is."""
+    if not isinstance(value, str | datetime):
+        raise PydanticCustomError("datetime_type", "not a time")
+    return value
+
+
+def _sensible(moment: datetime) -> datetime:
+    if moment < EARLIEST or moment > datetime.now(UTC) + AHEAD:
+        raise PydanticCustomError("moment", _("is more than a day ahead, or before 2000; check the machine's clock"))
+    return moment
+
+
+Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
+Moment = Annotated[AwareDatetime, BeforeValidator(_written), AfterValidator(_sensible)]
+
+CORRECTION: dict[str, JsonValue] = {
+    "machine": "lathe-1",
+    "number": 18,
+    "tool_memory": 3,
+    "amount": -0.0061,
+    "status": "pending",
+    "characteristic": "shaft-d40",
+    "sequence": 812,
+    "size_error": 0.0061,
+    "created_at": "2026-11-21T07:15:02.131Z",
+    "offset_expected": -0.0142,
+    "applied_at": None,
+    "applied_by": None,
+    "offset_after": None,
+    "decided_at": None,
+    "decided_by": None,
+    "status_reason": None,
+    "superseded_by": None,
+    "reason": {
+        "code": "full_deviation",
+        "text": "Deviation 6.1 µm is beyond the averaging limit 5.3 µm: corrected in full.",
+        "notes": [],
+    },
+    "note": None,
+}
+LAST: dict[str, JsonValue] = {
+    name: CORRECTION[name] for name in ("number", "amount", "status", "created_at", "applied_at")
+}
+TOOL: dict[str, JsonValue] = {
+    "machine": "lathe-1",
+    "tool_memory": 3,
+    "offset": -0.0081,
+    "total": -0.0081,
+    "parts": 211,
+    "changed_at": "2026-11-20T05:02:11Z",
+    "reset_at": "2026-11-20T05:02:11Z",
+    "last_correction": LAST,
+    "open_corrections": [LAST],
+    "characteristics": ["shaft-d40"],
+}
+
+
+class AppliedIn(Body):
+    """The machine (or a person at it) says that a correction is in the offset now."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"offset_after": -0.0142}})
+
+    offset_after: Annotated[
+        Length | None, Field(description="The offset that the control holds now; it is compared with the expected one.")
+    ] = None
+    applied_at: Annotated[Moment | None, Field(description="When; if left out, now.")] = None
+
+
+class DecisionIn(Body):
+    """Why a correction is rejected, approved or released."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"reason": "insert looked at, still good"}})
+
+    reason: Reason
+
+
+class ToolEdit(Body):
+    """The offset as somebody has set it by hand."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"offset": -0.012, "reason": "set at the control"}})
+
+    offset: Length
+    reason: Reason
+
+
+class ToolChange(Body):
+    """A new tool in this location."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"offset": 0.0, "reason": "insert worn after 211 parts"}})
+
+    offset: Annotated[Length, Field(description="The offset that the new tool starts with.")] = 0.0
+    reason: Reason
+
+
+class EmpiricalValueIn(Body):
+    """What is to be taken off every measurement (machine reading minus true value)."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"example": {"empirical_value": 0.002, "reason": "compared with the CMM, part 812"}}
+    )
+
+    empirical_value: Length
+    reason: Reason
+
+
+class Why(BaseModel):
+    """Code and sentence of the reading that asked for the correction."""
+
+    code: str
+    text: str
+    notes: list[str] = []
+
+
+class CorrectionOut(BaseModel):
+    """A change of a tool offset, on its way from the reading that asked for it to the machine that makes it."""
+
+    model_config = ConfigDict(json_schema_extra={"example": CORRECTION})
+
+    machine: str
+    number: Annotated[int, Field(description="Counts per machine, without gaps.")]
+    tool_memory: Annotated[int, Field(description="R10")]
+    amount: Annotated[float, Field(description="What the offset changes by, mm.")]
+    status: Status
+    characteristic: str
+    sequence: Annotated[int, Field(description="The reading that asked for it.")]
+    size_error: Annotated[float, Field(description="The error of size that it removes, mm.")]
+    created_at: datetime
+    offset_expected: Annotated[
+        float | None,
+        Field(
+            description="The offset once the pending ones up to this one, and this one, are applied; open ones only."
+        ),
+    ]
+    applied_at: datetime | None
+    applied_by: str | None
+    offset_after: float | None
+    decided_at: Annotated[datetime | None, Field(description="When it was released, approved, rejected or superseded.")]
+    decided_by: str | None
+    status_reason: Annotated[str | None, Field(description="What was said when that was decided.")]
+    superseded_by: int | None
+    reason: Annotated[Why | None, Field(description="Why it was asked for.")]
+    note: Annotated[str | None, Field(description="What else is to be said about what was just done.")] = None
+
+
+class CorrectionBrief(BaseModel):
+    """A correction, in short."""
+
+    number: int
+    amount: float
+    status: Status
+    created_at: datetime
+    applied_at: datetime | None
+
+
+class ToolOut(BaseModel):
+    """One location of the tool memory."""
+
+    model_config = ConfigDict(json_schema_extra={"example": TOOL})
+
+    machine: str
+    tool_memory: Annotated[int, Field(description="R10")]
+    offset: Annotated[float, Field(description="The offset that the control is known to hold, mm.")]
+    total: Annotated[float, Field(description="Sum of the corrections applied since the tool was changed, mm.")]
+    parts: Annotated[int, Field(description="Parts cut since the tool was changed.")]
+    changed_at: datetime | None
+    reset_at: Annotated[
+        datetime | None, Field(description="Changed, or edited by hand: parts cut before say nothing about it.")
+    ]
+    last_correction: Annotated[CorrectionBrief | None, Field(description="The one issued last, and its status.")]
+    open_corrections: list[CorrectionBrief]
+    characteristics: Annotated[list[str], Field(description="Which characteristics correct it.")]
+
+
+class ToolSet(ToolOut):
+    """A location whose offset was set just now."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": TOOL
+            | {
+                "open_corrections": [],
+                "superseded": [18],
+                "note": "Correction 18 was computed for the offset before and is superseded: do not apply it.",
+            }
+        }
+    )
+
+    superseded: Annotated[list[int], Field(description="Corrections that must not be applied any more.")]
+    note: str | None = None
+
+
+class AverageOut(BaseModel):
+    """One location of the average memory."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "machine": "lathe-1",
+                "average_memory": 5,
+                "average": 0.0012,
+                "empirical_value": 0.0,
+                "updated_at": "2026-11-21T07:15:02.131Z",
+                "characteristics": ["shaft-d40"],
+            }
+        }
+    )
+
+    machine: str
+    average_memory: Annotated[int, Field(description="R11")]
+    average: Annotated[float, Field(description="M, the running average of the deviation, mm.")]
+    empirical_value: Annotated[float, Field(description="Taken off every measurement, mm.")]
+    updated_at: datetime | None
+    characteristics: Annotated[list[str], Field(description="Which characteristics share it.")]
+
+
+def correction_out(row: CorrectionRow, note: str | None = None) -> CorrectionOut:
+    """A correction as it is answered."""
+    c = row.correction
+    return CorrectionOut(
+        machine=row.machine,
+        number=c.number,
+        tool_memory=c.tool_memory,
+        amount=c.amount,
+        status=c.status,  # type: ignore[arg-type] # the table's CHECK holds it
+        characteristic=row.characteristic,
+        sequence=c.sequence,
+        size_error=c.size_error,
+        created_at=c.created_at,
+        offset_expected=row.expected,
+        applied_at=c.applied_at,
+        applied_by=c.applied_by,
+        offset_after=c.offset_after,
+        decided_at=c.decided_at,
+        decided_by=c.decided_by,
+        status_reason=c.reason,
+        superseded_by=c.superseded_by,
+        reason=None if row.reason is None else Why(**row.reason),
+        note=note,
+    )
+
+
+def _brief(c: Correction) -> CorrectionBrief:
+    return CorrectionBrief.model_validate(c, from_attributes=True)
+
+
+def tool_out(row: ToolRow, machine: str) -> ToolOut:
+    """A location of the tool memory as it is answered."""
+    return ToolOut.model_validate(_tool(row, machine))
+
+
+def tool_set(row: ToolRow, machine: str, superseded: list[int]) -> ToolSet:
+    """The same after its offset was set."""
+    return ToolSet.model_validate(
+        _tool(row, machine) | {"superseded": superseded, "note": wording.edit_note(superseded)}
+    )
+
+
+def _tool(row: ToolRow, machine: str) -> dict[str, Any]:
+    return {
+        "machine": machine,
+        "tool_memory": row.tool.number,
+        "offset": row.tool.offset,
+        "total": row.tool.total,
+        "parts": row.parts,
+        "changed_at": row.tool.changed_at,
+        "reset_at": row.tool.reset_at,
+        "last_correction": None if row.last is None else _brief(row.last),
+        "open_corrections": [_brief(c) for c in row.open],
+        "characteristics": row.characteristics,
+    }
+
+
+def average_out(row: AverageRow, machine: str) -> AverageOut:
+    """A location of the average memory as it is answered."""
+    memory = row.memory
+    return AverageOut(
+        machine=machine,
+        average_memory=memory.location,
+        average=memory.average,
+        empirical_value=memory.empirical_value,
+        updated_at=memory.updated_at,
+        characteristics=row.characteristics,
+    )

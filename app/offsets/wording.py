@@ -1,0 +1,144 @@
+"""The sentences about corrections and tool offsets: what each status means, and why something cannot be done now."""
+
+from datetime import datetime
+
+from app.offsets.queries import Step
+from app.offsets.tables import Correction
+from app.web.i18n import _, ngettext
+from app.web.numbers import mm, um
+
+
+def status_word(status: str) -> str:
+    """A correction's status as it stands inside a sentence."""
+    return {
+        "held": _("held"),
+        "awaiting_approval": _("awaiting approval"),
+        "pending": _("pending"),
+        "applied": _("applied"),
+        "rejected": _("rejected"),
+        "superseded": _("superseded"),
+    }.get(status, status)
+
+
+def status_explained(status: str) -> str:
+    """What it waits for, or what became of it."""
+    return {
+        "held": _("Waits for an operator: its reading said that the tool is worn."),
+        "awaiting_approval": _("Waits until somebody approves it."),
+        "pending": _("Waits for the machine to apply it."),
+        "applied": _("Is in the offset."),
+        "rejected": _("Was refused; it changes nothing."),
+        "superseded": _("Was replaced by something newer; it changes nothing."),
+    }.get(status, status)
+
+
+def moment(at: datetime | None) -> str:
+    """A moment inside a sentence that programs read as well."""
+    return at.isoformat(timespec="seconds") if at else "?"
+
+
+def refused(correction: Correction, machine: str, verb: str) -> tuple[str, str]:
+    """Why this cannot be done to the correction as it stands, and what to do instead.
+
+    verb: `applied`, `rejected`, `approve` or `release`.
+    """
+    return _how_it_stands(correction, machine), _instead(correction, verb)
+
+
+def _how_it_stands(correction: Correction, machine: str) -> str:
+    values = {
+        "number": correction.number,
+        "machine": machine,
+        "who": correction.decided_by or _("the system"),
+        "at": moment(correction.decided_at),
+        "why": correction.reason or "–",
+        "tool": correction.tool_memory,
+    }
+    match correction.status:
+        case "held":
+            text = _("Correction {number} of {machine} is held: its reading said that tool {tool} is worn.")
+        case "awaiting_approval":
+            text = _("Correction {number} of {machine} still awaits approval.")
+        case "pending":
+            text = _("Correction {number} of {machine} is pending: it waits for the machine to apply it.")
+        case "applied":
+            values |= {"who": correction.applied_by or "?", "at": moment(correction.applied_at)}
+            text = _("Correction {number} of {machine} was applied already, on {at}, confirmed by {who}.")
+        case "rejected":
+            text = _("Correction {number} of {machine} was rejected by {who} on {at}: {why}")
+        case _ if correction.superseded_by is not None:
+            values["by"] = correction.superseded_by
+            text = _("Correction {number} of {machine} was superseded by correction {by}.")
+        case _:
+            text = _("Correction {number} of {machine} was superseded by {who} on {at}: {why}")
+    return text.format(**values)
+
+
+def _instead(correction: Correction, verb: str) -> str:
+    closed = correction.status in {"rejected", "superseded"}
+    if verb == "applied":
+        if closed:
+            return _(
+                "It must not be in the offset. If the machine has applied it, take {amount} back out of the offset, "
+                "or tell the offset as it is by a manual edit of tool {tool}."
+            ).format(amount=um(correction.amount), tool=correction.tool_memory)
+        if correction.status == "held":
+            return _("Acknowledge its alarm or release it first. A machine applies pending corrections only.")
+        return _("Approve it first. A machine applies pending corrections only.")
+    if correction.status == "applied":
+        return _("It cannot be taken back. If the offset is wrong, edit the offset of tool {tool} by hand.").format(
+            tool=correction.tool_memory
+        )
+    if closed:
+        return _("There is nothing left to do: the next reading asks for a new correction if one is needed.")
+    return {
+        "pending": _("It needs no release. Reject it if it must not be applied."),
+        "held": _("It is released, not approved: its tool is worn."),
+        "awaiting_approval": _("It is approved, not released: it is not held."),
+    }.get(correction.status, "")
+
+
+def edit_note(superseded: list[int]) -> str | None:
+    """What else happened when an offset was edited or a tool changed."""
+    if not superseded:
+        return None
+    return ngettext(
+        "Correction {numbers} was computed for the offset before and is superseded: do not apply it.",
+        "Corrections {numbers} were computed for the offset before and are superseded: do not apply them.",
+        len(superseded),
+    ).format(numbers=", ".join(map(str, superseded)))
+
+
+def still_active(alarm: int) -> str:
+    """Said when a held correction is released past its alarm."""
+    return _(
+        "Its alarm {alarm} (tool worn) is still active: acknowledge it on the board of alarms, where the decision about "
+        "the tool is recorded."
+    ).format(alarm=alarm)
+
+
+def offset_differs(alarm: int, expected: float, reported: float) -> str:
+    """Said to the machine that reported another offset than expected."""
+    return _(
+        "The machine holds {reported}, expected was {expected}. The reported offset counts from now on; alarm {alarm} says so."
+    ).format(reported=mm(reported), expected=mm(expected), alarm=alarm)
+
+
+def event_word(kind: str) -> str:
+    """A step in the history of an offset."""
+    return {
+        "change": _("Tool changed"),
+        "edit": _("Manual edit"),
+        "correction": _("Correction"),
+        "reported": _("Reported by the machine"),
+    }.get(kind, kind)
+
+
+def step(made: Step) -> str:
+    """What the history says of a step, besides its kind."""
+    event = made.event
+    if event.correction is not None:
+        return _("correction {number}: {amount}, {actor}").format(
+            number=event.correction, amount=um(made.amount), actor=event.actor
+        )
+    return f"{event.reason or '–'}, {event.actor}"
