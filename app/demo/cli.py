@@ -1,0 +1,73 @@
+"""``inband demo``: the server with the demonstration plant beside it."""
+
+import logging
+import threading
+from typing import Annotated
+
+import typer
+
+from app.cli.base import DatabaseUrl, DataDir, cli, say, settings_from
+from app.cli.serve import Host, Port, run
+from app.db.engine import Database
+from app.demo import people
+from app.demo.client import Ending, Refused
+from app.demo.installing import lines, run_line
+from app.demo.running import Line
+from app.settings import Settings
+
+log = logging.getLogger(__name__)
+
+
+@cli.command()
+def demo(
+    host: Host = None,
+    port: Port = None,
+    data_dir: DataDir = None,
+    database_url: DatabaseUrl = None,
+    seed: Annotated[
+        int, typer.Option(envvar="INBAND_SEED", help="The same seed gives the same wear, scatter and mishaps.")
+    ] = 1,
+    speed: Annotated[
+        float, typer.Option(envvar="INBAND_SPEED", min=1, max=10_000, help="How many times faster than life.")
+    ] = 60,
+) -> None:
+    """Run the server with a simulated plant: two lathes and a milling machine that call its public API."""
+    settings = settings_from(host=host, port=port, data_dir=data_dir, database_url=database_url)
+    plant_key: list[str] = []
+
+    def prepare(database: Database, settings: Settings) -> None:
+        passwords = people.sign_ins(database, settings)
+        plant_key.append(people.plant_key(database))
+        say(f"Sign in as one of these (kept for the next start in {people.file_of(settings)}):")
+        for name in people.PEOPLE:
+            say(f"  {name:<9} {passwords.get(name, '(the password you have chosen)')}", style="bold")
+
+    def beside(settings: Settings) -> None:
+        start(settings, plant_key[0], seed, speed)
+
+    run(settings, prepare=prepare, beside=beside)
+
+
+def start(settings: Settings, key: str, seed: int, speed: float) -> None:
+    """Set the plant up and let every machine run in a thread of its own until the server's process ends."""
+    ending = threading.Event()
+    made = lines(f"http://{_here(settings.host)}:{settings.port}", key, seed, ending)
+    say("The plant is starting: it pushes some hours of the past, then goes on live.")
+    for line in made:
+        threading.Thread(target=_run, args=(line, speed), name=f"demo {line.key}", daemon=True).start()
+
+
+def _run(line: Line, speed: float) -> None:
+    try:
+        run_line(line, speed)
+    except Ending:
+        pass
+    except Refused as refusal:
+        say(f"The simulated machine {line.key} has ended: {refusal}", style="bold red")
+    except Exception:
+        log.exception("the simulated machine %s has ended", line.key)
+
+
+def _here(host: str) -> str:
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 - compared only
+    return f"[{host}]" if ":" in host else host

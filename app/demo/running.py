@@ -1,0 +1,247 @@
+"""One machine of the plant in its loop: fetch corrections, cut, measure, report, stop when it is told to.
+
+Simulated seconds become times as follows: the past that is pushed at the start ends at the start and runs at its own
+pace; from there on the plant runs `speed` times as fast as it says, so its times are those of the wall clock.
+"""
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from random import Random
+from typing import Any
+
+from app.demo.client import Client, Refused
+from app.demo.simulation import Machine, Probe
+
+log = logging.getLogger(__name__)
+STOPS = {"tool_worn", "probe_fault", "offset_limit"}
+LARGEST_LAG = 30.0  # s of the wall clock: what was missed beyond it is not made up for
+PATIENCE = (60.0, 90.0)  # s of the wall clock until the simulated operator steps in
+
+
+@dataclass
+class Pace:
+    """Simulated seconds and times."""
+
+    speed: float
+    began: datetime
+    origin: float  # simulated seconds at `began`
+
+    def moment(self, at: float) -> datetime:
+        """The time that is written on what happened at this simulated second."""
+        ahead = at - self.origin
+        return self.began + timedelta(seconds=ahead / self.speed if ahead > 0 else ahead)
+
+    def due_in(self, at: float) -> float:
+        """Seconds of the wall clock until it happens."""
+        return (self.moment(at) - datetime.now(UTC)).total_seconds()
+
+    def now(self) -> float:
+        """The simulated second of this moment."""
+        return self.origin + (datetime.now(UTC) - self.began).total_seconds() * self.speed
+
+
+class Line:
+    """A machine with its gateway to the server, and the operator who looks after it."""
+
+    def __init__(
+        self, machine: Machine, gateway: Client, operator: Client, run: str, rng: Random, ending: threading.Event
+    ) -> None:
+        self.machine = machine
+        self.key = machine.spec.key
+        self._gateway = gateway
+        self._operator = operator
+        self._run = run
+        self._rng = rng
+        self._ending = ending
+        self._changed_at: dict[int, str | None] = {}
+        self._fault_told = False  # the machine was told to stop because of what its dirty stylus measured
+        self._patience: dict[str, float] = {}  # what waits for a person, and until when we leave it to others
+        self.pace = Pace(1.0, datetime.now(UTC), 0.0)
+
+    # --- the past
+
+    def has_history(self) -> bool:
+        """Whether the server holds readings of this machine already."""
+        first = self.machine.spec.features[0].key
+        return bool(self._gateway.get("/readings", characteristic=first, limit=1)["items"])
+
+    def fill(self, parts: int) -> None:
+        """Push a past that ends now, as fast as the server takes it; each part is cut with what had been decided by then."""
+        rehearsal = deepcopy(self.machine)  # how long it takes does not depend on what is decided
+        for _part in range(parts):
+            rehearsal.rest()
+            rehearsal.cut()
+        self.pace = Pace(1.0, datetime.now(UTC), rehearsal.at)
+        for _part in range(parts):
+            if self._ending.is_set():
+                return
+            self.machine.rest()
+            self.machine.cut()
+            self._apply(self._push_batch(self.machine.measure()))
+        for alarm in self._active_alarms():
+            self._acknowledge(alarm, "noted", "Looked at; the loop has corrected it.")
+
+    def _push_batch(self, probes: list[Probe]) -> list[dict[str, Any]]:
+        if not probes:
+            return []
+        answer = self._gateway.post("/readings/batch?decisions=true", [self._reading(probe) for probe in probes])
+        return [item["correction"] for item in answer["items"] if item["correction"]]
+
+    def _apply(self, corrections: list[dict[str, Any]]) -> None:
+        """Put them into the offsets; the next reading confirms them by its `correction_in_effect`."""
+        for correction in corrections:
+            if correction["status"] == "awaiting_approval":
+                self._operator.post(
+                    f"/corrections/{self.key}/{correction['number']}/approve", {"reason": "Plausible, small."}
+                )
+            if correction["status"] in {"pending", "awaiting_approval"}:
+                self.machine.edges[correction["tool_memory"]].correct(correction["number"], correction["amount"])
+
+    # --- the present
+
+    def settle(self) -> None:
+        """Take over the offsets that the server knows, after a start with an older history."""
+        tools = self._tools()
+        self.machine.settle({number: tool["offset"] for number, tool in tools.items()})
+
+    def live(self, pace: Pace) -> None:
+        """Cut and measure until the plant ends."""
+        self.pace = pace
+        self._changed_at = {number: tool["changed_at"] for number, tool in self._tools().items()}
+        self.machine.begin_live()
+        self.machine.stand(pace.now())
+        while not self._ending.is_set():
+            try:
+                self._cycle()
+            except Refused as refusal:
+                log.warning("%s: %s", self.key, refusal)
+                self._ending.wait(1.0)
+
+    def _cycle(self) -> None:
+        machine = self.machine
+        machine.rest()
+        self._wait_until(machine.at + machine.spec.cycle)
+        self._fetch_corrections()
+        if self._follow_tool_memory():
+            machine.stand(self.pace.now())  # the next part is cut after the change, not before
+            return
+        alarms = self._active_alarms()
+        self._look_after(alarms)
+        kinds = {alarm["kind"] for alarm in alarms}
+        if machine.dirt and "probe_fault" not in kinds and self._fault_told:
+            machine.clean_stylus()
+            self._fault_told = False
+        if kinds & STOPS:
+            machine.stand(machine.at + machine.spec.cycle)
+            if "probe_fault" not in kinds:
+                self._push(machine.measure(drain=True))
+            return
+        machine.cut()
+        self._push(machine.measure())
+        self._change_worn_tools()
+
+    def _push(self, probes: list[Probe]) -> None:
+        """One reading after the other; a machine that is told to stop does not go on probing."""
+        for probe in probes:
+            answer = self._gateway.post("/readings", self._reading(probe))
+            if answer["action"] == "stop":
+                self._fault_told = True
+                return
+
+    def _reading(self, probe: Probe) -> dict[str, Any]:
+        value = {"touches": probe.touches} if probe.touches else {"measured": probe.size}
+        return value | {
+            "characteristic": probe.feature.key,
+            "measured_at": self.pace.moment(probe.measured_at).isoformat(),
+            "machined_at": self.pace.moment(probe.part.cut_at).isoformat(),
+            "part": f"{self._run}-{probe.part.serial:04d}",
+            "key": f"{self._run}:{self.key}:{probe.part.serial}:{probe.feature.key}",
+            "correction_in_effect": probe.part.in_effect[probe.feature.key],
+        }
+
+    def _fetch_corrections(self) -> None:
+        for correction in self._gateway.items(f"/machines/{self.key}/corrections", status="pending"):
+            edge = self.machine.edges.get(correction["tool_memory"])
+            if edge is None:  # a location that somebody else uses
+                continue
+            offset = edge.correct(correction["number"], correction["amount"])
+            try:
+                self._gateway.post(f"/corrections/{self.key}/{correction['number']}/applied", {"offset_after": offset})
+            except Refused as refusal:  # superseded in this moment: the tool memory says what holds
+                log.info("%s: %s", self.key, refusal)
+
+    def _follow_tool_memory(self) -> bool:
+        """What stands in the tool memory is what the control holds; whether somebody changed a tool."""
+        changed = False
+        for number, tool in self._tools().items():
+            edge = self.machine.edges[number]
+            if tool["changed_at"] != self._changed_at[number]:
+                self._changed_at[number] = tool["changed_at"]
+                self.machine.fresh_edge(number, tool["offset"])
+                changed = True
+            edge.offset = tool["offset"]
+        return changed
+
+    def _tools(self) -> dict[int, dict[str, Any]]:
+        tools = self._gateway.items(f"/machines/{self.key}/tools")
+        return {tool["tool_memory"]: tool for tool in tools if tool["tool_memory"] in self.machine.edges}
+
+    # --- the operator
+
+    def _look_after(self, alarms: list[dict[str, Any]]) -> None:
+        """What waits for a person longer than a visitor needs to do it is done here."""
+        waiting: dict[str, Callable[[], object]] = {}
+        for alarm in alarms:
+            waiting[f"alarm {alarm['id']}"] = lambda alarm=alarm: self._acknowledge(
+                alarm, *REMEDIES.get(alarm["kind"], NOTED)
+            )  # type: ignore[misc]
+        for correction in self._operator.items(f"/machines/{self.key}/corrections", status="awaiting_approval"):
+            path = f"/corrections/{self.key}/{correction['number']}/approve"
+            waiting[path] = lambda path=path: self._operator.post(path, {"reason": "Plausible, small."})  # type: ignore[misc]
+        now = time.monotonic()
+        self._patience = {what: self._patience.get(what) or now + self._rng.uniform(*PATIENCE) for what in waiting}
+        for what, step_in in waiting.items():
+            if now >= self._patience[what]:
+                step_in()
+
+    def _active_alarms(self) -> list[dict[str, Any]]:
+        return list(self._operator.items("/alarms", state="active", machine=self.key))
+
+    def _acknowledge(self, alarm: dict[str, Any], action: str, comment: str) -> None:
+        try:
+            self._operator.post(
+                f"/alarms/{alarm['id']}/acknowledge", {"action": action, "comment": f"{comment} (simulated operator)"}
+            )
+        except Refused as refusal:
+            if refusal.status != 409:  # somebody was first
+                raise
+
+    def _change_worn_tools(self) -> None:
+        for number, edge in self.machine.edges.items():
+            if edge.parts >= edge.tool.life:
+                self._operator.post(
+                    f"/machines/{self.key}/tools/{number}/change",
+                    {"offset": 0.0, "reason": f"{edge.tool.name}: changed after {edge.parts} parts"},
+                )
+
+    def _wait_until(self, at: float) -> None:
+        due = self.pace.due_in(at)
+        if due < -LARGEST_LAG:
+            self.machine.stand(self.pace.now())
+        elif due > 0:
+            self._ending.wait(due)
+
+
+NOTED = ("noted", "Looked at.")
+REMEDIES = {
+    "tool_worn": ("tool_replaced", "Edge was chipped; fresh insert."),
+    "offset_limit": ("tool_replaced", "Fresh insert."),
+    "probe_fault": ("false_reading", "Stylus was dirty; wiped."),
+    "oversize": ("noted", "Part sorted out."),
+    "undersize": ("noted", "Part sorted out."),
+}
