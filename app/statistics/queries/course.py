@@ -1,0 +1,136 @@
+"""The course of a run of readings, thin enough to draw: single readings, or blocks of them with their extremes."""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import NamedTuple
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.characteristics.tables import Characteristic
+from app.readings.tables import Exclusion, Reading
+from app.statistics.queries.pyramid import BASE_LEVEL, FAN, TOP_LEVEL, Block, Run, blocks_of
+from app.statistics.queries.window import Window
+
+MOST_READINGS = 2_500  # drawn one by one
+MOST_BLOCKS = 1_300  # about one for every pixel that the readings have
+
+
+class Drawn(NamedTuple):
+    """One reading as far as it is drawn; mm."""
+
+    sequence: int
+    measured: float
+    deviation: float
+    zone: str
+    average_after: float
+    measured_at: datetime
+    received_at: datetime
+
+
+class Course(NamedTuple):
+    """Blocks and then single readings, ascending; together they are every reading of the window, once."""
+
+    blocks: list[Block]
+    readings: list[Drawn]
+    excluded: frozenset[int]
+
+
+_DRAWN = [getattr(Reading, name) for name in Drawn._fields]
+
+
+def plan(window: Window) -> tuple[list[tuple[int, int, int]], list[Run]]:
+    """What to read: (level, first block, last block) …, and runs of single readings.
+
+    As fine a level as `MOST_BLOCKS` allows; at both ends, where its blocks are not full, finer ones.
+
+    >>> plan(Window(1, 100, 100))
+    ([], [(1, 100)])
+    >>> plan(Window(1, 10_010, 10_010))
+    ([(5, 0, 311)], [(9985, 10010)])
+    """
+    if window.count <= MOST_READINGS:
+        return [], [(window.first, window.last)]
+    level = next(
+        (level for level in range(BASE_LEVEL, TOP_LEVEL, FAN) if window.count >> level <= MOST_BLOCKS), TOP_LEVEL
+    )
+    blocks: list[tuple[int, int, int]] = []
+    left, right = window.first - 1, window.last  # what is not covered yet: outside left … right it is
+    low, high = -(-left >> level), right >> level  # the coarse blocks: low … high - 1
+    while high <= low and level > BASE_LEVEL:
+        level -= FAN
+        low, high = -(-left >> level), right >> level
+    blocks.append((level, low, high - 1))
+    inner_left, inner_right = low << level, high << level
+    for finer in range(level - FAN, BASE_LEVEL - 1, -FAN):
+        low, high = -(-left >> finer), right >> finer
+        if low << finer < inner_left:
+            blocks.append((finer, low, (inner_left >> finer) - 1))
+            inner_left = low << finer
+        if high << finer > inner_right:
+            blocks.append((finer, inner_right >> finer, high - 1))
+            inner_right = high << finer
+    runs = [run for run in ((left + 1, inner_left), (inner_right + 1, right)) if run[0] <= run[1]]
+    return blocks, runs
+
+
+def course_of(session: Session, characteristic: Characteristic, window: Window) -> Course:
+    """Every reading of the window, in no more rows than can be drawn."""
+    pieces, runs = plan(window)
+    blocks: list[Block] = []
+    for level, low, high in pieces:
+        blocks += blocks_of(session, characteristic, level, range(low, high + 1))
+    blocks.sort(key=lambda block: block.first)
+    readings: list[Drawn] = []
+    excluded: set[int] = set()
+    for first, last in runs:
+        if first > last:
+            continue
+        readings += readings_of(session, characteristic, first, last)
+        excluded.update(excluded_of(session, characteristic, first, last))
+    return Course(blocks, readings, frozenset(excluded))
+
+
+def readings_of(session: Session, characteristic: Characteristic, first: int, last: int) -> list[Drawn]:
+    """These readings, ascending."""
+    rows = session.execute(
+        select(*_DRAWN)
+        .where(
+            Reading.machine_id == characteristic.machine_id,
+            Reading.characteristic_id == characteristic.id,
+            Reading.sequence.between(first, last),
+        )
+        .order_by(Reading.sequence)
+    )
+    return [Drawn(*row) for row in rows]
+
+
+def excluded_of(session: Session, characteristic: Characteristic, first: int, last: int) -> Sequence[int]:
+    """Which of these readings were taken out of the statistics, ascending."""
+    return session.scalars(
+        select(Exclusion.sequence)
+        .where(
+            Exclusion.machine_id == characteristic.machine_id,
+            Exclusion.characteristic_id == characteristic.id,
+            Exclusion.sequence.between(first, last),
+        )
+        .order_by(Exclusion.sequence)
+    ).all()
+
+
+def moments_of(
+    session: Session, characteristic: Characteristic, sequences: Sequence[int]
+) -> list[tuple[int, datetime]]:
+    """When these readings arrived, ascending."""
+    if not sequences:
+        return []
+    rows = session.execute(
+        select(Reading.sequence, Reading.received_at)
+        .where(
+            Reading.machine_id == characteristic.machine_id,
+            Reading.characteristic_id == characteristic.id,
+            Reading.sequence.in_(sequences),
+        )
+        .order_by(Reading.sequence)
+    )
+    return [(sequence, at) for sequence, at in rows]

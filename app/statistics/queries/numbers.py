@@ -1,0 +1,231 @@
+"""The numbers of a run of readings, exact; excluded readings are left out."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from math import fsum, sqrt
+from typing import Any
+
+from sqlalchemy import text
+from sqlalchemy.orm import Session
+
+from app.characteristics.tables import Characteristic, ParametersVersion
+from app.core.zones import Zone, nanometres
+from app.statistics.queries.course import excluded_of
+from app.statistics.queries.pyramid import Block, Run, cover_of
+from app.statistics.queries.window import Window
+
+MOST_ONE_BY_ONE = (
+    50_000  # readings that are aggregated as they are; more are taken from the pyramid where it settles them
+)
+MOST_IN_HISTOGRAM = 100_000
+
+# regr_sxx is the sum of squares about the mean, which PostgreSQL accumulates without cancellation (Youngs and Cramer).
+# A part is judged by its raw deviation and the tolerance of the version that was in force, in whole nanometres.
+_PARTS = f"""
+SELECT count(*), avg(r.deviation), regr_sxx(r.deviation, r.deviation), min(r.deviation), max(r.deviation),
+    count(r.correction), count(*) FILTER (WHERE round(abs(r.deviation) * 1000000) <= v.tolerance),
+    {", ".join(f"count(*) FILTER (WHERE r.zone = '{zone.value}')" for zone in Zone)}
+FROM unnest(CAST(:firsts AS bigint[]), CAST(:lasts AS bigint[])) AS run(first, last)
+JOIN reading r ON r.machine_id = :machine AND r.characteristic_id = :characteristic
+    AND r.sequence BETWEEN run.first AND run.last
+JOIN unnest(CAST(:versions AS int[]), CAST(:tolerances AS bigint[])) AS v(version, tolerance)
+    ON v.version = r.parameters_version
+WHERE (CAST(:start AS timestamptz) IS NULL OR r.measured_at >= :start)
+  AND (CAST(:end AS timestamptz) IS NULL OR r.measured_at <= :end)
+  AND NOT r.sequence = ANY(CAST(:excluded AS bigint[]))
+"""  # noqa: S608 - made of the names of our zones
+
+# width_bucket counts as `histogram_counts` does: a value on an edge belongs to the upper bar, on the limit to the inner.
+_HISTOGRAM = """
+SELECT width_bucket(CASE WHEN abs(deviation - :half) < 5e-7 THEN deviation - 1e-9 ELSE deviation END,
+                    CAST(:edges AS float8[])) AS bar, count(*)
+FROM reading
+WHERE machine_id = :machine AND characteristic_id = :characteristic AND sequence BETWEEN :first AND :last
+  AND NOT sequence = ANY(CAST(:excluded AS bigint[]))
+GROUP BY bar
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """What the readings amount to; deviations in mm, None where there are too few readings to say.
+
+    in_tolerance counts parts by their raw deviation; zones are those by which was decided.
+    """
+
+    count: int
+    excluded: int
+    mean: float | None
+    standard_deviation: float | None
+    minimum: float | None
+    maximum: float | None
+    in_tolerance: int
+    corrections: int
+    zones: dict[str, int]
+
+    @property
+    def share_in_tolerance(self) -> float | None:
+        return self.in_tolerance / self.count if self.count else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    count: int
+    mean: float
+    squares: float  # about the mean
+    minimum: float
+    maximum: float
+    corrections: int
+    in_tolerance: int
+    zones: Sequence[int]
+
+
+def numbers_of(
+    session: Session,
+    characteristic: Characteristic,
+    window: Window,
+    *,
+    start: datetime | None = None,
+    end: datetime | None = None,
+) -> Numbers:
+    """Exact for any number of readings. Within the window, those measured from `start` to `end` count."""
+    excluded = excluded_of(session, characteristic, window.first, window.last) if window.count else ()
+    tolerances = _tolerances(session, characteristic)
+    parts: list[_Part] = []
+    runs: list[Run] = [(window.first, window.last)]
+    if window.count > MOST_ONE_BY_ONE:
+        # Where even the extremes are in the tightest tolerance there ever was, no part is outside.
+        tightest = min(tolerances.values()) / 1_000_000
+        cover = cover_of(
+            session,
+            characteristic,
+            window.first,
+            window.last,
+            start=start,
+            end=end,
+            without=excluded,
+            settles=lambda block: -tightest <= block.minimum and block.maximum <= tightest,
+        )
+        runs, parts = cover.runs, [_part(block) for block in cover.blocks]
+    where = {"machine": characteristic.machine_id, "characteristic": characteristic.id, "excluded": list(excluded)}
+    if window.count and runs:
+        row = session.execute(
+            text(_PARTS),
+            where
+            | {
+                "firsts": [first for first, _last in runs],
+                "lasts": [last for _first, last in runs],
+                "versions": list(tolerances),
+                "tolerances": list(tolerances.values()),
+                "start": start,
+                "end": end,
+            },
+        ).one()
+        if row[0]:
+            count, mean, squares, minimum, maximum, corrections, in_tolerance, *zones = row
+            parts.append(_Part(count, mean, squares, minimum, maximum, corrections, in_tolerance, zones))
+    return _total(parts, _excluded_in_time(session, characteristic, excluded, start, end))
+
+
+def _part(block: Block) -> _Part:
+    squares = max(0.0, block.sum_squares - block.sum * block.sum / block.count)
+    return _Part(
+        block.count,
+        block.mean,
+        squares,
+        block.minimum,
+        block.maximum,
+        block.corrections,
+        block.count,
+        block.zones,
+    )
+
+
+def _total(parts: Sequence[_Part], excluded: int) -> Numbers:
+    """Put the parts together: the sum of squares about the common mean, without ever subtracting large numbers."""
+    count = sum(part.count for part in parts)
+    zones = {zone.value: sum(part.zones[at] for part in parts) for at, zone in enumerate(Zone)}
+    if not count:
+        return Numbers(0, excluded, None, None, None, None, 0, 0, zones)
+    mean = fsum(part.count * part.mean for part in parts) / count
+    squares = fsum(part.squares + part.count * (part.mean - mean) ** 2 for part in parts)
+    return Numbers(
+        count,
+        excluded,
+        mean,
+        sqrt(squares / (count - 1)) if count > 1 else None,
+        min(part.minimum for part in parts),
+        max(part.maximum for part in parts),
+        sum(part.in_tolerance for part in parts),
+        sum(part.corrections for part in parts),
+        zones,
+    )
+
+
+def _tolerances(session: Session, characteristic: Characteristic) -> dict[int, int]:
+    """Half the width of the tolerance (nm) by the version of the parameters."""
+    rows = session.execute(
+        text(
+            "SELECT version, CAST(parameters ->> 'tolerance_width' AS float8) FROM parameters_version "
+            "WHERE machine_id = :machine AND characteristic_id = :characteristic"
+        ).columns(ParametersVersion.version),
+        {"machine": characteristic.machine_id, "characteristic": characteristic.id},
+    )
+    return {version: nanometres(width / 2) for version, width in rows}
+
+
+def _excluded_in_time(
+    session: Session,
+    characteristic: Characteristic,
+    excluded: Sequence[int],
+    start: datetime | None,
+    end: datetime | None,
+) -> int:
+    if not excluded or (start is None and end is None):
+        return len(excluded)
+    return int(
+        session.execute(
+            text(
+                "SELECT count(*) FROM reading WHERE machine_id = :machine AND characteristic_id = :characteristic "
+                "AND sequence = ANY(CAST(:excluded AS bigint[])) "
+                "AND (CAST(:start AS timestamptz) IS NULL OR measured_at >= :start) "
+                "AND (CAST(:end AS timestamptz) IS NULL OR measured_at <= :end)"
+            ),
+            {
+                "machine": characteristic.machine_id,
+                "characteristic": characteristic.id,
+                "excluded": list(excluded),
+                "start": start,
+                "end": end,
+            },
+        ).scalar_one()
+    )
+
+
+def histogram_of(
+    session: Session, characteristic: Characteristic, window: Window, edges: Sequence[float], half: float
+) -> list[int]:
+    """How many deviations fall between the edges (mm, ascending); one count more than edges. half: the tolerance limit, mm.
+
+    Of more than `MOST_IN_HISTOGRAM` readings the last ones count.
+    """
+    counts = [0] * (len(edges) + 1)
+    first = max(window.first, window.last - MOST_IN_HISTOGRAM + 1)
+    if first > window.last:
+        return counts
+    rows: Iterable[Any] = session.execute(
+        text(_HISTOGRAM),
+        {
+            "machine": characteristic.machine_id,
+            "characteristic": characteristic.id,
+            "first": first,
+            "last": window.last,
+            "excluded": list(excluded_of(session, characteristic, first, window.last)),
+            "half": half,
+            "edges": list(edges),
+        },
+    )
+    for bar, count in rows:
+        counts[bar] = count
+    return counts

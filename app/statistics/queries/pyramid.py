@@ -1,0 +1,154 @@
+"""Reading the pyramid: which full blocks, and which single readings beside them, make up a run of readings."""
+
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.characteristics.tables import Characteristic
+from app.readings.tables import ReadingSummary
+
+BASE_LEVEL, TOP_LEVEL, FAN = 5, 23, 2  # blocks of 32, 128, 512 … 8 388 608 readings, as the writer makes them
+
+Run = tuple[int, int]
+"""Sequences from the first to the last, both included."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """The summary of one full block; deviations in mm."""
+
+    level: int
+    block: int
+    count: int
+    minimum: float
+    maximum: float
+    sum: float
+    sum_squares: float
+    average: float
+    corrections: int
+    zones: list[int]
+    first_at: datetime
+    last_at: datetime
+
+    @property
+    def first(self) -> int:
+        return (self.block << self.level) + 1
+
+    @property
+    def last(self) -> int:
+        return (self.block + 1) << self.level
+
+    @property
+    def mean(self) -> float:
+        return self.sum / self.count
+
+
+_COLUMNS = [getattr(ReadingSummary, name) for name in Block.__slots__]
+
+
+def blocks_of(session: Session, characteristic: Characteristic, level: int, numbers: Sequence[int]) -> list[Block]:
+    """These blocks of one level, as far as they are there, ascending."""
+    if not numbers:
+        return []
+    query = select(*_COLUMNS).where(
+        ReadingSummary.machine_id == characteristic.machine_id,
+        ReadingSummary.characteristic_id == characteristic.id,
+        ReadingSummary.level == level,
+    )
+    if numbers[-1] - numbers[0] == len(numbers) - 1:
+        query = query.where(ReadingSummary.block.between(numbers[0], numbers[-1]))
+    else:
+        query = query.where(ReadingSummary.block.in_(numbers))
+    return [Block(*row) for row in session.execute(query.order_by(ReadingSummary.block))]
+
+
+@dataclass(frozen=True)
+class Cover:
+    """Blocks that lie wholly in what was asked for, and the runs whose readings must be looked at one by one."""
+
+    blocks: list[Block]
+    runs: list[Run]
+
+
+def cover_of(
+    session: Session,
+    characteristic: Characteristic,
+    first: int,
+    last: int,
+    *,
+    start: datetime | None = None,
+    end: datetime | None = None,
+    without: Sequence[int] = (),
+    settles: Callable[[Block], bool] = lambda _block: True,
+) -> Cover:
+    """Walk down the pyramid over the sequences first … last, measured from `start` to `end`.
+
+    A block counts as a whole if it lies inside, holds none of the sequences `without` (ascending), and `settles` what is
+    asked; otherwise its four parts are looked at, at last the readings themselves.
+    """
+    timed = start is not None or end is not None
+    found: list[Block] = []
+    numbers: list[int] = list(range((first - 1) >> TOP_LEVEL, ((last - 1) >> TOP_LEVEL) + 1)) if last >= first else []
+    for level in range(TOP_LEVEL, BASE_LEVEL - 1, -FAN):
+        descend: set[int] = set()
+        wanted: list[int] = []
+        for number in numbers:
+            inside = first <= (number << level) + 1 and (number + 1) << level <= last
+            clean = not _any_between(without, (number << level) + 1, (number + 1) << level)
+            if timed or (inside and clean):
+                wanted.append(number)
+            else:
+                descend.add(number)
+        there = {block.block: block for block in blocks_of(session, characteristic, level, wanted)}
+        for number in wanted:
+            block = there.get(number)
+            if block is None:
+                descend.add(number)
+            elif (start is not None and block.last_at < start) or (end is not None and block.first_at > end):
+                continue
+            elif (
+                first <= block.first
+                and block.last <= last
+                and (start is None or block.first_at >= start)
+                and (end is None or block.last_at <= end)
+                and not _any_between(without, block.first, block.last)
+                and settles(block)
+            ):
+                found.append(block)
+            else:
+                descend.add(number)
+        if level > BASE_LEVEL:
+            numbers = [
+                part
+                for number in sorted(descend)
+                for part in range(number << FAN, (number + 1) << FAN)
+                if (part << (level - FAN)) < last and (part + 1) << (level - FAN) >= first
+            ]
+        else:
+            numbers = sorted(descend)
+    runs = ((max(first, (n << BASE_LEVEL) + 1), min(last, (n + 1) << BASE_LEVEL)) for n in numbers)
+    return Cover(found, joined(runs))
+
+
+def joined(runs: Iterable[Run]) -> list[Run]:
+    """Ascending runs, those that touch made one.
+
+    >>> joined([(1, 32), (33, 64), (97, 100)])
+    [(1, 64), (97, 100)]
+    """
+    made: list[Run] = []
+    for first, last in runs:
+        if made and made[-1][1] + 1 >= first:
+            made[-1] = (made[-1][0], max(made[-1][1], last))
+        else:
+            made.append((first, last))
+    return made
+
+
+def _any_between(ascending: Sequence[int], low: int, high: int) -> bool:
+    at = bisect_left(ascending, low)
+    return at < len(ascending) and ascending[at] <= high
