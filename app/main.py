@@ -7,17 +7,23 @@ from contextlib import asynccontextmanager
 from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
 
+from app.alarms import api as alarms
 from app.audit import api as audit
 from app.characteristics import api as characteristics
+from app.characteristics import figures_api
 from app.db.engine import Database
 from app.machines import api as machines
+from app.offsets import api as offsets
 from app.people import api as people
 from app.people import keys_api
+from app.people import pages as sign_in_pages
 from app.people.keys import KeyRing
 from app.readings import api as readings
 from app.readings.door import Directory, ReadingsDoor
 from app.readings.writer import Writer
 from app.settings import Settings
+from app.setup import pages as setup_pages
+from app.statistics import api as statistics
 from app.web import events_api, health
 from app.web.limits import BodyLimit
 from app.web.live import Live
@@ -29,13 +35,19 @@ from app.web.templates import assets
 ROUTERS: tuple[APIRouter, ...] = (
     machines.router,
     characteristics.router,
+    figures_api.router,
+    statistics.router,
     readings.push,
     readings.router,
+    offsets.router,
+    alarms.router,
     events_api.router,
     people.router,
     keys_api.router,
     audit.router,
     health.router,
+    sign_in_pages.router,
+    setup_pages.router,
 )
 
 

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from app.audit.actions import record
 from app.characteristics import queries, wording
 from app.characteristics.queries import Standing
-from app.characteristics.schemas import CharacteristicChange, CharacteristicIn
+from app.characteristics.schemas import CharacteristicChange, CharacteristicIn, warnings_of
 from app.characteristics.tables import Characteristic, ParametersVersion
 from app.core.parameters import BY_R, TWO_POINT_SWITCH, ParameterError, Parameters, Variant, read
 from app.core.zones import nanometres
@@ -20,7 +20,15 @@ from app.offsets.tables import AverageMemory
 from app.readings.tables import Stream
 from app.web.i18n import _
 
-__all__ = ["CharacteristicChange", "CharacteristicIn", "add_characteristic", "change_characteristic", "merged"]
+__all__ = [
+    "CharacteristicChange",
+    "CharacteristicIn",
+    "add_characteristic",
+    "change_characteristic",
+    "merged",
+    "refusals",
+    "warnings_of",
+]
 
 DRAWING = ("nominal", "upper_deviation", "lower_deviation")
 TARGET = ("target", "tolerance_width")
@@ -121,13 +129,18 @@ def _name_of(raw: str) -> str:
     return "variant" if raw.upper() == TWO_POINT_SWITCH else BY_R.get(raw.upper(), raw)
 
 
+def refusals(given: Mapping[str, Any]) -> list[FieldError]:
+    """Everything that is wrong with a whole set of parameters; nothing if it can be used."""
+    try:
+        read(given)
+    except ParameterError as error:
+        return wording.field_errors(error.problems)
+    return []
+
+
 def _read(given: Mapping[str, Any], *, reason_missing: bool = False) -> Parameters:
     """Raises `Invalid` with everything that is wrong at once."""
-    errors: list[FieldError] = []
-    try:
-        parameters = read(given)[0]
-    except ParameterError as error:
-        errors = wording.field_errors(error.problems)
+    errors = refusals(given)
     if reason_missing:
         wrong = _("is required when parameters change: say why, for those who read it in a year")
         errors.append(FieldError("reason", wrong))
@@ -137,7 +150,7 @@ def _read(given: Mapping[str, Any], *, reason_missing: bool = False) -> Paramete
             _("Correct the named fields and send them again; nothing was changed."),
             errors=errors,
         )
-    return parameters
+    return read(given)[0]
 
 
 def _refuse_moving(standing: Standing, change: CharacteristicChange) -> None:

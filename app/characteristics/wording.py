@@ -128,7 +128,7 @@ def sentence(problem: Problem) -> str:
     """What is wrong and what to do."""
     data, name = problem.data, named(problem.field)
     if problem.code == "order":
-        return _order(data)
+        return order_sentence(data["inner"], data["outer"], millimetres(data["smaller"]), millimetres(data["larger"]))
     if problem.code in {"range", "source_range"}:
         return _range(problem, name)
     return {
@@ -163,7 +163,8 @@ def sentence(problem: Problem) -> str:
     }.get(problem.code, problem.code)
 
 
-def _order(data: dict[str, Any]) -> str:
+def order_sentence(inner: str, outer: str, smaller: str, larger: str) -> str:
+    """Why this pair is refused: ``smaller`` is what R number ``inner`` has, ``larger`` what ``outer`` has."""
     names = {
         "R33": _("R33 zero range"),
         "R34": _("R34 averaging limit"),
@@ -171,26 +172,18 @@ def _order(data: dict[str, Any]) -> str:
         "R37": _("R37 wear limit"),
         "R36": _("R36 confidence limit"),
     }
-    values = {
-        "inner": names[data["inner"]],
-        "outer": names[data["outer"]],
-        "smaller": millimetres(data["smaller"]),
-        "larger": millimetres(data["larger"]),
-    }
-    if data["outer"] == "R35/2":
-        return _(
+    if outer == "R35/2":
+        sentence = _(
             "{inner} {smaller} must not be larger than R35/2 = {larger}; lower it, or leave it empty for a third of the "
             "tolerance"
-        ).format(**values)
-    if data["inner"] == "R35/2":
-        return _("{outer} {larger} must not be smaller than R35/2 = {smaller}; raise it").format(**values)
-    if data["strict"]:
-        return _("{inner} {smaller} must be smaller than {outer} {larger}; lower the one or raise the other").format(
-            **values
         )
-    return _("{inner} {smaller} must not be larger than {outer} {larger}; lower the one or raise the other").format(
-        **values
-    )
+    elif inner == "R35/2":
+        sentence = _("{outer} {larger} must not be smaller than R35/2 = {smaller}; raise it")
+    elif inner == "R33":
+        sentence = _("{inner} {smaller} must be smaller than {outer} {larger}; lower the one or raise the other")
+    else:
+        sentence = _("{inner} {smaller} must not be larger than {outer} {larger}; lower the one or raise the other")
+    return sentence.format(inner=names[inner], outer=names[outer], smaller=smaller, larger=larger)
 
 
 def _range(problem: Problem, name: str) -> str:

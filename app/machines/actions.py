@@ -12,6 +12,8 @@ from app.machines.tables import Machine, MachineState
 from app.offsets.tables import AverageMemory, Tool
 from app.web.i18n import _
 
+__all__ = ["MachineChange", "MachineIn", "add_machine", "change_machine"]
+
 TOOL_LOCATIONS = 32
 AVERAGE_LOCATIONS = 20
 

@@ -23,6 +23,7 @@ __all__ = [
     "accept_invitation",
     "add_key",
     "add_person",
+    "add_role_key",
     "change_password",
     "change_role",
     "create_invitation",
@@ -54,6 +55,11 @@ def add_person(session: Session, *, name: str, role: str, password: str, actor: 
     session.flush()
     record(session, actor, "person added", f"person/{name}", None, {"name": name, "role": role})
     return person
+
+
+def add_role_key(session: Session, *, name: str, role: str, actor: str) -> NewKey:
+    """Make a key for a program, with a person's role. Raises `Invalid`."""
+    return add_key(session, name=name, role=_role(role), actor=actor)
 
 
 def create_invitation(session: Session, role: str, actor: str = "command line") -> str:

@@ -8,7 +8,7 @@ from app.machines import queries as machines
 from app.people import actions, queries
 from app.people.schemas import KeyOut, MachineKeyIn, NewKeyOut, RoleKeyIn, key_out
 from app.web.api import api_router, problems
-from app.web.deps import Admin, SessionDep, require
+from app.web.deps import Admin, Engineer, SessionDep, require
 from app.web.fields import LARGEST_SERIAL, Cursor, Limit, Page, page_of
 
 router = api_router("keys")
@@ -17,7 +17,7 @@ KeyId = Annotated[int, Path(ge=1, le=LARGEST_SERIAL, description="The number of 
 
 
 @router.post("/machines/{machine}/keys", status_code=201, responses=problems(404))
-def make_machine_key(session: SessionDep, caller: Admin, machine: MachineKey, key: MachineKeyIn) -> NewKeyOut:
+def make_machine_key(session: SessionDep, caller: Engineer, machine: MachineKey, key: MachineKeyIn) -> NewKeyOut:
     """A key with which this machine pushes readings and handles its corrections. The secret is told this once."""
     found = machines.machine_named(session, machine)
     made = actions.add_key(session, name=key.name, machine=found.key, actor=caller.name)
@@ -40,7 +40,7 @@ def list_machine_keys(
 @router.delete("/machines/{machine}/keys/{key}", status_code=204, responses=problems(404))
 def revoke_machine_key(
     session: SessionDep,
-    caller: Admin,
+    caller: Engineer,
     machine: MachineKey,
     key: KeyId,
 ) -> Response:

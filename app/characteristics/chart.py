@@ -1,0 +1,287 @@
+"""Everything that is read for the charts of one characteristic. Never writes.
+
+Beside the readings there are corrections, alarms and tool changes. Of each no more are read than can be told apart on a
+chart, by an index, however many there are.
+"""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy import select, text
+from sqlalchemy.orm import Session
+
+from app.alarms.tables import Alarm
+from app.characteristics.figures import Block, Mark, Point, RunPoint, Step
+from app.characteristics.figures.lanes import COUNTED, MANUAL_EDIT, TOOL_CHANGE
+from app.characteristics.queries import Standing
+from app.offsets.tables import OPEN, AverageMemory, Correction, ToolEvent
+from app.statistics import queries as statistics
+from app.statistics.queries import Course, Window
+from app.web.i18n import _
+from app.web.theme import zone_name
+
+MOST_STEPS = 500
+MOST_SAMPLED = 300  # of more corrections than that, so many are shown, evenly spread
+MOST_BEFORE = 5_000  # corrections of a tool's life that are added up to where the chart begins
+MOST_ALARMS = 200
+MOST_CHANGES = 100
+MOST_MOMENTS = 200
+MOST_RUN = 2_000
+
+
+@dataclass(frozen=True)
+class Chart:
+    """What the zone chart draws; `centre` is the size (mm) at deviation 0."""
+
+    blocks: list[Block]
+    points: list[Point]
+    steps: list[Step]
+    marks: list[Mark]
+    total_before: float
+    centre: float
+
+
+@dataclass(frozen=True)
+class _Change:
+    """The tool was changed, or its offset edited by hand."""
+
+    at: datetime
+    kind: str
+    offset_after: float
+    sequence: int
+
+
+def reading_link(key: str, sequence: int) -> str:
+    return f"/characteristics/{key}/readings/{sequence}"
+
+
+def chart_of(session: Session, standing: Standing, window: Window) -> Chart:
+    """The zone chart of these readings."""
+    parameters, key = standing.parameters, standing.characteristic.key
+    course = statistics.course_of(session, standing.characteristic, window)
+    has_memory = parameters.average_memory > 0
+    changes = _changes(session, standing, course, window)
+    steps = _steps(session, standing, window, changes)
+    return Chart(
+        blocks=[
+            Block(
+                block.first,
+                block.last,
+                block.minimum,
+                block.maximum,
+                block.mean,
+                block.average if has_memory else None,
+                f"/characteristics/{key}?first={block.first}&through={block.last}",
+            )
+            for block in course.blocks
+        ],
+        points=[
+            Point(
+                reading.sequence,
+                reading.deviation,
+                reading.zone,
+                reading.average_after if has_memory else None,
+                reading.measured_at,
+                reading.sequence in course.excluded,
+                reading_link(key, reading.sequence),
+            )
+            for reading in course.readings
+        ],
+        steps=steps,
+        marks=[
+            *_alarms(session, standing, window),
+            *(
+                Mark(
+                    change.sequence,
+                    TOOL_CHANGE if change.kind == "change" else MANUAL_EDIT,
+                    (_("T{number} changed") if change.kind == "change" else _("T{number} offset edited")).format(
+                        number=parameters.tool_memory
+                    ),
+                    f"/tools/{standing.machine.key}/{parameters.tool_memory}",
+                )
+                for change in changes
+                if window.first <= change.sequence
+            ),
+        ],
+        total_before=_total_before(session, standing, window, changes) if window.count else 0.0,
+        centre=parameters.target + empirical_value_of(session, standing),
+    )
+
+
+def run_of(session: Session, standing: Standing, window: Window) -> list[RunPoint]:
+    """The measured sizes of these readings; of very many the last ones."""
+    key = standing.characteristic.key
+    first = max(window.first, window.last - MOST_RUN + 1)
+    course = statistics.course_of(session, standing.characteristic, Window(first, window.last, window.newest))
+    return [
+        RunPoint(
+            reading.sequence,
+            reading.measured_at,
+            reading.measured,
+            reading.zone,
+            reading.sequence in course.excluded,
+            reading_link(key, reading.sequence),
+        )
+        for reading in course.readings
+    ]
+
+
+def empirical_value_of(session: Session, standing: Standing) -> float:
+    """EV of the memory location that this characteristic names, mm; 0 without one."""
+    location = standing.parameters.average_memory
+    found = session.get(AverageMemory, (standing.machine.id, location)) if location else None
+    return found.empirical_value if found else 0.0
+
+
+def _alarms(session: Session, standing: Standing, window: Window) -> list[Mark]:
+    rows = session.execute(
+        select(Alarm.sequence, Alarm.kind, Alarm.acknowledged_at)
+        .where(
+            Alarm.machine_id == standing.machine.id,
+            Alarm.characteristic_id == standing.characteristic.id,
+            Alarm.sequence.between(window.first, window.last),
+        )
+        .order_by(Alarm.id.desc())
+        .limit(MOST_ALARMS)
+    )
+    key = standing.characteristic.key
+    return [
+        Mark(sequence, kind, alarm_word(kind), reading_link(key, sequence), active=acknowledged_at is None)
+        for sequence, kind, acknowledged_at in rows
+        if sequence is not None
+    ]
+
+
+def alarm_word(kind: str) -> str:
+    """The kind of an alarm in one or two words."""
+    return {
+        "tool_worn": _("Tool worn"),
+        "acceptance": _("Not accepted"),
+        "offset_limit": _("Offset limit"),
+        "offset_differs": _("Offset differs"),
+        "signal": _("Signal"),
+    }.get(kind) or zone_name(kind)
+
+
+def _changes(session: Session, standing: Standing, course: Course, window: Window) -> list[_Change]:
+    """Changes and edits of the tool, oldest first, each at the first reading that came after it.
+
+    One that came before the window is kept as well, at the reading before it: from there the corrections are summed.
+    """
+    number = standing.parameters.tool_memory
+    if not number or not window.count:
+        return []
+    rows = session.execute(
+        select(ToolEvent.at, ToolEvent.kind, ToolEvent.offset_after)
+        .where(ToolEvent.machine_id == standing.machine.id, ToolEvent.number == number, ToolEvent.kind != "correction")
+        .order_by(ToolEvent.id.desc())
+        .limit(MOST_CHANGES)
+    ).all()
+    if not rows:
+        return []
+    moments = [(reading.sequence, reading.received_at) for reading in course.readings]
+    if course.blocks:
+        step = -(-len(course.blocks) // MOST_MOMENTS)
+        sampled = [course.blocks[0].first, *(block.last for block in course.blocks[::step])]
+        moments = sorted(statistics.moments_of(session, standing.characteristic, sampled) + moments)
+    arrivals = [at for _sequence, at in moments]
+    changes = []
+    for at, kind, offset_after in reversed(rows):
+        place = bisect_right(arrivals, at)
+        if place < len(moments):
+            sequence = moments[place][0] if place else window.first - 1
+        elif window.reaches_now:
+            sequence = window.last + 1
+        else:
+            continue
+        changes.append(_Change(at, kind, offset_after, sequence))
+    return changes
+
+
+def _steps(session: Session, standing: Standing, window: Window, changes: Sequence[_Change]) -> list[Step]:
+    """The corrections of these readings; of too many, some spread evenly, the newest, and those that are open."""
+    if not window.count:
+        return []
+    query = (
+        select(
+            Correction.sequence, Correction.number, Correction.amount, Correction.status,
+            Correction.offset_after, Correction.applied_at,
+        )
+        .where(
+            Correction.machine_id == standing.machine.id,
+            Correction.characteristic_id == standing.characteristic.id,
+            Correction.sequence.between(window.first, window.last),
+        )
+        .order_by(Correction.sequence.desc())
+    )  # fmt: skip
+    key = standing.characteristic.key
+    rows = session.execute(query.limit(MOST_STEPS + 1)).all()
+    if len(rows) <= MOST_STEPS:
+        return [
+            Step(sequence, number, amount, status, reading_link(key, sequence))
+            for sequence, number, amount, status, _offset, _at in reversed(rows)
+        ]
+    newest = rows[:20]
+    tool_memory = standing.parameters.tool_memory
+    still_open = session.execute(
+        query.where(Correction.status.in_(OPEN), Correction.tool_memory == tool_memory).limit(MOST_STEPS)
+    ).all()
+    sampled = session.execute(
+        text(_SAMPLE),
+        {
+            "machine": standing.machine.id,
+            "characteristic": standing.characteristic.id,
+            "tool": tool_memory,
+            "first": window.first,
+            "last": window.last,
+            "stride": max(1, window.count // MOST_SAMPLED),
+        },
+    ).all()
+    shown = sorted({row[:2]: tuple(row) for row in (*sampled, *still_open, *newest)}.values())
+    return _with_totals(key, shown, [change for change in changes if change.kind == "change"])
+
+
+_SAMPLE = """
+SELECT c.sequence, c.number, c.amount, c.status, c.offset_after, c.applied_at
+FROM generate_series(CAST(:first AS bigint), CAST(:last AS bigint), CAST(:stride AS bigint)) AS place(sequence)
+CROSS JOIN LATERAL (
+    SELECT * FROM correction
+    WHERE machine_id = :machine AND characteristic_id = :characteristic AND sequence >= place.sequence
+        AND sequence < place.sequence + :stride AND sequence <= :last AND status = 'applied' AND tool_memory = :tool
+    ORDER BY machine_id, characteristic_id, sequence LIMIT 1
+) c
+"""
+
+
+def _with_totals(
+    key: str, rows: Sequence[tuple[int, int, float, str, float | None, datetime | None]], changes: Sequence[_Change]
+) -> list[Step]:
+    """Where corrections are left out, the sum cannot be added up: it is how far the offset has moved since the tool change."""
+    at_changes = [change.at for change in changes]
+    begin = next((offset - amount for _s, _n, amount, _status, offset, _at in rows if offset is not None), 0.0)
+    steps, total = [], 0.0
+    for sequence, number, amount, status, offset_after, applied_at in rows:
+        if offset_after is not None and applied_at is not None:
+            place = bisect_right(at_changes, applied_at)
+            total = offset_after - (changes[place - 1].offset_after if place else begin)
+        elif status in COUNTED:
+            total += amount
+        steps.append(Step(sequence, number, amount, status, reading_link(key, sequence), total))
+    return steps
+
+
+def _total_before(session: Session, standing: Standing, window: Window, changes: Sequence[_Change]) -> float:
+    """The sum of this characteristic's corrections from the last tool change to where the chart begins, mm."""
+    begun = max(
+        (change.at for change in changes if change.kind == "change" and change.sequence < window.first), default=None
+    )
+    query = select(Correction.amount, Correction.created_at).where(
+        Correction.machine_id == standing.machine.id,
+        Correction.characteristic_id == standing.characteristic.id,
+        Correction.sequence < window.first,
+        Correction.status.in_(sorted(COUNTED)),
+    )
+    rows = session.execute(query.order_by(Correction.sequence.desc()).limit(MOST_BEFORE))
+    return sum(amount for amount, created_at in rows if begun is None or created_at > begun)

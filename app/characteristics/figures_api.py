@@ -1,0 +1,149 @@
+"""JSON routes: the figures of a characteristic, as Plotly takes them."""
+
+from datetime import datetime
+from typing import Annotated, Any, Literal, NamedTuple
+
+import msgspec
+from fastapi import Depends, Path, Query, Response
+from pydantic import AwareDatetime
+
+from app.characteristics import queries
+from app.characteristics.chart import chart_of, run_of
+from app.characteristics.figures import histogram_edges, histogram_figure, run_figure, zone_chart
+from app.characteristics.queries import Standing
+from app.errors import FieldError, Invalid
+from app.statistics import queries as statistics
+from app.statistics.queries import Window
+from app.web.api import api_router, problems
+from app.web.deps import AnyCaller, SessionDep
+from app.web.fields import LARGEST_ID
+from app.web.i18n import _
+from app.web.theme import ThemeName
+
+router = api_router("characteristics")
+
+FIGURE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "A Plotly figure: `data` and `layout`",
+        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
+    }
+}
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+Theme = Annotated[ThemeName, Query(description="For a light or a dark page.")]
+Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
+
+
+class Choice(NamedTuple):
+    """Which readings are asked for."""
+
+    last: int | None
+    first: int | None
+    through: int | None
+    start: datetime | None
+    end: datetime | None
+
+
+def chosen(
+    last: Annotated[
+        str | None, Query(pattern=r"^([1-9][0-9]{0,17}|all)$", description="The last so many readings, or `all`.")
+    ] = None,
+    first: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="From this reading on.")] = None,
+    through: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="To this reading, itself included.")] = None,
+    start: Annotated[AwareDatetime | None, Query(alias="from", description="Measured at this moment or later.")] = None,
+    end: Annotated[AwareDatetime | None, Query(alias="to", description="Measured at this moment or earlier.")] = None,
+) -> Choice:
+    """The readings by number, by time, or the last ones; the last 200 if nothing is said."""
+    for name, low, high in (("first", first, through), ("from", start, end)):
+        if low is not None and high is not None and low > high:  # type: ignore[operator]
+            message = _("is beyond the end of the range; exchange the two")
+            raise Invalid(
+                f"{name}: {message}",
+                _("Correct the named fields and send it again."),
+                errors=[FieldError(name, message)],
+            )
+    if last is None and all(value is None for value in (first, through, start, end)):
+        return Choice(200, None, None, None, None)
+    return Choice(None if last in (None, "all") else int(last), first, through, start, end)
+
+
+Chosen = Annotated[Choice, Depends(chosen)]
+
+
+def _found(session: SessionDep, caller: AnyCaller, characteristic: str, choice: Choice) -> tuple[Standing, Window]:
+    standing = queries.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    return standing, statistics.window_of(session, standing.characteristic, **choice._asdict())
+
+
+def _answer(figure: dict[str, object]) -> Response:
+    # Thousands of numbers: written at once, not walked through by a validator first.
+    return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})
+
+
+@router.get("/characteristics/{characteristic}/figures/zones", responses=problems(404) | FIGURE, response_model=None)
+def get_zone_chart(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: Chosen,
+    scale: Annotated[
+        Literal["zones", "true"], Query(description="Each band equally tall, or linear in µm around the tolerance.")
+    ] = "zones",
+    theme: Theme = "light",
+    width: Width = 1240,
+) -> Response:
+    """The zone chart: readings in their zones, running average, corrections, tool changes, alarms.
+
+    Of more readings than can be drawn, blocks with their extremes: no extreme is ever thinned away.
+    """
+    standing, window = _found(session, caller, characteristic, choice)
+    chart = chart_of(session, standing, window)
+    return _answer(
+        zone_chart(
+            chart.points,
+            standing.parameters,
+            blocks=chart.blocks,
+            steps=chart.steps,
+            marks=chart.marks,
+            scale=scale,
+            theme=theme,
+            centre=chart.centre,
+            total_before=chart.total_before,
+            width=width,
+        )
+    )
+
+
+@router.get("/characteristics/{characteristic}/figures/run", responses=problems(404) | FIGURE, response_model=None)
+def get_run_chart(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: Chosen,
+    theme: Theme = "light",
+    width: Width = 1240,  # noqa: ARG001 - every chart is asked with its width
+) -> Response:
+    """The measured sizes over time; of more than 2 000 readings the last 2 000."""
+    standing, window = _found(session, caller, characteristic, choice)
+    parameters = standing.parameters
+    return _answer(run_figure(run_of(session, standing, window), parameters, target=parameters.target, theme=theme))
+
+
+@router.get(
+    "/characteristics/{characteristic}/figures/histogram", responses=problems(404) | FIGURE, response_model=None
+)
+def get_histogram(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: Chosen,
+    theme: Theme = "light",
+    width: Width = 300,  # noqa: ARG001 - every chart is asked with its width
+) -> Response:
+    """How the deviations are spread, without excluded readings; of more than 100 000 the last 100 000."""
+    standing, window = _found(session, caller, characteristic, choice)
+    parameters = standing.parameters
+    counts = statistics.histogram_of(
+        session, standing.characteristic, window, histogram_edges(parameters), parameters.tolerance_width / 2
+    )
+    return _answer(histogram_figure(counts, parameters, theme=theme))

@@ -1,0 +1,1 @@
+"""Set-up: the pages where machines, keys, characteristics and people are made and changed."""

@@ -1,0 +1,188 @@
+"""Set-up pages: characteristics and their parameters."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+from urllib.parse import quote
+
+from fastapi import APIRouter, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.characteristics import actions, queries
+from app.characteristics.actions import CharacteristicChange, CharacteristicIn
+from app.characteristics.tables import ParametersVersion
+from app.errors import Conflict, InbandError, Invalid
+from app.machines import queries as machines
+from app.setup import parameter_form
+from app.setup.frame import setup_page
+from app.web.deps import Caller, Engineer, FormDep, SessionDep, Viewer
+from app.web.forms import by_field, parsed
+
+router = APIRouter()
+
+
+@router.get("/setup/characteristics")
+def characteristics_page(request: Request, session: SessionDep, caller: Viewer, machine: str = "") -> Response:
+    chosen = machines.find_machine(session, machine)
+    return setup_page(
+        request,
+        "characteristics.html",
+        caller,
+        "characteristics",
+        rows=queries.characteristics(session, machine_id=chosen.id if chosen else None, limit=100_000),
+        machines=machines.machines(session, limit=100_000),
+        machine=chosen,
+        choice=parameter_form.choice,
+    )
+
+
+@router.get("/setup/characteristics/new")
+def new_characteristic_page(
+    request: Request, session: SessionDep, caller: Engineer, machine: str = "", like: str = ""
+) -> Response:
+    typed = parameter_form.typed_defaults() | {"machine": machine}
+    if like:
+        standing = queries.characteristic_named(session, like)
+        typed = parameter_form.typed_from(standing.version.parameters) | {
+            "machine": standing.machine.key,
+            "part": standing.characteristic.part or "",
+        }
+    return _new(request, session, caller, typed, {})
+
+
+@router.post("/setup/characteristics/new")
+def send_new_characteristic(request: Request, session: SessionDep, caller: Engineer, form: FormDep) -> Response:
+    named = {name: form.get(name, "") for name in ("key", "name", "machine", "part")}
+    try:
+        given = parsed(CharacteristicIn, named | {"parameters": parameter_form.parameters_from(form)})
+        made = actions.add_characteristic(session, given, caller.name)
+    except InbandError as error:
+        if not error.errors:
+            raise
+        return _new(request, session, caller, form, _all_errors(error, form), error.status)
+    return RedirectResponse(f"/setup/characteristics/{made.characteristic.key}?done=added", 303)
+
+
+def _all_errors(error: InbandError, form: Mapping[str, str]) -> dict[str, str]:
+    """What is wrong with the names and with the parameters at once, each once."""
+    errors = [*error.errors, *actions.refusals(parameter_form.parameters_from(form))]
+    return by_field(Invalid(error.detail, errors=dict.fromkeys(errors)))
+
+
+def _new(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    typed: Mapping[str, str],
+    errors: Mapping[str, str],
+    status: int = 200,
+) -> Response:
+    return setup_page(
+        request,
+        "characteristic_new.html",
+        caller,
+        "characteristics",
+        status=status,
+        machines=[(machine.key, machine.name) for machine in machines.machines(session, limit=100_000)],
+        **_form(typed, errors),
+    )
+
+
+@router.get("/setup/characteristics/{characteristic}")
+def characteristic_page(request: Request, session: SessionDep, caller: Viewer, characteristic: str) -> Response:
+    return _characteristic(request, session, caller, queries.characteristic_named(session, characteristic))
+
+
+@router.post("/setup/characteristics/{characteristic}")
+def send_characteristic(
+    request: Request, session: SessionDep, caller: Engineer, characteristic: str, form: FormDep
+) -> Response:
+    version = form.get("parameters_version", "")
+    looked_at = int(version) if version.isascii() and version.isdigit() and len(version) < 10 else None
+    standing = queries.characteristic_named(session, characteristic)
+    before = (standing.version.version, standing.characteristic.name, standing.characteristic.part)
+    try:
+        change = parsed(
+            CharacteristicChange,
+            {
+                "name": form.get("name", "").strip() or " ",  # refused in words; left out it would just stay
+                "parameters": parameter_form.parameters_from(form),
+                "parameters_version": looked_at,
+                "reason": form.get("reason", "").strip(),
+            },
+        )
+        part = parsed(CharacteristicChange, {"part": form.get("part", "").strip()}).part
+        change = change.model_copy(update={"part": part})
+        standing = actions.change_characteristic(session, characteristic, change, caller.name)
+    except InbandError as error:
+        if not error.errors and error.status != Conflict.status:
+            raise
+        session.expire_all()
+        return _characteristic(
+            request,
+            session,
+            caller,
+            queries.characteristic_named(session, characteristic),
+            status=error.status,
+            typed=form,
+            errors=by_field(error),
+            problem=error if error.status == Conflict.status else None,
+        )
+    after = (standing.version.version, standing.characteristic.name, standing.characteristic.part)
+    done = "same" if before == after else "changed"
+    return RedirectResponse(f"/setup/characteristics/{quote(characteristic)}?done={done}", 303)
+
+
+def _characteristic(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    standing: queries.Standing,
+    *,
+    status: int = 200,
+    typed: Mapping[str, str] | None = None,
+    errors: Mapping[str, str] | None = None,
+    problem: InbandError | None = None,
+) -> Response:
+    characteristic = standing.characteristic
+    if typed is None:
+        typed = parameter_form.typed_from(standing.version.parameters) | {
+            "name": characteristic.name,
+            "part": characteristic.part or "",
+        }
+    return setup_page(
+        request,
+        "characteristic.html",
+        caller,
+        "characteristics",
+        status=status,
+        characteristic=characteristic,
+        machine=standing.machine,
+        version=standing.version,
+        problem=problem,
+        warnings=actions.warnings_of(standing.parameters),
+        history=history(queries.versions(session, characteristic)),
+        **_form(typed, errors or {}),
+    )
+
+
+def history(versions: Sequence[ParametersVersion]) -> list[tuple[ParametersVersion, list[parameter_form.Difference]]]:
+    """Each version, newest first, with what it changed."""
+    older = [*versions[1:], None]
+    return [
+        (version, list(parameter_form.differences(before.parameters, version.parameters)) if before else [])
+        for version, before in zip(versions, older, strict=True)
+    ]
+
+
+def _form(typed: Mapping[str, str], errors: Mapping[str, str]) -> dict[str, Any]:
+    shown = parameter_form.typed_defaults() | {"key": "", "name": "", "machine": "", "part": "", "reason": ""}
+    return {
+        "typed": shown | dict(typed),
+        "errors": errors,
+        "groups": {group.id: group for group in parameter_form.groups()},
+        "inputs": parameter_form.inputs(),
+        "factors": parameter_form.factor_choices(),
+        "diagram": parameter_form.diagram(typed),
+        "sentences": parameter_form.sentences(),
+    }

@@ -1,0 +1,237 @@
+"""The parameter form: the core's table of fields as inputs, what was typed as parameters, and the zone diagram beside it.
+
+What people type stays text until the core has looked at it, so that nothing typed is lost when something is refused.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from app.characteristics.wording import choice, explanation, label, order_sentence
+from app.core.parameters import BY_NAME, FIELDS, Field, Kind, mean_nominal
+from app.web.i18n import _
+
+__all__ = ["choice", "diagram", "differences", "parameters_from", "sentences", "typed_defaults", "typed_from"]
+
+FACTORS = ("-1", "-0.5", "0.5")
+OTHER = "other"
+
+
+class Group(NamedTuple):
+    """Fields that belong together in the form."""
+
+    id: str
+    title: str
+    names: tuple[str, ...]
+
+
+def groups() -> list[Group]:
+    """The form from top to bottom."""
+    return [
+        Group("drawing", _("Drawing and tolerance"), ("nominal", "upper_deviation", "lower_deviation")),
+        Group("direct", _("Target and width"), ("target", "tolerance_width")),
+        Group("zones", _("Zones"), ("zero_range", "averaging_limit", "wear_limit", "confidence_limit")),
+        Group("averaging", _("Running average"), ("weighting_factor", "average_memory")),
+        Group("correction", _("Correction"), ("tool_memory", "mode", "wear_policy", "max_step", "max_total")),
+        Group(
+            "probing",
+            _("Probing"),
+            ("variant", "points", "repeats", "index", "wait", "axis", "direction", "path_factor"),
+        ),
+    ]
+
+
+class Input(NamedTuple):
+    """One field as the template draws it."""
+
+    name: str
+    r: str | None
+    label: str
+    help: str | None
+    unit: str | None
+    optional: bool
+    choices: list[tuple[str, str]]
+
+
+def inputs() -> dict[str, Input]:
+    """Every field by name."""
+    return {field.name: _input(field) for field in FIELDS}
+
+
+def _input(field: Field) -> Input:
+    units = {"index": None, "wait": "s", "path_factor": "mm"}
+    return Input(
+        field.name,
+        field.r,
+        label(field.name),
+        explanation(field.name),
+        "mm" if field.kind is Kind.LENGTH else units.get(field.name),
+        not field.required and field.default is None and field.name not in {"nominal", "factor"},
+        [(value, choice(field.name, value)) for value in field.choices],
+    )
+
+
+def factor_choices() -> list[tuple[str, str, str]]:
+    """The signs of domain §3, told by what is set up."""
+    return [
+        ("-1", _("−1"), _("Lathe, offset kept in diameter, outside or inside. Length or face.")),
+        ("-0.5", _("−1/2"), _("Lathe, offset kept as radius (L1). Milling radius, outside.")),
+        ("0.5", _("+1/2"), _("Milling radius, inside: hole or pocket.")),
+        (OTHER, _("Other"), _("A factor of your own, in the field below.")),
+    ]
+
+
+ORDER = (
+    # inner, outer, the field where one is told
+    ("R33", "R34", "averaging_limit"),
+    ("R34", "R35/2", "averaging_limit"),
+    ("R35/2", "R37", "wear_limit"),
+    ("R37", "R36", "confidence_limit"),
+)
+
+
+def sentences() -> list[dict[str, str]]:
+    """What the page says at once about a broken order; the server says the same when the form is sent."""
+    return [
+        {"field": field, "text": order_sentence(inner, outer, "{smaller}", "{larger}")} for inner, outer, field in ORDER
+    ]
+
+
+def typed_defaults() -> dict[str, str]:
+    """A new, empty form."""
+    return {field.name: _text(field.default) for field in FIELDS} | {
+        "factor": "",
+        "factor_other": "",
+        "accept_n": "1",
+        "accept_m": "1",
+    }
+
+
+def typed_from(parameters: Mapping[str, Any]) -> dict[str, str]:
+    """The form as it would have been typed for these parameters."""
+    typed = {name: _text(parameters.get(name)) for name in BY_NAME}
+    if parameters.get("nominal") is not None:  # the drawing is what was said; target and width follow from it
+        typed["target"] = typed["tolerance_width"] = ""
+    factor = _text(parameters.get("factor"))
+    known = factor in FACTORS
+    return typed | {
+        "factor": factor if known else OTHER,
+        "factor_other": "" if known else factor,
+        "accept_n": _text(parameters["accept"]["n"]),
+        "accept_m": _text(parameters["accept"]["m"]),
+    }
+
+
+def parameters_from(form: Mapping[str, str]) -> dict[str, Any]:
+    """What was typed, as the API takes it: every field is said, an empty one as null."""
+    given: dict[str, Any] = {}
+    for field in FIELDS:
+        text = form.get(field.name, "").strip()
+        if field.kind is Kind.YES_NO:
+            given[field.name] = text == "true"
+        elif field.kind is Kind.CHOICE:
+            given[field.name] = text or None
+        else:
+            given[field.name] = number(text)
+    if form.get("factor") == OTHER:
+        given["factor"] = number(form.get("factor_other", ""))
+    given["accept"] = {"n": number(form.get("accept_n", "")), "m": number(form.get("accept_m", ""))}
+    return given
+
+
+def number(text: str) -> float | int | str | None:
+    """A number as people type it: with a comma or a point, a minus sign of any kind. Else what was typed, for the core.
+
+    >>> number("0,0053"), number("−0.016"), number("3"), number(""), number("3 mm")
+    (0.0053, -0.016, 3, None, '3 mm')
+    """
+    cleaned = text.strip().replace("\N{MINUS SIGN}", "-").replace("\N{NO-BREAK SPACE}", "").replace(",", ".")
+    if not cleaned:
+        return None
+    if not cleaned.isascii() or "_" in cleaned or len(cleaned) > 40:
+        return text
+    try:
+        return int(cleaned)
+    except ValueError:
+        pass
+    try:
+        return float(cleaned)
+    except ValueError:
+        return text
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else ""
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+class Diagram(NamedTuple):
+    """The zone diagram's words as they stand, so that it is right before and without any script."""
+
+    target: float | None
+    width: float | None
+    limits: dict[str, float | None]
+
+
+def diagram(typed: Mapping[str, str]) -> Diagram:
+    """The limits that were typed, as far as they are numbers. mm."""
+    values = {name: _length(typed.get(name, "")) for name in BY_NAME}
+    target, width = values["target"], values["tolerance_width"]
+    drawing = [values[name] for name in ("nominal", "upper_deviation", "lower_deviation")]
+    if all(value is not None for value in drawing):
+        target, width = mean_nominal(*[value for value in drawing if value is not None])
+    averaging = values["averaging_limit"]
+    if averaging is None and width is not None:
+        averaging = round(width / 3, 9)
+    return Diagram(
+        target,
+        width,
+        {
+            "zero_range": values["zero_range"],
+            "averaging_limit": averaging,
+            "tolerance": None if width is None else width / 2,
+            "wear_limit": values["wear_limit"],
+            "confidence_limit": values["confidence_limit"],
+        },
+    )
+
+
+def _length(text: str) -> float | None:
+    value = number(text)
+    return float(value) if isinstance(value, int | float) and abs(value) < 1e9 else None
+
+
+class Difference(NamedTuple):
+    """What a new version changed in one parameter."""
+
+    name: str
+    r: str | None
+    before: str
+    after: str
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterable[Difference]:
+    """Two versions compared, worded."""
+    for name in (*BY_NAME, "accept"):
+        if old.get(name) != new.get(name):
+            field = BY_NAME.get(name)
+            yield Difference(label(name), field.r if field else None, worded(name, old), worded(name, new))
+
+
+def worded(name: str, parameters: Mapping[str, Any]) -> str:
+    """One parameter as people read it."""
+    value = parameters.get(name)
+    field = BY_NAME.get(name)
+    if value is None:
+        return "–"
+    if name == "accept":
+        return _("{n} of {m}").format(n=value["n"], m=value["m"])
+    if isinstance(value, bool):
+        return _("yes") if value else _("no")
+    if field is not None and field.choices:
+        return choice(name, str(value)).partition(":")[0]
+    return _text(value).replace("-", "\N{MINUS SIGN}") + (
+        " mm" if field is not None and field.kind is Kind.LENGTH else ""
+    )

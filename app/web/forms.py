@@ -1,0 +1,32 @@
+"""Forms that people send: read by the same schemas as JSON, and shown again with everything they typed."""
+
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from app.errors import FieldError, InbandError, Invalid
+from app.web.i18n import _
+from app.web.validation import field_errors
+
+Schema = TypeVar("Schema", bound=BaseModel)
+
+
+def parsed(schema: type[Schema], fields: Mapping[str, Any]) -> Schema:
+    """The form's fields as the API's schema; a field left empty is not said. Raises `Invalid`."""
+    given = {name: value for name, value in fields.items() if value is not None and value != ""}
+    try:
+        return schema.model_validate(given)
+    except ValidationError as error:
+        errors = [FieldError(field, message) for field, message in field_errors(error.errors())]
+        raise Invalid(_("The form has to be corrected."), errors=errors) from None
+
+
+def by_field(error: InbandError) -> dict[str, str]:
+    """What is wrong, by the name of the field in the form."""
+    messages: dict[str, str] = {}
+    for field, message in error.errors:
+        name = field.removeprefix("parameters.")
+        sentence = message[:1].upper() + message[1:]
+        messages[name] = f"{messages[name]}. {sentence}" if name in messages else sentence
+    return messages

@@ -1,0 +1,126 @@
+// <zone-diagram data-sentences='[{"field","text"} × 4]' data-not-a-number="…">: the zone diagram beside the parameter form.
+//
+// The server has drawn it; bands are equally tall, so what follows the typing is words alone. With every key it
+//   – writes deviation and size at each limit, target and width (L75), and the µm beside each length ([data-um]);
+//   – marks a limit that breaks R33 < R34 ≤ R35/2 ≤ R37 ≤ R36, and says why at the field, in the server's own sentences.
+// The server checks the same again when the form is sent; without this script nothing is lost but the immediacy.
+
+const NAMES = ["nominal", "upper_deviation", "lower_deviation", "target", "tolerance_width",
+  "zero_range", "averaging_limit", "wear_limit", "confidence_limit"];
+const ORDER = ["zero_range", "averaging_limit", "tolerance", "wear_limit", "confidence_limit"];
+const MINUS = "\u2212";
+
+/** What is typed, as a number of mm; null if empty, NaN if it is none. A comma is a point, as the server has it. */
+export function typed(text) {
+  const cleaned = text.trim().replaceAll(MINUS, "-").replaceAll(",", ".").replaceAll("\u00a0", "");
+  if (cleaned === "") return null;
+  return /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(cleaned) ? Number(cleaned) : NaN;
+}
+const usable = (value) => value !== null && Number.isFinite(value);
+const nanometres = (mm) => Math.round(mm * 1e6);
+/** At least four decimals, none hidden: 0.0090 mm. */
+const millimetres = (mm) => `${mm.toFixed(9).replace(/(\.\d{4}\d*?)0+$/, "$1")} mm`;
+const plain = (value) => String(Number(value.toPrecision(6)));
+const deviation = (mm) => (Math.abs(mm) >= 1 ? `${plain(Math.abs(mm))}\u00a0mm` : `${plain(Math.abs(mm) * 1000)}\u00a0µm`);
+const size = (mm) => `${mm < 0 ? MINUS : ""}${Math.abs(mm).toFixed(4)}`;
+
+customElements.define("zone-diagram", class extends HTMLElement {
+  connectedCallback() {
+    this.form = this.closest("form");
+    this.sentences = JSON.parse(this.dataset.sentences);
+    this.typing = (event) => {
+      this.forget(event.target);
+      this.draw();
+    };
+    this.form.addEventListener("input", this.typing);
+    this.draw();
+  }
+
+  disconnectedCallback() {
+    this.form.removeEventListener("input", this.typing);
+  }
+
+  /** What the server said about a field is about what was sent, not about what is typed now. */
+  forget(input) {
+    const field = input.closest(".field");
+    field?.querySelector(".error:not([data-live])")?.remove();
+    if (!field?.querySelector(".error")) input.removeAttribute("aria-invalid");
+  }
+
+  draw() {
+    const values = Object.fromEntries(NAMES.map((name) => [name, typed(this.form.elements[name].value)]));
+    let { target, tolerance_width: width } = values;
+    const drawing = [values.nominal, values.upper_deviation, values.lower_deviation];
+    if (drawing.every(usable)) {
+      target = values.nominal + (values.upper_deviation + values.lower_deviation) / 2;
+      width = values.upper_deviation - values.lower_deviation;
+    }
+    const limits = {
+      ...values,
+      tolerance: usable(width) ? width / 2 : null,
+      averaging_limit: values.averaging_limit ?? (usable(width) ? width / 3 : null),
+    };
+    this.form.elements.averaging_limit.placeholder = usable(width) && width > 0 ? plain(width / 3) : "";
+    this.write(target, width, limits);
+    this.explain(values, limits);
+  }
+
+  write(target, width, limits) {
+    for (const group of this.querySelectorAll("[data-limit]")) {
+      const limit = limits[group.dataset.limit];
+      const side = Number(group.dataset.side);
+      group.querySelector(".deviation").textContent = usable(limit) ? `${side > 0 ? "+" : MINUS}${deviation(limit)}` : "–";
+      group.querySelector(".size").textContent = usable(limit) && usable(target) ? size(target + side * limit) : "";
+    }
+    this.querySelector("[data-target]").textContent = usable(target) ? size(target) : "";
+    for (const [name, value] of [["target", target], ["width", width]]) {
+      const output = this.form.querySelector(`[data-size="${name}"]`);
+      output.textContent = usable(value) ? `${size(value)} mm` : "–";
+    }
+    for (const output of this.form.querySelectorAll("[data-um]")) {
+      const value = typed(this.form.elements[output.dataset.um].value);
+      const sign = output.dataset.um.endsWith("deviation") ? (value < 0 ? MINUS : "+") : "";
+      output.textContent = usable(value) ? `${sign}${plain(Math.abs(value) * 1000)}\u00a0µm` : "";
+    }
+  }
+
+  explain(values, limits) {
+    const said = new Map();
+    for (const name of NAMES) if (Number.isNaN(values[name])) said.set(name, this.dataset.notANumber);
+    const wrong = new Set();
+    ORDER.slice(1).forEach((outer, index) => {
+      const [smaller, larger] = [limits[ORDER[index]], limits[outer]];
+      if (!usable(smaller) || !usable(larger)) return;
+      const [below, above] = [nanometres(smaller), nanometres(larger)];
+      if (index === 0 ? below < above : below <= above) return;
+      wrong.add(ORDER[index]).add(outer);
+      const { field, text } = this.sentences[index];
+      const sentence = text.replace("{smaller}", millimetres(smaller)).replace("{larger}", millimetres(larger));
+      said.set(field, said.has(field) ? `${said.get(field)}. ${sentence}` : sentence);
+    });
+    for (const group of this.querySelectorAll("[data-limit]")) group.classList.toggle("wrong", wrong.has(group.dataset.limit));
+    for (const name of NAMES) this.say(name, said.get(name));
+  }
+
+  /** Say at a field what is wrong with it now, or nothing. What the server said stays until the field is typed in. */
+  say(name, sentence) {
+    const input = this.form.elements[name];
+    const field = input.closest(".field");
+    let note = field.querySelector(".error[data-live]");
+    if (!sentence || field.querySelector(".error:not([data-live])")) {
+      if (note) {
+        note.remove();
+        input.removeAttribute("aria-invalid");
+      }
+      return;
+    }
+    if (!note) {
+      note = Object.assign(document.createElement("p"), { className: "error", id: `f-${name}-live` });
+      note.dataset.live = "";
+      note.setAttribute("role", "status");
+      field.querySelector("input").parentElement.after(note);
+    }
+    if (note.textContent !== sentence) note.textContent = sentence;
+    input.setAttribute("aria-invalid", "true");
+  }
+});
