@@ -32,6 +32,7 @@ class ToolEvent(Base):
     __table_args__ = (
         CheckConstraint("kind IN ('change', 'edit', 'correction')", name="kind"),
         Index("tool_event_tool_idx", "machine_id", "number", "id"),
+        Index("tool_event_change_idx", "machine_id", "number", "id", postgresql_where=text("kind <> 'correction'")),
     )
 
     machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), primary_key=True, autoincrement=False)

@@ -33,13 +33,17 @@ UPPER, LOWER = 0.5, -0.5  # rows of the events
 
 @dataclass(frozen=True)
 class Step:
-    """One correction; `sequence` is the reading that caused it, `amount` what the offset changes by (mm)."""
+    """One correction; `sequence` is the reading that caused it, `amount` what the offset changes by (mm).
+
+    total: the sum after it (mm), where corrections before it are left out and it cannot be added up.
+    """
 
     sequence: int
     number: int
     amount: float
     status: str
     link: str | None = None
+    total: float | None = None
 
 
 @dataclass(frozen=True)
@@ -167,6 +171,8 @@ def offset_lane(
     for sequence, _order, step in sorted(events, key=lambda event: event[:2]):
         if step is None:
             total = 0.0
+        elif step.total is not None:
+            total = step.total
         elif step.status in COUNTED:
             total += step.amount
         if sequence < span[0]:  # counts, but lies before what is shown
