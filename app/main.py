@@ -11,7 +11,6 @@ from app.alarms import api as alarms
 from app.audit import api as audit
 from app.characteristics import api as characteristics
 from app.characteristics import figures_api
-from app.characteristics import figures_api
 from app.db.engine import Database
 from app.machines import api as machines
 from app.offsets import api as offsets
@@ -25,7 +24,6 @@ from app.readings.writer import Writer
 from app.settings import Settings
 from app.setup import pages as setup_pages
 from app.statistics import api as statistics
-from app.statistics import api as statistics
 from app.web import events_api, health
 from app.web.limits import BodyLimit
 from app.web.live import Live
@@ -37,8 +35,6 @@ from app.web.templates import assets
 ROUTERS: tuple[APIRouter, ...] = (
     machines.router,
     characteristics.router,
-    figures_api.router,
-    statistics.router,
     figures_api.router,
     statistics.router,
     readings.push,
