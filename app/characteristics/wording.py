@@ -16,9 +16,9 @@ def label(name: str) -> str:
         "average_memory": _("Average memory"),
         "variant": _("Measuring variant"),
         "points": _("Measuring points"),
-        "repeats": _("Repeats per point"),
-        "index": _("Index angle or spacing"),
-        "wait": _("Wait after indexing"),
+        "repeats": _("Repeats"),
+        "index": _("Index or spacing"),
+        "wait": _("Wait"),
         "axis": _("Measuring axis"),
         "direction": _("Probing direction"),
         "nominal": _("Nominal"),
@@ -36,9 +36,9 @@ def label(name: str) -> str:
         "accept": _("Acceptance"),
         "rejected_may_correct": _("A rejected part may correct"),
         "mode": _("Mode"),
-        "wear_policy": _("Correction beyond the wear limit"),
-        "max_step": _("Largest single correction"),
-        "max_total": _("Largest sum of corrections per tool"),
+        "wear_policy": _("Beyond the wear limit"),
+        "max_step": _("Largest step"),
+        "max_total": _("Largest sum"),
     }.get(name, name)
 
 
@@ -48,9 +48,9 @@ def explanation(name: str) -> str | None:
         "tool_memory": _("Whose offset is corrected, 1 to 32. 0 measures only."),
         "average_memory": _("Where the running average is kept, 1 to 20; may be shared. 0 keeps none."),
         "points": _("For the variants with several points."),
-        "repeats": _("Touches at the same point; their mean counts. Usual: 1 to 10."),
+        "repeats": _("At the same point; the mean counts. Usual: 1 to 10."),
         "index": _("Degrees between points, or mm along Z."),
-        "wait": _("Seconds before measuring goes on."),
+        "wait": _("Seconds before measuring goes on after indexing."),
         "target": _("Aimed at: the middle of the tolerance."),
         "tolerance_width": _("Upper minus lower limit."),
         "zero_range": _("Up to here a deviation is scatter: nothing is corrected."),
@@ -61,8 +61,12 @@ def explanation(name: str) -> str | None:
             "1 takes the last reading whole; larger follows slower and scatters less. Usual: 1 to 4."
         ),
         "path_factor": _("The touch is expected within ± this many mm of the target. Usual: 1 to 10."),
+        "mode": _("Automatic: the machine fetches each correction. Approval: a person releases it first."),
+        "wear_policy": _("What becomes of a correction computed for a worn tool."),
         "max_step": _("A larger correction is cut to this. Empty: no limit."),
-        "max_total": _("Beyond it nothing is corrected and an alarm is raised. Empty: no limit."),
+        "max_total": _(
+            "Sum of corrections per tool: beyond it nothing is corrected and an alarm is raised. Empty: no limit."
+        ),
         "rejected_may_correct": _("A part outside n of m also corrects the tool."),
     }.get(name)
 
@@ -80,12 +84,12 @@ def choice(name: str, value: str) -> str:
         "axis": {"X": "X", "Y": "Y", "Z": "Z"},
         "direction": {"positive": _("Positive (+)"), "negative": _("Negative (−)")},
         "mode": {
-            "automatic": _("Automatic: the machine fetches each correction"),
-            "approval": _("Approval: a person releases each correction"),
-            "measure_only": _("Measure only: nothing is corrected"),
+            "automatic": _("Automatic"),
+            "approval": _("Approval by a person"),
+            "measure_only": _("Measure only"),
         },
         "wear_policy": {
-            "hold": _("Held until the operator decides"),
+            "hold": _("Held for the operator"),
             "release": _("Released at once"),
         },
     }.get(name, {}).get(value, value)
@@ -197,9 +201,8 @@ def _range(problem: Problem, name: str) -> str:
         "highest": f"{highest:.10g}{unit}",
     }
     if problem.warning:
-        return _(
-            "{name} {value} is unusual: {lowest} to {highest} is the control's range. Check the unit (mm)."
-        ).format(**values)
+        unusual = _("{name} {value} is unusual: the control's range is {lowest} to {highest}").format(**values)
+        return unusual + (_("; check that it is in mm") if unit else "")
     return _("{name} must lie between {lowest} and {highest}, not {value}").format(**values)
 
 

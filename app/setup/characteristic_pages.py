@@ -32,7 +32,7 @@ def characteristics_page(request: Request, session: SessionDep, caller: Viewer, 
         rows=queries.characteristics(session, machine_id=chosen.id if chosen else None, limit=100_000),
         machines=machines.machines(session, limit=100_000),
         machine=chosen,
-        choice=parameter_form.choice,
+        mode_words=lambda mode: parameter_form.choice("mode", mode.value),
     )
 
 
@@ -180,9 +180,10 @@ def _form(typed: Mapping[str, str], errors: Mapping[str, str]) -> dict[str, Any]
     return {
         "typed": shown | dict(typed),
         "errors": errors,
-        "groups": {group.id: group for group in parameter_form.groups()},
         "inputs": parameter_form.inputs(),
         "factors": parameter_form.factor_choices(),
         "diagram": parameter_form.diagram(typed),
         "sentences": parameter_form.sentences(),
+        "short": parameter_form.short,
+        "micrometres": lambda name: parameter_form.micrometres(name, typed.get(name, "")),
     }

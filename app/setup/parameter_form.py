@@ -14,30 +14,8 @@ __all__ = ["choice", "diagram", "differences", "parameters_from", "sentences", "
 
 FACTORS = ("-1", "-0.5", "0.5")
 OTHER = "other"
-
-
-class Group(NamedTuple):
-    """Fields that belong together in the form."""
-
-    id: str
-    title: str
-    names: tuple[str, ...]
-
-
-def groups() -> list[Group]:
-    """The form from top to bottom."""
-    return [
-        Group("drawing", _("Drawing and tolerance"), ("nominal", "upper_deviation", "lower_deviation")),
-        Group("direct", _("Target and width"), ("target", "tolerance_width")),
-        Group("zones", _("Zones"), ("zero_range", "averaging_limit", "wear_limit", "confidence_limit")),
-        Group("averaging", _("Running average"), ("weighting_factor", "average_memory")),
-        Group("correction", _("Correction"), ("tool_memory", "mode", "wear_policy", "max_step", "max_total")),
-        Group(
-            "probing",
-            _("Probing"),
-            ("variant", "points", "repeats", "index", "wait", "axis", "direction", "path_factor"),
-        ),
-    ]
+DRAWING = ("nominal", "upper_deviation", "lower_deviation")
+DIRECT = ("target", "tolerance_width")
 
 
 class Input(NamedTuple):
@@ -65,7 +43,7 @@ def _input(field: Field) -> Input:
         label(field.name),
         explanation(field.name),
         "mm" if field.kind is Kind.LENGTH else units.get(field.name),
-        not field.required and field.default is None and field.name not in {"nominal", "factor"},
+        not field.required and field.default is None and field.name not in {*DRAWING, *DIRECT, "factor"},
         [(value, choice(field.name, value)) for value in field.choices],
     )
 
@@ -109,6 +87,9 @@ def typed_defaults() -> dict[str, str]:
 def typed_from(parameters: Mapping[str, Any]) -> dict[str, str]:
     """The form as it would have been typed for these parameters."""
     typed = {name: _text(parameters.get(name)) for name in BY_NAME}
+    width = parameters["tolerance_width"]
+    if parameters["averaging_limit"] == round(width / 3, 9):  # left to follow the tolerance
+        typed["averaging_limit"] = ""
     if parameters.get("nominal") is not None:  # the drawing is what was said; target and width follow from it
         typed["target"] = typed["tolerance_width"] = ""
     factor = _text(parameters.get("factor"))
@@ -179,7 +160,7 @@ def diagram(typed: Mapping[str, str]) -> Diagram:
     """The limits that were typed, as far as they are numbers. mm."""
     values = {name: _length(typed.get(name, "")) for name in BY_NAME}
     target, width = values["target"], values["tolerance_width"]
-    drawing = [values[name] for name in ("nominal", "upper_deviation", "lower_deviation")]
+    drawing = [values[name] for name in DRAWING]
     if all(value is not None for value in drawing):
         target, width = mean_nominal(*[value for value in drawing if value is not None])
     averaging = values["averaging_limit"]
@@ -201,6 +182,21 @@ def diagram(typed: Mapping[str, str]) -> Diagram:
 def _length(text: str) -> float | None:
     value = number(text)
     return float(value) if isinstance(value, int | float) and abs(value) < 1e9 else None
+
+
+def micrometres(name: str, text: str) -> str:
+    """A typed length in µm, as the page says it beside the field while one types."""
+    value = _length(text)
+    if value is None:
+        return ""
+    sign = "" if name not in DRAWING else "\N{MINUS SIGN}" if value < 0 else "+"
+    return f"{sign}{abs(value) * 1000:.6g}\N{NO-BREAK SPACE}µm"
+
+
+def short(limit: float) -> str:
+    """A limit as the diagram says it: four digits, in mm from 1 mm on."""
+    size = abs(limit)
+    return f"{size:.4g}\N{NO-BREAK SPACE}mm" if size >= 1 else f"{size * 1000:.4g}\N{NO-BREAK SPACE}µm"
 
 
 class Difference(NamedTuple):
@@ -231,7 +227,7 @@ def worded(name: str, parameters: Mapping[str, Any]) -> str:
     if isinstance(value, bool):
         return _("yes") if value else _("no")
     if field is not None and field.choices:
-        return choice(name, str(value)).partition(":")[0]
+        return choice(name, str(value))
     return _text(value).replace("-", "\N{MINUS SIGN}") + (
         " mm" if field is not None and field.kind is Kind.LENGTH else ""
     )

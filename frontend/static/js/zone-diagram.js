@@ -20,8 +20,8 @@ const usable = (value) => value !== null && Number.isFinite(value);
 const nanometres = (mm) => Math.round(mm * 1e6);
 /** At least four decimals, none hidden: 0.0090 mm. */
 const millimetres = (mm) => `${mm.toFixed(9).replace(/(\.\d{4}\d*?)0+$/, "$1")} mm`;
-const plain = (value) => String(Number(value.toPrecision(6)));
-const deviation = (mm) => (Math.abs(mm) >= 1 ? `${plain(Math.abs(mm))}\u00a0mm` : `${plain(Math.abs(mm) * 1000)}\u00a0µm`);
+const plain = (value, digits = 6) => String(Number(value.toPrecision(digits)));
+const deviation = (mm) => (Math.abs(mm) >= 1 ? `${plain(Math.abs(mm), 4)}\u00a0mm` : `${plain(Math.abs(mm) * 1000, 4)}\u00a0µm`);
 const size = (mm) => `${mm < 0 ? MINUS : ""}${Math.abs(mm).toFixed(4)}`;
 
 customElements.define("zone-diagram", class extends HTMLElement {
@@ -118,7 +118,7 @@ customElements.define("zone-diagram", class extends HTMLElement {
       note = Object.assign(document.createElement("p"), { className: "error", id: `f-${name}-live` });
       note.dataset.live = "";
       note.setAttribute("role", "status");
-      field.querySelector("input").parentElement.after(note);
+      (field.querySelector("output") ?? input.parentElement).after(note);
     }
     if (note.textContent !== sentence) note.textContent = sentence;
     input.setAttribute("aria-invalid", "true");
