@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
-from sqlalchemy import Select, func, select
+from sqlalchemy import Select, any_, func, literal, select
 from sqlalchemy.orm import Session, aliased
 
 from app.alarms.tables import Alarm
@@ -155,7 +155,7 @@ def readings_behind(session: Session, row: AlarmRow) -> tuple[str | None, list[i
             Characteristic.key == key,
             Reading.machine_id == found.machine_id,
             Reading.sequence >= found.sequence,
-            Reading.alarms.contains([found.id]),
+            literal(found.id) == any_(Reading.alarms),
         )
     )
     if row.characteristic is not None:  # the last one of a tool's alarm may be of another characteristic

@@ -50,7 +50,7 @@ def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[
         found = session.execute(
             select(Alarm.id, Alarm.kind).where(Alarm.machine_id == entry.machine_id, Alarm.id.in_(alarm_ids))
         )
-        kinds = dict(found.tuples())
+        kinds = {row.id: row.kind for row in found}
     excluded = {
         sequence: {"at": at, "by": actor, "reason": reason}
         for sequence, at, actor, reason in session.execute(

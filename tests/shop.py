@@ -1,0 +1,85 @@
+"""A small shop floor for tests: a lathe, one characteristic whose limits are easy to hit, and short words for what is done to it.
+
+Target 40 mm; zero ±1 µm, averaging ±5 µm, tolerance ±8 µm, wear from 300 µm, confidence 1 mm; k = 2, factor −1.
+"""
+
+import itertools
+from typing import Any
+
+import httpx
+
+PARAMETERS: dict[str, Any] = {
+    "tool_memory": 3,
+    "average_memory": 5,
+    "target": 40.0,
+    "tolerance_width": 0.016,
+    "zero_range": 0.001,
+    "averaging_limit": 0.005,
+    "wear_limit": 0.3,
+    "confidence_limit": 1.0,
+    "weighting_factor": 2,
+    "factor": -1,
+}
+_names = itertools.count(1)
+
+
+class Shop:
+    """One machine of its own on a running server. Every answer that is not as expected fails the test."""
+
+    def __init__(self, server: Any) -> None:
+        self.server = server
+        self.admin: httpx.Client = server.client(server.key())
+        number = next(_names)
+        self.machine, self.characteristic = f"lathe-{number}", f"shaft-{number}"
+        self.call("POST", "/machines", 201, key=self.machine, name=f"Lathe {number}", control="sinumerik")
+        self.add(self.characteristic)
+        self.machine_client: httpx.Client = server.client(server.key(machine=self.machine))
+
+    def add(self, key: str, **parameters: Any) -> None:
+        """A characteristic of this machine."""
+        self.call(
+            "POST",
+            "/characteristics",
+            201,
+            key=key,
+            name=f"Seat {key}",
+            machine=self.machine,
+            unit="mm",
+            parameters=PARAMETERS | parameters,
+        )
+
+    def call(self, method: str, path: str, status: int = 200, client: httpx.Client | None = None, **body: Any) -> Any:
+        """One request; the JSON of the answer."""
+        answer = (client or self.admin).request(method, f"/api/v1{path}", json=body or None)
+        assert answer.status_code == status, f"{method} {path}: {answer.status_code} {answer.text}"
+        return answer.json() if answer.content else None
+
+    def read(self, micrometres: float, characteristic: str | None = None, **more: Any) -> Any:
+        """Push a reading that deviates by so much."""
+        return self.call(
+            "POST",
+            "/readings",
+            201,
+            characteristic=characteristic or self.characteristic,
+            measured=round(40 + micrometres / 1000, 6),
+            **more,
+        )
+
+    def correction(self, number: int, verb: str | None = None, status: int = 200, **body: Any) -> Any:
+        """Look at a correction, or do something to it."""
+        path = f"/corrections/{self.machine}/{number}"
+        return self.call("POST", f"{path}/{verb}", status, **body) if verb else self.call("GET", path, status)
+
+    def tool(self, number: int = 3) -> Any:
+        return self.call("GET", f"/machines/{self.machine}/tools/{number}")
+
+    def average(self, location: int = 5) -> float:
+        value: float = self.call("GET", f"/machines/{self.machine}/averages/{location}")["average"]
+        return value
+
+    def alarms(self, state: str = "active") -> list[Any]:
+        items: list[Any] = self.call("GET", f"/alarms?state={state}&machine={self.machine}")["items"]
+        return items
+
+    def acknowledge(self, alarm: int, action: str, status: int = 200, comment: str = "looked at", **more: Any) -> Any:
+        return self.call("POST", f"/alarms/{alarm}/acknowledge", status, action=action, comment=comment, **more)
