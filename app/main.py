@@ -18,6 +18,7 @@ from app.people import api as people
 from app.people import keys_api
 from app.people import pages as sign_in_pages
 from app.people.keys import KeyRing
+from app.plant import pages as plant_pages
 from app.readings import api as readings
 from app.readings.door import Directory, ReadingsDoor
 from app.readings.writer import Writer
@@ -46,6 +47,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     keys_api.router,
     audit.router,
     health.router,
+    plant_pages.router,
     sign_in_pages.router,
     setup_pages.router,
 )

@@ -13,6 +13,7 @@ from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.alarms.tables import Alarm
+from app.alarms.wording import kind_word
 from app.characteristics.figures import Block, Mark, Point, RunPoint, Step
 from app.characteristics.figures.lanes import COUNTED, MANUAL_EDIT, TOOL_CHANGE
 from app.characteristics.queries import Standing
@@ -20,7 +21,6 @@ from app.offsets.tables import OPEN, AverageMemory, Correction, ToolEvent
 from app.statistics import queries as statistics
 from app.statistics.queries import Course, Window
 from app.web.i18n import _
-from app.web.theme import zone_name
 
 MOST_STEPS = 500
 MOST_SAMPLED = 300  # of more corrections than that, so many are shown, evenly spread
@@ -148,21 +148,10 @@ def _alarms(session: Session, standing: Standing, window: Window) -> list[Mark]:
     )
     key = standing.characteristic.key
     return [
-        Mark(sequence, kind, alarm_word(kind), reading_link(key, sequence), active=acknowledged_at is None)
+        Mark(sequence, kind, kind_word(kind), reading_link(key, sequence), active=acknowledged_at is None)
         for sequence, kind, acknowledged_at in rows
         if sequence is not None
     ]
-
-
-def alarm_word(kind: str) -> str:
-    """The kind of an alarm in one or two words."""
-    return {
-        "tool_worn": _("Tool worn"),
-        "acceptance": _("Not accepted"),
-        "offset_limit": _("Offset limit"),
-        "offset_differs": _("Offset differs"),
-        "signal": _("Signal"),
-    }.get(kind) or zone_name(kind)
 
 
 def _changes(session: Session, standing: Standing, course: Course, window: Window) -> list[_Change]:
@@ -277,11 +266,21 @@ def _total_before(session: Session, standing: Standing, window: Window, changes:
     begun = max(
         (change.at for change in changes if change.kind == "change" and change.sequence < window.first), default=None
     )
-    query = select(Correction.amount, Correction.created_at).where(
-        Correction.machine_id == standing.machine.id,
-        Correction.characteristic_id == standing.characteristic.id,
-        Correction.sequence < window.first,
-        Correction.status.in_(sorted(COUNTED)),
+    query = (
+        select(Correction.amount, Correction.created_at)
+        .where(
+            Correction.machine_id == standing.machine.id,
+            Correction.characteristic_id == standing.characteristic.id,
+            Correction.sequence < window.first,
+            Correction.status.in_(sorted(COUNTED)),
+        )
+        .order_by(Correction.sequence.desc())
     )
-    rows = session.execute(query.order_by(Correction.sequence.desc()).limit(MOST_BEFORE))
-    return sum(amount for amount, created_at in rows if begun is None or created_at > begun)
+    total = 0.0
+    for page in range(MOST_BEFORE // MOST_STEPS):
+        rows = session.execute(query.limit(MOST_STEPS).offset(page * MOST_STEPS)).all()
+        of_this_life = [amount for amount, created_at in rows if begun is None or created_at > begun]
+        total += sum(of_this_life)
+        if len(of_this_life) < MOST_STEPS:
+            break
+    return total

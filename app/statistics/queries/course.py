@@ -13,7 +13,7 @@ from app.statistics.queries.pyramid import BASE_LEVEL, FAN, TOP_LEVEL, Block, Ru
 from app.statistics.queries.window import Window
 
 MOST_READINGS = 2_500  # drawn one by one
-MOST_BLOCKS = 1_300  # about one for every pixel that the readings have
+MOST_BLOCKS = 1_000  # about one for every pixel that the readings have
 
 
 class Drawn(NamedTuple):

@@ -1,0 +1,93 @@
+"""Pages: the plant, and one machine of it."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy.orm import Session
+
+from app.characteristics.figures import band_picture, sparkline
+from app.plant import queries
+from app.plant.queries import Group, Row
+from app.plant.state import CALM, NEED_SOMEONE, State
+from app.web.deps import SessionDep, require
+from app.web.i18n import _
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False, dependencies=[require("viewer")])
+Show = Annotated[Literal["all", "attention"], Query()]
+
+
+@router.get("/")
+def plant_page(request: Request, session: SessionDep, show: Show = "all") -> Response:
+    """Every machine and characteristic."""
+    return _page(request, session, show, None)
+
+
+@router.get("/plant/{machine}")
+def machine_page(request: Request, session: SessionDep, machine: str, show: Show = "all") -> Response:
+    """One machine; also the part of the plant's page that is fetched again when something happens to it."""
+    return _page(request, session, show, machine)
+
+
+@router.get("/plant-summary")
+def summary(request: Request, session: SessionDep, show: Show = "all") -> Response:
+    """How many characteristics are in which state, for the head of the plant's page."""
+    groups = queries.plant(session, trends=False)
+    return page(request, "plant/summary.html", **_summary(groups), show=show)
+
+
+def _page(request: Request, session: Session, show: str, machine: str | None) -> Response:
+    groups, now = queries.plant(session, machine=machine), datetime.now(UTC)
+    return page(
+        request,
+        "plant/plant.html",
+        groups=[Group(each.machine, [row for row in each.rows if _shown(row, show)], each.alarms) for each in groups],
+        machine=groups[0].machine if machine else None,
+        show=show,
+        state_word=state_word,
+        band=lambda row: band_picture(row.stream.last_deviation, row.parameters, row.stream.last_zone, row.average),
+        spark=lambda row: sparkline(row.trend, row.parameters),
+        is_calm=lambda row: row.state in CALM,
+        is_old=lambda row: row.old_from is not None and row.old_from <= now,
+        **_summary(groups),
+    )
+
+
+def _shown(row: Row, show: str) -> bool:
+    return show == "all" or row.state in NEED_SOMEONE or bool(row.alarms)
+
+
+def _summary(groups: list[Group]) -> dict[str, Any]:
+    """How many need someone, have nothing new, run, or wait for their first reading."""
+    now = datetime.now(UTC)
+    rows = [row for group in groups for row in group.rows]
+    need = [row for row in rows if _shown(row, "attention")]
+    calm = [row for row in rows if not _shown(row, "attention")]
+    empty = [row for row in calm if row.state is State.NO_DATA]
+    old = [row for row in calm if row.old_from is not None and row.old_from <= now]
+    return {
+        "total": len(rows),
+        "need": len(need),
+        "old": len(old),
+        "empty": len(empty),
+        "calm": len(calm) - len(empty) - len(old),
+    }
+
+
+def state_word(state: State) -> str:
+    """The state in one or two words."""
+    return {
+        State.PROBE_FAULT: _("Probe fault"),
+        State.TOOL_WORN: _("Tool worn"),
+        State.HELD: _("Held"),
+        State.OVERSIZE: _("Oversize"),
+        State.UNDERSIZE: _("Undersize"),
+        State.NO_DATA: _("No readings yet"),
+        State.AWAITING_APPROVAL: _("Awaiting approval"),
+        State.CORRECTING: _("Correcting"),
+        State.DRIFTING_UP: _("Drifting up"),
+        State.DRIFTING_DOWN: _("Drifting down"),
+        State.MEASURE_ONLY: _("Measure only"),
+        State.IN_BAND: _("In band"),
+    }[state]

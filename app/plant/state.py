@@ -1,0 +1,106 @@
+"""In which state a characteristic is, told by its data alone. Pure."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from enum import StrEnum
+
+from app.core.parameters import Parameters
+from app.core.zones import nanometres
+
+DRIFT = 5  # readings in a row on one side, beyond the zero range, are a drift
+QUIET = timedelta(minutes=15)  # nobody expects a reading sooner
+MISSED = 10  # usual intervals without a reading, after which what is known is old
+
+
+class State(StrEnum):
+    """From the most urgent to the calmest; the first that applies is shown."""
+
+    PROBE_FAULT = "probe_fault"
+    TOOL_WORN = "tool_worn"
+    HELD = "held"
+    OVERSIZE = "oversize"
+    UNDERSIZE = "undersize"
+    NO_DATA = "no_data"
+    AWAITING_APPROVAL = "awaiting_approval"
+    CORRECTING = "correcting"
+    DRIFTING_UP = "drifting_up"
+    DRIFTING_DOWN = "drifting_down"
+    MEASURE_ONLY = "measure_only"
+    IN_BAND = "in_band"
+
+
+NEED_SOMEONE = frozenset(
+    {
+        State.PROBE_FAULT,
+        State.TOOL_WORN,
+        State.HELD,
+        State.OVERSIZE,
+        State.UNDERSIZE,
+        State.AWAITING_APPROVAL,
+    }
+)
+# What is only worth something while it is new: an old one of these is shown as old.
+CALM = frozenset({State.CORRECTING, State.DRIFTING_UP, State.DRIFTING_DOWN, State.MEASURE_ONLY, State.IN_BAND})
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the state is told by.
+
+    alarms: kinds of the active ones. corrections: statuses of the open ones. trend: the last deviations, oldest first, mm;
+    since: when the first of them arrived.
+    """
+
+    parameters: Parameters
+    readings: int
+    zone: str | None
+    deviation: float | None
+    paused: bool
+    alarms: Collection[str]
+    corrections: Collection[str]
+    trend: Sequence[float]
+    since: datetime | None
+    last_at: datetime | None
+
+    @property
+    def old_from(self) -> datetime | None:
+        """From this moment on, what is known of the process is old; None while nothing is known."""
+        if self.last_at is None:
+            return None
+        usual = timedelta(0)
+        if self.since is not None and len(self.trend) > 1:
+            usual = (self.last_at - self.since) / (len(self.trend) - 1)
+        return self.last_at + max(QUIET, MISSED * usual)
+
+
+def state_of(known: Known) -> State:
+    """The most urgent thing that can be said."""
+    if known.paused or "probe_fault" in known.alarms:
+        return State.PROBE_FAULT
+    if "tool_worn" in known.alarms:
+        return State.TOOL_WORN
+    if "held" in known.corrections:
+        return State.HELD
+    if known.readings == 0 or known.deviation is None:
+        return State.NO_DATA
+    # The part itself: a reading that counts outstanding corrections may be decided in a milder zone.
+    if abs(nanometres(known.deviation)) > known.parameters.limits.tolerance:
+        return State.OVERSIZE if known.deviation > 0 else State.UNDERSIZE
+    if "awaiting_approval" in known.corrections:
+        return State.AWAITING_APPROVAL
+    if "pending" in known.corrections:
+        return State.CORRECTING
+    return drift(known.trend, known.parameters) or (
+        State.MEASURE_ONLY if known.parameters.measures_only else State.IN_BAND
+    )
+
+
+def drift(trend: Sequence[float], parameters: Parameters) -> State | None:
+    """Whether the last readings all lie on one side beyond the zero range."""
+    last = [nanometres(deviation) for deviation in trend[-DRIFT:]]
+    if len(last) == DRIFT and min(last) > parameters.limits.zero_range:
+        return State.DRIFTING_UP
+    if len(last) == DRIFT and max(last) < -parameters.limits.zero_range:
+        return State.DRIFTING_DOWN
+    return None
