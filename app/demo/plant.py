@@ -112,11 +112,11 @@ LATHE_1 = Machine(
     features=(
         Feature(
             "shaft-d40", "Bearing seat Ø40 h6", 3, LATHE_OUTSIDE, 40.0, 0.0, -0.016, factor=-1,
-            average_memory=5, warmth=-0.009, more={"averaging_limit": 0.0053, "max_step": 0.5},
+            average_memory=5, warmth=0.009, more={"averaging_limit": 0.0053, "max_step": 0.5},
         ),
         Feature(
             "shaft-d35", "Bearing seat Ø35 h6", 3, LATHE_OUTSIDE, 35.0, 0.0, -0.016, factor=-1,
-            average_memory=5, warmth=-0.008, more={"averaging_limit": 0.0053, "max_step": 0.5},
+            average_memory=5, warmth=0.008, more={"averaging_limit": 0.0053, "max_step": 0.5},
         ),
         Feature(
             "shaft-l120", "Shoulder length 120", 7, LENGTH, 120.0, 0.025, -0.025, factor=-1,
@@ -140,12 +140,12 @@ LATHE_2 = Machine(
     features=(
         Feature(
             "flange-d62", "Bore Ø62 H7", 5, LATHE_INSIDE_RADIUS, 62.0, 0.030, 0.0, factor=-0.5,
-            average_memory=1, zero_range=0.002, scatter=0.0014, warmth=0.011,
+            average_memory=1, zero_range=0.002, scatter=0.0014, warmth=-0.011,
             touches=(2, 2), more={"variant": "indexed", "averaging_limit": 0.010},
         ),
         Feature(
             "flange-d80", "Spigot Ø80 h7", 2, LATHE_OUTSIDE, 80.0, 0.0, -0.030, factor=-1,
-            average_memory=2, weighting_factor=3, zero_range=0.002, scatter=0.0015, warmth=-0.014,
+            average_memory=2, weighting_factor=3, zero_range=0.002, scatter=0.0015, warmth=0.010,
             more={"mode": "approval"},
         ),
         Feature(
@@ -170,15 +170,15 @@ MILL_1 = Machine(
     features=(
         Feature(
             "plate-p48", "Pocket 48 H8", 11, MILLING_INSIDE, 48.0, 0.039, 0.0, factor=0.5,
-            average_memory=11, zero_range=0.003, scatter=0.002, warmth=0.010, more={"axis": "Y"},
+            average_memory=11, zero_range=0.003, scatter=0.002, warmth=-0.010, more={"axis": "Y"},
         ),
         Feature(
             "plate-w20", "Web 20 h8", 12, MILLING_OUTSIDE, 20.0, 0.0, -0.033, factor=-0.5,
-            average_memory=12, zero_range=0.003, scatter=0.002, warmth=-0.006,
+            average_memory=12, zero_range=0.003, scatter=0.002, warmth=0.008,
         ),
         Feature(
             "plate-d30", "Bore Ø30 H7", 14, MILLING_INSIDE, 30.0, 0.021, 0.0, factor=0.5,
-            average_memory=0, weighting_factor=1, zero_range=0.003, scatter=0.0014, warmth=0.006,
+            average_memory=0, weighting_factor=1, zero_range=0.003, scatter=0.0014, warmth=-0.006,
             touches=(4, 1), more={"variant": "round"},
         ),
     ),

@@ -14,7 +14,7 @@ from datetime import UTC, datetime, timedelta
 from random import Random
 from typing import Any
 
-from app.demo.client import Client, Refused
+from app.demo.client import Client, Ending, Refused
 from app.demo.simulation import Machine, Probe
 
 log = logging.getLogger(__name__)
@@ -62,6 +62,11 @@ class Line:
         self._fault_told = False  # the machine was told to stop because of what its dirty stylus measured
         self._patience: dict[str, float] = {}  # what waits for a person, and until when we leave it to others
         self.pace = Pace(1.0, datetime.now(UTC), 0.0)
+
+    def close(self) -> None:
+        """Hang up."""
+        self._gateway.close()
+        self._operator.close()
 
     # --- the past
 
@@ -118,6 +123,8 @@ class Line:
         while not self._ending.is_set():
             try:
                 self._cycle()
+            except Ending:
+                return
             except Refused as refusal:
                 log.warning("%s: %s", self.key, refusal)
                 self._ending.wait(1.0)
@@ -169,9 +176,11 @@ class Line:
             edge = self.machine.edges.get(correction["tool_memory"])
             if edge is None:  # a location that somebody else uses
                 continue
-            offset = edge.correct(correction["number"], correction["amount"])
+            confirmation = {}
+            if correction["number"] not in edge.applied:  # else it is in the offset already, with those after it
+                confirmation["offset_after"] = edge.correct(correction["number"], correction["amount"])
             try:
-                self._gateway.post(f"/corrections/{self.key}/{correction['number']}/applied", {"offset_after": offset})
+                self._gateway.post(f"/corrections/{self.key}/{correction['number']}/applied", confirmation)
             except Refused as refusal:  # superseded in this moment: the tool memory says what holds
                 log.info("%s: %s", self.key, refusal)
 
