@@ -1,0 +1,158 @@
+"""Pages: the operator's board, one alarm, the history. Everything works as plain links and posts; scripts only save a page load."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request, Response
+from starlette.responses import RedirectResponse
+
+from app.alarms import acknowledging, queries, wording
+from app.alarms.queries import AlarmRow
+from app.alarms.schemas import AcknowledgeIn
+from app.errors import Conflict, Invalid
+from app.machines import queries as machines
+from app.web.deps import Caller, FormDep, Operator, SessionDep, Viewer, require
+from app.web.fields import LARGEST_ID
+from app.web.forms import by_field, parsed
+from app.web.i18n import _
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+MOST_ON_BOARD = 100
+ON_HISTORY_PAGE = 50
+MachineFilter = Annotated[str | None, Query(max_length=64)]
+Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
+
+
+def address(path: str, **query: Any) -> str:
+    """A path with those of the query that are given."""
+    given = {name: value for name, value in query.items() if value not in {None, ""}}
+    return f"{path}?{urlencode(given)}" if given else path
+
+
+@router.get("/alarms", dependencies=[require("viewer")])
+def board(
+    request: Request,
+    session: SessionDep,
+    machine: MachineFilter = None,
+    done: Number = None,
+    late: Number = None,
+) -> Response:
+    """What needs someone, oldest first; below it what was acknowledged last, and what followed."""
+    shown = machines.machine_named(session, machine) if machine else None
+    machine_id = shown.id if shown else None
+    rows = queries.alarms(session, state="active", machine_id=machine_id, limit=MOST_ON_BOARD)
+    by_machine = queries.active_by_machine(session)
+    return page(
+        request,
+        "alarms/board.html",
+        rows=rows,
+        active=queries.active_count(session, machine_id),
+        last=queries.acknowledged_last(session, machine_id=machine_id),
+        machines=[(each.key, each.name, by_machine.get(each.key, 0)) for each in machines.machines(session)],
+        machine=shown,
+        done=queries.alarm(session, done) if done else None,
+        late=queries.alarm(session, late) if late else None,
+        wording=wording,
+        address=address,
+    )
+
+
+@router.get("/alarms/count", dependencies=[require("viewer")])
+def count(request: Request, session: SessionDep) -> Response:
+    """The number beside *Alarms* in the navigation."""
+    return page(request, "alarm_count.html", active_alarms=queries.active_count(session))
+
+
+@router.get("/alarms/history", dependencies=[require("viewer")])
+def history(request: Request, session: SessionDep, machine: MachineFilter = None, before: Number = None) -> Response:
+    """All alarms, newest first."""
+    shown = machines.machine_named(session, machine) if machine else None
+    rows = queries.history(session, machine_id=shown.id if shown else None, before=before, limit=ON_HISTORY_PAGE + 1)
+    more = len(rows) > ON_HISTORY_PAGE
+    rows = rows[:ON_HISTORY_PAGE]
+    here = {"machine": machine}
+    return page(
+        request,
+        "alarms/history.html",
+        rows=rows,
+        machines=[(each.key, each.name) for each in machines.machines(session)],
+        machine=shown,
+        older=address("/alarms/history", **here, before=rows[-1].alarm.id) if more else None,
+        newest=address("/alarms/history", **here) if before else None,
+        wording=wording,
+        address=address,
+    )
+
+
+@router.get("/alarms/{number}")
+def alarm_page(
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    number: int,
+    action: Annotated[str | None, Query(max_length=40)] = None,
+    machine: MachineFilter = None,
+) -> Response:
+    """One alarm; with ``action`` it asks for the second touch."""
+    return _alarm(request, queries.alarm(session, number), caller, action, machine)
+
+
+def _alarm(
+    request: Request,
+    row: AlarmRow,
+    caller: Caller,
+    action: str | None,
+    machine: str | None,
+    form: Mapping[str, str] | None = None,
+    error: Invalid | None = None,
+) -> Response:
+    active = row.alarm.acknowledged_at is None
+    asked = action if active and action in wording.offered(row) and caller.may("operator") else None
+    return page(
+        request,
+        "alarms/alarm.html",
+        status=error.status if error else 200,
+        row=row,
+        action=asked,
+        machine=machine,
+        form=form or {},
+        errors=by_field(error) if error else {},
+        wording=wording,
+        address=address,
+    )
+
+
+@router.post("/alarms/{number}/acknowledge")
+def acknowledge(request: Request, session: SessionDep, caller: Operator, number: int, form: FormDep) -> Response:
+    """The second touch. Sent twice, or after somebody else, it changes nothing and says so."""
+    machine = form.get("machine") or None
+    try:
+        given = parsed(
+            AcknowledgeIn,
+            {"action": form.get("action"), "comment": _comment(form), "offset": _length(form.get("offset", ""))},
+        )
+        acknowledging.acknowledge(session, number, given.action, given.comment, caller, offset=given.offset)
+    except Conflict:
+        alarm = queries.alarm(session, number).alarm
+        again = alarm.acknowledged_by == caller.name and alarm.action == form.get("action")
+        return RedirectResponse(address("/alarms", machine=machine, **{"done" if again else "late": number}), 303)
+    except Invalid as error:
+        return _alarm(request, queries.alarm(session, number), caller, form.get("action"), machine, form, error)
+    return RedirectResponse(address("/alarms", machine=machine, done=number), 303)
+
+
+def _comment(form: Mapping[str, str]) -> str:
+    """What was chosen, and what was typed besides."""
+    chosen, more = form.get("comment", "").strip(), form.get("more", "").strip()
+    return _("{chosen}: {more}").format(chosen=chosen, more=more) if chosen and more else chosen or more
+
+
+def _length(text: str) -> float | str | None:
+    """A length as people type it; what is no number is left for the schema to refuse."""
+    text = text.strip().replace(",", ".").replace("\N{MINUS SIGN}", "-")
+    try:
+        return float(text) if text else None
+    except ValueError:
+        return text
