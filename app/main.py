@@ -8,6 +8,7 @@ from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
 
 from app.alarms import api as alarms
+from app.alarms import pages as alarm_pages
 from app.audit import api as audit
 from app.characteristics import api as characteristics
 from app.characteristics import figures_api
@@ -48,6 +49,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     audit.router,
     health.router,
     plant_pages.router,
+    alarm_pages.router,
     sign_in_pages.router,
     setup_pages.router,
 )
