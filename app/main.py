@@ -89,4 +89,4 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
     for router in ROUTERS:
         app.include_router(router)
     app.mount("/static", assets())
-    return ReadingsDoor(SecurityHeaders(app), keys, directory, writer, database)
+    return ReadingsDoor(SecurityHeaders(app), keys.lookup, directory, writer, database)

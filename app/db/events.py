@@ -12,14 +12,14 @@ from sqlalchemy.orm import Session
 
 CHANNEL = "inband"
 
-# psycopg placeholders; the writer of readings sends the same statement over its own connection.
-PUBLISH = f"""
-WITH held AS MATERIALIZED (SELECT pg_advisory_xact_lock(7291, 1)),
-     written AS (INSERT INTO event (changes) SELECT %(changes)s::jsonb FROM held RETURNING id)
+# The end of a statement that writes: `changes` is an SQL expression for the list of changes. The writer of readings
+# puts it behind its own inserts, so that telling costs it no statement.
+PUBLISHED = f"""
+held AS MATERIALIZED (SELECT pg_advisory_xact_lock(7291, 1)),
+written AS (INSERT INTO event (changes) SELECT {{changes}}::jsonb FROM held RETURNING id)
 SELECT pg_notify('{CHANNEL}', id::text) FROM written
 """  # noqa: S608 - the channel is our own constant
-
-_PUBLISH = text(PUBLISH.replace("%(changes)s::jsonb", "CAST(:changes AS jsonb)"))
+_PUBLISH = text("WITH " + PUBLISHED.format(changes="CAST(:changes AS text)"))
 
 
 def publish(session: Session, *changes: dict[str, Any]) -> None:

@@ -79,6 +79,13 @@ class Correction(Base):
             "tool_memory",
             postgresql_where=text("status IN ('held', 'awaiting_approval', 'pending')"),
         ),
+        Index(
+            "correction_applied_idx",
+            "machine_id",
+            "tool_memory",
+            "applied_at",
+            postgresql_where=text("status = 'applied'"),
+        ),
         Index("correction_reading_idx", "machine_id", "characteristic_id", "sequence"),
     )
 

@@ -4,6 +4,7 @@ It does what the documented route `POST /api/v1/readings` (in `api.py`) says, fo
 of a web framework between the socket and the writer. Everything else goes on to the application.
 """
 
+from collections.abc import Awaitable, Callable
 from datetime import UTC, datetime
 from typing import Any
 
@@ -16,7 +17,6 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from app.db.engine import Database
 from app.errors import DatabaseAway, FieldError, InbandError, NotAllowed, NotFound, NotSignedIn, TooLarge
 from app.people.callers import Caller
-from app.people.keys import KeyRing
 from app.readings import queries
 from app.readings.answers import answer
 from app.readings.judge import Stored, Verdict
@@ -28,6 +28,9 @@ from app.web.i18n import _
 PATH = "/api/v1/readings"
 LARGEST_BODY = 256 * 1024
 _json = msgspec.json.Encoder()
+
+Lookup = Callable[[str], Awaitable[Caller | None]]
+"""Who calls with a secret; None if it is not known."""
 
 
 class Directory:
@@ -60,9 +63,9 @@ class Directory:
 class ReadingsDoor:
     """ASGI middleware: answers single readings that come with a key."""
 
-    def __init__(self, app: ASGIApp, keys: KeyRing, directory: Directory, writer: Writer, database: Database) -> None:
+    def __init__(self, app: ASGIApp, lookup: Lookup, directory: Directory, writer: Writer, database: Database) -> None:
         self.app = app
-        self.keys = keys
+        self.lookup = lookup
         self.directory = directory
         self.writer = writer
         self.database = database
@@ -97,7 +100,7 @@ class ReadingsDoor:
         await send({"type": "http.response.body", "body": body})
 
     async def _take(self, secret: str, receive: Receive) -> tuple[int, bytes, dict[str, str]]:
-        caller = await self.keys.lookup(secret)
+        caller = await self.lookup(secret)
         if caller is None:
             raise NotSignedIn(
                 _("This key is not known, or was revoked."), _("Make a key for the machine under Set-up and send it.")

@@ -6,7 +6,7 @@ ground along for the next one, and collects the rows to write. It does no I/O, s
 """
 
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
 from app.core.acceptance import accepted
@@ -33,7 +33,7 @@ from app.web.i18n import _
 
 @dataclass(slots=True)
 class OpenAlarm:
-    """An active alarm; without an id until the writer has drawn one for it."""
+    """An alarm that these readings raise. The writer finds out whether it is active already, or draws a number for it."""
 
     machine_id: int
     characteristic_id: int | None
@@ -42,8 +42,8 @@ class OpenAlarm:
     id: int | None = None
     sequence: int | None = None
     last_sequence: int | None = None
-    count: int = 0  # repetitions noted now, the first one included when it is new
-    new: bool = False
+    count: int = 0  # readings that raised it now
+    new: bool = True
     data: dict[str, Any] = field(default_factory=dict)
 
 
@@ -217,7 +217,7 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
         )
 
     sequence = stream.sequence + 1
-    measured_at = reading.measured_at or now
+    measured_at = now if reading.measured_at is None else reading.measured_at.astimezone(UTC)
     previous_tool = False
     outstanding: list[IssuedCorrection] = []
     if tool is not None:
@@ -435,7 +435,6 @@ def _signal(ground: Ground, stream: StreamState, signal: Signal, sequence: int, 
             parameters.tool_memory or None,
             signal.value,
             sequence=sequence,
-            new=True,
         )
         ground.raised.append(active)
         if of_tool:
@@ -449,8 +448,6 @@ def _signal(ground: Ground, stream: StreamState, signal: Signal, sequence: int, 
             "decided": decision.decided,
             "limit": parameters.tolerance_width / 2 if limit is None else limit,
         }
-    elif active.count == 0 and not active.new:
-        ground.raised.append(active)
     active.count += 1
     active.last_sequence = sequence
     return active

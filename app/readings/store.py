@@ -8,6 +8,7 @@ a transaction cannot be had through the actions that serve one person at a time.
 """
 
 from collections.abc import Iterable, Sequence
+from datetime import datetime
 from typing import Any
 
 import msgspec
@@ -15,7 +16,7 @@ from psycopg import AsyncConnection, AsyncCursor
 
 from app.core.parameters import Parameters
 from app.core.zones import Zone
-from app.db.events import PUBLISH
+from app.db.events import PUBLISHED
 from app.readings.judge import AverageState, Ground, IssuedCorrection, OpenAlarm, StreamState, ToolState
 from app.readings.records import Entry, Record
 from app.readings.schemas import ReadingIn
@@ -29,40 +30,49 @@ LOCK = """
 SELECT machine_id, last_correction, pg_current_xact_id()::text FROM machine_state
 WHERE machine_id = ANY(%s) ORDER BY machine_id FOR UPDATE
 """
-STREAMS = """
-SELECT s.machine_id, s.characteristic_id, s.sequence, s.parameters_version, s.paused_by, s.last_measured_at,
-       a.location, a.average, a.empirical_value, t.number, t."offset", t.total, t.reset_at
-FROM stream s
-LEFT JOIN average_memory a ON a.machine_id = s.machine_id AND a.location = s.average_memory
-LEFT JOIN tool t ON t.machine_id = s.machine_id AND t.number = s.tool_memory
-WHERE s.machine_id = ANY(%s) AND s.characteristic_id = ANY(%s)
-"""
-OPEN_CORRECTIONS = """
-SELECT machine_id, number, tool_memory, amount, status, applied_at FROM correction
-WHERE machine_id = ANY(%s) AND status IN ('held', 'awaiting_approval', 'pending')
-"""
-# What has been applied since the oldest correction or time that a reading of that machine names.
-APPLIED_SINCE = """
-SELECT c.machine_id, c.number, c.tool_memory, c.amount, c.status, c.applied_at
-FROM json_to_recordset(%s) AS w(machine_id int, number int, since timestamptz)
-JOIN correction c ON c.machine_id = w.machine_id AND c.status = 'applied'
-    AND (c.number > w.number OR c.applied_at > w.since)
+# One statement for all that is needed, as one JSON document, because each statement costs more than what it reads here.
+# Corrections of a tool: the open ones, and those applied since the oldest correction or time that a reading names.
+# The row comparison with the keys is what makes the planner take their index even before the table has been analysed;
+# with plain equalities it may walk the primary key instead, through every reading of the characteristic.
+LOAD = """
+SELECT json_build_object(
+    'streams', (
+        SELECT json_agg(json_build_array(s.machine_id, s.characteristic_id, s.sequence, s.parameters_version, s.paused_by,
+            s.last_measured_at, a.location, a.average, a.empirical_value, t.number, t."offset", t.total, t.reset_at,
+            CASE WHEN t.number IS NOT NULL THEN (
+                SELECT json_agg(json_build_array(c.number, c.amount, c.status, c.applied_at) ORDER BY c.number) FROM (
+                    SELECT number, amount, status, applied_at FROM correction
+                    WHERE machine_id = t.machine_id AND tool_memory = t.number
+                        AND status IN ('held', 'awaiting_approval', 'pending')
+                    UNION
+                    SELECT number, amount, status, applied_at FROM correction
+                    WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
+                        AND number > w.number
+                    UNION
+                    SELECT number, amount, status, applied_at FROM correction
+                    WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
+                        AND applied_at > w.since
+                ) c
+            ) END))
+        FROM json_to_recordset(%(machines)s) AS w(machine_id int, number int, since timestamptz)
+        JOIN stream s ON s.machine_id = w.machine_id AND s.characteristic_id = ANY(%(characteristics)s)
+        LEFT JOIN average_memory a ON a.machine_id = s.machine_id AND a.location = s.average_memory
+        LEFT JOIN tool t ON t.machine_id = s.machine_id AND t.number = s.tool_memory
+    ),
+    'known', (
+        SELECT json_agg(json_build_array(r.characteristic_id, r.key, r.sequence, r.measured))
+        FROM json_to_recordset(%(keys)s) AS w(machine_id int, characteristic_id int, key text)
+        CROSS JOIN LATERAL (
+            SELECT * FROM reading
+            WHERE key IS NOT NULL AND (machine_id, characteristic_id, key) >= (w.machine_id, w.characteristic_id, w.key)
+            ORDER BY machine_id, characteristic_id, key LIMIT 1
+        ) r
+        WHERE r.machine_id = w.machine_id AND r.characteristic_id = w.characteristic_id AND r.key = w.key
+    ))::text
 """
 ACTIVE_ALARMS = """
-SELECT machine_id, characteristic_id, tool_memory, kind, id FROM alarm
+SELECT machine_id, characteristic_id, CASE WHEN characteristic_id IS NULL THEN tool_memory END, kind, id FROM alarm
 WHERE machine_id = ANY(%s) AND acknowledged_at IS NULL
-"""
-# The row comparison is what makes the planner take the index of keys even before the table has been analysed; with plain
-# equalities it may walk the primary key instead, through every reading of the characteristic.
-KNOWN_KEYS = """
-SELECT r.characteristic_id, r.key, r.sequence, r.measured
-FROM json_to_recordset(%s) AS w(machine_id int, characteristic_id int, key text)
-CROSS JOIN LATERAL (
-    SELECT * FROM reading
-    WHERE key IS NOT NULL AND (machine_id, characteristic_id, key) >= (w.machine_id, w.characteristic_id, w.key)
-    ORDER BY machine_id, characteristic_id, key LIMIT 1
-) r
-WHERE r.machine_id = w.machine_id AND r.characteristic_id = w.characteristic_id AND r.key = w.key
 """
 PARAMETERS = """
 SELECT parameters FROM parameters_version WHERE machine_id = %s AND characteristic_id = %s AND version = %s
@@ -90,9 +100,11 @@ FROM json_to_recordset((SELECT d -> 'averages' FROM doc)) AS n(machine_id int, l
 WHERE a.machine_id = n.machine_id AND a.location = n.location
 """
 SAVE = f"""
-WITH doc AS MATERIALIZED (SELECT %s::json AS d), moved AS ({MOVE_STREAMS}), averaged AS ({MOVE_AVERAGES})
-INSERT INTO reading ({_COLUMNS})
-SELECT {_COLUMNS} FROM json_to_recordset((SELECT d -> 'readings' FROM doc)) AS r({_READING})
+WITH doc AS MATERIALIZED (SELECT %s::json AS d), moved AS ({MOVE_STREAMS}), averaged AS ({MOVE_AVERAGES}),
+stored AS (
+    INSERT INTO reading ({_COLUMNS})
+    SELECT {_COLUMNS} FROM json_to_recordset((SELECT d -> 'readings' FROM doc)) AS r({_READING})
+), {PUBLISHED.format(changes="(SELECT d -> 'changes' FROM doc)")}
 """  # noqa: S608 - made of constants
 COPY = f"COPY reading ({_COLUMNS}) FROM STDIN (FORMAT BINARY)"
 # The rarer rows, each statement sent only when there is something for it.
@@ -180,11 +192,42 @@ def as_json(value: Any) -> str:
     return _json.encode(value).decode()
 
 
+class _Issued(msgspec.Struct, array_like=True):
+    number: int
+    amount: float
+    status: str
+    applied_at: datetime | None
+
+
+class _Stream(msgspec.Struct, array_like=True):
+    machine_id: int
+    characteristic_id: int
+    sequence: int
+    version: int
+    paused_by: int | None
+    last_measured_at: datetime | None
+    location: int | None
+    average: float | None
+    empirical_value: float | None
+    tool: int | None
+    offset: float | None
+    total: float | None
+    reset_at: datetime | None
+    corrections: list[_Issued] | None
+
+
+class _Loaded(msgspec.Struct):
+    streams: list[_Stream]
+    known: list[tuple[int, str, int, float]] | None
+
+
+_loaded = msgspec.json.Decoder(_Loaded)
+
+
 async def load(conn: AsyncConnection[Any], book: Book, wanted: Sequence[tuple[Entry, ReadingIn]]) -> tuple[Ground, str]:
     """Begin a transaction, lock the machines, load what the readings are judged against; also its transaction id."""
-    machines = list({entry.machine_id for entry, _ in wanted})
     entries = {entry.characteristic_id: entry for entry, _ in wanted}
-    since = _oldest_named(wanted)
+    machines = _machines(wanted)
     keys = [
         {"machine_id": e.machine_id, "characteristic_id": e.characteristic_id, "key": r.key}
         for e, r in wanted
@@ -192,70 +235,79 @@ async def load(conn: AsyncConnection[Any], book: Book, wanted: Sequence[tuple[En
     ]
     async with conn.pipeline():
         await conn.execute("BEGIN")
-        locks = await conn.execute(LOCK, (machines,))
-        streams = await conn.execute(STREAMS, (machines, list(entries)))
-        corrections = await conn.execute(OPEN_CORRECTIONS, (machines,))
-        alarms = await conn.execute(ACTIVE_ALARMS, (machines,))
-        applied = await conn.execute(APPLIED_SINCE, (as_json(since),)) if since else None
-        known = await conn.execute(KNOWN_KEYS, (as_json(keys),)) if keys else None
-    ground = Ground()
+        locks = await conn.execute(LOCK, (list(machines),))
+        document = await conn.execute(
+            LOAD,
+            {
+                "machines": as_json(list(machines.values())),
+                "characteristics": list(entries),
+                "keys": as_json(keys),
+            },
+        )
     locked = await locks.fetchall()
-    transaction = locked[0][2]
+    (text,) = await document.fetchone() or ("",)
+    loaded = _loaded.decode(text)
+    ground = Ground()
     ground.last_correction = {machine_id: last for machine_id, last, _transaction in locked}
-    issued = {row[:2]: row for cursor in (corrections, applied) if cursor for row in await cursor.fetchall()}
-    for row in await streams.fetchall():
-        await _add_stream(conn, book, ground, entries[row[1]], row)
-    for machine_id, number, tool_memory, amount, status, applied_at in (issued[at] for at in sorted(issued)):
-        tool = ground.tools.get((machine_id, tool_memory))
-        if tool is not None:
-            tool.corrections.append(
-                IssuedCorrection(machine_id, number, tool_memory, amount, status, applied_at=applied_at)
-            )
-    for machine_id, characteristic_id, tool_memory, kind, number in await alarms.fetchall():
-        alarm = OpenAlarm(machine_id, characteristic_id, tool_memory, kind, number)
-        if characteristic_id is None:
-            ground.tool_alarms[machine_id, tool_memory, kind] = alarm
-        elif characteristic_id in ground.streams:
-            ground.streams[characteristic_id].alarms[kind] = alarm
-    if known is not None:
-        ground.stored_keys = {(c, key): (sequence, measured) for c, key, sequence, measured in await known.fetchall()}
-    return ground, transaction
+    for row in loaded.streams:
+        entry = entries[row.characteristic_id]
+        parameters = book.get((row.characteristic_id, row.version)) or await _look_up(conn, book, row)
+        _add_stream(ground, entry, parameters, row)
+    ground.stored_keys = {(c, key): (sequence, measured) for c, key, sequence, measured in loaded.known or ()}
+    return ground, locked[0][2]
 
 
-def _oldest_named(wanted: Iterable[tuple[Entry, ReadingIn]]) -> list[dict[str, Any]]:
-    oldest: dict[int, dict[str, Any]] = {}
+def _machines(wanted: Iterable[tuple[Entry, ReadingIn]]) -> dict[int, dict[str, Any]]:
+    """The machines, each with the oldest correction and the oldest time that one of its readings names."""
+    machines: dict[int, dict[str, Any]] = {}
     for entry, reading in wanted:
-        if reading.correction_in_effect is None and reading.machined_at is None:
-            continue
-        row = oldest.setdefault(entry.machine_id, {"machine_id": entry.machine_id, "number": None, "since": None})
+        row = machines.get(entry.machine_id)
+        if row is None:
+            row = machines[entry.machine_id] = {"machine_id": entry.machine_id, "number": None, "since": None}
         if reading.correction_in_effect is not None:
             known = row["number"]
             row["number"] = reading.correction_in_effect if known is None else min(known, reading.correction_in_effect)
         elif reading.machined_at is not None:
             row["since"] = reading.machined_at if row["since"] is None else min(row["since"], reading.machined_at)
-    return list(oldest.values())
+    return machines
 
 
-async def _add_stream(
-    conn: AsyncConnection[Any], book: Book, ground: Ground, entry: Entry, row: tuple[Any, ...]
-) -> None:
-    (machine_id, characteristic_id, sequence, version, paused_by, last_measured_at) = row[:6]
-    (location, average, empirical_value, number, offset, total, reset_at) = row[6:]
-    parameters = book.get((characteristic_id, version))
-    if parameters is None:
-        cursor = await conn.execute(PARAMETERS, (machine_id, characteristic_id, version))
-        found = await cursor.fetchone()
-        assert found is not None
-        parameters = book[characteristic_id, version] = Parameters.from_dict(found[0])
+async def _look_up(conn: AsyncConnection[Any], book: Book, row: _Stream) -> Parameters:
+    cursor = await conn.execute(PARAMETERS, (row.machine_id, row.characteristic_id, row.version))
+    found = await cursor.fetchone()
+    assert found is not None
+    parameters = book[row.characteristic_id, row.version] = Parameters.from_dict(found[0])
+    return parameters
+
+
+def _add_stream(ground: Ground, entry: Entry, parameters: Parameters, row: _Stream) -> None:
     memory = tool = None
-    if location is not None:
-        memory = ground.averages.setdefault(
-            (machine_id, location), AverageState(machine_id, location, average, empirical_value)
-        )
-    if number is not None:
-        tool = ground.tools.setdefault((machine_id, number), ToolState(machine_id, number, offset, total, reset_at))
-    ground.streams[characteristic_id] = StreamState(
-        entry, sequence, version, parameters, memory, tool, paused_by, last_measured_at, before=sequence
+    if row.location is not None:
+        memory = ground.averages.get((row.machine_id, row.location))
+        if memory is None:
+            memory = ground.averages[row.machine_id, row.location] = AverageState(
+                row.machine_id, row.location, row.average or 0.0, row.empirical_value or 0.0
+            )
+    if row.tool is not None:
+        tool = ground.tools.get((row.machine_id, row.tool))
+        if tool is None:
+            tool = ground.tools[row.machine_id, row.tool] = ToolState(
+                row.machine_id, row.tool, row.offset or 0.0, row.total or 0.0, row.reset_at
+            )
+            tool.corrections = [
+                IssuedCorrection(row.machine_id, c.number, row.tool, c.amount, c.status, applied_at=c.applied_at)
+                for c in row.corrections or ()
+            ]
+    ground.streams[row.characteristic_id] = StreamState(
+        entry,
+        row.sequence,
+        row.version,
+        parameters,
+        memory,
+        tool,
+        row.paused_by,
+        row.last_measured_at,
+        before=row.sequence,
     )
 
 
@@ -273,24 +325,33 @@ async def save(conn: AsyncConnection[Any], ground: Ground) -> None:
             if a.changed
         ],
         "readings": [] if copying else [record._asdict() for record in records],
+        "changes": _changes(ground, touched),
     }
     if copying:
         await _copy(conn, records)
     async with conn.pipeline():
-        await conn.execute(SAVE, (as_json(document),))
         for statement, rows in _rarer(ground):
             if rows:
                 await conn.execute(statement, (as_json(rows),))
-        for statement, rows in _full_blocks(touched):
-            await conn.execute(statement, (as_json(rows),))
-        await conn.execute(PUBLISH, {"changes": as_json(_changes(ground, touched))})
+        await conn.execute(SAVE, (as_json(document),))
+        for statement, blocks in _full_blocks(touched):
+            await conn.execute(statement, (as_json(blocks),))
         await conn.execute("COMMIT")
 
 
 async def _number_alarms(conn: AsyncConnection[Any], ground: Ground) -> None:
-    new = [alarm for alarm in ground.raised if alarm.id is None]
+    """Find the alarms that are active for the same trouble already, and draw numbers for the others."""
+    if not ground.raised:
+        return
+    cursor: AsyncCursor[Any] = await conn.execute(ACTIVE_ALARMS, (list(ground.last_correction),))
+    active = {row[:4]: row[4] for row in await cursor.fetchall()}
+    for alarm in ground.raised:
+        tool = alarm.tool_memory if alarm.characteristic_id is None else None
+        alarm.id = active.get((alarm.machine_id, alarm.characteristic_id, tool, alarm.kind))
+        alarm.new = alarm.id is None
+    new = [alarm for alarm in ground.raised if alarm.new]
     if new:
-        cursor: AsyncCursor[Any] = await conn.execute(ALARM_NUMBERS, (len(new),))
+        cursor = await conn.execute(ALARM_NUMBERS, (len(new),))
         for alarm, (number,) in zip(new, await cursor.fetchall(), strict=True):
             alarm.id = number
 

@@ -26,7 +26,7 @@ async def events(
     last_event_id: Annotated[str | None, Header(description="Resume after this event.")] = None,
     after: Annotated[int | None, Query(ge=0, description="The same, for programs that cannot set the header.")] = None,
 ) -> StreamingResponse:
-    """Server-sent events: reading, correction, alarm, tool, average, characteristic, machine; `ping` while all is quiet.
+    """Server-sent events: reading, correction, alarm, tool, average, characteristic, machine; `heartbeat` while all is quiet.
 
     Each carries what changed (machine, characteristic, numbers); look the thing itself up. Of many readings of one
     characteristic within a tenth of a second the last one is told. `resync` means: more was missed than is kept.

@@ -20,7 +20,7 @@ from app.db.events import CHANNEL
 log = logging.getLogger(__name__)
 
 PAUSE = 0.1  # s between two looks into the journal
-PING = 5.0  # s; a page that hears nothing for longer says so
+HEARTBEAT = 5.0  # s; a page that hears nothing for longer says so
 KEPT_HOURS = 6
 MOST_MISSED = 1000  # transactions that a client which comes back is told one by one
 MOST_WAITING = 1000  # events that a slow client may be behind
@@ -64,7 +64,7 @@ class Live:
                     self._last = self._last or await _newest(conn)
                     while True:
                         await self._pass_on(conn)
-                        async for _ in conn.notifies(timeout=PING, stop_after=1):
+                        async for _ in conn.notifies(timeout=HEARTBEAT, stop_after=1):
                             pass
                         await asyncio.sleep(PAUSE)
             except psycopg.Error as error:
@@ -118,10 +118,10 @@ class Live:
                         yield _frame(message)
             while not self.closing.is_set():
                 try:
-                    async with asyncio.timeout(PING):
+                    async with asyncio.timeout(HEARTBEAT):
                         next_message = await client.get()
                 except TimeoutError:
-                    yield b"event: ping\ndata: {}\n\n"
+                    yield b"event: heartbeat\ndata: {}\n\n"
                     continue
                 if next_message is None:
                     return

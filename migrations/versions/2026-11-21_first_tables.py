@@ -267,6 +267,8 @@ CREATE INDEX correction_tool_idx ON correction (machine_id, tool_memory, number)
 
 CREATE INDEX correction_open_idx ON correction (machine_id, tool_memory) WHERE status IN ('held', 'awaiting_approval', 'pending');
 
+CREATE INDEX correction_applied_idx ON correction (machine_id, tool_memory, applied_at) WHERE status = 'applied';
+
 CREATE INDEX correction_reading_idx ON correction (machine_id, characteristic_id, sequence);
 
 CREATE TABLE browser_session (
