@@ -1,8 +1,8 @@
 """Parameters in words: what each is called, what it does, and what is wrong with one, in the words of the shop floor."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from app.core.parameters import BY_NAME, Kind, Problem
 from app.errors import FieldError
@@ -212,3 +212,55 @@ def _target_twice(problem: Problem, name: str) -> str:
     return _(
         "{name} {value} does not agree with nominal and deviations, which give {computed}; say only one of the two"
     ).format(name=name, value=millimetres(problem.data["value"]), computed=millimetres(problem.data["computed"]))
+
+
+class HasParameters(Protocol):
+    """A stored version of the parameters."""
+
+    @property
+    def parameters(self) -> Mapping[str, Any]: ...
+
+
+Version = TypeVar("Version", bound=HasParameters)
+
+
+class Difference(NamedTuple):
+    """What a new version changed in one parameter."""
+
+    name: str
+    r: str | None
+    before: str
+    after: str
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterable[Difference]:
+    """What the newer of two versions changed, worded."""
+    for name in (*BY_NAME, "accept"):
+        if old.get(name) != new.get(name):
+            field = BY_NAME.get(name)
+            yield Difference(label(name), field.r if field else None, worded(name, old), worded(name, new))
+
+
+def worded(name: str, parameters: Mapping[str, Any]) -> str:
+    """One parameter as people read it."""
+    value = parameters.get(name)
+    field = BY_NAME.get(name)
+    if value is None:
+        return "–"
+    if name == "accept":
+        return _("{n} of {m}").format(n=value["n"], m=value["m"])
+    if isinstance(value, bool):
+        return _("yes") if value else _("no")
+    if field is not None and field.choices:
+        return choice(name, str(value))
+    text = f"{value:.10g}" if isinstance(value, float) else str(value)
+    return text.replace("-", "\N{MINUS SIGN}") + (" mm" if field is not None and field.kind is Kind.LENGTH else "")
+
+
+def history(versions: Sequence[Version]) -> list[tuple[Version, list[Difference]]]:
+    """Each version, newest first, with what it changed; the oldest of them changed nothing."""
+    older = [*versions[1:], None]
+    return [
+        (version, list(differences(before.parameters, version.parameters)) if before else [])
+        for version, before in zip(versions, older, strict=True)
+    ]

@@ -1,6 +1,6 @@
 """Set-up pages: characteristics and their parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 from urllib.parse import quote
 
@@ -10,7 +10,7 @@ from starlette.responses import RedirectResponse
 
 from app.characteristics import actions, queries
 from app.characteristics.actions import CharacteristicChange, CharacteristicIn
-from app.characteristics.tables import ParametersVersion
+from app.characteristics.wording import history
 from app.errors import Conflict, InbandError, Invalid
 from app.machines import queries as machines
 from app.setup import parameter_form
@@ -164,15 +164,6 @@ def _characteristic(
         history=history(queries.versions(session, characteristic)),
         **_form(typed, errors or {}),
     )
-
-
-def history(versions: Sequence[ParametersVersion]) -> list[tuple[ParametersVersion, list[parameter_form.Difference]]]:
-    """Each version, newest first, with what it changed."""
-    older = [*versions[1:], None]
-    return [
-        (version, list(parameter_form.differences(before.parameters, version.parameters)) if before else [])
-        for version, before in zip(versions, older, strict=True)
-    ]
 
 
 def _form(typed: Mapping[str, str], errors: Mapping[str, str]) -> dict[str, Any]:

@@ -3,14 +3,14 @@
 What people type stays text until the core has looked at it, so that nothing typed is lost when something is refused.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from app.characteristics.wording import choice, explanation, label, order_sentence
 from app.core.parameters import BY_NAME, FIELDS, Field, Kind, mean_nominal
 from app.web.i18n import _
 
-__all__ = ["choice", "diagram", "differences", "parameters_from", "sentences", "typed_defaults", "typed_from"]
+__all__ = ["choice", "diagram", "parameters_from", "sentences", "typed_defaults", "typed_from"]
 
 FACTORS = ("-1", "-0.5", "0.5")
 OTHER = "other"
@@ -197,37 +197,3 @@ def short(limit: float) -> str:
     """A limit as the diagram says it: four digits, in mm from 1 mm on."""
     size = abs(limit)
     return f"{size:.4g}\N{NO-BREAK SPACE}mm" if size >= 1 else f"{size * 1000:.4g}\N{NO-BREAK SPACE}µm"
-
-
-class Difference(NamedTuple):
-    """What a new version changed in one parameter."""
-
-    name: str
-    r: str | None
-    before: str
-    after: str
-
-
-def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterable[Difference]:
-    """Two versions compared, worded."""
-    for name in (*BY_NAME, "accept"):
-        if old.get(name) != new.get(name):
-            field = BY_NAME.get(name)
-            yield Difference(label(name), field.r if field else None, worded(name, old), worded(name, new))
-
-
-def worded(name: str, parameters: Mapping[str, Any]) -> str:
-    """One parameter as people read it."""
-    value = parameters.get(name)
-    field = BY_NAME.get(name)
-    if value is None:
-        return "–"
-    if name == "accept":
-        return _("{n} of {m}").format(n=value["n"], m=value["m"])
-    if isinstance(value, bool):
-        return _("yes") if value else _("no")
-    if field is not None and field.choices:
-        return choice(name, str(value))
-    return _text(value).replace("-", "\N{MINUS SIGN}") + (
-        " mm" if field is not None and field.kind is Kind.LENGTH else ""
-    )
