@@ -1,0 +1,75 @@
+"""The ring that knows keys without asking the database each time."""
+
+import asyncio
+import time
+
+import pytest
+from sqlalchemy.exc import OperationalError
+
+from app.db.engine import Database
+from app.people import actions
+from app.people.keys import KEPT, KeyRing
+
+
+@pytest.fixture
+def secret(database: Database) -> str:
+    with database.begin() as session:
+        return actions.add_key(session, name="night report", role="viewer", actor="tests").secret
+
+
+def test_a_known_key_costs_no_query_and_an_unknown_one_is_nobody(database: Database, secret: str) -> None:
+    async def look() -> None:
+        ring = KeyRing(database)
+        first = await ring.lookup(secret)
+        assert first is not None
+        assert (first.kind, first.role, first.name) == ("key", "viewer", "key night report")
+        ring._read = None  # type: ignore[method-assign, assignment]
+        assert await ring.lookup(secret) is first
+        assert await KeyRing(database).lookup(secret + "x") is None
+
+    asyncio.run(look())
+
+
+def test_many_callers_at_once_ask_once(database: Database, secret: str) -> None:
+    async def look() -> int:
+        ring, asked = KeyRing(database), 0
+        read = ring._read
+
+        def counting(secret_hash: bytes) -> object:
+            nonlocal asked
+            asked += 1
+            return read(secret_hash)
+
+        ring._read = counting  # type: ignore[method-assign, assignment]
+        await asyncio.gather(*(ring.lookup(secret) for _ in range(64)))
+        return asked
+
+    assert asyncio.run(look()) == 1
+
+
+def test_revoked_here_at_once_and_elsewhere_within_a_second(database: Database, secret: str) -> None:
+    async def look() -> None:
+        ring = KeyRing(database)
+        caller = await ring.lookup(secret)
+        assert caller is not None
+        assert caller.key_id is not None
+        elsewhere = KeyRing(database)
+        elsewhere.forget = lambda: None  # type: ignore[method-assign] # as if in another process: it is not told
+        await elsewhere.lookup(secret)
+        with database.begin() as session:
+            actions.revoke_key(session, caller.key_id, "tests")
+            assert await ring.lookup(secret) is caller, "not yet: the revocation is not committed"
+        assert await ring.lookup(secret) is None
+        deadline = time.monotonic() + KEPT + 0.1
+        while await elsewhere.lookup(secret) is not None:
+            assert time.monotonic() < deadline
+            await asyncio.sleep(0.01)
+
+    asyncio.run(look())
+
+
+def test_without_a_database_a_key_is_not_taken_for_unknown(secret: str) -> None:
+    away = Database("postgresql://nobody@127.0.0.1:9/nothing")
+    with pytest.raises(OperationalError):
+        asyncio.run(KeyRing(away).lookup(secret))
+    away.close()
