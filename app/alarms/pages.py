@@ -14,8 +14,7 @@ from app.errors import Conflict, Invalid
 from app.machines import queries as machines
 from app.web.deps import Caller, FormDep, Operator, SessionDep, Viewer, require
 from app.web.fields import LARGEST_ID
-from app.web.forms import by_field, parsed
-from app.web.i18n import _
+from app.web.forms import by_field, length, parsed, words
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -131,7 +130,7 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
     try:
         given = parsed(
             AcknowledgeIn,
-            {"action": form.get("action"), "comment": _comment(form), "offset": _length(form.get("offset", ""))},
+            {"action": form.get("action"), "comment": words(form, "comment"), "offset": length(form.get("offset"))},
         )
         acknowledging.acknowledge(session, number, given.action, given.comment, caller, offset=given.offset)
     except Conflict:
@@ -141,18 +140,3 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
     except Invalid as error:
         return _alarm(request, queries.alarm(session, number), caller, form.get("action"), machine, form, error)
     return RedirectResponse(address("/alarms", machine=machine, done=number), 303)
-
-
-def _comment(form: Mapping[str, str]) -> str:
-    """What was chosen, and what was typed besides."""
-    chosen, more = form.get("comment", "").strip(), form.get("more", "").strip()
-    return _("{chosen}: {more}").format(chosen=chosen, more=more) if chosen and more else chosen or more
-
-
-def _length(text: str) -> float | str | None:
-    """A length as people type it; what is no number is left for the schema to refuse."""
-    text = text.strip().replace(",", ".").replace("\N{MINUS SIGN}", "-")
-    try:
-        return float(text) if text else None
-    except ValueError:
-        return text

@@ -60,7 +60,7 @@ def sentence(row: AlarmRow) -> str:
         case "offset_differs":
             text = _(
                 "After correction {correction} the machine holds {reported} in tool {tool}; {expected} was expected. "
-                "Somebody has changed the offset at the control."
+                "Was it changed at the control?"
             )
         case _:
             text = str(data.get("text") or kind_word(alarm.kind))
@@ -75,8 +75,8 @@ _KNOWN = frozenset(
 def what_to_do(kind: str) -> str:
     """What the operator looks at first."""
     return {
-        "oversize": _("Set the part aside and look at tool and clamping. The size is corrected for the next parts."),
-        "undersize": _("Set the part aside and look at tool and clamping. The size is corrected for the next parts."),
+        "oversize": _("Set the part aside and look at tool and clamping."),
+        "undersize": _("Set the part aside and look at tool and clamping."),
         "tool_worn": _("Look at the cutting edge."),
         "probe_fault": _("Clean the stylus, look at chips, coolant and the program. Then say what it was."),
         "acceptance": _("Measure the part by hand and confirm."),

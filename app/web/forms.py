@@ -30,3 +30,22 @@ def by_field(error: InbandError) -> dict[str, str]:
         sentence = message[:1].upper() + message[1:]
         messages[name] = f"{messages[name]}. {sentence}" if name in messages else sentence
     return messages
+
+
+def length(text: str | None) -> float | str | None:
+    """A length in mm as people type it, with a decimal point or comma; what is no number is left for the schema to refuse.
+
+    >>> length(" 0,05 "), length("−0.5"), length(""), length("5 mm")
+    (0.05, -0.5, None, '5 mm')
+    """
+    text = (text or "").strip()
+    try:
+        return float(text.replace(",", ".").replace("\N{MINUS SIGN}", "-")) if text else None
+    except ValueError:
+        return text
+
+
+def words(fields: Mapping[str, str], name: str) -> str:
+    """A reason or comment: the one that was chosen as `name`, and what was typed besides as `more`."""
+    chosen, more = fields.get(name, "").strip(), fields.get("more", "").strip()
+    return _("{chosen}: {more}").format(chosen=chosen, more=more) if chosen and more else chosen or more
