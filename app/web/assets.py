@@ -26,7 +26,6 @@ FOREVER = "public, max-age=31536000, immutable"
 COMPRESSIBLE = (".js", ".css", ".svg", ".json", ".txt", ".html")
 
 mimetypes.add_type("text/javascript", ".js")
-mimetypes.add_type("font/woff2", ".woff2")
 
 
 def _hash(*contents: bytes) -> str:

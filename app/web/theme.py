@@ -12,7 +12,7 @@ from typing import Any, Literal
 from app.web.i18n import _
 
 ThemeName = Literal["light", "dark"]
-FONT = '"IBM Plex Sans", system-ui, "Segoe UI", Roboto, "Noto Sans", "Liberation Sans", sans-serif'
+FONT = '"IBM Plex Sans", "Segoe UI", Roboto, "Noto Sans", "Liberation Sans", system-ui, sans-serif'
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,8 @@ def zone_chart(
     else:
         ends = [end for block in blocks for end in (block.minimum, block.maximum)]
         ruler = TrueScale.of(limits, [*(point.deviation for point in points), *ends])
-    letters, left, right = (14, 104, 322) if width >= WIDE else (12, 92, 274)
+    # Room at the right for the longest words in the letters of any system (Liberation Sans and 5 % more).
+    letters, left, right = (14, 104, 342) if width >= WIDE else (12, 92, 292)
     first = min([block.first for block in blocks] + [point.sequence for point in points], default=1)
     last = max([block.last for block in blocks] + [point.sequence for point in points], default=first + 9)
     room = max((last - first) * 0.02, 0.6)
