@@ -11,6 +11,7 @@ from fastapi.exceptions import RequestValidationError
 from sqlalchemy import exc as sql
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.routing import Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.errors import (
@@ -107,7 +108,7 @@ def _of_http(request: Request, error: HTTPException) -> InbandError:
     if error.status_code == NotAllowed.status:
         return NotAllowed(str(error.detail))
     if error.status_code == MethodNotAllowed.status:
-        allowed = (error.headers or {}).get("Allow", "")
+        allowed = ", ".join(_methods(request))
         return MethodNotAllowed(
             _("{method} cannot be used here.").format(method=request.method),
             _("Use one of these methods: {allowed}.").format(allowed=allowed),
@@ -118,6 +119,15 @@ def _of_http(request: Request, error: HTTPException) -> InbandError:
             _("The request cannot be read: {detail}").format(detail=error.detail), _("Correct it and send it again.")
         )
     return InbandError(str(error.detail))
+
+
+def _methods(request: Request) -> list[str]:
+    """What can be done at this address. (Starlette names the methods of the first route that fits, not of all.)"""
+    return [
+        method
+        for method in ("GET", "POST", "PUT", "PATCH", "DELETE")
+        if any(route.matches({**request.scope, "method": method})[0] is Match.FULL for route in request.app.routes)
+    ]
 
 
 async def _database(request: Request, error: Exception) -> Response:

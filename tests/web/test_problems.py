@@ -1,0 +1,204 @@
+"""Whatever is wrong with a request, the answer is a problem in words: a document for programs, a page for people."""
+
+import asyncio
+import json
+from typing import Any
+
+import httpx
+import psycopg
+import pytest
+from fastapi import FastAPI
+from sqlalchemy import exc as sql
+from starlette.requests import Request
+
+from app.errors import FieldError, NotFound, TooManyRequests
+from app.web.json_bodies import read_json
+from app.web.limits import LARGER, MEGABYTE, BodyLimit, limit_of
+from app.web.problems import add_problem_handlers
+from app.web.validation import field_path
+from tests.shop import Shop
+
+JSON = {"Content-Type": "application/json"}
+
+
+@pytest.fixture(scope="module")
+def shop(server: Any) -> Shop:
+    return Shop(server)
+
+
+def refused(answer: httpx.Response, status: int) -> dict[str, Any]:
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    problem: dict[str, Any] = answer.json()
+    assert problem["type"].startswith("urn:inband:problem:")
+    assert problem["status"] == status
+    assert problem["title"]
+    assert problem["detail"]
+    assert isinstance(problem["errors"], list)
+    assert "Traceback" not in answer.text
+    return problem
+
+
+class TestBodies:
+    @pytest.mark.parametrize(
+        ("body", "field", "words"),
+        [
+            (b"", "body", "is missing"),
+            (b"nonsense", "body", "is not JSON: line 1, column 1"),
+            (b'{"key": "a"', "body", "is not JSON"),
+            (b"[]", "body", "must be a JSON object"),
+            (b"null", "body", ""),
+            (b'"text"', "body", "must be a JSON object"),
+            (b"NaN", "body", "must be a finite number"),
+            (b'{"key": "\xff"}', "body", "is not UTF-8"),
+            (b'\xef\xbb\xbf{"key": "a"}', "body", ""),
+            (b'{"key": "a", "key": "b"}', "body", 'says "key" twice'),
+            (b'{"name": "\\ud800"}', "name", "half a character"),
+            (b'{"name": "\\u0000"}', "name", "U+0000"),
+            (b'{"na\\u0000me": 1}', "body", "U+0000"),
+            (b'{"name": 1e999}', "name", "finite"),
+            (b'{"name": -Infinity}', "name", "finite"),
+            (b'{"name": ' + b"9" * 5000 + b"}", "body", "too large a number"),
+            (b"[" * 100_000, "body", ""),
+            (b'{"name": ' + b"[" * 30 + b"]" * 30 + b"}", "body", "nested too deeply"),
+        ],
+    )
+    def test_traps(self, shop: Shop, body: bytes, field: str, words: str) -> None:
+        problem = refused(shop.admin.post("/api/v1/machines", content=body, headers=JSON), 422)
+        assert field in [error["field"] for error in problem["errors"]]
+        assert words in problem["errors"][0]["message"]
+
+    @pytest.mark.parametrize(
+        "media_type",
+        ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data", "application/xml", "", "json"],
+    )
+    def test_another_content_type_is_told_how(self, shop: Shop, media_type: str) -> None:
+        answer = shop.admin.post("/api/v1/machines", content=b'{"key": "a"}', headers={"Content-Type": media_type})
+        problem = refused(answer, 422)
+        assert problem["errors"][0]["field"] == "Content-Type"
+        assert "-H 'Content-Type: application/json'" in problem["what_to_do"]
+
+    def test_charset_and_json_dialects_are_welcome(self, shop: Shop) -> None:
+        for number, media_type in enumerate(("application/json; charset=utf-8", "application/merge-patch+json")):
+            body = json.dumps({"key": f"dialect-{number}", "name": "x", "control": "other"})
+            answer = shop.admin.post("/api/v1/machines", content=body, headers={"Content-Type": media_type})
+            assert answer.status_code == 201
+
+    def test_too_large_is_413_announced_or_not(self, shop: Shop) -> None:
+        large = b" " * (MEGABYTE + 1)
+        for content in (large, iter([large[: MEGABYTE // 2]] * 3)):
+            problem = refused(shop.admin.post("/api/v1/machines", content=content, headers=JSON), 413)
+            assert "1 MB" in problem["detail"]
+        fits = b" " * (MEGABYTE - 100) + b"{}"
+        refused(shop.admin.post("/api/v1/machines", content=fits, headers=JSON), 422)
+
+    def test_batches_may_be_larger(self) -> None:
+        assert limit_of("/api/v1/readings") == MEGABYTE
+        assert limit_of("/api/v1/readings/batch") == LARGER["/api/v1/readings/batch"] > 10 * MEGABYTE
+
+    def test_paths_of_fields(self) -> None:
+        assert field_path(("body", "parameters", "zero_range")) == "parameters.zero_range"
+        assert field_path(("body", 17, "measured")) == "[17].measured"
+        assert field_path(("query", "limit")) == "limit"
+        assert field_path(("body",)) == "body"
+
+    def test_good_json_is_read_as_it_is(self) -> None:
+        assert read_json('{"a": [1, 2.5, "ш", null, true]}'.encode(), "application/json") == {
+            "a": [1, 2.5, "ш", None, True]
+        }
+
+
+class TestAddresses:
+    @pytest.mark.parametrize(
+        "path", ["/api/v1/nothing", "/api/v2/machines", "/api/", "/api/v1/machines/a/b/c", "/api/v1/%00"]
+    )
+    def test_programs_get_a_document(self, shop: Shop, path: str) -> None:
+        refused(shop.admin.get(path), 404)
+
+    def test_a_wrong_method_says_the_right_ones(self, shop: Shop) -> None:
+        answer = shop.admin.put(f"/api/v1/machines/{shop.machine}", json={})
+        assert "PUT" in refused(answer, 405)["detail"]
+        assert set(answer.headers["allow"].split(", ")) >= {"GET", "PATCH"}
+
+    def test_people_get_a_page(self, shop: Shop) -> None:
+        answer = shop.server.client().get("/nothing-here")
+        assert answer.status_code == 404
+        assert answer.headers["content-type"].startswith("text/html")
+        assert "There is nothing at /nothing-here" in answer.text
+
+    def test_what_comes_back_is_escaped(self, shop: Shop) -> None:
+        answer = shop.server.client().get("/<script>alert(1)</script>")
+        assert "<script>alert" not in answer.text
+
+
+class Away(psycopg.OperationalError):
+    pass
+
+
+class Trouble(psycopg.DataError):
+    sqlstate = "22003"
+
+
+class Taken(psycopg.IntegrityError):
+    sqlstate = "23505"
+
+
+class Broken(psycopg.IntegrityError):
+    sqlstate = "23514"
+
+
+def wrapped(error: psycopg.Error) -> sql.DBAPIError:
+    return sql.DBAPIError("SELECT secret", {}, error)
+
+
+ERRORS: dict[str, tuple[Exception, int]] = {
+    "ours": (NotFound("There is no such thing.", "Look elsewhere.", errors=[FieldError("key", "x")]), 404),
+    "slower": (TooManyRequests("Slower.", retry_after=7), 429),
+    "away": (wrapped(Away("connection refused to 10.1.2.3")), 503),
+    "away-raw": (Away("gone"), 503),
+    "pool": (sql.TimeoutError("QueuePool limit"), 503),
+    "data": (wrapped(Trouble("out of range")), 422),
+    "taken": (wrapped(Taken("duplicate key")), 409),
+    "broken": (wrapped(Broken("check constraint")), 500),
+    "bug": (ZeroDivisionError("secret detail"), 500),
+}
+
+
+@pytest.fixture
+def raising() -> FastAPI:
+    app = FastAPI()
+
+    @app.get("/{kind:path}")
+    def fail(request: Request, kind: str) -> None:
+        raise ERRORS[kind.rpartition("/")[2]][0]
+
+    add_problem_handlers(app)
+    app.add_middleware(BodyLimit)
+    return app
+
+
+def get(app: FastAPI, path: str) -> httpx.Response:
+    """One request in this process; whatever is not made an answer is raised here."""
+
+    async def ask() -> httpx.Response:
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://inband.test") as client:
+            return await client.get(path)
+
+    return asyncio.run(ask())
+
+
+@pytest.mark.parametrize("kind", ERRORS)
+def test_every_error_becomes_an_answer(raising: FastAPI, kind: str, caplog: pytest.LogCaptureFixture) -> None:
+    status = ERRORS[kind][1]
+    answer = get(raising, f"/api/{kind}")
+    problem = refused(answer, status)
+    assert "secret" not in answer.text
+    assert "10.1.2.3" not in answer.text
+    if status in {429, 503}:
+        assert int(answer.headers["retry-after"]) > 0
+    if status == 500:
+        assert f"incident {problem['incident']}" in caplog.text
+    page = get(raising, f"/{kind}")
+    assert page.status_code == status
+    assert page.headers["content-type"].startswith("text/html")
+    assert "secret" not in page.text
