@@ -109,6 +109,15 @@ def edit_note(superseded: list[int]) -> str | None:
     ).format(numbers=", ".join(map(str, superseded)))
 
 
+def will_fall(numbers: list[int]) -> str:
+    """What will happen to open corrections when an offset is edited or a tool changed."""
+    return ngettext(
+        "Correction {numbers} was computed for the offset until now and is dropped.",
+        "Corrections {numbers} were computed for the offset until now and are dropped.",
+        len(numbers),
+    ).format(numbers=", ".join(map(str, numbers)))
+
+
 def still_active(alarm: int) -> str:
     """Said when a held correction is released past its alarm."""
     return _(

@@ -1,0 +1,194 @@
+"""What the pages ask before they do something to a correction, a tool or an average: the title, what will follow, the words
+to choose from, and the one number that may be typed.
+"""
+
+from dataclasses import dataclass, field
+from typing import cast
+
+from app.errors import NotFound
+from app.offsets import wording
+from app.offsets.actions import Verb
+from app.offsets.queries import AverageRow, CorrectionRow, ToolRow
+from app.web.i18n import _
+from app.web.numbers import mm, um
+
+
+@dataclass(frozen=True)
+class Question:
+    """The second touch, in words. ``number`` is the field for a length (mm), if there is one; ``send_to`` lies below the
+    machine's address.
+    """
+
+    title: str
+    button: str
+    send_to: str
+    follows: list[str]
+    reasons: list[str] = field(default_factory=list)
+    do: str | None = None
+    number: str | None = None
+    number_label: str = ""
+    number_r: str | None = None
+    number_value: str = ""
+    number_hint: str = ""
+    number_needed: bool = False
+
+
+def plain(length: float) -> str:
+    """A length as one would type it: `-0.0061`."""
+    return f"{length:.9f}".rstrip("0").ljust(len(f"{length:.4f}"), "0")
+
+
+def offered(status: str) -> list[str]:
+    """What a person may do to a correction of this status, the likeliest first."""
+    return {
+        "held": ["release", "rejected"],
+        "awaiting_approval": ["approve", "rejected"],
+        "pending": ["applied", "rejected"],
+    }.get(status, [])
+
+
+def verb(word: str) -> Verb:
+    """What a form wants done to a correction. Raises `NotFound` when that is nothing we know."""
+    if word in {"approve", "release", "rejected"}:
+        return cast("Verb", word)
+    raise NotFound(_("The form does not say what to do with the correction."), _("Go back to the tool memory."))
+
+
+def verb_word(verb: str) -> str:
+    """What stands on the button."""
+    return {
+        "approve": _("Approve"),
+        "release": _("Release"),
+        "rejected": _("Reject"),
+        "applied": _("Mark applied"),
+    }.get(verb, verb)
+
+
+def about_correction(row: CorrectionRow, verb: str) -> Question:
+    """Asks before a correction is approved, released, rejected or marked applied."""
+    c = row.correction
+    values = {"number": c.number, "amount": um(c.amount), "tool": c.tool_memory, "machine": row.machine}
+    after = mm(row.expected)
+    send_to = f"corrections/{c.number}"
+    to_machine = _("The machine fetches it and changes the offset of tool {tool} by {amount}.").format(**values)
+    match verb:
+        case "applied":
+            return Question(
+                _("Is correction {number} in the control?").format(**values),
+                _("It is applied"),
+                send_to,
+                [
+                    _("The offset of tool {tool} changes by {amount}, to {after}.").format(**values, after=after),
+                    _("Say what the control shows if it shows another offset."),
+                ],
+                do=verb,
+                number="offset_after",
+                number_label=_("Offset the control shows"),
+                number_r=f"R10 = {c.tool_memory}",
+                number_hint="" if row.expected is None else plain(row.expected),
+            )
+        case "approve":
+            return Question(
+                _("Approve correction {number}?").format(**values),
+                _("Approve"),
+                send_to,
+                [to_machine],
+                [_("Part measured, agrees"), _("Process is known"), _("As expected")],
+                do=verb,
+            )
+        case "release":
+            return Question(
+                _("Release correction {number}?").format(**values),
+                _("Release"),
+                send_to,
+                [to_machine, _("The alarm “tool worn” stays until it is acknowledged.")],
+                [_("Edge looked at, still good"), _("Until the end of the batch"), _("Replaced at next stop")],
+                do=verb,
+            )
+        case _:
+            return Question(
+                _("Reject correction {number}?").format(**values),
+                _("Reject"),
+                send_to,
+                [
+                    _("Tool {tool} is not changed by {amount}. The next reading asks again if it is needed.").format(
+                        **values
+                    )
+                ],
+                [_("False reading"), _("Not applied at the machine"), _("Set by hand instead")],
+                do=verb,
+            )
+
+
+def about_tool(row: ToolRow, what: str) -> Question:
+    """Asks before an offset is set by hand or a tool changed. Raises `NotFound` for anything else."""
+    number = row.tool.number
+    values = {"tool": number, "offset": mm(row.tool.offset), "parts": row.parts}
+    follows = [_("The running averages of the characteristics on it begin at 0.")]
+    if row.open:
+        follows.append(wording.will_fall([c.number for c in row.open]))
+    match what:
+        case "edit":
+            return Question(
+                _("Set the offset of tool {tool} by hand").format(**values),
+                _("Set the offset"),
+                f"tools/{number}/edit",
+                [_("Known until now: {offset}.").format(**values), *follows],
+                [_("Set at the control"), _("Part measured by hand"), _("Typing error corrected")],
+                number="offset",
+                number_label=_("Offset"),
+                number_r=f"R10 = {number}",
+                number_value=plain(row.tool.offset),
+                number_needed=True,
+            )
+        case "change":
+            return Question(
+                _("Tool {tool} was changed?").format(**values),
+                _("Tool changed"),
+                f"tools/{number}/change",
+                [
+                    _("The old tool cut {parts} parts. Parts and sum of corrections begin at 0.").format(**values),
+                    *follows,
+                ],
+                [_("Insert turned"), _("New insert"), _("New tool"), _("Insert chipped")],
+                number="offset",
+                number_label=_("Offset of the new tool"),
+                number_r=f"R10 = {number}",
+                number_hint="0.0000",
+            )
+        case _:
+            raise NotFound(_("There is nothing at this address."), _("Go back to the tool memory."))
+
+
+def about_average(row: AverageRow) -> Question:
+    """Asks before an empirical value is set."""
+    memory = row.memory
+    return Question(
+        _("Set the empirical value of R11 = {location}").format(location=memory.location),
+        _("Set the empirical value"),
+        f"averages/{memory.location}/edit",
+        [
+            _("It is taken off every measurement: machine reading minus true value."),
+            _("The running average {average} begins at 0.").format(average=um(memory.average)),
+        ],
+        [_("Compared with the measuring machine"), _("Compared with a gauge"), _("Probe calibrated")],
+        number="empirical_value",
+        number_label=_("Empirical value"),
+        number_r=f"R11 = {memory.location}",
+        number_value=plain(memory.empirical_value),
+        number_needed=True,
+    )
+
+
+def done(verb: str, number: int) -> str | None:
+    """What the page says after it was done."""
+    sentence = {
+        "applied": _("Correction {n} is applied."),
+        "approve": _("Correction {n} is approved; it waits for the machine."),
+        "release": _("Correction {n} is released; it waits for the machine."),
+        "rejected": _("Correction {n} is rejected."),
+        "edit": _("The offset of tool {n} is set."),
+        "change": _("Tool {n} begins anew."),
+        "average": _("The empirical value of R11 = {n} is set."),
+    }.get(verb)
+    return None if sentence is None else sentence.format(n=number)
