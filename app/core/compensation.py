@@ -68,6 +68,7 @@ class Code(StrEnum):
     BEFORE_TOOL_CHANGE = "before_tool_change"
     OFFSET_LIMIT = "offset_limit"
     REJECTED = "rejected"
+    IMPORTED = "imported"
 
 
 class State(NamedTuple):

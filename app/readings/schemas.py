@@ -56,6 +56,19 @@ def decode_one(body: bytes, now: datetime) -> ReadingIn:
     return reading
 
 
+def reading_of(fields: dict[str, Any], now: datetime) -> ReadingIn:
+    """The reading that these fields make, out of a file for example; times may be datetimes. Raises `Invalid`."""
+    try:
+        reading = msgspec.convert(fields, ReadingIn)
+    except msgspec.ValidationError:
+        written = {n: v.isoformat() if isinstance(v, datetime) else v for n, v in fields.items()}
+        reading = _retry(written, "")
+    errors = list(_sense(reading, now, ""))
+    if errors:
+        raise _invalid(errors)
+    return reading
+
+
 def decode_many(body: bytes, now: datetime, *, lines: bool) -> list[ReadingIn]:
     """The readings in a JSON list, or one per line of NDJSON. Raises `Invalid` with what is wrong, by position."""
     try:

@@ -32,8 +32,8 @@ WHERE machine_id = ANY(%s) ORDER BY machine_id FOR UPDATE
 """
 # One statement for all that is needed, as one JSON document, because each statement costs more than what it reads here.
 # Corrections of a tool: the open ones, and those applied since the oldest correction or time that a reading names.
-# The row comparison with the keys is what makes the planner take their index even before the table has been analysed;
-# with plain equalities it may walk the primary key instead, through every reading of the characteristic.
+# The row comparison with the keys can only be had from their own index; plain equalities the planner may also answer by
+# walking the primary key through every reading of the characteristic.
 LOAD = """
 SELECT json_build_object(
     'streams', (
@@ -44,14 +44,14 @@ SELECT json_build_object(
                     SELECT number, amount, status, applied_at FROM correction
                     WHERE machine_id = t.machine_id AND tool_memory = t.number
                         AND status IN ('held', 'awaiting_approval', 'pending')
-                    UNION
+                    UNION ALL
                     SELECT number, amount, status, applied_at FROM correction
                     WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
                         AND number > w.number
-                    UNION
+                    UNION ALL
                     SELECT number, amount, status, applied_at FROM correction
                     WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
-                        AND applied_at > w.since
+                        AND applied_at > w.since AND (number <= w.number OR w.number IS NULL)
                 ) c
             ) END))
         FROM json_to_recordset(%(machines)s) AS w(machine_id int, number int, since timestamptz)
@@ -334,7 +334,7 @@ async def save(conn: AsyncConnection[Any], ground: Ground) -> None:
             if rows:
                 await conn.execute(statement, (as_json(rows),))
         await conn.execute(SAVE, (as_json(document),))
-        for statement, blocks in _full_blocks(touched):
+        for statement, blocks in full_blocks([(stream.entry, stream.before, stream.sequence) for stream in touched]):
             await conn.execute(statement, (as_json(blocks),))
         await conn.execute("COMMIT")
 
@@ -418,19 +418,22 @@ def _rarer(ground: Ground) -> Iterable[tuple[str, list[Any]]]:
         yield REPEAT, [alarm for alarm in ground.raised if not alarm.new]
 
 
-def _full_blocks(touched: list[StreamState]) -> Iterable[tuple[str, list[dict[str, int]]]]:
-    """The statements that summarise the blocks which these readings have filled, lowest level first."""
+def full_blocks(spans: list[tuple[Entry, int, int]]) -> Iterable[tuple[str, list[dict[str, int]]]]:
+    """The statements that summarise the blocks which these readings have filled, lowest level first.
+
+    spans: where, the number of the last reading before them, and the number of their last.
+    """
     for level in range(BASE_LEVEL, TOP_LEVEL + 1, FAN):
         rows = [
             {
-                "machine_id": stream.entry.machine_id,
-                "characteristic_id": stream.entry.characteristic_id,
+                "machine_id": entry.machine_id,
+                "characteristic_id": entry.characteristic_id,
                 "level": level,
-                "first": stream.before >> level,
-                "last": stream.sequence >> level,
+                "first": before >> level,
+                "last": after >> level,
             }
-            for stream in touched
-            if stream.before >> level < stream.sequence >> level
+            for entry, before, after in spans
+            if before >> level < after >> level
         ]
         if not rows:
             return

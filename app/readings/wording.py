@@ -94,6 +94,8 @@ def _sentence(record: Record, p: Parameters) -> str:
             )
         case Code.MEASURE_ONLY:
             text = _("Deviation %(deviation)s: this characteristic is only measured, nothing is corrected.")
+        case Code.IMPORTED:
+            text = _("Deviation %(deviation)s: imported from a file. Judged like any other, it corrects nothing.")
         case Code.BEFORE_TOOL_CHANGE:
             text = _(
                 "Deviation %(deviation)s: the part was cut before the tool was changed or its offset edited by hand, "

@@ -1,0 +1,140 @@
+"""Numbers and times as people's files hold them; what cannot be read is refused in words, never guessed."""
+
+import re
+import unicodedata
+from datetime import UTC, datetime
+from functools import lru_cache
+from zoneinfo import ZoneInfo, available_timezones
+
+from app.web.i18n import _
+
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_DAY_FIRST = re.compile(
+    r"(\d{1,2})\.\s*(\d{1,2})\.\s*(\d{4})\.?(?:[\s,T]+(\d{1,2}):(\d{2})(?::(\d{2})(?:[.,](\d{1,6})\d*)?)?)?"
+)
+_ISO = re.compile(
+    r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)?(?:\s?(?:[Zz]|[+-]\d{2}(?::?\d{2})?))?"
+)
+UNITS = {"mm": 1.0, "um": 0.001, "inch": 25.4}
+"""Millimetres in each unit that a file may hold."""
+
+
+class Unreadable(ValueError):
+    """A cell that is not what its column should hold; the message says why, and what to do."""
+
+
+def plain(text: str) -> str:
+    """Without blanks around it, with an ordinary minus sign and ordinary blanks."""
+    return text.replace("\N{NO-BREAK SPACE}", " ").replace("\N{MINUS SIGN}", "-").strip()
+
+
+def number(text: str, decimal: str) -> float:
+    """A finite number written with this decimal sign ("." or ",").
+
+    >>> number("39,998", ","), number(" -0.5e-3 ", ".")
+    (39.998, -0.0005)
+    """
+    given = plain(text)
+    if not given:
+        raise Unreadable(_("is empty; remove the line if the probe measured nothing"))
+    other = "." if decimal == "," else ","
+    if other in given:
+        if decimal in given:
+            raise Unreadable(_("has a point and a comma; write it without a separator of thousands"))
+        raise Unreadable(
+            _(
+                "has a {other}, but decimals are read with {decimal}; say --decimal {other} if all are written so"
+            ).format(other=_sign(other), decimal=_sign(decimal))
+        )
+    given = given.replace(",", ".")
+    if not _NUMBER.fullmatch(given):
+        raise Unreadable(_("is not a number; write it like 39{decimal}9981, without a unit").format(decimal=decimal))
+    value = float(given)
+    if value in {float("inf"), float("-inf")}:
+        raise Unreadable(_("is too large to be a number of this world"))
+    return value
+
+
+def _sign(character: str) -> str:
+    return _("comma") if character == "," else _("point")
+
+
+def moment(text: str, zone: ZoneInfo | None, pattern: str | None = None) -> datetime:
+    """A time with its offset: ISO 8601, day.month.year, or as `pattern` (strptime) says.
+
+    A time that names no offset is one of `zone`; without a zone it is refused, because an hour more or less would put
+    readings in another order.
+
+    >>> moment("21.11.2026 08:15:02", ZoneInfo("Europe/Belgrade")).isoformat()
+    '2026-11-21T08:15:02+01:00'
+    """
+    given = plain(text)
+    if not given:
+        raise Unreadable(_("is empty; every line needs a time, or none does"))
+    read = _by_pattern(given, pattern) if pattern else _by_shape(given)
+    if read.tzinfo is not None:
+        return read
+    if zone is None:
+        raise Unreadable(_("does not say in which time zone; name it: --timezone Europe/Belgrade"))
+    local = read.replace(tzinfo=zone)
+    if local.astimezone(UTC).astimezone(zone).replace(tzinfo=None) != read:
+        raise Unreadable(_("does not exist in {zone}: the clocks went forward in that hour").format(zone=zone.key))
+    return local
+
+
+def _by_pattern(given: str, pattern: str) -> datetime:
+    try:
+        return datetime.strptime(given, pattern)  # noqa: DTZ007 - the zone is seen to by the caller
+    except ValueError:
+        raise Unreadable(_("does not have the form {pattern}").format(pattern=pattern)) from None
+
+
+def _by_shape(given: str) -> datetime:
+    try:
+        if _ISO.fullmatch(given):
+            return datetime.fromisoformat(given.replace(" +", "+").replace(" -", "-").replace(" Z", "Z"))
+        if found := _DAY_FIRST.fullmatch(given):
+            day, month, year, hour, minute, second = (int(part or 0) for part in found.groups()[:6])
+            return datetime(year, month, day, hour, minute, second, int((found[7] or "0").ljust(6, "0")))  # noqa: DTZ001
+    except ValueError as error:
+        raise Unreadable(_("is not a time: {error}").format(error=error)) from None
+    if re.fullmatch(r"[0-9.,]+", given):
+        raise Unreadable(
+            _("is a count of days or seconds and could mean several times; write it as 2026-11-21T08:15:02+01:00")
+        )
+    if "/" in given:
+        raise Unreadable(
+            _("could be day/month or month/day; say which: --time-format '%d/%m/%Y %H:%M:%S' or another order")
+        )
+    raise Unreadable(_("is not a time; write it as 2026-11-21T08:15:02+01:00 or 21.11.2026 08:15:02"))
+
+
+@lru_cache
+def zone_named(name: str) -> ZoneInfo:
+    """The time zone. Raises `Unreadable`."""
+    if name not in available_timezones():
+        raise Unreadable(_("There is no time zone {name}; name it like Europe/Belgrade.").format(name=repr(name)))
+    return ZoneInfo(name)
+
+
+def folded(text: str) -> str:
+    """For comparing names: lower case, no accents, single blanks, no unit in brackets.
+
+    >>> folded("Izmerjena  vrednost [mm]"), folded("Čas_meritve")
+    ('izmerjena vrednost', 'cas meritve')
+    """
+    text = re.sub(r"[\[(<].*?[\])>]", " ", text.replace("_", " ").replace("-", " ").replace(".", " "))
+    decomposed = unicodedata.normalize("NFD", text.casefold().replace("đ", "d"))
+    return " ".join("".join(c for c in decomposed if unicodedata.category(c) != "Mn").split())
+
+
+def unit_in(name: str) -> str | None:
+    """The unit that a column's name carries.
+
+    >>> unit_in("Wert [µm]"), unit_in("размер (мкм)"), unit_in("measured")
+    ('um', 'um', None)
+    """
+    found = re.search(r"[\[(<]\s*([^\])>]*?)\s*[\])>]|[_ ](mm|um|µm|μm|inch)$", name)
+    word = (found[1] or found[2] or "").casefold() if found else ""
+    words = {"mm": "mm", "мм": "mm", "µm": "um", "μm": "um", "um": "um", "mkm": "um", "мкм": "um", "mikron": "um"}
+    return (words | {"in": "inch", "inch": "inch", '"': "inch", "zoll": "inch"}).get(word)
