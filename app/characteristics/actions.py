@@ -138,19 +138,20 @@ def refusals(given: Mapping[str, Any]) -> list[FieldError]:
     return []
 
 
-def _read(given: Mapping[str, Any], *, reason_missing: bool = False) -> Parameters:
+def _read(given: Mapping[str, Any]) -> Parameters:
     """Raises `Invalid` with everything that is wrong at once."""
     errors = refusals(given)
-    if reason_missing:
-        wrong = _("is required when parameters change: say why, for those who read it in a year")
-        errors.append(FieldError("reason", wrong))
     if errors:
-        raise Invalid(
-            "; ".join(f"{field}: {message}" for field, message in errors[:3]),
-            _("Correct the named fields and send them again; nothing was changed."),
-            errors=errors,
-        )
+        raise _refused(errors)
     return read(given)[0]
+
+
+def _refused(errors: list[FieldError]) -> Invalid:
+    return Invalid(
+        "; ".join(f"{field}: {message}" for field, message in errors[:3]),
+        _("Correct the named fields and send them again; nothing was changed."),
+        errors=errors,
+    )
 
 
 def _refuse_moving(standing: Standing, change: CharacteristicChange) -> None:
@@ -184,9 +185,16 @@ def _change_parameters(
 ) -> tuple[Standing, list[dict[str, Any]]]:
     """Under the machine's lock. Returns how things stand now, and what to tell everybody."""
     characteristic, machine, version = standing
-    old, new = standing.parameters, _read(merged(version.parameters, given), reason_missing=not reason)
+    wanted = merged(version.parameters, given)
+    errors = refusals(wanted)
+    old, new = standing.parameters, None if errors else read(wanted)[0]
     if new == old:
         return standing, []
+    if not reason:
+        wrong = _("is required when parameters change: say why, for those who read it in a year")
+        errors.append(FieldError("reason", wrong))
+    if errors or new is None:
+        raise _refused(errors)
     made = _new_version(characteristic, version.version + 1, new, actor, reason)
     session.add(made)
     session.flush()

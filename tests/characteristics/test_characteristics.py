@@ -154,6 +154,7 @@ class TestChange:
     def test_what_does_not_differ_makes_no_version(self, shop: Shop) -> None:
         before = shop.call("GET", path(shop))
         assert change(shop, 200, **before["parameters"]) == before
+        assert shop.call("PATCH", path(shop), parameters=before["parameters"], name=before["name"]) == before
 
     def test_null_goes_back_to_the_default(self, server: Any) -> None:
         shop = Shop(server)
