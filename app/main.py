@@ -12,9 +12,11 @@ from app.alarms import pages as alarm_pages
 from app.audit import api as audit
 from app.characteristics import api as characteristics
 from app.characteristics import figures_api
+from app.characteristics import pages as characteristic_pages
 from app.db.engine import Database
 from app.machines import api as machines
 from app.offsets import api as offsets
+from app.offsets import pages as offset_pages
 from app.people import api as people
 from app.people import keys_api
 from app.people import pages as sign_in_pages
@@ -49,7 +51,9 @@ ROUTERS: tuple[APIRouter, ...] = (
     audit.router,
     health.router,
     plant_pages.router,
+    characteristic_pages.router,
     alarm_pages.router,
+    offset_pages.router,
     sign_in_pages.router,
     setup_pages.router,
 )

@@ -9,9 +9,9 @@ from sqlalchemy.orm import Session
 from app.characteristics.figures import band_picture, sparkline
 from app.plant import queries
 from app.plant.queries import Group, Row
-from app.plant.state import CALM, NEED_SOMEONE, State
+from app.plant.state import State
+from app.plant.wording import state_word
 from app.web.deps import SessionDep, require
-from app.web.i18n import _
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False, dependencies=[require("viewer")])
@@ -48,24 +48,23 @@ def _page(request: Request, session: Session, show: str, machine: str | None) ->
         state_word=state_word,
         band=lambda row: band_picture(row.stream.last_deviation, row.parameters, row.stream.last_zone, row.average),
         spark=lambda row: sparkline(row.trend, row.parameters),
-        is_calm=lambda row: row.state in CALM,
-        is_old=lambda row: row.old_from is not None and row.old_from <= now,
+        now=now,
         **_summary(groups),
     )
 
 
 def _shown(row: Row, show: str) -> bool:
-    return show == "all" or row.state in NEED_SOMEONE or bool(row.alarms)
+    return show == "all" or row.needs_someone
 
 
 def _summary(groups: list[Group]) -> dict[str, Any]:
     """How many need someone, have nothing new, run, or wait for their first reading."""
     now = datetime.now(UTC)
     rows = [row for group in groups for row in group.rows]
-    need = [row for row in rows if _shown(row, "attention")]
-    calm = [row for row in rows if not _shown(row, "attention")]
+    need = [row for row in rows if row.needs_someone]
+    calm = [row for row in rows if not row.needs_someone]
     empty = [row for row in calm if row.state is State.NO_DATA]
-    old = [row for row in calm if row.old_from is not None and row.old_from <= now]
+    old = [row for row in calm if row.is_old(now)]
     return {
         "total": len(rows),
         "need": len(need),
@@ -73,21 +72,3 @@ def _summary(groups: list[Group]) -> dict[str, Any]:
         "empty": len(empty),
         "calm": len(calm) - len(empty) - len(old),
     }
-
-
-def state_word(state: State) -> str:
-    """The state in one or two words."""
-    return {
-        State.PROBE_FAULT: _("Probe fault"),
-        State.TOOL_WORN: _("Tool worn"),
-        State.HELD: _("Held"),
-        State.OVERSIZE: _("Oversize"),
-        State.UNDERSIZE: _("Undersize"),
-        State.NO_DATA: _("No readings yet"),
-        State.AWAITING_APPROVAL: _("Awaiting approval"),
-        State.CORRECTING: _("Correcting"),
-        State.DRIFTING_UP: _("Drifting up"),
-        State.DRIFTING_DOWN: _("Drifting down"),
-        State.MEASURE_ONLY: _("Measure only"),
-        State.IN_BAND: _("In band"),
-    }[state]

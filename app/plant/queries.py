@@ -14,7 +14,7 @@ from app.core.parameters import Parameters
 from app.machines.queries import machine_named
 from app.machines.tables import Machine
 from app.offsets.tables import OPEN, AverageMemory, Correction, Tool
-from app.plant.state import Known, State, state_of
+from app.plant.state import CALM, NEED_SOMEONE, Known, State, state_of
 from app.readings.tables import Stream
 
 TREND = 50  # readings of the small picture
@@ -53,6 +53,18 @@ class Row:
     @property
     def old_from(self) -> datetime | None:
         return self.known.old_from
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether the state is only worth something while it is new."""
+        return self.state in CALM
+
+    @property
+    def needs_someone(self) -> bool:
+        return self.state in NEED_SOMEONE or bool(self.alarms)
+
+    def is_old(self, now: datetime) -> bool:
+        return self.old_from is not None and self.old_from <= now
 
 
 class Group(NamedTuple):
@@ -104,6 +116,12 @@ def plant(session: Session, *, machine: str | None = None, trends: bool = True) 
             )
         )
     return [Group(each, rows[each.id], tool_alarms[each.id]) for each in machines]
+
+
+def row_of(session: Session, machine: str, characteristic: str) -> Row:
+    """One characteristic at a glance. Raises `NotFound` for an unknown machine."""
+    (group,) = plant(session, machine=machine)
+    return next(row for row in group.rows if row.characteristic.key == characteristic)
 
 
 def _standing(machine_id: int | None) -> Any:

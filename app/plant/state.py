@@ -8,7 +8,7 @@ from enum import StrEnum
 from app.core.parameters import Parameters
 from app.core.zones import nanometres
 
-DRIFT = 5  # readings in a row on one side, beyond the zero range, are a drift
+DRIFT = 7  # readings in a row on one side, beyond the zero range, are a drift
 QUIET = timedelta(minutes=15)  # nobody expects a reading sooner
 MISSED = 10  # usual intervals without a reading, after which what is known is old
 

@@ -25,6 +25,7 @@ from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, layout, palette, zon
 __all__ = ["Block", "Mark", "Point", "Step", "zone_chart"]
 
 WIDE = 1500  # pixels from which on there is room for larger letters
+WORD = 70  # pixels that a value in the chart takes
 EVENTS, READINGS, OFFSETS = [0.915, 1.0], [0.18, 0.91], [0.0, 0.14]  # of the height, from the bottom
 
 
@@ -98,13 +99,14 @@ def zone_chart(
         *_readings(points, ruler, colours),
         *_latest(points, ruler, colours),
     ]
-    events, event_notes, event_lines = event_lane(marks, span, max(width - left - right, 200), colours)
+    pixels = max(width - left - right, 200)
+    events, event_notes, event_lines = event_lane(marks, span, pixels, colours)
     offsets, offset_notes = offset_lane(steps, marks, span, total_before, colours)
     notes = [
         *limit_labels(limits, ruler, colours, letters),
         *event_notes,
         *offset_notes,
-        *_beyond(points, ruler, colours),
+        *_beyond(points, ruler, span, pixels, colours),
     ]
     if not points and not blocks:
         # Without a trace of its own plotly would not know where the axis of the readings is.
@@ -248,8 +250,16 @@ def _readings(points: Sequence[Point], ruler: Scale, colours: Palette) -> list[d
     ]
 
 
-def _beyond(points: Sequence[Point], ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
-    """The values of readings drawn at the edge because they lie further out; of many, the last ones."""
+def _beyond(
+    points: Sequence[Point], ruler: Scale, span: tuple[float, float], pixels: int, colours: Palette
+) -> list[dict[str, Any]]:
+    """The values of readings drawn at the edge because they lie further out; of those too close together the newest."""
+    apart = (span[1] - span[0]) * WORD / pixels
+    told: list[Point] = []
+    for point in reversed(points):
+        near = (other for other in told if (other.deviation > 0) == (point.deviation > 0))
+        if not ruler.fits(point.deviation) and all(other.sequence - point.sequence > apart for other in near):
+            told.append(point)
     return [
         {
             "x": point.sequence,
@@ -259,7 +269,7 @@ def _beyond(points: Sequence[Point], ruler: Scale, colours: Palette) -> list[dic
             "showarrow": False,
             "font": {"size": 12, "color": zone_colour(point.zone, colours)},
         }
-        for point in [point for point in points if not ruler.fits(point.deviation)][-8:]
+        for point in told
     ]
 
 

@@ -1,0 +1,241 @@
+"""Pages: one characteristic with its zone chart and decisions, and one of its readings.
+
+The live parts of the page are fetched one by one (header `X-Live-Part`), so nothing is looked up that is not shown.
+"""
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from functools import cached_property
+from typing import Annotated, Any, Literal
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Header, Path, Query, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.alarms.wording import action_word
+from app.characteristics import chart, queries
+from app.characteristics.decisions import Decision, decision, decisions, version_of
+from app.characteristics.figures import band_picture
+from app.characteristics.figures_api import Choice, Chosen
+from app.characteristics.queries import Standing
+from app.characteristics.wording import history, in_order, label, worded
+from app.core.parameters import BY_NAME
+from app.errors import InbandError
+from app.plant import queries as plant
+from app.plant.wording import state_word
+from app.readings import actions as readings
+from app.readings import queries as reading_queries
+from app.statistics import queries as statistics
+from app.statistics.queries import MOST_IN_HISTOGRAM, Numbers, Window
+from app.web.deps import Caller, FormDep, Operator, SessionDep, Viewer
+from app.web.fields import LARGEST_ID, Reason
+from app.web.forms import by_field
+from app.web.i18n import _
+from app.web.templates import page
+from app.web.validation import checked
+
+router = APIRouter(include_in_schema=False)
+
+SHOWN = 25  # decisions on a page
+AROUND = 25  # readings on either side of one, in its own chart
+VERSIONS = 50
+Sequence_ = Annotated[int, Path(ge=1, le=LARGEST_ID, alias="sequence")]
+
+
+class Shown:
+    """What the page of a characteristic shows, each part looked up when the template comes to it."""
+
+    def __init__(self, session: Session, standing: Standing, choice: Choice, before: int | None) -> None:
+        self._session, self._choice, self._before = session, choice, before
+        self.standing = standing
+        self.now = datetime.now(UTC)
+
+    @cached_property
+    def row(self) -> plant.Row:
+        return plant.row_of(self._session, self.standing.machine.key, self.standing.characteristic.key)
+
+    @cached_property
+    def empirical_value(self) -> float:
+        return chart.empirical_value_of(self._session, self.standing)
+
+    @cached_property
+    def window(self) -> Window:
+        return statistics.window_of(self._session, self.standing.characteristic, **self._choice._asdict())
+
+    @property
+    def counted(self) -> Window:
+        """The readings whose numbers are shown: of very many the last ones."""
+        first = max(self.window.first, self.window.last - MOST_IN_HISTOGRAM + 1)
+        return Window(first, self.window.last, self.window.newest)
+
+    @cached_property
+    def numbers(self) -> Numbers:
+        return statistics.numbers_of(self._session, self.standing.characteristic, self.counted)
+
+    @cached_property
+    def decisions(self) -> list[Decision]:
+        return decisions(self._session, self.standing, before=self._before, limit=SHOWN + 1)
+
+    @cached_property
+    def history(self) -> list[Any]:
+        versions = queries.versions(self._session, self.standing.characteristic, limit=VERSIONS + 1)
+        return history(versions)[:VERSIONS]
+
+
+@router.get("/characteristics/{characteristic}")
+def characteristic_page(
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    characteristic: str,
+    choice: Chosen,
+    scale: Annotated[Literal["zones", "true", "time"], Query()] = "zones",
+    before: Annotated[int | None, Query(ge=1, le=LARGEST_ID)] = None,
+    x_live_part: Annotated[str | None, Header()] = None,
+) -> Response:
+    """The zone chart, the numbers, the decisions and the parameters of one characteristic."""
+    standing = queries.characteristic_named(session, characteristic)
+    path = f"/characteristics/{standing.characteristic.key}"
+    chosen = _as_query(choice)
+
+    def link(**changes: Any) -> str:
+        """This page with something else chosen."""
+        kept = (chosen if not changes.keys() & {"last", "first"} else {}) | {"scale": scale}
+        values = {name: value for name, value in {**kept, **changes}.items() if value is not None}
+        return f"{path}?{urlencode({name: v for name, v in values.items() if (name, v) != ('scale', 'zones')})}"
+
+    figure = "run" if scale == "time" else "zones"
+    shown = chosen if scale == "time" else chosen | {"scale": scale}
+    return page(
+        request,
+        "characteristics/characteristic.html",
+        shown=Shown(session, standing, choice, before),
+        wanted=lambda part: x_live_part is None or x_live_part == part,
+        characteristic=standing.characteristic,
+        machine=standing.machine,
+        parameters=standing.parameters,
+        version=standing.version,
+        table=parameter_table(standing.version.parameters),
+        choice=choice,
+        scale=scale,
+        before=before,
+        page_size=SHOWN,
+        most=MOST_IN_HISTOGRAM,
+        link=link,
+        chart_url=f"/api/v1{path}/figures/{figure}?{urlencode(shown)}",
+        histogram_url=f"/api/v1{path}/figures/histogram?{urlencode(chosen)}",
+        may_edit=caller.may("engineer"),
+        state_word=state_word,
+        action_word=action_word,
+    )
+
+
+def _as_query(choice: Choice) -> dict[str, Any]:
+    """The choice as the address says it."""
+    if choice == Choice(None, None, None, None, None):
+        return {"last": "all"}
+    named = {
+        "last": choice.last,
+        "first": choice.first,
+        "through": choice.through,
+        "from": choice.start and choice.start.isoformat(),
+        "to": choice.end and choice.end.isoformat(),
+    }
+    return {name: value for name, value in named.items() if value is not None}
+
+
+def parameter_table(stored: Mapping[str, Any]) -> Sequence[tuple[str, str, str]]:
+    """R number, name and value of every parameter that is set, in the order of the cycles."""
+    ordered = in_order(stored)
+    return [
+        ((BY_NAME[name].r or "") if name in BY_NAME else "", label(name), worded(name, ordered))
+        for name, value in ordered.items()
+        if value is not None
+    ]
+
+
+@router.get("/characteristics/{characteristic}/readings/{sequence}")
+def reading_page(
+    request: Request, session: SessionDep, caller: Viewer, characteristic: str, sequence: Sequence_
+) -> Response:
+    """One reading: what was measured, what was decided, why, by which parameters, and what followed."""
+    return _reading(request, session, caller, queries.characteristic_named(session, characteristic), sequence)
+
+
+@router.post("/characteristics/{characteristic}/readings/{sequence}/exclude")
+def send_exclusion(
+    request: Request, session: SessionDep, caller: Operator, characteristic: str, sequence: Sequence_, form: FormDep
+) -> Response:
+    """Take the reading out of the statistics."""
+    standing = queries.characteristic_named(session, characteristic)
+    entry = reading_queries.entry_of(session, characteristic)
+    assert entry is not None
+    try:
+        reason = checked(Reason, form.get("reason", ""), "reason")
+        readings.exclude(session, entry, sequence, caller.name, reason)
+    except InbandError as error:
+        if error.status == 404:
+            raise
+        session.expire_all()
+        return _reading(request, session, caller, standing, sequence, status=error.status, typed=form, problem=error)
+    return RedirectResponse(chart.reading_link(characteristic, sequence), 303)
+
+
+def _reading(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    standing: Standing,
+    sequence: int,
+    *,
+    status: int = 200,
+    typed: Mapping[str, str] | None = None,
+    problem: InbandError | None = None,
+) -> Response:
+    found = decision(session, standing, sequence)
+    version = version_of(session, standing, found.reading["parameters_version"])
+    limits = queries.parameters_of(
+        session, standing.machine.id, standing.characteristic.id, found.reading["parameters_version"]
+    )
+    newest = statistics.window_of(session, standing.characteristic).newest
+    key = standing.characteristic.key
+    around = {"first": max(1, sequence - AROUND), "through": min(newest, sequence + AROUND)}
+    return page(
+        request,
+        "characteristics/reading.html",
+        status=status,
+        decision=found,
+        reading=found.reading,
+        characteristic=standing.characteristic,
+        machine=standing.machine,
+        version=version,
+        limits=limits,
+        table=parameter_table(version.parameters),
+        band=band_picture(
+            found.reading["deviation"],
+            limits,
+            None,
+            found.reading["average_after"] if limits.average_memory else None,
+        ),
+        newest=newest,
+        older=chart.reading_link(key, sequence - 1) if sequence > 1 else None,
+        newer=chart.reading_link(key, sequence + 1) if sequence < newest else None,
+        chart_url=f"/api/v1/characteristics/{key}/figures/zones?{urlencode(around)}",
+        may_exclude=caller.may("operator"),
+        typed=typed or {},
+        problem=problem,
+        errors=by_field(problem) if problem else {},
+        code_word=code_word,
+        action_word=action_word,
+    )
+
+
+def code_word(action: str) -> str:
+    """What was decided, in a few words."""
+    return {
+        "none": _("No correction"),
+        "correct": _("Corrected"),
+        "hold": _("Correction held"),
+        "stop": _("Machine told to stop"),
+    }.get(action, action)
