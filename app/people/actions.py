@@ -29,6 +29,7 @@ __all__ = [
     "create_invitation",
     "disable_person",
     "enable_person",
+    "reset_password",
     "revoke_key",
     "withdraw_invitation",
 ]
@@ -119,6 +120,19 @@ def change_password(session: Session, caller: Caller, old: str, new: str, keep_t
         delete(BrowserSession).where(BrowserSession.person_id == person.id, BrowserSession.token_hash != kept)
     )
     record(session, caller.name, "password changed", f"person/{person.name}")
+
+
+def reset_password(session: Session, person_id: int, actor: str) -> tuple[str, str]:
+    """Give somebody who has forgotten theirs a new password, told this once, and sign them out everywhere.
+
+    Returns their name and the password.
+    """
+    person = _person(session, person_id)
+    password = "-".join(secrets.token_hex(2) for _part in range(4))
+    person.password_hash = hashed(password)
+    session.execute(delete(BrowserSession).where(BrowserSession.person_id == person.id))
+    record(session, actor, "password reset", f"person/{person.name}")
+    return person.name, password
 
 
 def change_role(session: Session, person_id: int, role: str, actor: str) -> Person:

@@ -14,7 +14,7 @@ from app.people.schemas import (
 )
 from app.people.tables import Person
 from app.web.api import api_router, problems
-from app.web.deps import Admin, AnyCaller, SessionDep, SettingsDep, require
+from app.web.deps import AddressDep, Admin, AnyCaller, SessionDep, require
 from app.web.fields import LARGEST_SERIAL, Cursor, Limit, Page, page_of
 from app.web.i18n import _
 
@@ -56,10 +56,10 @@ def change_person(session: SessionDep, caller: Admin, person: PersonId, change: 
 
 
 @router.post("/people/invitations", status_code=201)
-def invite_person(session: SessionDep, caller: Admin, settings: SettingsDep, invitation: InvitationIn) -> InvitationOut:
+def invite_person(session: SessionDep, caller: Admin, address: AddressDep, invitation: InvitationIn) -> InvitationOut:
     """Make a one-time link with which somebody chooses a name and a password."""
     token = actions.create_invitation(session, invitation.role, caller.name)
-    return InvitationOut(role=invitation.role, url=f"{settings.address}/invitation/{token}")
+    return InvitationOut(role=invitation.role, url=f"{address}/invitation/{token}")
 
 
 def _found(person: Person | None) -> Person:

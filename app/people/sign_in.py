@@ -60,7 +60,7 @@ def sign_in(database: Database, name: str, password: str, address: str, hours: i
     if not right or person is None:
         raise SignInRefused(
             _("Name and password do not belong together."),
-            _("Type both again. If you have forgotten the password, ask an administrator for a new invitation."),
+            _("Type both again. If you have forgotten the password, ask an administrator for a new one."),
         )
     with database.begin() as session:
         session.execute(

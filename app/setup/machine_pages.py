@@ -15,7 +15,7 @@ from app.machines.actions import MachineChange, MachineIn
 from app.people import actions as people
 from app.people import queries as people_queries
 from app.setup.frame import setup_page
-from app.web.deps import Caller, Engineer, FormDep, SessionDep, SettingsDep, Viewer
+from app.web.deps import AddressDep, Caller, Engineer, FormDep, SessionDep, Viewer
 from app.web.forms import by_field, parsed
 from app.web.i18n import _
 
@@ -80,15 +80,13 @@ def _new(
 
 
 @router.get("/setup/machines/{machine}")
-def machine_page(
-    request: Request, session: SessionDep, caller: Viewer, settings: SettingsDep, machine: str
-) -> Response:
-    return _machine(request, session, caller, settings.address, machine)
+def machine_page(request: Request, session: SessionDep, caller: Viewer, address: AddressDep, machine: str) -> Response:
+    return _machine(request, session, caller, address, machine)
 
 
 @router.post("/setup/machines/{machine}")
 def send_machine(
-    request: Request, session: SessionDep, caller: Engineer, settings: SettingsDep, machine: str, form: FormDep
+    request: Request, session: SessionDep, caller: Engineer, address: AddressDep, machine: str, form: FormDep
 ) -> Response:
     try:
         actions.change_machine(session, machine, parsed(MachineChange, form), caller.name)
@@ -96,14 +94,14 @@ def send_machine(
         if not error.errors:
             raise
         return _machine(
-            request, session, caller, settings.address, machine, status=error.status, typed=form, errors=by_field(error)
+            request, session, caller, address, machine, status=error.status, typed=form, errors=by_field(error)
         )
     return RedirectResponse(f"/setup/machines/{quote(machine)}?done=changed", 303)
 
 
 @router.post("/setup/machines/{machine}/keys")
 def send_machine_key(
-    request: Request, session: SessionDep, caller: Engineer, settings: SettingsDep, machine: str, form: FormDep
+    request: Request, session: SessionDep, caller: Engineer, address: AddressDep, machine: str, form: FormDep
 ) -> Response:
     """The answer shows the secret, this once, so it is no redirect."""
     found = queries.machine_named(session, machine)
@@ -111,8 +109,8 @@ def send_machine_key(
         made = people.add_key(session, name=form.get("name", ""), machine=found.key, actor=caller.name)
     except InbandError as error:
         errors = {f"key_{field}": message for field, message in by_field(error).items()}
-        return _machine(request, session, caller, settings.address, machine, status=error.status, errors=errors)
-    return _machine(request, session, caller, settings.address, machine, new_key=made)
+        return _machine(request, session, caller, address, machine, status=error.status, errors=errors)
+    return _machine(request, session, caller, address, machine, new_key=made)
 
 
 @router.post("/setup/machines/{machine}/keys/{key}/revoke")

@@ -10,7 +10,7 @@ from starlette.responses import RedirectResponse
 from app.errors import InbandError, NotFound
 from app.people import actions, queries
 from app.setup.frame import setup_page
-from app.web.deps import Admin, Caller, FormDep, SessionDep, SettingsDep
+from app.web.deps import AddressDep, Admin, Caller, FormDep, SessionDep
 from app.web.forms import by_field
 from app.web.i18n import _
 
@@ -35,12 +35,12 @@ def people_page(request: Request, session: SessionDep, caller: Admin) -> Respons
 
 @router.post("/setup/people/invitations")
 def send_invitation(
-    request: Request, session: SessionDep, caller: Admin, settings: SettingsDep, form: FormDep
+    request: Request, session: SessionDep, caller: Admin, address: AddressDep, form: FormDep
 ) -> Response:
     """The answer shows the link, this once, so it is no redirect."""
     role = form.get("role", "")
     token = actions.create_invitation(session, role, caller.name)
-    return _people(request, session, caller, link=f"{settings.address}/invitation/{token}", link_role=role)
+    return _people(request, session, caller, link=f"{address}/invitation/{token}", link_role=role)
 
 
 @router.post("/setup/people/invitations/{token_hash}/withdraw")
@@ -67,6 +67,13 @@ def send_key(request: Request, session: SessionDep, caller: Admin, form: FormDep
 def send_revoke_key(session: SessionDep, caller: Admin, key: int) -> Response:
     actions.revoke_key(session, key, caller.name)
     return RedirectResponse("/setup/people?done=revoked", 303)
+
+
+@router.post("/setup/people/{person}/password")
+def send_new_password(request: Request, session: SessionDep, caller: Admin, person: int) -> Response:
+    """The answer shows the password, this once, so it is no redirect."""
+    name, password = actions.reset_password(session, person, caller.name)
+    return _people(request, session, caller, new_password=(name, password))
 
 
 @router.post("/setup/people/{person}/{what}")
@@ -102,7 +109,13 @@ def _people(
     errors: Mapping[str, str] | None = None,
     **more: Any,
 ) -> Response:
-    shown: dict[str, Any] = {"link": None, "link_role": None, "new_key": None, "problem": None} | more
+    shown: dict[str, Any] = {
+        "link": None,
+        "link_role": None,
+        "new_key": None,
+        "problem": None,
+        "new_password": None,
+    } | more
     return setup_page(
         request,
         "people.html",

@@ -25,6 +25,7 @@ from app.settings import Settings
 from app.web.i18n import _
 
 __all__ = [
+    "AddressDep",
     "Admin",
     "AnyCaller",
     "Caller",
@@ -58,6 +59,14 @@ def get_settings(request: Request) -> Settings:
 
 
 SettingsDep = Annotated[Settings, Depends(get_settings)]
+
+
+def get_address(request: Request, settings: SettingsDep) -> str:
+    """How people reach this server: the address an administrator set, else the one that this request came by."""
+    return settings.public_url or str(request.base_url).rstrip("/")
+
+
+AddressDep = Annotated[str, Depends(get_address)]
 
 
 def bearer(request: Request) -> str | None:

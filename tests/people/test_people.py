@@ -206,6 +206,23 @@ class TestOverHttp:
         assert here.get("/account").status_code == 200
         assert there.get("/account").status_code == 303
 
+    def test_a_forgotten_password(self, server: Any, admin: httpx.Client) -> None:
+        server.person("Fata", "viewer", PASSWORD)
+        theirs = server.client()
+        theirs.post("/sign-in", data={"name": "Fata", "password": PASSWORD})
+        number = next(
+            one["id"]
+            for one in server.client(server.key()).get("/api/v1/people").json()["items"]
+            if one["name"] == "Fata"
+        )
+        shown = admin.post(f"/setup/people/{number}/password", data={"csrf": self.csrf(admin)})
+        password = re.search(r"(?:[0-9a-f]{4}-){3}[0-9a-f]{4}", shown.text)
+        assert password
+        assert theirs.get("/account").status_code == 303, "signed out"
+        for typed, status in ((PASSWORD, 401), (password[0], 303)):
+            answer = server.client().post("/sign-in", data={"name": "Fata", "password": typed})
+            assert answer.status_code == status
+
     @pytest.mark.parametrize("body", [{}, {"role": "king", "name": "x"}, {"name": "x"}, {"name": "", "role": "viewer"}])
     def test_bad_keys_are_refused(self, server: Any, body: dict[str, Any]) -> None:
         assert server.client(server.key()).post("/api/v1/keys", json=body).status_code == 422
