@@ -19,6 +19,7 @@ PARTS = (
     "app.cli.serve",
     "app.cli.database",
     "app.cli.people",
+    "app.cli.data",
     "app.demo.cli",
 )
 

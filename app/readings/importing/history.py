@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 import msgspec
-from psycopg import Connection, Cursor
+from psycopg import Connection, Cursor, RawCursor
 from sqlalchemy.orm import Session
 
 from app.audit import actions as audit
@@ -289,7 +289,7 @@ def _move_over(cursor: Cursor[Any], entry: Entry, version: int, now: datetime, s
     cursor.execute(TOUCHES, where)
     cursor.execute(MOVE_STREAM, where | {"count": summary.stored, "now": now})
     for statement, rows in full_blocks([(entry, before, summary.last_sequence)]):
-        cursor.execute(statement, (as_json(rows),))
+        RawCursor(cursor.connection).execute(statement, (as_json(rows),))
 
 
 def _clash(line: int, key: str, measured: float, other: float, sequence: int | None, first: int | None) -> Flaw:

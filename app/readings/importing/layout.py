@@ -158,15 +158,20 @@ def _first_values(path: Path, *, is_list: bool, most: int = 200) -> list[Any]:
             whole = json.loads(path.read_text("utf-8-sig"))
             return whole[:most] if isinstance(whole, list) else []
         with path.open(encoding="utf-8-sig") as file:
-            return [json.loads(line) for line, _count in zip(file, range(most), strict=False) if line.strip()]
+            return [_object(line) for line, _count in zip(file, range(most), strict=False) if line.strip()]
     except UnicodeDecodeError:
         raise Unusable(_("JSON files are UTF-8 text; this is not.")) from None
     except ValueError as error:
-        if is_list:
-            raise Unusable(_("This is not JSON: {error}.").format(error=error)) from None
-        return []  # the line is named when it is read
+        raise Unusable(_("This is not JSON: {error}.").format(error=error)) from None
     except RecursionError:
         raise Unusable(_("This is nested too deeply to be readings.")) from None
+
+
+def _object(line: str) -> Any:
+    try:
+        return json.loads(line)
+    except ValueError:
+        return None  # the line is named when it is read
 
 
 def _columns(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str, tuple[int, ...]]:
