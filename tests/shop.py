@@ -4,9 +4,11 @@ Target 40 mm; zero ±1 µm, averaging ±5 µm, tolerance ±8 µm, wear from 300 
 """
 
 import itertools
+import re
 from typing import Any
 
 import httpx
+from playwright.sync_api import Page
 
 PARAMETERS: dict[str, Any] = {
     "tool_memory": 3,
@@ -83,3 +85,40 @@ class Shop:
 
     def acknowledge(self, alarm: int, action: str, status: int = 200, comment: str = "looked at", **more: Any) -> Any:
         return self.call("POST", f"/alarms/{alarm}/acknowledge", status, action=action, comment=comment, **more)
+
+
+PASSWORD = "correct horse battery"
+
+
+class Person:
+    """Somebody with a browser that runs no scripts: follows links, sends forms."""
+
+    def __init__(self, server: Any, role: str) -> None:
+        self.name = f"{role}-{next(_names)}"
+        server.person(self.name, role, PASSWORD)
+        self.browser: httpx.Client = server.client()
+        self.browser.follow_redirects = True
+        answer = self.browser.post("/sign-in", data={"name": self.name, "password": PASSWORD})
+        assert answer.status_code == 200, answer.text
+
+    def open(self, path: str, status: int = 200) -> str:
+        """The page's text."""
+        answer = self.browser.get(path)
+        assert answer.status_code == status, f"{path}: {answer.status_code} {answer.text}"
+        return answer.text
+
+    def send(self, path: str, status: int = 200, **fields: str) -> str:
+        """Send a form with the token of this session; the text of the page that one ends up on."""
+        found = re.search(r'<meta name="csrf" content="([^"]+)"', self.open("/alarms"))
+        assert found is not None
+        answer = self.browser.post(path, data={"csrf": found[1], **fields})
+        assert answer.status_code == status, f"{path}: {answer.status_code} {answer.text}"
+        return answer.text
+
+    def sign_in(self, page: Page) -> None:
+        """The same person in a real browser."""
+        page.goto("/sign-in")
+        page.get_by_label("Name").fill(self.name)
+        page.get_by_label("Password").fill(PASSWORD)
+        page.locator("main button[type=submit]").click()
+        page.wait_for_url(lambda url: not url.endswith("/sign-in"))

@@ -89,7 +89,10 @@ def change_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, too
     return tool_set(queries.tools(session, found, only=tool)[0], found.key, done.superseded)
 
 
-@router.get("/machines/{machine}/tools/{tool}/figure", responses=problems(404))
+@router.get(
+    "/machines/{machine}/tools/{tool}/figure",
+    responses=problems(404) | {200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}},
+)
 def tool_figure(
     session: SessionDep,
     caller: AnyCaller,

@@ -68,7 +68,7 @@ def about_correction(row: CorrectionRow, verb: str) -> Question:
     """Asks before a correction is approved, released, rejected or marked applied."""
     c = row.correction
     values = {"number": c.number, "amount": um(c.amount), "tool": c.tool_memory, "machine": row.machine}
-    after = mm(row.expected)
+    after = "–" if row.expected is None else f"{plain(row.expected)} mm"
     send_to = f"corrections/{c.number}"
     to_machine = _("The machine fetches it and changes the offset of tool {tool} by {amount}.").format(**values)
     match verb:

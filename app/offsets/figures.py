@@ -93,8 +93,9 @@ def offset_figure(changes: Sequence[OffsetChange], *, theme: ThemeName = "light"
                 "itemclick": False,
                 "itemdoubleclick": False,
             },
-            xaxis=date_axis(),
+            xaxis=date_axis() | {"visible": bool(changes)},
             yaxis={
+                "visible": bool(changes),
                 "tickformat": "+.4f",
                 "nticks": 6,
                 "title": {"text": _("Offset, mm"), "font": {"size": 13, "color": colours.quiet}, "standoff": 8},
