@@ -17,6 +17,7 @@ from app.alarms.wording import kind_word
 from app.characteristics.figures import Block, Mark, Point, RunPoint, Step
 from app.characteristics.figures.lanes import COUNTED, MANUAL_EDIT, TOOL_CHANGE
 from app.characteristics.queries import Standing
+from app.core.zones import classify
 from app.offsets.tables import OPEN, AverageMemory, Correction, ToolEvent
 from app.statistics import queries as statistics
 from app.statistics.queries import Course, Window
@@ -58,7 +59,10 @@ def reading_link(key: str, sequence: int) -> str:
 
 
 def chart_of(session: Session, standing: Standing, window: Window) -> Chart:
-    """The zone chart of these readings."""
+    """The zone chart of these readings: each in the zone where it lies, by the limits of now.
+
+    In which zone it was decided may differ (corrections not yet in effect, other limits then); its own page says so.
+    """
     parameters, key = standing.parameters, standing.characteristic.key
     course = statistics.course_of(session, standing.characteristic, window)
     has_memory = parameters.average_memory > 0
@@ -81,7 +85,7 @@ def chart_of(session: Session, standing: Standing, window: Window) -> Chart:
             Point(
                 reading.sequence,
                 reading.deviation,
-                reading.zone,
+                classify(reading.deviation, parameters.limits),
                 reading.average_after if has_memory else None,
                 reading.measured_at,
                 reading.sequence in course.excluded,
@@ -120,7 +124,7 @@ def run_of(session: Session, standing: Standing, window: Window) -> list[RunPoin
             reading.sequence,
             reading.measured_at,
             reading.measured,
-            reading.zone,
+            classify(reading.deviation, standing.parameters.limits),
             reading.sequence in course.excluded,
             reading_link(key, reading.sequence),
         )

@@ -89,6 +89,7 @@ def get_zone_chart(
     scale: Annotated[
         Literal["zones", "true"], Query(description="Each band equally tall, or linear in µm around the tolerance.")
     ] = "zones",
+    ringed: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="The reading with a ring about it.")] = None,
     theme: Theme = "light",
     width: Width = 1240,
 ) -> Response:
@@ -110,6 +111,7 @@ def get_zone_chart(
             centre=chart.centre,
             total_before=chart.total_before,
             width=width,
+            ringed=ringed or ("newest" if window.reaches_now else None),
         )
     )
 

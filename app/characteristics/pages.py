@@ -200,7 +200,7 @@ def _reading(
     )
     newest = statistics.window_of(session, standing.characteristic).newest
     key = standing.characteristic.key
-    around = {"first": max(1, sequence - AROUND), "through": min(newest, sequence + AROUND)}
+    around = {"first": max(1, sequence - AROUND), "through": min(newest, sequence + AROUND), "ringed": sequence}
     return page(
         request,
         "characteristics/reading.html",

@@ -46,7 +46,7 @@ def _page(request: Request, session: Session, show: str, machine: str | None) ->
         machine=groups[0].machine if machine else None,
         show=show,
         state_word=state_word,
-        band=lambda row: band_picture(row.stream.last_deviation, row.parameters, row.stream.last_zone, row.average),
+        band=lambda row: band_picture(row.stream.last_deviation, row.parameters, None, row.average),
         spark=lambda row: sparkline(row.trend, row.parameters),
         now=now,
         **_summary(groups),

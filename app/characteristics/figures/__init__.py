@@ -7,6 +7,7 @@ band_picture(…)      the last deviation in its zone, small enough for a list
 sparkline(…)         the trend of the last deviations, in a line's height
 """
 
+from app.characteristics.figures.blocks import Block
 from app.characteristics.figures.distribution import (
     RunPoint,
     histogram_counts,
@@ -16,7 +17,7 @@ from app.characteristics.figures.distribution import (
 )
 from app.characteristics.figures.glance import band_picture, sparkline
 from app.characteristics.figures.scale import ScaleName, TrueScale, ZoneScale, bands
-from app.characteristics.figures.zones import Block, Mark, Point, Step, zone_chart
+from app.characteristics.figures.zones import Mark, Point, Step, zone_chart
 
 __all__ = [
     "Block",

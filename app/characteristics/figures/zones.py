@@ -12,12 +12,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import Any, Literal
 
+from app.characteristics.figures.blocks import Block, envelope
 from app.characteristics.figures.labels import band_shapes, limit_labels, limit_lines, size_ticks
 from app.characteristics.figures.lanes import Mark, Step, event_lane, offset_lane
 from app.characteristics.figures.scale import Scale, ScaleName, TrueScale, ZoneScale
-from app.core.zones import HasLimits, Limits, classify
+from app.core.zones import HasLimits, Limits
 from app.web.i18n import _
 from app.web.numbers import um
 from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, layout, palette, zone_colour, zone_name
@@ -42,23 +43,6 @@ class Point:
     link: str | None = None
 
 
-@dataclass(frozen=True)
-class Block:
-    """Many readings in one: for charts of more than can be drawn. `link` opens its part of the chart; mm."""
-
-    first: int
-    last: int
-    minimum: float
-    maximum: float
-    mean: float
-    average: float | None = None
-    link: str | None = None
-
-    @property
-    def middle(self) -> float:
-        return (self.first + self.last) / 2
-
-
 def zone_chart(
     points: Sequence[Point],
     limits: HasLimits,
@@ -71,6 +55,7 @@ def zone_chart(
     centre: float | None = None,
     total_before: float = 0.0,
     width: int = 1240,
+    ringed: int | Literal["newest"] | None = "newest",
 ) -> dict[str, Any]:
     """The figure.
 
@@ -78,6 +63,7 @@ def zone_chart(
     steps: corrections by ascending sequence of the reading that caused them; total_before: their sum before the first (mm).
     marks: alarms and tool changes. centre: the size (mm) at deviation 0, target + empirical value, for the sizes at the left.
     width: of the chart in pixels, about: decides which words have room.
+    ringed: the number of the reading with a ring about it; `newest` is the last one.
     """
     colours = palette(theme)
     ruler: Scale
@@ -94,10 +80,10 @@ def zone_chart(
     span = (first - room, last + room * 1.5)
 
     traces = [
-        *_envelope(blocks, ruler, Limits.of(limits), colours),
+        *envelope(blocks, ruler, Limits.of(limits), colours),
         *_average(blocks, points, ruler, colours),
         *_readings(points, ruler, colours),
-        *_latest(points, ruler, colours),
+        *_ring(points, ringed, ruler, colours),
     ]
     pixels = max(width - left - right, 200)
     events, event_notes, event_lines = event_lane(marks, span, pixels, colours)
@@ -273,16 +259,19 @@ def _beyond(
     ]
 
 
-def _latest(points: Sequence[Point], ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
-    """A ring about the newest reading, found from two metres away."""
-    if not points:
+def _ring(
+    points: Sequence[Point], ringed: int | Literal["newest"] | None, ruler: Scale, colours: Palette
+) -> list[dict[str, Any]]:
+    """A ring about the newest reading, or about the one that the page is about, found from two metres away."""
+    wanted = points[-1].sequence if ringed == "newest" and points else ringed
+    point = next((point for point in points if point.sequence == wanted), None)
+    if point is None:
         return []
-    point = points[-1]
     return [
         {
             "type": "scatter",
             "mode": "markers",
-            "name": _("Newest"),
+            "name": _("Newest") if ringed == "newest" else _("This reading"),
             "meta": "newest",
             "x": [point.sequence],
             "y": [ruler.position(point.deviation)],
@@ -318,73 +307,3 @@ def _average(blocks: Sequence[Block], points: Sequence[Point], ruler: Scale, col
             "hoverinfo": "skip",
         }
     ]
-
-
-def _envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits, colours: Palette) -> list[dict[str, Any]]:
-    """Smallest and largest reading of every block, filled between; extremes that need someone keep their shapes."""
-    if not blocks:
-        return []
-    x = [block.middle for block in blocks]
-    text = [
-        "<br>".join(
-            (
-                f"<b>{_('Readings {first} to {last}').format(first=block.first, last=block.last)}</b>",
-                _("largest {value}").format(value=um(block.maximum)),
-                _("mean {value}").format(value=um(block.mean)),
-                _("smallest {value}").format(value=um(block.minimum)),
-            )
-        )
-        for block in blocks
-    ]
-    edge = {"width": 1, "color": _see_through(colours.steady, 0.5), "shape": "hvh"}
-    common = {"type": "scatter", "mode": "lines", "x": x, "customdata": [block.link for block in blocks], "text": text}
-    common |= {"hovertemplate": "%{text}<extra></extra>"}
-    lower = common | {
-        "y": [ruler.position(b.minimum) for b in blocks],
-        "line": edge,
-        "showlegend": False,
-        "meta": "minimum",
-    }
-    upper = common | {
-        "y": [ruler.position(b.maximum) for b in blocks],
-        "line": edge,
-        "fill": "tonexty",
-        "fillcolor": _see_through(colours.steady),
-        "name": _("Smallest to largest"),
-        "meta": "maximum",
-    }
-    mean = common | {
-        "y": [ruler.position(b.mean) for b in blocks],
-        "line": {"width": 1.5, "color": colours.average},
-        "name": _("Mean"),
-        "meta": "mean",
-    }
-    extremes = [
-        (block, value, zone)
-        for block in blocks
-        for value in dict.fromkeys((block.minimum, block.maximum))
-        if (zone := classify(value, edges)) not in {"zero", "average", "full"}
-    ]
-    marks = {
-        "type": "scatter",
-        "mode": "markers",
-        "meta": "extremes",
-        "x": [block.middle for block, _value, _zone in extremes],
-        "y": [ruler.position(value) for _block, value, _zone in extremes],
-        "marker": {
-            "symbol": [ZONE_SYMBOLS[zone] for _block, _value, zone in extremes],
-            "size": 9,
-            "color": [zone_colour(zone, colours) for _block, _value, zone in extremes],
-        },
-        "customdata": [block.link for block, _value, _zone in extremes],
-        "text": [f"<b>{um(value)}</b> · {zone_name(zone)}" for _block, value, zone in extremes],
-        "hovertemplate": "%{text}<extra></extra>",
-        "showlegend": False,
-        "cliponaxis": False,
-    }
-    return [lower, upper, mean, *([marks] if extremes else [])]
-
-
-def _see_through(colour: str, share: float = 0.28) -> str:
-    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
-    return f"rgba({red},{green},{blue},{share})"
