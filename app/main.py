@@ -3,6 +3,7 @@
 import gc
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 
 from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
@@ -28,9 +29,10 @@ from app.readings.writer import Writer
 from app.settings import Settings
 from app.setup import pages as setup_pages
 from app.statistics import api as statistics
-from app.web import events_api, health
+from app.web import api_docs, events_api, health
 from app.web.limits import BodyLimit
 from app.web.live import Live
+from app.web.openapi import document
 from app.web.problems import add_problem_handlers
 from app.web.security import SecurityHeaders
 from app.web.templates import assets
@@ -50,6 +52,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     keys_api.router,
     audit.router,
     health.router,
+    api_docs.router,
     plant_pages.router,
     characteristic_pages.router,
     alarm_pages.router,
@@ -92,5 +95,6 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
     app.add_middleware(BodyLimit)
     for router in ROUTERS:
         app.include_router(router)
+    app.openapi = partial(document, app, readings.SCHEMAS)  # type: ignore[method-assign]
     app.mount("/static", assets())
     return ReadingsDoor(SecurityHeaders(app), keys.lookup, directory, writer, database)

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable
 from datetime import datetime
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from app.core.compensation import Action, needs_approval
 from app.core.parameters import Parameters
@@ -59,13 +59,44 @@ def answer(
     }
 
 
-class IssuedCorrection(BaseModel):
-    """The correction that a reading led to, as it was issued; `amount` is in offset units, mm."""
+ANSWER: dict[str, JsonValue] = {
+    "characteristic": "shaft-d40",
+    "sequence": 812,
+    "key": "lathe-1:000812:d40",
+    "part": "SN-000812",
+    "measured": 39.9981,
+    "measured_at": "2026-11-21T07:15:02.120Z",
+    "received_at": "2026-11-21T07:15:02.131Z",
+    "late": False,
+    "deviation": 0.0061,
+    "decided_deviation": 0.0061,
+    "outstanding": [],
+    "zone": "full",
+    "average_before": 0.0012,
+    "average_after": 0.0,
+    "action": "correct",
+    "correction": {"number": 18, "tool_memory": 3, "amount": -0.0061, "status": "pending"},
+    "alarms": [],
+    "reason": {
+        "code": "full_deviation",
+        "text": "Deviation 6.1 µm is beyond the averaging limit 5.3 µm: corrected in full.",
+        "notes": [],
+    },
+    "parameters_version": 4,
+}
+ROW = ANSWER | {"excluded": None}
+DETAIL = ROW | {"touches": None, "machined_at": None, "correction_in_effect": 17}
 
-    number: int
-    tool_memory: int
-    amount: float
-    status: str
+
+class IssuedCorrection(BaseModel):
+    """The correction that a reading led to, as it was issued."""
+
+    number: Annotated[int, Field(description="Counts per machine, without gaps; confirm it by this number.")]
+    tool_memory: Annotated[int, Field(description="R10: the tool memory location whose offset is to be changed.")]
+    amount: Annotated[float, Field(description="Add this to the offset, mm.")]
+    status: Annotated[
+        str, Field(description="pending: apply it; held or awaiting_approval: a person decides first, so do not.")
+    ]
 
 
 class RaisedAlarm(BaseModel):
@@ -76,35 +107,46 @@ class RaisedAlarm(BaseModel):
 
 
 class WhySo(BaseModel):
-    """Why it was decided so: a code for programs, sentences for people, and codes of what else was considered."""
+    """Why it was decided so."""
 
-    code: str
-    text: str
-    notes: list[str]
+    code: Annotated[str, Field(description="For programs.")]
+    text: Annotated[str, Field(description="For people.")]
+    notes: Annotated[
+        list[str],
+        Field(description="What else was considered: outstanding, part_out_of_tolerance, clamped, late."),
+    ]
 
 
 class ReadingAnswer(BaseModel):
     """The answer to one reading. Lengths in mm; `deviation` is raw, `decided_deviation` counts outstanding corrections."""
 
+    model_config = ConfigDict(json_schema_extra={"example": ANSWER})
+
     characteristic: str
-    sequence: int
+    sequence: Annotated[int, Field(description="Counts 1, 2, 3 … per characteristic, without gaps.")]
     key: str | None
     part: str | None
-    measured: float
+    measured: Annotated[float, Field(description="The size, mm; of touches, what they amount to.")]
     measured_at: datetime
     received_at: datetime
-    late: bool
-    deviation: float
-    decided_deviation: float
-    outstanding: list[int]
-    zone: str
-    average_before: float
-    average_after: float
-    action: str
-    correction: IssuedCorrection | None
+    late: Annotated[bool, Field(description="Measured before a reading that had come in already.")]
+    deviation: Annotated[float, Field(description="Measured - target - empirical value, as the part came out.")]
+    decided_deviation: Annotated[
+        float, Field(description="What it would have been with the outstanding corrections; decided by this.")
+    ]
+    outstanding: Annotated[
+        list[int], Field(description="Numbers of the corrections that were not in effect yet when the part was cut.")
+    ]
+    zone: Annotated[str, Field(description="zero, average, full, oversize, undersize, wear or probe_fault.")]
+    average_before: Annotated[float, Field(description="Running average M before this reading.")]
+    average_after: Annotated[float, Field(description="M after it; 0 after a correction.")]
+    action: Annotated[
+        str, Field(description="none; correct: apply the correction; hold: a person decides; stop: stop the machine.")
+    ]
+    correction: Annotated[IssuedCorrection | None, Field(description="What this reading led to, if anything.")]
     alarms: list[RaisedAlarm]
     reason: WhySo
-    parameters_version: int
+    parameters_version: Annotated[int, Field(description="Which version of the parameters it was judged by.")]
 
 
 class Excluded(BaseModel):
@@ -118,12 +160,16 @@ class Excluded(BaseModel):
 class ReadingRow(ReadingAnswer):
     """A stored reading."""
 
-    excluded: Excluded | None
+    model_config = ConfigDict(json_schema_extra={"example": ROW})
+
+    excluded: Annotated[Excluded | None, Field(description="If it was taken out of the statistics.")]
 
 
 class ReadingDetail(ReadingRow):
     """A stored reading with everything about it."""
 
-    touches: list[list[float]] | None
+    model_config = ConfigDict(json_schema_extra={"example": DETAIL})
+
+    touches: Annotated[list[list[float]] | None, Field(description="One list per point, each with its repeats.")]
     machined_at: datetime | None
     correction_in_effect: int | None

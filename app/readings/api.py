@@ -1,12 +1,13 @@
 """JSON routes: pushing readings and looking them up. Single readings with a key are answered by `door.py`, which see."""
 
+import json
 from collections import Counter
 from datetime import UTC, datetime
 from typing import Annotated, Any, cast
 
 import msgspec
 from fastapi import APIRouter, Path, Query, Request, Response
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 
 from app.db.engine import Database
@@ -45,18 +46,28 @@ Sequence = Annotated[int, Path(ge=1, le=2**63 - 1, description="Number of the re
 
 
 class BatchCounts(BaseModel):
-    """What became of a batch. `items` only with `decisions=true`: each as a single reading is answered."""
+    """What became of a batch."""
 
-    stored: int
-    repeated: int
-    zones: dict[str, int]
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {"stored": 3, "repeated": 0, "zones": {"zero": 2, "full": 1}, "corrections": 1, "alarms": 0}
+        }
+    )
+
+    stored: Annotated[int, Field(description="Readings that are new.")]
+    repeated: Annotated[int, Field(description="Readings whose key was sent before; nothing happened twice.")]
+    zones: Annotated[dict[str, int], Field(description="How many of the new ones were decided in each zone.")]
     corrections: int
-    alarms: int
-    items: list[ReadingAnswer] | None = None
+    alarms: Annotated[int, Field(description="Alarms that were raised, without repetitions.")]
+    items: Annotated[
+        list[ReadingAnswer] | None, Field(description="With `decisions=true`: each as a single reading is answered.")
+    ] = None
 
 
 class ExcludeIn(Body):
     """Why a reading is taken out of the statistics."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"reason": "chip under the stylus"}})
 
     reason: Reason
 
@@ -101,7 +112,7 @@ async def push_reading(request: Request, caller: AnyCaller) -> Response:
             "required": True,
             "content": {
                 "application/json": {"schema": {"type": "array", "items": _schema}, "example": [EXAMPLE]},
-                NDJSON: {"schema": _schema},
+                NDJSON: {"schema": _schema, "example": json.dumps(EXAMPLE)},
             },
         }
     },

@@ -27,16 +27,37 @@ MOST_POINTS, MOST_REPEATS = 100, 100
 class ReadingIn(Struct, forbid_unknown_fields=True, gc=False):
     """One reading as it is sent. Lengths in mm, times RFC 3339 with an offset."""
 
-    characteristic: Annotated[str, Meta(min_length=1, max_length=64)]
-    measured: Length | None = None
-    touches: (
-        Annotated[list[Annotated[list[Length], Meta(max_length=MOST_REPEATS)]], Meta(max_length=MOST_POINTS)] | None
-    ) = None
-    measured_at: Moment | None = None
-    machined_at: Moment | None = None
-    part: Annotated[str, Meta(min_length=1, max_length=128)] | None = None
-    key: Annotated[str, Meta(min_length=1, max_length=128)] | None = None
-    correction_in_effect: Annotated[int, Meta(ge=0, le=2_147_483_647)] | None = None
+    characteristic: Annotated[str, Meta(min_length=1, max_length=64, description="The key of the characteristic.")]
+    measured: Annotated[Length | None, Meta(description="The size, mm.")] = None
+    touches: Annotated[
+        Annotated[list[Annotated[list[Length], Meta(max_length=MOST_REPEATS)]], Meta(max_length=MOST_POINTS)] | None,
+        Meta(description="In place of measured: one list per point (R23), each with its repeats (R27)."),
+    ] = None
+    measured_at: Annotated[Moment | None, Meta(description="When it was measured; if left out, when it came in.")] = (
+        None
+    )
+    machined_at: Annotated[
+        Moment | None,
+        Meta(
+            description="When the part was cut: in place of correction_in_effect, if the machine knows only the time."
+        ),
+    ] = None
+    part: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=128)] | None, Meta(description="Serial number of the part.")
+    ] = None
+    key: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=128)] | None,
+        Meta(
+            description="Yours, unique per characteristic: sent again, you get the first answer and nothing happens twice."
+        ),
+    ] = None
+    correction_in_effect: Annotated[
+        Annotated[int, Meta(ge=0, le=2_147_483_647)] | None,
+        Meta(
+            description="Number of the last correction the machine had applied when it cut this part; 0 for none. "
+            "It also confirms the pending ones up to it."
+        ),
+    ] = None
 
 
 FIELDS = ReadingIn.__struct_fields__

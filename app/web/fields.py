@@ -52,12 +52,15 @@ Text200 = Annotated[
 """A name: one line, 1 to 200 characters."""
 
 Reason = Annotated[
-    str, StringConstraints(strip_whitespace=True, min_length=1, max_length=1000), AfterValidator(_readable)
+    str,
+    StringConstraints(strip_whitespace=True, min_length=1, max_length=1000),
+    AfterValidator(_readable),
+    Field(description="Why, in words; it stays on record."),
 ]
 """Why somebody did something: 1 to 1000 characters."""
 
 Limit = Annotated[int, Field(ge=1, le=1000, description="How many items at most.")]
-Cursor = Annotated[int, Field(ge=0, le=LARGEST_ID)]
+Cursor = Annotated[int, Field(ge=0, le=LARGEST_ID, description="Cursor: the `next` of the page before.")]
 """A cursor that is the number of the last item seen."""
 
 

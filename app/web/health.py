@@ -12,17 +12,22 @@ from sqlalchemy import text
 from starlette.responses import Response
 
 from app.db.engine import Database
+from app.web.api import EVERY_ERROR
 
-router = APIRouter(tags=["health"])
+router = APIRouter(tags=["health"], generate_unique_id_function=lambda route: route.name)
 
 
-@router.get("/health/live")
+def _says(example: Any, media_type: str = "application/json") -> dict[int | str, dict[str, Any]]:
+    return {200: {"content": {media_type: {"example": example}}}}
+
+
+@router.get("/health/live", responses=_says({"status": "live"}))
 def live() -> dict[str, str]:
     """The process answers."""
     return {"status": "live"}
 
 
-@router.get("/health/ready", responses={503: {"description": "The database cannot be reached"}})
+@router.get("/health/ready", responses=_says({"status": "ready"}) | {503: EVERY_ERROR[503]})
 def ready(request: Request) -> dict[str, str]:
     """The process answers and reaches its database."""
     database: Database = request.app.state.database
@@ -31,7 +36,11 @@ def ready(request: Request) -> dict[str, str]:
     return {"status": "ready"}
 
 
-@router.get("/metrics", response_class=Response)
+@router.get(
+    "/metrics",
+    response_class=Response,
+    responses=_says('inband_readings_total{machine="lathe-1"} 812.0\n', "text/plain") | {503: EVERY_ERROR[503]},
+)
 def metrics(request: Request) -> Response:
     """Prometheus metrics. What is counted is asked of the database, so every process answers the same."""
     return Response(generate_latest(request.app.state.metrics), media_type=CONTENT_TYPE_LATEST)

@@ -1,0 +1,239 @@
+"""The OpenAPI document: what the routes declare, completed so that a program can be written from it alone.
+
+FastAPI describes parameters, bodies and answers. Added here: the schemas of the readings door (msgspec's), who may call,
+every error in the shape it really has, and an example at every place where one is looked for.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from fastapi.routing import APIRoute, iter_route_contexts
+from pydantic import BaseModel
+
+from app import __version__
+from app.errors import InbandError, Unexpected
+from app.web.api import BASE, EVERY_ERROR
+from app.web.deps import SESSION_COOKIE
+from app.web.problems import PROBLEM_JSON
+
+Json = dict[str, Any]
+
+SUMMARY = "Machines push probe readings; Inband decides, stores, and hands the tool-offset correction back."
+DESCRIPTION = f"""\
+Lengths are millimetres, times RFC 3339 with an offset, keys are slugs (`[a-z0-9][a-z0-9._-]{{0,63}}`). What is here is kept within \
+version 1; fields may be added to answers, so skip those you do not know.
+
+A program sends its key: `Authorization: Bearer KEY`. The key of a machine pushes readings and handles corrections of that machine \
+only; other keys have a role: viewer, operator, engineer or admin, each of which may do what those before it may. A browser's \
+session works too; then a change carries the header `X-CSRF-Token`.
+
+Errors are `{PROBLEM_JSON}` (RFC 9457) with what is wrong, where, and what to do about it. After a 5xx nothing was stored, but for \
+`outcome-unknown`: send it again with the same key and you get its answer.
+
+Lists answer `items` and `next`: pass `next` as the cursor of the following page (`after`, or `before` where the newest come first) \
+until it is null."""
+
+TAGS = {
+    "readings": "What the probe measured. The answer says what was decided, why, and what to correct.",
+    "offsets": "Tool memory (R10), average memory (R11), and the corrections on their way into the offsets.",
+    "alarms": "What needs a person, and what that person did about it.",
+    "machines": "The machines that push readings.",
+    "characteristics": "What is measured, by which R parameters it is judged, and its charts.",
+    "statistics": "What a run of readings amounts to.",
+    "events": "What changes, as it changes.",
+    "keys": "Keys by which machines and other programs call.",
+    "people": "People who sign in, and invitations.",
+    "audit": "Who changed what, when and why.",
+    "health": "For those who run the server. These need no key.",
+    "documentation": "This description. It needs no key.",
+}
+OPEN_TAGS = {"health", "documentation"}
+
+
+def document(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
+    """The document of this application, made once. ``schemas``: components that routes refer to and FastAPI does not know."""
+    if app.openapi_schema is None:
+        app.openapi_schema = _made(app, schemas)
+    return app.openapi_schema
+
+
+def operations(made: Json) -> Iterator[tuple[str, str, Json]]:
+    """Every operation of a document as (method, path, description), by path as it was declared."""
+    for path, item in made["paths"].items():
+        for method, operation in item.items():
+            yield method, path, operation
+
+
+def resolve(made: Json, part: Json) -> Json:
+    """What a ``$ref`` of the document stands for; anything else as it is.
+
+    Raises `KeyError` for a reference to nothing.
+    """
+    while "$ref" in part:
+        found: Any = made
+        for step in part["$ref"].removeprefix("#/").split("/"):
+            found = found[step]
+        part = found
+    return part
+
+
+def _made(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
+    made = get_openapi(
+        title="Inband",
+        version=__version__,
+        summary=SUMMARY,
+        description=DESCRIPTION,
+        routes=app.routes,
+        tags=[{"name": name, "description": words} for name, words in TAGS.items()],
+        servers=[{"url": "/", "description": "this server"}],
+        license_info={"name": "MIT", "identifier": "MIT"},
+    )
+    components = made["components"]
+    components["schemas"] |= schemas
+    for name, example in _examples(BaseModel):
+        if name in components["schemas"]:
+            components["schemas"][name] |= example
+    components["securitySchemes"] = {
+        "key": {"type": "http", "scheme": "bearer", "description": "The key of a machine, or a key with a role."},
+        "session": {
+            "type": "apiKey",
+            "in": "cookie",
+            "name": SESSION_COOKIE,
+            "description": "The browser's session; changes carry X-CSRF-Token as well.",
+        },
+    }
+    components["responses"] = {_name(status): _problem(described) for status, described in _errors()}
+    made["security"] = [{"key": []}, {"session": []}]
+    roles = dict(_roles(app))
+    for _method, _path, operation in operations(made):
+        _complete(made, operation)
+        if OPEN_TAGS.intersection(operation["tags"]):
+            operation["security"] = []
+        else:
+            operation["x-role"], operation["x-machine-key"] = roles[operation["operationId"]]
+    _tidy(made["paths"])
+    _tidy(components["schemas"])
+    return made
+
+
+# --- errors
+
+
+def _errors() -> Iterable[tuple[int, Json]]:
+    unexpected = Unexpected(
+        "An error that nobody foresaw. Nothing of this request was stored.",
+        "Try again. If it happens again, tell your administrator the incident number 9f3c1a70.",
+        incident="9f3c1a70",
+    )
+    described = {int(status): dict(error) for status, error in EVERY_ERROR.items()}
+    described[InbandError.status] = {
+        "description": unexpected.title,
+        "content": {PROBLEM_JSON: {"example": unexpected.as_problem()}},
+    }
+    return sorted(described.items())
+
+
+def _name(status: int) -> str:
+    return f"Problem{status}"
+
+
+def _problem(described: Json) -> Json:
+    example = described["content"][PROBLEM_JSON]["example"]
+    content = {"schema": {"$ref": "#/components/schemas/Problem"}, "example": example}
+    response: Json = {"description": described["description"], "content": {PROBLEM_JSON: content}}
+    if example["status"] in {429, 503}:
+        response["headers"] = {"Retry-After": {"schema": {"type": "integer"}, "description": "Seconds to wait."}}
+    return response
+
+
+# --- one operation
+
+
+def _complete(made: Json, operation: Json) -> None:
+    operation["summary"] = operation["operationId"].replace("_", " ").capitalize()
+    responses = operation["responses"]
+    errors = {int(status) for status in responses if status >= "4"}
+    if not OPEN_TAGS.intersection(operation["tags"]):
+        errors |= {500} | ({413} if "requestBody" in operation else set())
+    for status in errors:
+        responses[str(status)] = {"$ref": f"#/components/responses/{_name(status)}"}
+    operation["responses"] = dict(sorted(responses.items()))
+    for status, response in operation["responses"].items():
+        if status < "4":
+            _with_examples(made, response.get("content", {}))
+            if response["description"] == "Successful Response":
+                response["description"] = "Done"
+    if "requestBody" in operation:
+        _with_examples(made, operation["requestBody"]["content"])
+    for parameter in operation.get("parameters", []):
+        examples = parameter["schema"].pop("examples", [None])
+        if examples[0] is not None:
+            parameter["example"] = examples[0]
+
+
+def _with_examples(made: Json, content: Json) -> None:
+    """Where the schema has an example and the place of use has none, that one."""
+    for media in content.values():
+        if "example" in media or "examples" in media:
+            continue
+        schema = media.get("schema", {})
+        if "anyOf" in schema:  # a body that may be left out
+            schema = schema["anyOf"][0]
+        found = _example(made, resolve(made, schema))
+        if found is not None:
+            media["example"] = found
+
+
+def _examples(base: type[BaseModel]) -> Iterator[tuple[str, Json]]:
+    """The examples of our models as they were written: FastAPI sorts their fields and drops those that are null."""
+    for model in base.__subclasses__():
+        extra = model.model_config.get("json_schema_extra")
+        if model.__module__.startswith("app.") and isinstance(extra, dict):
+            yield model.__name__, {name: extra[name] for name in ("example", "examples") if name in extra}
+        yield from _examples(model)
+
+
+def _example(made: Json, schema: Json) -> Any:
+    if "example" in schema:
+        return schema["example"]
+    if "examples" in schema:
+        return schema["examples"][0]
+    properties = schema.get("properties", {})
+    if set(properties) == {"items", "next"}:  # one page of a list
+        item = _example(made, resolve(made, properties["items"]["items"]))
+        return None if item is None else {"items": [item], "next": None}
+    return None
+
+
+# --- who may call
+
+
+def _roles(app: FastAPI) -> Iterator[tuple[str, tuple[str, bool]]]:
+    """By operation id: the least role, and whether a machine's own key will do. A test holds the server to it."""
+    for context in iter_route_contexts(app.routes):
+        route = context.original_route
+        if not isinstance(route, APIRoute) or not route.path.startswith(BASE):
+            continue
+        asked = {
+            dependency.call.__name__.removeprefix("require_")
+            for dependency in route.dependant.dependencies
+            if dependency.call is not None and dependency.call.__name__.startswith("require_")
+        }
+        if asked:
+            yield route.name, (asked.pop(), False)
+        else:  # any caller; the route itself then looks for the role at the machine in question
+            yield route.name, ("viewer" if route.methods == {"GET"} else "operator", True)
+
+
+def _tidy(part: Any) -> None:
+    """Take out the titles that are only the names again."""
+    if isinstance(part, dict):
+        if isinstance(part.get("title"), str) and "status" not in part:
+            del part["title"]
+        for inner in part.values():
+            _tidy(inner)
+    elif isinstance(part, list):
+        for inner in part:
+            _tidy(inner)
