@@ -8,10 +8,12 @@ keys may use asks for `AnyCaller` and then says ``caller.must_at(machine.id, "op
 
 import secrets
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Annotated, Any, cast
 from urllib.parse import urlsplit
 
 from fastapi import Depends, Request
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData
@@ -113,6 +115,24 @@ async def get_caller(request: Request, session: SessionDep) -> Caller:
     if request.method not in SAFE_METHODS:
         await _check_token(request, caller.csrf)
     return caller
+
+
+async def recognise(request: Request) -> None:
+    """For the frame of a page that no route makes, such as "there is nothing here": who is signed in, if that can be told."""
+    token = request.cookies.get(SESSION_COOKIE)
+    if token is None or getattr(request.state, "person", None) is not None:
+        return
+
+    def look() -> tuple[Caller, int] | None:
+        database: Database = request.app.state.database
+        with database.begin() as session:
+            return signed_in(session, token)
+
+    with suppress(SQLAlchemyError):
+        found = await run_in_threadpool(look)
+        if found is not None:
+            request.state.person, request.state.active_alarms = found
+            request.state.csrf = found[0].csrf
 
 
 async def _check_token(request: Request, expected: str) -> None:

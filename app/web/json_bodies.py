@@ -11,7 +11,7 @@ from typing import Any
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
 
-from app.errors import FieldError, Invalid
+from app.errors import FieldError, Invalid, NotSignedIn
 from app.web.i18n import _
 from app.web.validation import field_path
 
@@ -125,8 +125,15 @@ class JsonRoute(APIRoute):
                 return await handle(request)
             read = _Read(request.scope, request.receive)
             body = await read.body()
-            if body:
-                read.value = read_json(body, request.headers.get("content-type"))
+            try:
+                if body:
+                    read.value = read_json(body, request.headers.get("content-type"))
+            except Invalid:
+                if "authorization" not in request.headers and not request.cookies:
+                    raise NotSignedIn(
+                        _("Nobody is signed in."), _("Send a key: Authorization: Bearer YOUR-KEY")
+                    ) from None
+                raise
             return await handle(read)
 
         return handle_strictly

@@ -26,6 +26,7 @@ from app.errors import (
     TooLarge,
     Unexpected,
 )
+from app.web.deps import recognise
 from app.web.i18n import _, negotiate, speaking
 from app.web.limits import MEGABYTE, limit_of
 from app.web.problem import problem_page
@@ -88,6 +89,8 @@ async def _validation(request: Request, error: Exception) -> Response:
 
 async def _http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
+    if not is_for_programs(request.url.path):
+        await recognise(request)
     return answer(request, _of_http(request, error))
 
 

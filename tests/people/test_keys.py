@@ -9,6 +9,7 @@ from sqlalchemy.exc import OperationalError
 from app.db.engine import Database
 from app.people import actions
 from app.people.keys import KEPT, KeyRing
+from tests.loops import run
 
 
 @pytest.fixture
@@ -27,7 +28,7 @@ def test_a_known_key_costs_no_query_and_an_unknown_one_is_nobody(database: Datab
         assert await ring.lookup(secret) is first
         assert await KeyRing(database).lookup(secret + "x") is None
 
-    asyncio.run(look())
+    run(look())
 
 
 def test_many_callers_at_once_ask_once(database: Database, secret: str) -> None:
@@ -44,7 +45,7 @@ def test_many_callers_at_once_ask_once(database: Database, secret: str) -> None:
         await asyncio.gather(*(ring.lookup(secret) for _ in range(64)))
         return asked
 
-    assert asyncio.run(look()) == 1
+    assert run(look()) == 1
 
 
 def test_revoked_here_at_once_and_elsewhere_within_a_second(database: Database, secret: str) -> None:
@@ -65,11 +66,11 @@ def test_revoked_here_at_once_and_elsewhere_within_a_second(database: Database, 
             assert time.monotonic() < deadline
             await asyncio.sleep(0.01)
 
-    asyncio.run(look())
+    run(look())
 
 
 def test_without_a_database_a_key_is_not_taken_for_unknown(secret: str) -> None:
     away = Database("postgresql://nobody@127.0.0.1:9/nothing")
     with pytest.raises(OperationalError):
-        asyncio.run(KeyRing(away).lookup(secret))
+        run(KeyRing(away).lookup(secret))
     away.close()

@@ -270,3 +270,4 @@ def test_every_page_of_setup_opens(admin: Browser, shop: Shop) -> None:
         "/setup/characteristics/new?like=nowhere",
     ):
         assert "There is no" in admin.get(path, 404)
+    assert "Sign out" in admin.get("/setup/nothing-here", 404), "who is signed in stays so on a wrong address"

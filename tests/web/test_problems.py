@@ -1,6 +1,5 @@
 """Whatever is wrong with a request, the answer is a problem in words: a document for programs, a page for people."""
 
-import asyncio
 import json
 from typing import Any
 
@@ -16,6 +15,7 @@ from app.web.json_bodies import read_json
 from app.web.limits import LARGER, MEGABYTE, BodyLimit, limit_of
 from app.web.problems import add_problem_handlers
 from app.web.validation import field_path
+from tests.loops import run
 from tests.shop import Shop
 
 JSON = {"Content-Type": "application/json"}
@@ -77,6 +77,10 @@ class TestBodies:
         problem = refused(answer, 422)
         assert problem["errors"][0]["field"] == "Content-Type"
         assert "-H 'Content-Type: application/json'" in problem["what_to_do"]
+
+    def test_who_calls_is_asked_before_what_is_sent(self, shop: Shop) -> None:
+        for body in (b"nonsense", b"{}", b'{"key": NaN}'):
+            refused(shop.server.client().post("/api/v1/machines", content=body, headers=JSON), 401)
 
     def test_charset_and_json_dialects_are_welcome(self, shop: Shop) -> None:
         for number, media_type in enumerate(("application/json; charset=utf-8", "application/merge-patch+json")):
@@ -184,7 +188,7 @@ def get(app: FastAPI, path: str) -> httpx.Response:
         async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://inband.test") as client:
             return await client.get(path)
 
-    return asyncio.run(ask())
+    return run(ask())
 
 
 @pytest.mark.parametrize("kind", ERRORS)
