@@ -80,9 +80,8 @@ async def load(port: int, key: str, connections: int, seconds: float, spread: in
     begun = time.monotonic()
     clients: list[Client] = []
     for number in range(connections):
-        _transport, client = await loop.create_connection(
-            lambda number=number: Client(number, head, spread, run, begun + seconds), "127.0.0.1", port
-        )
+        client = Client(number, head, spread, run, begun + seconds)
+        await loop.create_connection(lambda client=client: client, "127.0.0.1", port)  # type: ignore[misc]
         clients.append(client)
     await asyncio.gather(*(client.done for client in clients))
     took = time.monotonic() - begun

@@ -117,4 +117,4 @@ def _summarise(connection: psycopg.Connection[Any], machine: int, characteristic
             "last": now >> level,
         }
         statement = SUMMARISE_READINGS if level == BASE_LEVEL else SUMMARISE_SUMMARIES
-        connection.execute(statement, [json.dumps([row])])
+        psycopg.RawCursor(connection).execute(statement, [json.dumps([row])])

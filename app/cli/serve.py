@@ -22,6 +22,7 @@ from app.db.engine import Database
 from app.errors import InbandError
 from app.people import actions, queries
 from app.settings import Settings
+from app.web.protocol import OneWriteProtocol
 
 Host = Annotated[str | None, typer.Option(envvar="INBAND_HOST", help="Address to listen on.", show_default="127.0.0.1")]
 Port = Annotated[int | None, typer.Option(envvar="INBAND_PORT", help="Port to listen on.", show_default="8000")]
@@ -85,7 +86,7 @@ def _serve(settings: Settings, listening: socket.socket) -> None:
         port=settings.port,
         workers=settings.workers,
         loop="uvloop",
-        http="httptools",
+        http=OneWriteProtocol,
         ws="none",
         access_log=False,
         log_level="warning",

@@ -12,11 +12,11 @@ from datetime import datetime
 from typing import Any
 
 import msgspec
-from psycopg import AsyncConnection, AsyncCursor
 
 from app.core.parameters import Parameters
 from app.core.zones import Zone
 from app.db.events import PUBLISHED
+from app.db.pipeline import Pipeline
 from app.readings.judge import AverageState, Ground, IssuedCorrection, OpenAlarm, StreamState, ToolState
 from app.readings.records import Entry, Record
 from app.readings.schemas import ReadingIn
@@ -28,13 +28,14 @@ COPY_FROM = 500  # readings in one transaction from which COPY is faster than on
 
 LOCK = """
 SELECT machine_id, last_correction, pg_current_xact_id()::text FROM machine_state
-WHERE machine_id = ANY(%s) ORDER BY machine_id FOR UPDATE
+WHERE machine_id = ANY($1::int[]) ORDER BY machine_id FOR UPDATE
 """
 # One statement for all that is needed, as one JSON document, because each statement costs more than what it reads here.
 # Corrections of a tool: the open ones, and those applied since the oldest correction or time that a reading names.
 # The row comparison with the keys can only be had from their own index; plain equalities the planner may also answer by
 # walking the primary key through every reading of the characteristic.
 LOAD = """
+WITH doc AS MATERIALIZED (SELECT $1::json AS d)
 SELECT json_build_object(
     'streams', (
         SELECT json_agg(json_build_array(s.machine_id, s.characteristic_id, s.sequence, s.parameters_version, s.paused_by,
@@ -54,14 +55,15 @@ SELECT json_build_object(
                         AND applied_at > w.since AND (number <= w.number OR w.number IS NULL)
                 ) c
             ) END))
-        FROM json_to_recordset(%(machines)s) AS w(machine_id int, number int, since timestamptz)
-        JOIN stream s ON s.machine_id = w.machine_id AND s.characteristic_id = ANY(%(characteristics)s)
+        FROM json_to_recordset((SELECT d -> 'streams' FROM doc))
+            AS w(machine_id int, characteristic_id int, number int, since timestamptz)
+        JOIN stream s ON s.machine_id = w.machine_id AND s.characteristic_id = w.characteristic_id
         LEFT JOIN average_memory a ON a.machine_id = s.machine_id AND a.location = s.average_memory
         LEFT JOIN tool t ON t.machine_id = s.machine_id AND t.number = s.tool_memory
     ),
     'known', (
         SELECT json_agg(json_build_array(r.characteristic_id, r.key, r.sequence, r.measured))
-        FROM json_to_recordset(%(keys)s) AS w(machine_id int, characteristic_id int, key text)
+        FROM json_to_recordset((SELECT d -> 'keys' FROM doc)) AS w(machine_id int, characteristic_id int, key text)
         CROSS JOIN LATERAL (
             SELECT * FROM reading
             WHERE key IS NOT NULL AND (machine_id, characteristic_id, key) >= (w.machine_id, w.characteristic_id, w.key)
@@ -72,12 +74,14 @@ SELECT json_build_object(
 """
 ACTIVE_ALARMS = """
 SELECT machine_id, characteristic_id, CASE WHEN characteristic_id IS NULL THEN tool_memory END, kind, id FROM alarm
-WHERE machine_id = ANY(%s) AND acknowledged_at IS NULL
+WHERE machine_id = ANY($1::int[]) AND acknowledged_at IS NULL
 """
 PARAMETERS = """
-SELECT parameters FROM parameters_version WHERE machine_id = %s AND characteristic_id = %s AND version = %s
+SELECT p.parameters FROM json_to_record($1) AS w(machine_id int, characteristic_id int, version int)
+JOIN parameters_version p ON p.machine_id = w.machine_id AND p.characteristic_id = w.characteristic_id
+    AND p.version = w.version
 """
-ALARM_NUMBERS = "SELECT nextval('alarm_id') FROM generate_series(1, %s)"
+ALARM_NUMBERS = "SELECT nextval('alarm_id') FROM generate_series(1, $1::int)"
 
 _READING = """machine_id int4, characteristic_id int4, sequence int8, measured float8, deviation float8, decided float8,
     average_before float8, average_after float8, measured_at timestamptz, received_at timestamptz,
@@ -100,7 +104,7 @@ FROM json_to_recordset((SELECT d -> 'averages' FROM doc)) AS n(machine_id int, l
 WHERE a.machine_id = n.machine_id AND a.location = n.location
 """
 SAVE = f"""
-WITH doc AS MATERIALIZED (SELECT %s::json AS d), moved AS ({MOVE_STREAMS}), averaged AS ({MOVE_AVERAGES}),
+WITH doc AS MATERIALIZED (SELECT $1::json AS d), moved AS ({MOVE_STREAMS}), averaged AS ({MOVE_AVERAGES}),
 stored AS (
     INSERT INTO reading ({_COLUMNS})
     SELECT {_COLUMNS} FROM json_to_recordset((SELECT d -> 'readings' FROM doc)) AS r({_READING})
@@ -110,18 +114,18 @@ COPY = f"COPY reading ({_COLUMNS}) FROM STDIN (FORMAT BINARY)"
 # The rarer rows, each statement sent only when there is something for it.
 TOUCHES = """
 INSERT INTO reading_touches (machine_id, characteristic_id, sequence, touches)
-SELECT * FROM json_to_recordset(%s) AS r(machine_id int, characteristic_id int, sequence bigint, touches jsonb)
+SELECT * FROM json_to_recordset($1) AS r(machine_id int, characteristic_id int, sequence bigint, touches jsonb)
 """
 COUNTERS = """
 UPDATE machine_state m SET last_correction = n.last_correction
-FROM json_to_recordset(%s) AS n(machine_id int, last_correction int) WHERE m.machine_id = n.machine_id
+FROM json_to_recordset($1) AS n(machine_id int, last_correction int) WHERE m.machine_id = n.machine_id
 """
 ISSUE = """
 INSERT INTO correction (machine_id, number, characteristic_id, sequence, tool_memory, size_error, amount, status,
     decided_at, superseded_by, applied_at, applied_by, offset_after)
 SELECT machine_id, number, characteristic_id, sequence, tool_memory, size_error, amount, status,
     CASE WHEN superseded_by IS NOT NULL THEN now() END, superseded_by, applied_at, applied_by, offset_after
-FROM json_to_recordset(%s) AS r(machine_id int, number int, characteristic_id int, sequence bigint,
+FROM json_to_recordset($1) AS r(machine_id int, number int, characteristic_id int, sequence bigint,
     tool_memory int, size_error float8, amount float8, status text, superseded_by int, applied_at timestamptz,
     applied_by text, offset_after float8)
 """
@@ -129,29 +133,29 @@ CHANGE_CORRECTIONS = """
 UPDATE correction c SET status = n.status, superseded_by = n.superseded_by, applied_at = n.applied_at,
     applied_by = n.applied_by, offset_after = n.offset_after,
     decided_at = CASE WHEN n.status = 'superseded' THEN now() ELSE c.decided_at END
-FROM json_to_recordset(%s) AS n(machine_id int, number int, status text, superseded_by int, applied_at timestamptz,
+FROM json_to_recordset($1) AS n(machine_id int, number int, status text, superseded_by int, applied_at timestamptz,
     applied_by text, offset_after float8)
 WHERE c.machine_id = n.machine_id AND c.number = n.number
 """
 MOVE_TOOLS = """
 UPDATE tool t SET "offset" = n."offset", total = n.total
-FROM json_to_recordset(%s) AS n(machine_id int, number int, "offset" float8, total float8)
+FROM json_to_recordset($1) AS n(machine_id int, number int, "offset" float8, total float8)
 WHERE t.machine_id = n.machine_id AND t.number = n.number
 """
 STEPS = """
 INSERT INTO tool_event (machine_id, number, at, kind, offset_before, offset_after, correction, actor)
 SELECT machine_id, number, at, 'correction', offset_before, offset_after, correction, actor
-FROM json_to_recordset(%s) AS r(machine_id int, number int, at timestamptz, offset_before float8,
+FROM json_to_recordset($1) AS r(machine_id int, number int, at timestamptz, offset_before float8,
     offset_after float8, correction int, actor text)
 """
 RAISE = """
 INSERT INTO alarm (machine_id, id, kind, characteristic_id, tool_memory, count, sequence, last_sequence, data)
-SELECT * FROM json_to_recordset(%s) AS r(machine_id int, id bigint, kind text, characteristic_id int, tool_memory int,
+SELECT * FROM json_to_recordset($1) AS r(machine_id int, id bigint, kind text, characteristic_id int, tool_memory int,
     count int, sequence bigint, last_sequence bigint, data jsonb)
 """
 REPEAT = """
 UPDATE alarm a SET count = a.count + n.count, last_at = now(), last_sequence = n.last_sequence
-FROM json_to_recordset(%s) AS n(machine_id int, id bigint, count int, last_sequence bigint)
+FROM json_to_recordset($1) AS n(machine_id int, id bigint, count int, last_sequence bigint)
 WHERE a.machine_id = n.machine_id AND a.id = n.id
 """
 
@@ -162,11 +166,11 @@ SUMMARISE_READINGS = f"""
 INSERT INTO reading_summary
 SELECT b.machine_id, b.characteristic_id, {BASE_LEVEL}, (r.sequence - 1) >> {BASE_LEVEL} AS block, count(*),
     min(deviation), max(deviation), sum(deviation), sum(deviation * deviation),
-    min(deviation) FILTER (WHERE (r.sequence - 1) %% {1 << BASE_LEVEL} = 0),
-    min(deviation) FILTER (WHERE r.sequence %% {1 << BASE_LEVEL} = 0),
-    min(average_after) FILTER (WHERE r.sequence %% {1 << BASE_LEVEL} = 0),
+    min(deviation) FILTER (WHERE (r.sequence - 1) % {1 << BASE_LEVEL} = 0),
+    min(deviation) FILTER (WHERE r.sequence % {1 << BASE_LEVEL} = 0),
+    min(average_after) FILTER (WHERE r.sequence % {1 << BASE_LEVEL} = 0),
     count(correction), ARRAY[{_ZONES}], min(measured_at), max(measured_at)
-FROM json_to_recordset(%s) AS b(machine_id int, characteristic_id int, first bigint, last bigint)
+FROM json_to_recordset($1) AS b(machine_id int, characteristic_id int, first bigint, last bigint)
 JOIN reading r ON r.machine_id = b.machine_id AND r.characteristic_id = b.characteristic_id
     AND r.sequence > b.first << {BASE_LEVEL} AND r.sequence <= b.last << {BASE_LEVEL}
 GROUP BY 1, 2, 4
@@ -174,11 +178,11 @@ GROUP BY 1, 2, 4
 SUMMARISE_SUMMARIES = f"""
 INSERT INTO reading_summary
 SELECT b.machine_id, b.characteristic_id, b.level, l.block >> {FAN} AS block, sum(l.count), min(minimum), max(maximum),
-    sum(l.sum), sum(sum_squares), min(l.first) FILTER (WHERE l.block %% {1 << FAN} = 0),
-    min(l.last) FILTER (WHERE l.block %% {1 << FAN} = {(1 << FAN) - 1}),
-    min(l.average) FILTER (WHERE l.block %% {1 << FAN} = {(1 << FAN) - 1}),
+    sum(l.sum), sum(sum_squares), min(l.first) FILTER (WHERE l.block % {1 << FAN} = 0),
+    min(l.last) FILTER (WHERE l.block % {1 << FAN} = {(1 << FAN) - 1}),
+    min(l.average) FILTER (WHERE l.block % {1 << FAN} = {(1 << FAN) - 1}),
     sum(corrections), ARRAY[{_ZONE_SUMS}], min(first_at), max(last_at)
-FROM json_to_recordset(%s) AS b(machine_id int, characteristic_id int, level int, first bigint, last bigint)
+FROM json_to_recordset($1) AS b(machine_id int, characteristic_id int, level int, first bigint, last bigint)
 JOIN reading_summary l ON l.machine_id = b.machine_id AND l.characteristic_id = b.characteristic_id
     AND l.level = b.level - {FAN} AND l.block >= b.first << {FAN} AND l.block < b.last << {FAN}
 GROUP BY 1, 2, 3, 4
@@ -224,37 +228,36 @@ class _Loaded(msgspec.Struct):
 _loaded = msgspec.json.Decoder(_Loaded)
 
 
-async def load(conn: AsyncConnection[Any], book: Book, wanted: Sequence[tuple[Entry, ReadingIn]]) -> tuple[Ground, str]:
+async def load(pipeline: Pipeline, book: Book, wanted: Sequence[tuple[Entry, ReadingIn]]) -> tuple[Ground, str]:
     """Begin a transaction, lock the machines, load what the readings are judged against; also its transaction id."""
     entries = {entry.characteristic_id: entry for entry, _ in wanted}
     machines = _machines(wanted)
-    keys = [
-        {"machine_id": e.machine_id, "characteristic_id": e.characteristic_id, "key": r.key}
-        for e, r in wanted
-        if r.key is not None
-    ]
-    async with conn.pipeline():
-        await conn.execute("BEGIN")
-        locks = await conn.execute(LOCK, (list(machines),))
-        document = await conn.execute(
-            LOAD,
-            {
-                "machines": as_json(list(machines.values())),
-                "characteristics": list(entries),
-                "keys": as_json(keys),
-            },
-        )
-    locked = await locks.fetchall()
-    (text,) = await document.fetchone() or ("",)
-    loaded = _loaded.decode(text)
+    document = {
+        "streams": [
+            {"machine_id": e.machine_id, "characteristic_id": e.characteristic_id, **machines[e.machine_id]}
+            for e in entries.values()
+        ],
+        "keys": [
+            {"machine_id": e.machine_id, "characteristic_id": e.characteristic_id, "key": r.key}
+            for e, r in wanted
+            if r.key is not None
+        ],
+    }
+    _begun, locked, ((text,),) = await pipeline.run(
+        (("BEGIN", None), (LOCK, _array(machines)), (LOAD, as_json(document)))
+    )
+    loaded = _loaded.decode(text or b"")
     ground = Ground()
-    ground.last_correction = {machine_id: last for machine_id, last, _transaction in locked}
+    ground.last_correction = {int(machine_id or 0): int(last or 0) for machine_id, last, _transaction in locked}
     for row in loaded.streams:
-        entry = entries[row.characteristic_id]
-        parameters = book.get((row.characteristic_id, row.version)) or await _look_up(conn, book, row)
-        _add_stream(ground, entry, parameters, row)
+        parameters = book.get((row.characteristic_id, row.version)) or await _look_up(pipeline, book, row)
+        _add_stream(ground, entries[row.characteristic_id], parameters, row)
     ground.stored_keys = {(c, key): (sequence, measured) for c, key, sequence, measured in loaded.known or ()}
-    return ground, locked[0][2]
+    return ground, (locked[0][2] or b"").decode()
+
+
+def _array(numbers: Iterable[int]) -> str:
+    return "{" + ",".join(map(str, numbers)) + "}"
 
 
 def _machines(wanted: Iterable[tuple[Entry, ReadingIn]]) -> dict[int, dict[str, Any]]:
@@ -263,7 +266,7 @@ def _machines(wanted: Iterable[tuple[Entry, ReadingIn]]) -> dict[int, dict[str, 
     for entry, reading in wanted:
         row = machines.get(entry.machine_id)
         if row is None:
-            row = machines[entry.machine_id] = {"machine_id": entry.machine_id, "number": None, "since": None}
+            row = machines[entry.machine_id] = {"number": None, "since": None}
         if reading.correction_in_effect is not None:
             known = row["number"]
             row["number"] = reading.correction_in_effect if known is None else min(known, reading.correction_in_effect)
@@ -272,11 +275,10 @@ def _machines(wanted: Iterable[tuple[Entry, ReadingIn]]) -> dict[int, dict[str, 
     return machines
 
 
-async def _look_up(conn: AsyncConnection[Any], book: Book, row: _Stream) -> Parameters:
-    cursor = await conn.execute(PARAMETERS, (row.machine_id, row.characteristic_id, row.version))
-    found = await cursor.fetchone()
-    assert found is not None
-    parameters = book[row.characteristic_id, row.version] = Parameters.from_dict(found[0])
+async def _look_up(pipeline: Pipeline, book: Book, row: _Stream) -> Parameters:
+    wanted = {"machine_id": row.machine_id, "characteristic_id": row.characteristic_id, "version": row.version}
+    (((text,),),) = await pipeline.run(((PARAMETERS, as_json(wanted)),))  # a version that is named is there
+    parameters = book[row.characteristic_id, row.version] = Parameters.from_dict(msgspec.json.decode(text or b""))
     return parameters
 
 
@@ -311,9 +313,9 @@ def _add_stream(ground: Ground, entry: Entry, parameters: Parameters, row: _Stre
     )
 
 
-async def save(conn: AsyncConnection[Any], ground: Ground) -> None:
+async def save(pipeline: Pipeline, ground: Ground) -> None:
     """Write everything that was decided on this ground and commit it."""
-    await _number_alarms(conn, ground)
+    await _number_alarms(pipeline, ground)
     records = [verdict.record() for verdict in ground.verdicts]
     touched = [stream for stream in ground.streams.values() if stream.last is not None]
     copying = len(records) >= COPY_FROM
@@ -328,36 +330,46 @@ async def save(conn: AsyncConnection[Any], ground: Ground) -> None:
         "changes": _changes(ground, touched),
     }
     if copying:
-        await _copy(conn, records)
-    async with conn.pipeline():
-        for statement, rows in _rarer(ground):
-            if rows:
-                await conn.execute(statement, (as_json(rows),))
-        await conn.execute(SAVE, (as_json(document),))
-        for statement, blocks in full_blocks([(stream.entry, stream.before, stream.sequence) for stream in touched]):
-            await conn.execute(statement, (as_json(blocks),))
-        await conn.execute("COMMIT")
+        await _copy(pipeline, records)
+    await pipeline.run(
+        (
+            *((statement, as_json(rows)) for statement, rows in _rarer(ground) if rows),
+            (SAVE, as_json(document)),
+            *(
+                (statement, as_json(blocks))
+                for statement, blocks in full_blocks([(s.entry, s.before, s.sequence) for s in touched])
+            ),
+            ("COMMIT", None),
+        )
+    )
 
 
-async def _number_alarms(conn: AsyncConnection[Any], ground: Ground) -> None:
+async def _number_alarms(pipeline: Pipeline, ground: Ground) -> None:
     """Find the alarms that are active for the same trouble already, and draw numbers for the others."""
     if not ground.raised:
         return
-    cursor: AsyncCursor[Any] = await conn.execute(ACTIVE_ALARMS, (list(ground.last_correction),))
-    active = {row[:4]: row[4] for row in await cursor.fetchall()}
+    (rows,) = await pipeline.run(((ACTIVE_ALARMS, _array(ground.last_correction)),))
+    active = {
+        (int(machine or 0), _number(characteristic), _number(tool), (kind or b"").decode()): _number(alarm)
+        for machine, characteristic, tool, kind, alarm in rows
+    }
     for alarm in ground.raised:
         tool = alarm.tool_memory if alarm.characteristic_id is None else None
         alarm.id = active.get((alarm.machine_id, alarm.characteristic_id, tool, alarm.kind))
         alarm.new = alarm.id is None
     new = [alarm for alarm in ground.raised if alarm.new]
     if new:
-        cursor = await conn.execute(ALARM_NUMBERS, (len(new),))
-        for alarm, (number,) in zip(new, await cursor.fetchall(), strict=True):
-            alarm.id = number
+        (numbers,) = await pipeline.run(((ALARM_NUMBERS, str(len(new))),))
+        for alarm, (number,) in zip(new, numbers, strict=True):
+            alarm.id = _number(number)
 
 
-async def _copy(conn: AsyncConnection[Any], records: list[Record]) -> None:
-    async with conn.cursor() as cursor, cursor.copy(COPY) as copy:
+def _number(text: bytes | None) -> int | None:
+    return None if text is None else int(text)
+
+
+async def _copy(pipeline: Pipeline, records: list[Record]) -> None:
+    async with pipeline.connection.cursor() as cursor, cursor.copy(COPY) as copy:
         copy.set_types(COPY_TYPES)
         for record in records:
             await copy.write_row(record)
@@ -416,6 +428,10 @@ def _rarer(ground: Ground) -> Iterable[tuple[str, list[Any]]]:
     if ground.raised:
         yield RAISE, [alarm for alarm in ground.raised if alarm.new]
         yield REPEAT, [alarm for alarm in ground.raised if not alarm.new]
+
+
+def _full(touched: list[StreamState]) -> Iterable[tuple[str, list[dict[str, int]]]]:
+    return full_blocks([(stream.entry, stream.before, stream.sequence) for stream in touched])
 
 
 def full_blocks(spans: list[tuple[Entry, int, int]]) -> Iterable[tuple[str, list[dict[str, int]]]]:

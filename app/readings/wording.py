@@ -1,5 +1,6 @@
 """The sentences about readings: why it was decided so, and what is wrong with touches."""
 
+from collections.abc import Callable
 from typing import Any
 
 from app.core.compensation import Code, average_of
@@ -42,21 +43,46 @@ def _averaged(record: Record, parameters: Parameters) -> float:
     return average_of(record.average_before, record.decided, parameters.weighting_factor)
 
 
-def _sentence(record: Record, p: Parameters) -> str:
-    values = {
-        "deviation": um(record.decided),
-        "average": um(record.average_after),
-        "zero": um(p.zero_range),
-        "averaging": um(p.averaging_limit),
-        "tolerance": um(p.tolerance_width / 2),
-        "wear": um(p.wear_limit),
-        "confidence": um(p.confidence_limit),
-        "number": record.correction,
-        "alarm": record.paused_by,
-        "total": um(p.max_total or 0.0),
-        "n": p.accept_n,
-        "m": p.accept_m,
-    }
+class _Values(dict[str, str]):
+    """What a sentence may name, worded when it does: every reading is answered with one, and most name two values."""
+
+    def __init__(self, record: Record, parameters: Parameters) -> None:
+        super().__init__()
+        self.record, self.parameters = record, parameters
+
+    def __missing__(self, name: str) -> str:
+        made = _WORDED[name](self.record, self.parameters)
+        return um(made) if isinstance(made, float) else str(made)
+
+
+def _of_reading(name: str) -> Callable[[Record, Parameters], Any]:
+    return lambda record, _parameters: getattr(record, name)
+
+
+def _of_parameters(name: str) -> Callable[[Record, Parameters], Any]:
+    return lambda _record, parameters: getattr(parameters, name)
+
+
+_WORDED: dict[str, Callable[[Record, Parameters], float | int | None]] = {
+    "deviation": _of_reading("decided"),
+    "raw": _of_reading("deviation"),
+    "average": _of_reading("average_after"),
+    "averaged": _averaged,
+    "number": _of_reading("correction"),
+    "alarm": _of_reading("paused_by"),
+    "zero": _of_parameters("zero_range"),
+    "averaging": _of_parameters("averaging_limit"),
+    "tolerance": lambda _record, parameters: parameters.tolerance_width / 2,
+    "wear": _of_parameters("wear_limit"),
+    "confidence": _of_parameters("confidence_limit"),
+    "total": _of_parameters("max_total"),
+    "n": _of_parameters("accept_n"),
+    "m": _of_parameters("accept_m"),
+}
+
+
+def _sentence(record: Record, parameters: Parameters) -> str:
+    values = _Values(record, parameters)
     match record.code:
         case Code.WITHIN_ZERO_RANGE:
             text = _("Deviation %(deviation)s is within the zero range %(zero)s: no correction, the average is kept.")
@@ -66,8 +92,7 @@ def _sentence(record: Record, p: Parameters) -> str:
                 "within the zero range %(zero)s: no correction, the average is kept."
             )
         case Code.AVERAGED_DEVIATION:
-            values["average"] = um(_averaged(record, p))
-            text = _("The running average %(average)s is beyond the zero range %(zero)s: corrected by the average.")
+            text = _("The running average %(averaged)s is beyond the zero range %(zero)s: corrected by the average.")
         case Code.FULL_DEVIATION:
             text = _("Deviation %(deviation)s is beyond the averaging limit %(averaging)s: corrected in full.")
         case Code.OUT_OF_TOLERANCE:
@@ -83,9 +108,8 @@ def _sentence(record: Record, p: Parameters) -> str:
                 "Corrected in full, as this characteristic is set to release."
             )
         case Code.PROBE_FAULT:
-            values["deviation"] = um(record.deviation)
             text = _(
-                "Deviation %(deviation)s has reached the confidence interval %(confidence)s: the probe or the program is wrong. "
+                "Deviation %(raw)s has reached the confidence interval %(confidence)s: the probe or the program is wrong. "
                 "The machine is told to stop, and compensation pauses until the alarm is acknowledged."
             )
         case Code.PAUSED:

@@ -17,6 +17,7 @@ import psycopg
 from psycopg import AsyncConnection
 
 from app.db.engine import LIMITS
+from app.db.pipeline import Pipeline
 from app.errors import DatabaseAway, InbandError, Invalid, OutcomeUnknown
 from app.readings.judge import Stored, Verdict, judge
 from app.readings.records import Entry
@@ -26,6 +27,7 @@ from app.web.i18n import _
 
 log = logging.getLogger(__name__)
 
+ROLLBACK = (("ROLLBACK", None),)
 Outcome = Verdict | Stored | InbandError
 MOST_AT_ONCE = 256
 MOST_WAITING = 20_000
@@ -41,21 +43,27 @@ class CommitLost(Exception):
         self.outcomes = outcomes
 
 
-async def connect(dsn: str) -> AsyncConnection[Any]:
-    """A connection for readings: pipelines, statements prepared at their first use, transactions by our own word."""
-    return await AsyncConnection.connect(
-        dsn, autocommit=True, prepare_threshold=0, options=LIMITS, application_name="inband-readings", connect_timeout=5
+# Every statement of the writer finds its rows by an index, however small the tables are when it is first planned; planned
+# anew each time, the planning would cost more than the work.
+PLANNER = "-c plan_cache_mode=force_generic_plan -c enable_seqscan=off -c enable_sort=off -c enable_hashjoin=off"
+
+
+async def connect(dsn: str) -> Pipeline:
+    """A connection for readings: statements prepared at their first use, transactions by our own word."""
+    connection = await AsyncConnection.connect(
+        dsn, autocommit=True, options=f"{LIMITS} {PLANNER}", application_name="inband-readings", connect_timeout=5
     )
+    return Pipeline(connection)
 
 
 async def transact(
-    conn: AsyncConnection[Any], book: Book, wanted: Sequence[tuple[Entry, ReadingIn]], *, all_or_nothing: bool = False
+    pipeline: Pipeline, book: Book, wanted: Sequence[tuple[Entry, ReadingIn]], *, all_or_nothing: bool = False
 ) -> list[Outcome]:
     """Decide and store these readings in one transaction, in their order.
 
     Raises `Invalid` naming each refused reading when it is all or nothing, `CommitLost`, and psycopg's errors.
     """
-    ground, transaction = await load(conn, book, wanted)
+    ground, transaction = await load(pipeline, book, wanted)
     now = datetime.now(UTC)
     outcomes: list[Outcome] = []
     for entry, reading in wanted:
@@ -66,12 +74,12 @@ async def transact(
     if all_or_nothing:
         refuse_all(outcomes)
     if not ground.verdicts:
-        await conn.execute("ROLLBACK")
+        await pipeline.run(ROLLBACK)
         return outcomes
     try:
-        await save(conn, ground)
-    except psycopg.OperationalError as error:
-        if conn.closed:
+        await save(pipeline, ground)
+    except psycopg.Error as error:
+        if pipeline.closed:
             raise CommitLost(transaction, outcomes) from error
         raise
     return outcomes
@@ -82,6 +90,9 @@ def refuse_all(outcomes: Sequence[Outcome]) -> None:
     refused = [(at, outcome) for at, outcome in enumerate(outcomes) if isinstance(outcome, InbandError)]
     if not refused:
         return
+    away = next((error for _at, error in refused if isinstance(error, DatabaseAway | OutcomeUnknown)), None)
+    if away is not None:
+        raise away
     errors = [
         error._replace(field=f"[{at}].{error.field}")
         for at, refusal in refused[:MOST_ERRORS]
@@ -90,7 +101,7 @@ def refuse_all(outcomes: Sequence[Outcome]) -> None:
     kinds = {type(refusal) for _, refusal in refused}
     kind = kinds.pop() if len(kinds) == 1 else Invalid
     raise kind(
-        _("%(count)s of %(all)s readings cannot be taken; the first is number %(first)s: %(detail)s")
+        _("%(count)s of %(all)s readings cannot be taken; the first is [%(first)s]: %(detail)s")
         % {"count": len(refused), "all": len(outcomes), "first": refused[0][0], "detail": refused[0][1].detail},
         _("Nothing of this batch was stored. Correct what is named under errors and send the batch again."),
         errors=errors,
@@ -103,12 +114,12 @@ class Keeper:
     def __init__(self, dsn: str, book: Book) -> None:
         self.dsn = dsn
         self.book = book
-        self._conn: AsyncConnection[Any] | None = None
+        self._pipeline: Pipeline | None = None
 
     async def close(self) -> None:
         """Give the connection back."""
-        if self._conn is not None:
-            await self._conn.close()
+        if self._pipeline is not None:
+            await self._pipeline.connection.close()
 
     async def store(self, wanted: Sequence[tuple[Entry, ReadingIn]], *, all_or_nothing: bool = False) -> list[Outcome]:
         """What becomes of each reading, after the commit. Raises only when it is all or nothing."""
@@ -116,9 +127,9 @@ class Keeper:
         pause = 0.02
         while True:
             try:
-                if self._conn is None or self._conn.closed:
-                    self._conn = await connect(self.dsn)
-                return await transact(self._conn, self.book, wanted, all_or_nothing=all_or_nothing)
+                if self._pipeline is None or self._pipeline.closed:
+                    self._pipeline = await connect(self.dsn)
+                return await transact(self._pipeline, self.book, wanted, all_or_nothing=all_or_nothing)
             except CommitLost as lost:
                 if (outcomes := await self._settle(lost, deadline)) is not None:
                     return outcomes
@@ -143,28 +154,49 @@ class Keeper:
                 return [(await self.store([item]))[0] for item in wanted]
 
     async def _roll_back(self) -> None:
-        if self._conn is not None and not self._conn.closed:
+        if self._pipeline is not None and not self._pipeline.closed:
             try:
-                await self._conn.execute("ROLLBACK")
+                await self._pipeline.run(ROLLBACK)
             except psycopg.Error:
-                await self._conn.close()
+                await self._pipeline.connection.close()
 
     async def _settle(self, lost: CommitLost, deadline: float) -> list[Outcome] | None:
         """How the commit ended: its outcomes if it is in the database, None if it must be done again."""
         pause = 0.02
         while True:
             try:
-                self._conn = await connect(self.dsn)
-                cursor = await self._conn.execute("SELECT pg_xact_status(%s::xid8)", (lost.transaction,))
-                row = await cursor.fetchone()
+                self._pipeline = await connect(self.dsn)
+                status = await _status(self._pipeline.connection, lost)
             except psycopg.OperationalError:
-                row = ("in progress",)
-            if row is None or row[0] != "in progress":
-                return lost.outcomes if row is not None and row[0] == "committed" else None
+                status = "in progress"
+            if status != "in progress":
+                return lost.outcomes if status == "committed" else None
             if monotonic() + pause > deadline:
                 return [OutcomeUnknown() if isinstance(o, Verdict) else o for o in lost.outcomes]
             await asyncio.sleep(pause)
             pause = min(2 * pause, 0.5)
+
+
+async def _status(conn: AsyncConnection[Any], lost: CommitLost) -> str | None:
+    """What became of a transaction: ``committed``, ``aborted``, ``in progress``; None if the database knows nothing of it.
+
+    A server that crashed may give the numbers of its last transactions to others, so the readings themselves are looked
+    for as well.
+    """
+    try:
+        cursor = await conn.execute("SELECT pg_xact_status(%s::xid8)", (lost.transaction,))
+        row = await cursor.fetchone()
+    except psycopg.DataError:  # a number that this server has not given to anybody yet
+        return None
+    if row is None or row[0] != "committed":
+        return None if row is None else row[0]
+    first = next(outcome for outcome in lost.outcomes if isinstance(outcome, Verdict))
+    entry = first.stream.entry
+    cursor = await conn.execute(
+        "SELECT 1 FROM reading WHERE machine_id = %s AND characteristic_id = %s AND sequence = %s AND received_at = %s",
+        (entry.machine_id, entry.characteristic_id, first.sequence, first.received_at),
+    )
+    return "committed" if await cursor.fetchone() else None
 
 
 def store_batch(dsn: str, book: Book, wanted: Sequence[tuple[Entry, ReadingIn]]) -> list[Outcome]:
@@ -222,7 +254,11 @@ class Writer:
                 self._wake.clear()
             if not batch:
                 continue
-            outcomes = await self._keeper.store([item[:2] for item in batch])
+            try:
+                outcomes = await self._keeper.store([item[:2] for item in batch])
+            except Exception:
+                log.exception("the writer met what nobody foresaw")
+                outcomes = [OutcomeUnknown()] * len(batch)
             for (_entry, _reading, future), outcome in zip(batch, outcomes, strict=True):
                 if not future.done():  # the client may be gone; what it sent is stored all the same
                     future.set_result(outcome)
