@@ -38,6 +38,8 @@ class Alarm(Base):
             unique=True,
             postgresql_where=text("acknowledged_at IS NULL AND characteristic_id IS NULL"),
         ),
+        Index("alarm_active_idx", "machine_id", "id", postgresql_where=text("acknowledged_at IS NULL")),
+        Index("alarm_acknowledged_idx", "acknowledged_at", "id", postgresql_where=text("acknowledged_at IS NOT NULL")),
     )
 
     machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), primary_key=True, autoincrement=False)

@@ -14,7 +14,6 @@ from sqlalchemy.orm import Session
 from app.alarms import actions as alarms
 from app.alarms.tables import Alarm
 from app.audit.actions import record
-from app.characteristics.tables import Characteristic
 from app.core.compensation import DECIMALS
 from app.core.zones import nanometres
 from app.db.events import publish
@@ -22,6 +21,7 @@ from app.errors import Conflict
 from app.machines.queries import lock_machines
 from app.machines.tables import Machine
 from app.offsets import queries, wording
+from app.offsets.news import alarm_raised, average_changed, correction_changed, tool_changed
 from app.offsets.queries import OFFSET_TOLERANCE
 from app.offsets.tables import OPEN, AverageMemory, Correction, Tool, ToolEvent
 from app.people.callers import Caller
@@ -31,6 +31,7 @@ from app.web.i18n import _
 Verb = Literal["rejected", "approve", "release"]
 FROM: dict[str, tuple[str, ...]] = {"rejected": OPEN, "approve": ("awaiting_approval",), "release": ("held",)}
 INTO = {"rejected": "rejected", "approve": "pending", "release": "pending"}
+BY_READING = "reading "  # how `applied_by` begins when a reading confirmed it (`correction_in_effect`)
 SAID = {"rejected": "correction rejected", "approve": "correction approved", "release": "correction released"}
 
 
@@ -66,18 +67,40 @@ def mark_applied(
     """
     correction = _locked(session, machine, number)
     if correction.status == "applied":
-        _refuse_other_offset(correction, machine, offset_after)
-        return Decided(correction)
+        if offset_after is None or not _differs(offset_after, correction.offset_after):
+            return Decided(correction)
+        if not (correction.applied_by or "").startswith(BY_READING):
+            raise _other_offset(correction, machine, offset_after)
+        # A reading said that it is in effect; only now the machine says what its offset is.
+        tool = queries.tool(session, machine, correction.tool_memory)
+        late = offset_after - (correction.offset_after or 0.0)
+        return _reported(session, machine, correction, tool, caller, tool.offset, tool.offset + late, datetime.now(UTC))
     _must_be(correction, machine, "applied", ("pending",))
     tool = queries.tool(session, machine, correction.tool_memory)
     now = datetime.now(UTC)
     at = min(now, applied_at or now)
-    before = tool.offset
-    expected = round(before + correction.amount, DECIMALS) + 0.0
-    tool.offset = expected if offset_after is None else round(offset_after, DECIMALS) + 0.0
+    correction.status, correction.applied_at = "applied", at
     tool.total = round(tool.total + correction.amount, DECIMALS) + 0.0
-    correction.status, correction.applied_at, correction.applied_by = "applied", at, caller.name
-    correction.offset_after = tool.offset
+    expected = round(tool.offset + correction.amount, DECIMALS) + 0.0
+    if caller.kind != "machine":  # what a machine does all day stands in the history of its tools
+        _record_status(session, machine, correction, caller, "correction applied", "pending", None)
+    reported = expected if offset_after is None else offset_after
+    return _reported(session, machine, correction, tool, caller, expected, reported, at)
+
+
+def _reported(
+    session: Session,
+    machine: Machine,
+    correction: Correction,
+    tool: Tool,
+    caller: Caller,
+    expected: float,
+    reported: float,
+    at: datetime,
+) -> Decided:
+    """The correction is applied, and this is the offset now; another one than expected raises an alarm."""
+    before, tool.offset = tool.offset, round(reported, DECIMALS) + 0.0
+    correction.offset_after, correction.applied_by = tool.offset, caller.name
     session.add(
         ToolEvent(
             machine_id=machine.id,
@@ -86,26 +109,33 @@ def mark_applied(
             kind="correction",
             offset_before=before,
             offset_after=tool.offset,
-            correction=number,
+            correction=correction.number,
             actor=caller.name,
         )
     )
-    if caller.kind != "machine":  # what a machine does all day stands in the history of its tools
-        _record_status(session, machine, correction, caller, "correction applied", "pending", None)
-    changes = [_correction_changed(session, machine, correction), _tool_changed(machine, tool.number)]
+    changes = [correction_changed(session, machine, correction), tool_changed(machine, tool.number)]
     note = None
-    if abs(nanometres(tool.offset - expected)) > OFFSET_TOLERANCE:
+    if _differs(tool.offset, expected):
         alarm = alarms.raise_for_tool(
             session,
             machine.id,
             tool.number,
             "offset_differs",
-            {"correction": number, "expected": expected, "reported": tool.offset, "limit": OFFSET_TOLERANCE / 1e6},
+            {
+                "correction": correction.number,
+                "expected": expected,
+                "reported": tool.offset,
+                "limit": OFFSET_TOLERANCE / 1e6,
+            },
         )
-        changes.append(_alarm_raised(machine, alarm))
+        changes.append(alarm_raised(machine, alarm))
         note = wording.offset_differs(alarm.id, expected, tool.offset)
     publish(session, *changes)
     return Decided(correction, note)
+
+
+def _differs(offset: float, known: float | None) -> bool:
+    return known is not None and abs(nanometres(offset - known)) > OFFSET_TOLERANCE
 
 
 def decide(session: Session, machine: Machine, number: int, verb: Verb, reason: str, caller: Caller) -> Decided:
@@ -119,7 +149,7 @@ def decide(session: Session, machine: Machine, number: int, verb: Verb, reason: 
     correction.status, correction.reason = INTO[verb], reason
     correction.decided_at, correction.decided_by = datetime.now(UTC), caller.name
     _record_status(session, machine, correction, caller, SAID[verb], before, reason)
-    publish(session, _correction_changed(session, machine, correction))
+    publish(session, correction_changed(session, machine, correction))
     alarm = _wear_alarm(session, correction) if before == "held" else None
     return Decided(correction, None if alarm is None else wording.still_active(alarm))
 
@@ -192,9 +222,9 @@ def _set_offset(
     record(session, caller.name, said, f"tool/{machine.key}/{number}", before, after, reason)
     publish(
         session,
-        _tool_changed(machine, number),
-        *(_correction_changed(session, machine, correction) for correction in fallen),
-        *(_average_changed(machine, location) for location in begun),
+        tool_changed(machine, number),
+        *(correction_changed(session, machine, correction) for correction in fallen),
+        *(average_changed(machine, location) for location in begun),
     )
     return Restarted(tool, [correction.number for correction in fallen], begun, parts)
 
@@ -215,7 +245,7 @@ def set_empirical_value(
     after = {"empirical_value": memory.empirical_value, "average": memory.average}
     subject = f"average/{machine.key}/{location}"
     record(session, caller.name, "empirical value changed", subject, before, after, reason)
-    publish(session, _average_changed(machine, location))
+    publish(session, average_changed(machine, location))
     return memory
 
 
@@ -230,14 +260,11 @@ def _must_be(correction: Correction, machine: Machine, verb: str, statuses: tupl
         raise Conflict(detail, instead, correction_status=correction.status)
 
 
-def _refuse_other_offset(correction: Correction, machine: Machine, offset_after: float | None) -> None:
-    known = correction.offset_after
-    if offset_after is None or known is None or abs(nanometres(offset_after - known)) <= OFFSET_TOLERANCE:
-        return
-    raise Conflict(
+def _other_offset(correction: Correction, machine: Machine, offset_after: float) -> Conflict:
+    return Conflict(
         _(
             "Correction {number} of {machine} was confirmed with the offset {known} mm already, not {reported} mm. Nothing was changed."
-        ).format(number=correction.number, machine=machine.key, known=known, reported=offset_after),
+        ).format(number=correction.number, machine=machine.key, known=correction.offset_after, reported=offset_after),
         _("Tell the offset as it is now by a manual edit of tool {tool}.").format(tool=correction.tool_memory),
         correction_status=correction.status,
     )
@@ -290,38 +317,3 @@ def _record_status(
     if correction.offset_after is not None:
         after["offset_after"] = correction.offset_after
     record(session, caller.name, said, subject, {"status": before}, after, reason)
-
-
-def _correction_changed(session: Session, machine: Machine, correction: Correction) -> dict[str, Any]:
-    return {
-        "kind": "correction",
-        "machine": machine.key,
-        "characteristic": session.scalar(
-            select(Characteristic.key).where(
-                Characteristic.machine_id == machine.id, Characteristic.id == correction.characteristic_id
-            )
-        ),
-        "tool": correction.tool_memory,
-        "number": correction.number,
-        "status": correction.status,
-    }
-
-
-def _tool_changed(machine: Machine, number: int) -> dict[str, Any]:
-    return {"kind": "tool", "machine": machine.key, "tool": number}
-
-
-def _average_changed(machine: Machine, location: int) -> dict[str, Any]:
-    return {"kind": "average", "machine": machine.key, "average_memory": location}
-
-
-def _alarm_raised(machine: Machine, alarm: Alarm) -> dict[str, Any]:
-    return {
-        "kind": "alarm",
-        "machine": machine.key,
-        "characteristic": None,
-        "tool": alarm.tool_memory,
-        "id": alarm.id,
-        "alarm": alarm.kind,
-        "state": "active",
-    }

@@ -80,6 +80,22 @@ class TestApplied:
         assert (again["id"], again["count"]) == (alarm["id"], 2)
         assert "1.0000" in again["text"]
 
+    def test_an_offset_reported_after_a_reading_has_confirmed_it_still_counts(self, shop: Shop) -> None:
+        number = pending(shop)
+        shop.read(0.0, correction_in_effect=number)
+        assert shop.correction(number)["status"] == "applied"
+        assert shop.correction(number, "applied", offset_after=-0.006)["offset_after"] == -0.006
+        assert shop.alarms() == []
+        number = shop.read(6.0, correction_in_effect=number)["correction"]["number"]
+        shop.read(0.0, correction_in_effect=number)
+        later = pending(shop)
+        shop.correction(later, "applied")
+        assert shop.tool()["offset"] == -0.018
+        shop.correction(number, "applied", offset_after=0.1)  # expected -0.012
+        assert shop.alarms()[0]["kind"] == "offset_differs"
+        assert shop.tool()["offset"] == 0.094  # with the later one
+        shop.correction(number, "applied", 409, offset_after=0.2)
+
     @pytest.mark.parametrize(("off", "alarms"), [(0.0005, 0), (-0.0005, 0), (0.000501, 1), (-0.000501, 1)])
     def test_a_control_may_round_by_half_a_micrometre(self, shop: Shop, off: float, alarms: int) -> None:
         shop.correction(pending(shop), "applied", offset_after=round(-0.006 + off, 6))
