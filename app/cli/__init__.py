@@ -20,6 +20,7 @@ PARTS = (
     "app.cli.database",
     "app.cli.people",
     "app.cli.data",
+    "app.cli.replay",
     "app.demo.cli",
 )
 

@@ -1,34 +1,25 @@
-"""``inband import``, ``inband export`` and ``inband replay``: readings out of files, into files, and through the rules."""
+"""``inband import`` and ``inband export``: readings out of files and into files."""
 
 import getpass
-import json
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, TextIO
 from zoneinfo import ZoneInfo
 
-import msgspec
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
-from app.characteristics import wording
 from app.cli.base import DatabaseUrl, DataDir, cli, migrated, people, say, settings_from
-from app.core.parameters import BY_R, ParameterError, Parameters, read
-from app.errors import Invalid, NotFound
-from app.formats import r_numbers, values
+from app.errors import NotFound
+from app.formats import values
 from app.readings import exporting, queries
 from app.readings.importing.actions import import_readings
 from app.readings.importing.history import Flawed, Summary
 from app.readings.importing.layout import Layout, Wishes, look
-from app.readings.importing.lines import Flaw, lines
-from app.readings.replaying import replay
 from app.web.i18n import _, ngettext
-from app.web.numbers import um
 
 
 class Unit(StrEnum):
@@ -99,7 +90,7 @@ def import_file(
     database_url: DatabaseUrl = None,
 ) -> None:
     """Import readings from a file: all of them or none. They are history: judged, but they correct nothing."""
-    wishes = _wishes(mapping, delimiter, decimal, unit, timezone, time_format, encoding)
+    wishes = wishes_of(mapping, delimiter, decimal, unit, timezone, time_format, encoding)
     layout = look(file, wishes)
     _tell(layout)
     with migrated(settings_from(data_dir=data_dir, database_url=database_url)) as database, _bar(file) as bar:
@@ -115,7 +106,7 @@ def import_file(
                 progress=bar,
             )
         except Flawed as refusal:
-            _report(refusal)
+            report(refusal)
             raise typer.Exit(1) from None
     _sum_up(summary, characteristic, live=live, dry_run=dry_run)
 
@@ -152,77 +143,7 @@ def export_file(
     say(ngettext("%(num)d reading written.", "%(num)d readings written.", count) % {"num": count})
 
 
-@cli.command("replay")
-def replay_file(
-    file: File,
-    parameters: Annotated[
-        Path,
-        typer.Option(
-            envvar="INBAND_PARAMETERS",
-            help="JSON as the API has it, or program text with R33=0.001 …",
-            exists=True,
-            dir_okay=False,
-            readable=True,
-        ),
-    ],
-    mapping: Mapping = "",
-    delimiter: Delimiter = None,
-    decimal: Decimal = None,
-    unit: UnitOption = None,
-    timezone: Zone = None,
-    time_format: TimeFormat = None,
-    encoding: Encoding = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", envvar="INBAND_JSON", help="One JSON object per line, as when piped.")
-    ] = False,
-) -> None:
-    """Run readings through the rules and print the decisions. Stores nothing and needs no database."""
-    rules = _parameters(parameters)
-    layout = look(file, _wishes(mapping, delimiter, decimal, unit, timezone, time_format, encoding))
-    decisions = replay(rules, lines(file, layout, "replay"), "replay")
-    flaws: list[Flaw] = []
-    good = _aside(decisions, flaws)
-    if as_json or not sys.stdout.isatty():
-        for each in good:
-            sys.stdout.write(msgspec.json.encode(each).decode() + "\n")
-    else:
-        Console().print(_table(good))
-    if flaws:
-        _report(Flawed(flaws[:200], len(flaws)), stored=False)
-        raise typer.Exit(1)
-
-
-def _aside(decisions: Iterable[dict[str, Any] | Flaw], flaws: list[Flaw]) -> Iterator[dict[str, Any]]:
-    for each in decisions:
-        if isinstance(each, Flaw):
-            flaws.append(each)
-        else:
-            yield each
-
-
-def _table(decisions: Iterable[dict[str, Any]]) -> Table:
-    table = Table(header_style="bold", pad_edge=False)
-    table.add_column(_("No."), justify="right")
-    for heading in (_("Measured"), _("Deviation"), _("Average"), _("Correction")):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column(_("Zone"), no_wrap=True)
-    table.add_column(_("Reason"), ratio=1)
-    for each in decisions:
-        correction = each["correction"]
-        table.add_row(
-            str(each["sequence"]),
-            f"{each['measured']:.4f}",
-            um(each["deviation"]),
-            um(each["average_after"]),
-            um(correction["amount"]) if correction else "",
-            each["zone"].replace("_", " "),
-            each["reason"]["text"],
-            style="bold" if correction else None,
-        )
-    return table
-
-
-def _wishes(
+def wishes_of(
     mapping: str,
     delimiter: str | None,
     decimal: str | None,
@@ -266,7 +187,7 @@ def _bar(file: Path) -> Iterator[Any]:
         yield lambda: progress.advance(task)
 
 
-def _report(refusal: Flawed, *, stored: bool = True) -> None:
+def report(refusal: Flawed, *, stored: bool = True) -> None:
     for flaw in refusal.flaws:
         say(str(flaw))
     more = refusal.count - len(refusal.flaws)
@@ -329,30 +250,3 @@ def _output(path: Path | None) -> Iterator[TextIO]:
         draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)
-
-
-def _parameters(path: Path) -> Parameters:
-    text = path.read_text("utf-8-sig")
-    try:
-        given = json.loads(text) if text.lstrip().startswith("{") else _of_program(text)
-    except ValueError as error:
-        raise Invalid(f"{path.name}: {error}") from None
-    if isinstance(given.get("parameters"), dict):  # what GET /characteristics/… answers
-        given = given["parameters"]
-    try:
-        rules, warnings = read(given)
-    except ParameterError as error:
-        wrong = wording.field_errors(error.problems)
-        raise Invalid("\n".join(f"{path.name}: {field}: {message}" for field, message in wrong)) from None
-    for field, message in wording.field_errors(warnings):
-        say(f"{field}: {message}", style="yellow")
-    return rules
-
-
-def _of_program(text: str) -> dict[str, float]:
-    """R parameters of program text; those of calibration and of the touch itself are not asked for here."""
-    found = r_numbers.read(text)
-    other = [name for name in found if name not in BY_R and name != "R24"]
-    if other:
-        say(_("Not used: {names}").format(names=", ".join(other)))
-    return {name: value for name, value in found.items() if name not in other}

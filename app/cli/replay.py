@@ -1,0 +1,146 @@
+"""``inband replay``: readings out of a file through the rules, and nothing is stored."""
+
+import json
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from app.characteristics import wording
+from app.cli.base import cli, say
+from app.cli.data import (
+    Decimal,
+    Delimiter,
+    Encoding,
+    File,
+    Mapping,
+    TimeFormat,
+    UnitOption,
+    Zone,
+    report,
+    wishes_of,
+)
+from app.core.parameters import BY_R, ParameterError, Parameters, read
+from app.errors import Invalid
+from app.formats import r_numbers
+from app.readings.importing.history import Flawed
+from app.readings.importing.layout import look
+from app.readings.importing.lines import Flaw, lines
+from app.readings.replaying import replay
+from app.web.i18n import _
+from app.web.numbers import um
+
+
+@cli.command("replay")
+def replay_file(
+    file: File,
+    parameters: Annotated[
+        Path,
+        typer.Option(
+            envvar="INBAND_PARAMETERS",
+            help="JSON as the API has it, or program text with R33=0.001 …",
+            exists=True,
+            dir_okay=False,
+            readable=True,
+        ),
+    ],
+    factor: Annotated[
+        float | None,
+        typer.Option(
+            envvar="INBAND_FACTOR",
+            help="Which way the offset acts, where the parameters do not say: R numbers have no name for it.",
+        ),
+    ] = None,
+    mapping: Mapping = "",
+    delimiter: Delimiter = None,
+    decimal: Decimal = None,
+    unit: UnitOption = None,
+    timezone: Zone = None,
+    time_format: TimeFormat = None,
+    encoding: Encoding = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", envvar="INBAND_JSON", help="One JSON object per line, as when piped.")
+    ] = False,
+) -> None:
+    """Run readings through the rules and print the decisions. Stores nothing and needs no database."""
+    rules = _parameters(parameters, factor)
+    layout = look(file, wishes_of(mapping, delimiter, decimal, unit, timezone, time_format, encoding))
+    decisions = replay(rules, lines(file, layout, "replay"), "replay")
+    flaws: list[Flaw] = []
+    good = _aside(decisions, flaws)
+    if as_json or not sys.stdout.isatty():
+        for each in good:
+            sys.stdout.write(msgspec.json.encode(each).decode() + "\n")
+    else:
+        Console().print(_table(good))
+    if flaws:
+        report(Flawed(flaws[:200], len(flaws)), stored=False)
+        raise typer.Exit(1)
+
+
+def _aside(decisions: Iterable[dict[str, Any] | Flaw], flaws: list[Flaw]) -> Iterator[dict[str, Any]]:
+    for each in decisions:
+        if isinstance(each, Flaw):
+            flaws.append(each)
+        else:
+            yield each
+
+
+def _table(decisions: Iterable[dict[str, Any]]) -> Table:
+    table = Table(header_style="bold", pad_edge=False)
+    table.add_column(_("No."), justify="right")
+    for heading in (_("Measured"), _("Deviation"), _("Average"), _("Correction")):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column(_("Zone"), no_wrap=True)
+    table.add_column(_("Reason"), ratio=1)
+    for each in decisions:
+        correction = each["correction"]
+        table.add_row(
+            str(each["sequence"]),
+            f"{each['measured']:.4f}",
+            um(each["deviation"]),
+            um(each["average_after"]),
+            um(correction["amount"]) if correction else "",
+            each["zone"].replace("_", " "),
+            each["reason"]["text"],
+            style="bold" if correction else None,
+        )
+    return table
+
+
+def _parameters(path: Path, factor: float | None) -> Parameters:
+    text = path.read_text("utf-8-sig")
+    try:
+        given = json.loads(text) if text.lstrip().startswith("{") else _of_program(text)
+    except ValueError as error:
+        raise Invalid(f"{path.name}: {error}") from None
+    if isinstance(given.get("parameters"), dict):  # what GET /characteristics/… answers
+        given = given["parameters"]
+    if factor is not None:
+        given["factor"] = factor
+    try:
+        rules, warnings = read(given)
+    except ParameterError as error:
+        wrong = wording.field_errors(error.problems)
+        missing = any(problem.code == "sign_missing" for problem in error.problems)
+        raise Invalid(
+            "\n".join(f"{path.name}: {field}: {message}" for field, message in wrong),
+            _("Say it with --factor, for example --factor -1.") if missing else None,
+        ) from None
+    for field, message in wording.field_errors(warnings):
+        say(f"{field}: {message}", style="yellow")
+    return rules
+
+
+def _of_program(text: str) -> dict[str, float]:
+    """R parameters of program text; those of calibration and of the touch itself are not asked for here."""
+    found = r_numbers.read(text)
+    other = [name for name in found if name not in BY_R and name != "R24"]
+    if other:
+        say(_("Not used: {names}").format(names=", ".join(other)))
+    return {name: value for name, value in found.items() if name not in other}
