@@ -103,7 +103,7 @@ def chart_of(session: Session, standing: Standing, window: Window) -> Chart:
                     (_("T{number} changed") if change.kind == "change" else _("T{number} offset edited")).format(
                         number=parameters.tool_memory
                     ),
-                    f"/tools/{standing.machine.key}/{parameters.tool_memory}",
+                    f"/machines/{standing.machine.key}/tools?tool={parameters.tool_memory}#tool",
                 )
                 for change in changes
                 if window.first <= change.sequence
