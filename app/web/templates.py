@@ -16,6 +16,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
+from app import __version__
 from app.web import i18n, numbers, theme
 from app.web.assets import Assets
 
@@ -49,7 +50,7 @@ def environment() -> Environment:
         when=numbers.when,
         ago=numbers.ago,
     )
-    env.globals.update(asset=assets().url, assets=assets(), theme=theme)
+    env.globals.update(asset=assets().url, assets=assets(), theme=theme, version=__version__)
     return env
 
 

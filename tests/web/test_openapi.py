@@ -1,0 +1,355 @@
+"""The OpenAPI document is complete and true, and its page can be used."""
+
+import json
+import subprocess
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import msgspec
+import pytest
+from fastapi import FastAPI
+from fastapi.routing import APIRoute, iter_route_contexts
+from playwright.sync_api import Page, expect
+from pydantic import TypeAdapter
+
+from app.main import create_app
+from app.readings.answers import ReadingAnswer
+from app.readings.api import BatchCounts
+from app.readings.schemas import ReadingIn
+from app.settings import Settings
+from app.web.api_docs import _kind, curl, prose
+from app.web.openapi import operations, resolve
+from tests.conftest import Server
+
+Json = dict[str, Any]
+ROLES = ("viewer", "operator", "engineer", "admin")
+
+
+@pytest.fixture(scope="module")
+def app() -> FastAPI:
+    door: Any = create_app(Settings(database_url="postgresql://nobody@localhost/none"))
+    inner: FastAPI = door.app.app
+    return inner
+
+
+@pytest.fixture(scope="module")
+def made(app: FastAPI) -> Json:
+    travelled: Json = json.loads(json.dumps(app.openapi()))
+    return travelled
+
+
+def api_routes(app: FastAPI) -> Iterator[APIRoute]:
+    for context in iter_route_contexts(app.routes):
+        route = context.original_route
+        if isinstance(route, APIRoute) and route.path.startswith(("/api/v1", "/health", "/metrics")):
+            yield route
+
+
+def media_of(described: Json) -> list[tuple[str, Json]]:
+    return list(described.get("content", {}).items())
+
+
+def ids(made: Json) -> list[str]:
+    return [operation["operationId"] for _method, _path, operation in operations(made)]
+
+
+class TestComplete:
+    def test_it_says_which_openapi_it_is(self, made: Json) -> None:
+        assert made["openapi"].startswith("3.1.")
+        assert made["info"]["title"] == "Inband"
+        assert [server["url"] for server in made["servers"]] == ["/"]
+
+    def test_every_route_is_in_it(self, app: FastAPI, made: Json) -> None:
+        described = {(method, path) for method, path, _operation in operations(made)}
+        served = {(method.lower(), route.path_format) for route in api_routes(app) for method in route.methods or ()}
+        assert described == served
+
+    def test_operation_ids_are_unique_words(self, made: Json) -> None:
+        found = ids(made)
+        assert len(found) == len(set(found))
+        assert all(each.isidentifier() for each in found)
+
+    def test_every_reference_leads_somewhere(self, made: Json) -> None:
+        def walk(part: Any) -> Iterator[str]:
+            if isinstance(part, dict):
+                if isinstance(part.get("$ref"), str):
+                    yield part["$ref"]
+                for inner in part.values():
+                    yield from walk(inner)
+            elif isinstance(part, list):
+                for inner in part:
+                    yield from walk(inner)
+
+        references = set(walk(made))
+        assert "#/components/schemas/ReadingIn" in references
+        for reference in references:
+            assert resolve(made, {"$ref": reference})
+
+    def test_every_tag_has_a_sentence_and_every_operation_one_tag(self, made: Json) -> None:
+        tags = {tag["name"]: tag["description"] for tag in made["tags"]}
+        used = {tag for _m, _p, operation in operations(made) for tag in operation["tags"]}
+        assert used == set(tags)
+        assert all(words.endswith(".") for words in tags.values())
+        assert all(len(operation["tags"]) == 1 for _m, _p, operation in operations(made))
+
+    def test_everything_is_explained(self, made: Json) -> None:
+        silent = [
+            f"{operation['operationId']} {parameter.get('name', '')}"
+            for _method, _path, operation in operations(made)
+            for parameter in [{"description": operation.get("description")}, *operation.get("parameters", [])]
+            if not parameter.get("description")
+        ]
+        assert silent == []
+
+    def test_every_path_parameter_is_declared(self, made: Json) -> None:
+        for _method, path, operation in operations(made):
+            declared = [each["name"] for each in operation.get("parameters", []) if each["in"] == "path"]
+            assert declared == [part[1:-1] for part in path.split("/") if part.startswith("{")], path
+
+    def test_every_body_and_every_answer_has_an_example(self, made: Json) -> None:
+        missing = [
+            f"{operation['operationId']} {status} {kind}"
+            for _method, _path, operation in operations(made)
+            for status, described in [("body", operation.get("requestBody", {})), *operation["responses"].items()]
+            for kind, media in media_of(resolve(made, described))
+            if "example" not in media
+        ]
+        assert missing == []
+
+    def test_keys_and_cookies_are_declared_and_health_needs_neither(self, made: Json) -> None:
+        assert {tuple(each) for each in made["security"]} == {("key",), ("session",)}
+        assert set(made["components"]["securitySchemes"]) == {"key", "session"}
+        for _method, path, operation in operations(made):
+            open_to_all = path.startswith(("/health", "/metrics")) or path.endswith("openapi.json")
+            assert (operation.get("security") == []) is open_to_all, path
+
+    def test_every_operation_says_how_it_fails(self, made: Json) -> None:
+        for _method, path, operation in operations(made):
+            if operation.get("security") == []:
+                continue
+            expected = {"401", "403", "422", "500", "503"}
+            expected |= {"404"} if "{" in path else set()
+            expected |= {"413"} if "requestBody" in operation else set()
+            assert expected <= set(operation["responses"]), path
+
+    def test_errors_are_problem_documents(self, made: Json) -> None:
+        for response in made["components"]["responses"].values():
+            ((kind, media),) = media_of(response)
+            assert kind == "application/problem+json"
+            problem = media["example"]
+            assert {"type", "title", "status", "detail", "errors", "what_to_do"} <= set(problem)
+            assert ("Retry-After" in response.get("headers", {})) is (problem["status"] in {429, 503})
+
+
+class TestExamples:
+    def test_bodies_are_what_the_routes_take(self, app: FastAPI, made: Json) -> None:
+        routes = {route.name: route for route in api_routes(app)}
+        checked = 0
+        for _method, _path, operation in operations(made):
+            route = routes[operation["operationId"]]
+            if route.body_field is None:
+                continue
+            ((_type, media),) = media_of(operation["requestBody"])
+            model: Any = route.body_field.field_info.annotation
+            TypeAdapter(model).validate_python(media["example"])
+            checked += 1
+        assert checked > 10
+
+    def test_answers_are_what_the_routes_give(self, app: FastAPI, made: Json) -> None:
+        checked = 0
+        for route in api_routes(app):
+            operation = made["paths"][route.path_format][min(route.methods or ()).lower()]
+            models = {status: described.get("model") for status, described in route.responses.items()}
+            models |= {route.status_code or 200: models.get(route.status_code or 200) or route.response_model}
+            for status, model in models.items():
+                if model is None or int(status) >= 400:
+                    continue
+                example = dict(media_of(operation["responses"][str(status)]))["application/json"]["example"]
+                answer = TypeAdapter(model).validate_python(example)
+                assert TypeAdapter(model).dump_python(answer, mode="json", exclude_unset=True).keys() == example.keys()
+                checked += 1
+        assert checked > 30
+
+    def test_readings_are_what_the_door_takes(self, made: Json) -> None:
+        one = dict(media_of(made["paths"]["/api/v1/readings"]["post"]["requestBody"]))
+        many = dict(media_of(made["paths"]["/api/v1/readings/batch"]["post"]["requestBody"]))
+        assert msgspec.convert(one["application/json"]["example"], ReadingIn).measured == 39.9981
+        assert msgspec.convert(many["application/json"]["example"], list[ReadingIn])
+        lines = many["application/x-ndjson"]["example"].encode()
+        assert msgspec.json.Decoder(ReadingIn).decode_lines(lines)
+
+
+# --- the document against the server
+
+
+@pytest.fixture(scope="module")
+def shop(server: Server, made: Json) -> Json:
+    """A server where the things stand that the document's examples name: lathe-1, shaft-d40, corrections, an alarm."""
+    clients = {role: server.client(server.key(role)) for role in ROLES}
+    engineer = clients["engineer"]
+    paths = made["paths"]
+    for path in ("/api/v1/machines", "/api/v1/characteristics"):
+        ((_type, media),) = media_of(paths[path]["post"]["requestBody"])
+        assert engineer.post(path, json=media["example"]).status_code == 201
+    reading = without_time(
+        dict(media_of(paths["/api/v1/readings"]["post"]["requestBody"]))["application/json"]["example"]
+    )
+    clients["machine"] = server.client(server.key(machine="lathe-1"))
+    corrected = [{"characteristic": "shaft-d40", "measured": 39.9981, "correction_in_effect": n} for n in range(20)]
+    for each in corrected:  # so that there is a correction 17
+        assert engineer.post("/api/v1/readings", json=each).json()["action"] == "correct"
+    return {"clients": clients, "reading": reading}
+
+
+def without_time(example: Any) -> Any:
+    """The example, but measured now: the time in it is far ahead on a computer whose clock is not set."""
+    if isinstance(example, list):
+        return [without_time(each) for each in example]
+    return {name: value for name, value in example.items() if name != "measured_at"}
+
+
+def send(client: httpx.Client, method: str, path: str, operation: Json, number: int = 1) -> httpx.Response:
+    """Call an operation with the examples of the document; numbers that have no example there are ``number``."""
+    query: Json = {}
+    for parameter in operation.get("parameters", []):
+        example = parameter.get("example", number)
+        if parameter["in"] == "path":
+            path = path.replace(f"{{{parameter['name']}}}", str(example))
+        elif parameter.get("required"):
+            query[parameter["name"]] = example
+    body = {}
+    if "requestBody" in operation:
+        kind, media = media_of(operation["requestBody"])[0]
+        body = {"content": json.dumps(without_time(media["example"])).encode(), "headers": {"Content-Type": kind}}
+    if operation["operationId"] == "events":
+        with client.stream(method, path) as answer:
+            return answer
+    return client.request(method, path, params=query, **body)  # type: ignore[arg-type]
+
+
+class TestAgainstTheServer:
+    def test_answers_to_readings_are_as_described(self, shop: Json) -> None:
+        machine = shop["clients"]["machine"]
+        first = machine.post("/api/v1/readings", json=shop["reading"] | {"key": "one"})
+        again = machine.post("/api/v1/readings", json=shop["reading"] | {"key": "one"})
+        assert (first.status_code, again.status_code) == (201, 200)
+        assert first.json() == again.json()
+        assert first.json().keys() == ReadingAnswer.model_fields.keys()
+        ReadingAnswer.model_validate(first.json())
+        batch = machine.post("/api/v1/readings/batch?decisions=true", json=[shop["reading"] | {"key": "two"}])
+        assert batch.json().keys() == BatchCounts.model_fields.keys()
+        BatchCounts.model_validate(batch.json())
+
+    def test_the_examples_work_and_the_roles_are_true(self, shop: Json, made: Json) -> None:
+        """Every operation with the examples as they stand: refused below its role, taken (or not found) with it."""
+        clients = shop["clients"]
+        wrong = []
+        for method, path, operation in operations(made):
+            if operation.get("security") == []:
+                continue
+            least = operation["x-role"]
+            for role in [*ROLES, "machine"]:
+                may = operation["x-machine-key"] if role == "machine" else ROLES.index(role) >= ROLES.index(least)
+                answer = send(clients[role], method, path, operation, number=999_999)
+                refused = answer.status_code in {401, 403}
+                if refused is may or answer.status_code == 422 or answer.status_code >= 500:
+                    wrong.append(f"{role}: {method} {path} answered {answer.status_code}")
+        assert wrong == []
+
+    def test_errors_are_described_where_they_happen(self, server: Server, made: Json) -> None:
+        anonymous = server.client()
+        for method, path, operation in operations(made):
+            answer = send(anonymous, method, path, operation)
+            if operation.get("security") == []:
+                assert answer.status_code == 200, path
+            else:
+                assert answer.status_code == 401, path
+                assert answer.headers["content-type"] == "application/problem+json"
+
+    def test_the_document_needs_no_key(self, server: Server, made: Json) -> None:
+        answer = server.client().get("/api/v1/openapi.json")
+        assert answer.headers["content-type"] == "application/json"
+        assert answer.json() == made
+
+
+class TestPage:
+    def test_every_operation_stands_on_it_with_a_command(self, server: Server, made: Json) -> None:
+        text = server.client().get("/api/docs").text
+        for each in ids(made):
+            assert f'id="{each}"' in text
+        assert text.count("curl -sS") == len(ids(made))
+        assert "correction_in_effect" in text
+        assert "R33. Zero range." in text
+
+    def test_searching_opening_and_printing(self, page: Page) -> None:
+        page.goto("/api/docs")
+        assert page.locator("details.operation[open]").count() == 0
+        page.keyboard.press("/")
+        page.keyboard.type("offset_after")
+        expect(page.locator("#mark_applied")).to_be_visible()
+        expect(page.locator("#list_people")).to_be_hidden()
+        page.get_by_role("searchbox").fill("no such words anywhere")
+        expect(page.get_by_role("status").first).to_have_text("Nothing has all of these words.")
+        page.get_by_role("searchbox").fill("")
+        page.get_by_role("navigation", name="Operations").get_by_role("link", name="Push reading").click()
+        expect(page.locator("#push_reading[open]")).to_be_visible()
+        page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        assert page.locator("details.operation:not([open])").count() == 0
+        page.evaluate("dispatchEvent(new Event('afterprint'))")
+        assert page.locator("details.operation[open]").count() == 1
+
+    def test_it_is_linked_and_knows_who_is_signed_in(self, page: Page, server: Server) -> None:
+        password = server.person("Dora", "viewer")
+        page.goto("/sign-in")
+        page.get_by_label("Name").fill("Dora")
+        page.locator("input[type=password]").fill(password)
+        page.locator("main button[type=submit]").click()
+        page.goto("/")
+        page.get_by_role("contentinfo").get_by_role("link", name="API").click()
+        expect(page.get_by_role("heading", level=1)).to_have_text("API")
+        expect(page.get_by_role("banner")).to_contain_text("Dora")
+
+    def test_wide_things_do_not_widen_it(self, page: Page) -> None:
+        page.set_viewport_size({"width": 800, "height": 1000})
+        page.goto("/api/docs#add_characteristic")
+        expect(page.locator("#add_characteristic[open]")).to_be_visible()
+        assert page.evaluate("document.documentElement.scrollWidth") <= 800
+
+
+class TestWords:
+    @pytest.mark.parametrize(
+        ("text", "html"),
+        [
+            ("a `b<c` d", "<p>a <code>b&lt;c</code> d</p>"),
+            ("<script>", "<p>&lt;script&gt;</p>"),
+            ("raises *offset differs*", "<p>raises <em>offset differs</em></p>"),
+            ("3 * 4", "<p>3 * 4</p>"),
+            ("First\nline\n\n- one\n- `two`", "<p>First line</p><ul><li>one</li><li><code>two</code></li></ul>"),
+        ],
+    )
+    def test_docstrings_become_html(self, text: str, html: str) -> None:
+        assert prose(text) == html
+
+    @pytest.mark.parametrize(
+        ("schema", "words"),
+        [
+            ({"type": "integer", "minimum": 1, "maximum": 32}, "whole number, 1 to 32"),
+            ({"type": "string", "maxLength": 64}, "text, at most 64 characters"),
+            ({"enum": ["a", "b", None]}, "a | b"),
+            ({"type": ["number", "null"], "minimum": 0}, "number, at least 0 or null"),
+            ({"anyOf": [{"type": "string", "format": "date-time"}, {"type": "null"}]}, "time or null"),
+            ({"type": "array", "items": {"type": "boolean"}}, "list of true or false"),
+            ({}, "any"),
+        ],
+    )
+    def test_schemas_become_words(self, schema: Json, words: str) -> None:
+        assert _kind({}, schema) == words
+
+    def test_the_command_survives_a_shell(self) -> None:
+        body = {"content": {"application/json": {"example": {"reason": "it's $HOME `date`"}}}}
+        line = curl("post", "/x/{key}", {"parameters": [], "requestBody": body, "responses": {}}, "http://host")
+        said = subprocess.run(
+            ["sh", "-c", f"curl() {{ printf '%s\\n' \"$@\"; }}\n{line}"], capture_output=True, text=True
+        )
+        assert '{"reason": "it\'s $HOME `date`"}' in said.stdout.splitlines()
