@@ -150,8 +150,11 @@ def decide(session: Session, machine: Machine, number: int, verb: Verb, reason: 
     correction.decided_at, correction.decided_by = datetime.now(UTC), caller.name
     _record_status(session, machine, correction, caller, SAID[verb], before, reason)
     publish(session, correction_changed(session, machine, correction))
-    alarm = _wear_alarm(session, correction) if before == "held" else None
-    return Decided(correction, None if alarm is None else wording.still_active(alarm))
+    if before == "held":
+        alarm = _wear_alarm(session, correction)
+        return Decided(correction, None if alarm is None else wording.still_active(alarm))
+    counting = queries.counting_on(session, machine, correction) if verb == "rejected" else []
+    return Decided(correction, wording.counted_on(counting))
 
 
 def edit_tool(session: Session, machine: Machine, number: int, offset: float, reason: str, caller: Caller) -> Restarted:

@@ -64,8 +64,8 @@ def verb_word(verb: str) -> str:
     }.get(verb, verb)
 
 
-def about_correction(row: CorrectionRow, verb: str) -> Question:
-    """Asks before a correction is approved, released, rejected or marked applied."""
+def about_correction(row: CorrectionRow, verb: str, counting_on: list[int]) -> Question:
+    """Asks before a correction is approved, released, rejected or marked applied. counting_on: see the query of that name."""
     c = row.correction
     values = {"number": c.number, "amount": um(c.amount), "tool": c.tool_memory, "machine": row.machine}
     after = "–" if row.expected is None else f"{plain(row.expected)} mm"
@@ -113,7 +113,8 @@ def about_correction(row: CorrectionRow, verb: str) -> Question:
                 [
                     _("Tool {tool} is not changed by {amount}. The next reading asks again if it is needed.").format(
                         **values
-                    )
+                    ),
+                    *filter(None, [wording.counted_on(counting_on)]),
                 ],
                 [_("False reading"), _("Not applied at the machine"), _("Set by hand instead")],
                 do=verb,

@@ -120,7 +120,9 @@ def _correction(
         status=error.status if error else 200,
         machine=shown,
         row=row,
-        question=asking.about_correction(row, asked) if asked else None,
+        question=asking.about_correction(row, asked, queries.counting_on(session, shown, row.correction))
+        if asked
+        else None,
         form=form or {},
         errors=by_field(error) if error else {},
         wording=wording,

@@ -206,6 +206,13 @@ def open_corrections(session: Session, machine: Machine, tool_memory: int | None
     return session.scalars(wanted.order_by(Correction.number).execution_options(populate_existing=True)).all()
 
 
+def counting_on(session: Session, machine: Machine, found: Correction) -> list[int]:
+    """Later open corrections of its tool that were computed as if this one came into effect."""
+    if found.status == "held":
+        return []
+    return [c.number for c in open_corrections(session, machine, found.tool_memory) if c.number > found.number]
+
+
 def open_counts(session: Session) -> dict[int, dict[str, int]]:
     """How many corrections of each machine (by id) are open, by status."""
     found: dict[int, dict[str, int]] = defaultdict(dict)

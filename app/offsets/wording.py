@@ -118,6 +118,17 @@ def will_fall(numbers: list[int]) -> str:
     ).format(numbers=", ".join(map(str, numbers)))
 
 
+def counted_on(numbers: list[int]) -> str | None:
+    """Said when a correction is rejected on which later ones count."""
+    if not numbers:
+        return None
+    return ngettext(
+        "Correction {numbers} of the same tool was computed as if this one were applied: decide about it, too.",
+        "Corrections {numbers} of the same tool were computed as if this one were applied: decide about them, too.",
+        len(numbers),
+    ).format(numbers=", ".join(map(str, numbers)))
+
+
 def still_active(alarm: int) -> str:
     """Said when a held correction is released past its alarm."""
     return _(

@@ -209,6 +209,14 @@ class TestDecided:
         problem = shop.call("POST", f"/corrections/{shop.machine}/1/{verb}", 422, **body)
         assert problem["status"] == 422
 
+    def test_rejecting_one_names_those_that_count_on_it(self, shop: Shop) -> None:
+        first, second = shop.read(20.0)["correction"]["number"], shop.read(50.0)["correction"]["number"]
+        held = shop.read(400.0)["correction"]["number"]
+        note = shop.correction(first, "rejected", reason="x")["note"]
+        assert f"Corrections {second}, {held} of the same tool" in note
+        shop.correction(held, "rejected", reason="x")
+        assert shop.correction(second, "rejected", reason="x")["note"] is None
+
     def test_a_newer_correction_supersedes_the_held_one(self, shop: Shop) -> None:
         number = held(shop)
         newer = shop.read(20.0)["correction"]["number"]
