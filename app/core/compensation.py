@@ -184,8 +184,6 @@ def decide(
         signals.append(Signal.TOOL_WORN)
     elif not good:
         signals.append(Signal.OVERSIZE if deviation > 0 else Signal.UNDERSIZE)
-    elif zone in (Zone.OVERSIZE, Zone.UNDERSIZE):
-        signals.append(Signal(zone.value))
     if not accepted:
         signals.append(Signal.ACCEPTANCE)
 

@@ -201,6 +201,12 @@ def test_a_bad_part_is_told_even_when_its_error_has_been_corrected_since(shaft: 
     assert decision.signals == (Signal.OVERSIZE,)
 
 
+def test_a_good_part_is_not_called_bad_because_of_a_correction_still_to_come(shaft: Made) -> None:
+    decision = decide(shaft(), State(), -0.0017, outstanding=0.02)
+    assert (decision.zone, decision.action, decision.good) == (Zone.OVERSIZE, Action.CORRECT, True)
+    assert decision.signals == ()
+
+
 def test_a_probe_fault_is_told_by_the_raw_deviation(shaft: Made) -> None:
     decision = decide(shaft(), State(), 1.0, outstanding=-0.9)
     assert (decision.zone, decision.action) == (Zone.PROBE_FAULT, Action.STOP)
