@@ -1,0 +1,73 @@
+"""In which state a characteristic is: the most urgent thing wins, and calm states grow old."""
+
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import pytest
+
+from app.core.parameters import Parameters, read
+from app.plant.state import Known, State, state_of
+from tests.shop import PARAMETERS
+
+NOW = datetime(2026, 11, 21, 8, tzinfo=UTC)
+
+
+def parameters(**other: Any) -> Parameters:
+    return read(PARAMETERS | other)[0]
+
+
+def known(**other: Any) -> Known:
+    values: dict[str, Any] = {
+        "parameters": parameters(),
+        "readings": 7,
+        "zone": "zero",
+        "deviation": 0.0002,
+        "paused": False,
+        "alarms": set(),
+        "corrections": set(),
+        "trend": [0.0002, -0.0003, 0.0002],
+        "since": NOW - timedelta(minutes=20),
+        "last_at": NOW,
+    }
+    return Known(**values | other)
+
+
+@pytest.mark.parametrize(
+    ("facts", "state"),
+    [
+        ({}, State.IN_BAND),
+        ({"paused": True, "alarms": {"tool_worn"}, "corrections": {"held"}}, State.PROBE_FAULT),
+        ({"alarms": {"tool_worn", "oversize"}, "corrections": {"held"}}, State.TOOL_WORN),
+        ({"corrections": {"held", "pending"}}, State.HELD),
+        ({"readings": 0, "deviation": None}, State.NO_DATA),
+        ({"deviation": 0.0081}, State.OVERSIZE),
+        ({"deviation": -0.0081, "zone": "zero"}, State.UNDERSIZE),
+        ({"deviation": 0.008}, State.IN_BAND),
+        ({"corrections": {"awaiting_approval", "pending"}}, State.AWAITING_APPROVAL),
+        ({"corrections": {"pending"}}, State.CORRECTING),
+        ({"trend": [0.0011] * 7}, State.DRIFTING_UP),
+        ({"trend": [0.009] + [-0.002] * 7}, State.DRIFTING_DOWN),
+        ({"trend": [0.0011] * 6 + [0.001]}, State.IN_BAND),
+        ({"trend": [0.0011] * 6}, State.IN_BAND),
+        ({"parameters": parameters(tool_memory=0)}, State.MEASURE_ONLY),
+        ({"alarms": {"oversize"}}, State.IN_BAND),  # the part after it was good; the alarm stands beside
+    ],
+)
+def test_the_most_urgent_thing_is_said(facts: dict[str, Any], state: State) -> None:
+    assert state_of(known(**facts)) is state
+
+
+@pytest.mark.parametrize(
+    ("facts", "minutes"),
+    [
+        ({}, 100),  # three readings in twenty minutes: one is missed after ten times ten minutes
+        ({"since": NOW - timedelta(seconds=20)}, 15),  # a fast machine: not sooner than after a quarter of an hour
+        ({"trend": [0.0002], "since": NOW}, 15),
+    ],
+)
+def test_what_is_known_grows_old(facts: dict[str, Any], minutes: int) -> None:
+    assert known(**facts).old_from == NOW + timedelta(minutes=minutes)
+
+
+def test_what_was_never_known_cannot_grow_old() -> None:
+    assert known(readings=0, deviation=None, last_at=None, since=None, trend=[]).old_from is None
