@@ -25,6 +25,7 @@ from app.people.keys import KeyRing
 from app.plant import pages as plant_pages
 from app.readings import api as readings
 from app.readings.door import Directory, ReadingsDoor
+from app.readings.importing import pages as import_pages
 from app.readings.writer import Writer
 from app.settings import Settings
 from app.setup import pages as setup_pages
@@ -59,6 +60,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     offset_pages.router,
     sign_in_pages.router,
     setup_pages.router,
+    import_pages.router,
 )
 
 

@@ -42,9 +42,9 @@ def number(text: str, decimal: str) -> float:
         if decimal in given:
             raise Unreadable(_("has a point and a comma; write it without a separator of thousands"))
         raise Unreadable(
-            _(
-                "has a {other}, but decimals are read with {decimal}; say --decimal {other} if all are written so"
-            ).format(other=_sign(other), decimal=_sign(decimal))
+            _("has a {other}, but decimals are read with a {decimal}; say so if all are written with a {other}").format(
+                other=_sign(other), decimal=_sign(decimal)
+            )
         )
     given = given.replace(",", ".")
     if not _NUMBER.fullmatch(given):
@@ -75,7 +75,7 @@ def moment(text: str, zone: ZoneInfo | None, pattern: str | None = None) -> date
     if read.tzinfo is not None:
         return read
     if zone is None:
-        raise Unreadable(_("does not say in which time zone; name it: --timezone Europe/Belgrade"))
+        raise Unreadable(_("does not say in which time zone; name the time zone, such as Europe/Belgrade"))
     local = read.replace(tzinfo=zone)
     if local.astimezone(UTC).astimezone(zone).replace(tzinfo=None) != read:
         raise Unreadable(_("does not exist in {zone}: the clocks went forward in that hour").format(zone=zone.key))
@@ -103,9 +103,7 @@ def _by_shape(given: str) -> datetime:
             _("is a count of days or seconds and could mean several times; write it as 2026-11-21T08:15:02+01:00")
         )
     if "/" in given:
-        raise Unreadable(
-            _("could be day/month or month/day; say which: --time-format '%d/%m/%Y %H:%M:%S' or another order")
-        )
+        raise Unreadable(_("could be day/month or month/day; say which by a form of times such as %d/%m/%Y %H:%M:%S"))
     raise Unreadable(_("is not a time; write it as 2026-11-21T08:15:02+01:00 or 21.11.2026 08:15:02"))
 
 

@@ -33,7 +33,7 @@ def test_numbers_as_people_write_them(text: str, decimal: str, value: float) -> 
     [
         ("", ".", "is empty"),
         ("1.234,5", ",", "separator of thousands"),
-        ("39.998", ",", "has a point, but decimals are read with comma"),
+        ("39.998", ",", "has a point, but decimals are read with a comma"),
         ("39,998", ".", "has a comma"),
         ("39.998 mm", ".", "without a unit"),
         ("NaN", ".", "is not a number"),
@@ -99,7 +99,7 @@ def test_what_is_not_a_time_is_refused_with_its_reason(text: str, why: str) -> N
 
 
 def test_a_time_without_a_zone_is_refused_until_the_zone_is_named() -> None:
-    with pytest.raises(Unreadable, match="--timezone"):
+    with pytest.raises(Unreadable, match="name the time zone"):
         moment("2026-11-21 08:15", None)
     with pytest.raises(Unreadable, match="There is no time zone 'Belgrade'"):
         zone_named("Belgrade")

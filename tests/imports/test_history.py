@@ -151,7 +151,7 @@ def test_values_in_another_unit_are_noticed(plant: Database, tmp_path: Path) -> 
     path = table(tmp_path / "a.csv", [39992.0, 39993.5])
     with pytest.raises(Invalid, match=r"from the target 39\.992 mm") as refusal:
         run(plant, path)
-    assert "--unit" in (refusal.value.what_to_do or "")
+    assert "name their unit" in (refusal.value.what_to_do or "")
     run(plant, path, wishes=Wishes(unit="um"))
     assert [r["measured"] for r in stored(plant)] == [39.992, 39.9935]
 

@@ -249,7 +249,7 @@ def _refuse_something_else(summary: Summary, parameters: Parameters) -> None:
             limit=parameters.confidence_limit, target=parameters.target
         ),
         _(
-            "Nothing was imported. Is it the right characteristic, the right column, and are the values in mm? See --unit."
+            "Nothing was imported. Is it the right characteristic and the right column? If the values are not in mm, name their unit."
         ),
         errors=[FieldError("measured", _("no value is near the target"))],
     )

@@ -71,20 +71,31 @@ class Layout:
     time_format: str | None = None
 
     @property
-    def ignored(self) -> list[str]:
-        """Columns that mean nothing here."""
+    def complete(self) -> bool:
+        """Whether it is known where the measured values are."""
+        return "measured" in self.columns or "touches" in self.columns
+
+    @property
+    def ignored_places(self) -> list[int]:
+        """Where the columns are that mean nothing here."""
         used = {place for places in self.columns.values() for place in places}
-        return [name for place, name in enumerate(self.header) if place not in used]
+        return [place for place in range(len(self.header)) if place not in used]
+
+    @property
+    def ignored(self) -> list[str]:
+        """Their names."""
+        return [self.header[place] for place in self.ignored_places]
 
     def named(self, field_name: str) -> str:
         """The column that a field is read from."""
         return "+".join(self.header[place] for place in self.columns.get(field_name, ()))
 
 
-def look(path: Path, wishes: Wishes, name: str | None = None) -> Layout:
+def look(path: Path, wishes: Wishes, name: str | None = None, *, complete: bool = True) -> Layout:
     """Find out how a file is to be read. Raises `Invalid`, naming what must be said.
 
     name: what the file is called where `path` is only a copy of it; its ending says what kind it is.
+    complete: refuse a file in which no column is known to hold what was measured.
     """
     try:
         zone = values.zone_named(wishes.timezone) if wishes.timezone else None
@@ -101,11 +112,20 @@ def look(path: Path, wishes: Wishes, name: str | None = None) -> Layout:
     ending = Path(name or path.name).suffix.lower()
     try:
         if ending in {".ndjson", ".jsonl", ".json"}:
-            return _json_layout(path, wishes, zone, is_list=ending == ".json")
-        return _csv_layout(path, wishes, zone)
+            layout = _json_layout(path, wishes, zone, is_list=ending == ".json")
+        else:
+            layout = _csv_layout(path, wishes, zone)
     except Unusable as error:
         where = _("line {line}").format(line=error.line) if error.line else "file"
         raise wrong(where, str(error)) from None
+    if complete and not layout.complete:
+        raise wrong(
+            "measured",
+            _(
+                "No column is recognised as the measured value. Say which it is: measured=COLUMN. The columns are: {header}."
+            ).format(header=", ".join(layout.header)),
+        )
+    return layout
 
 
 def wrong(where: str, message: str) -> Invalid:
@@ -122,7 +142,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None) -> Layout:
         raise wrong("file", _("The file is empty."))
     header = tuple(cell.strip().removeprefix("\ufeff") for cell in first.cells)
     columns = _columns(header, wishes.mapping)
-    place = columns.get("measured", columns.get("touches", (0,)))[0]
+    place = columns.get("measured", (0,))[0]
     sample = [row.cells[place] for row, _count in zip(rows, range(200), strict=False) if len(row.cells) > place]
     return Layout(
         kind="csv",
@@ -131,7 +151,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None) -> Layout:
         encoding=encoding,
         delimiter=delimiter,
         decimal=wishes.decimal or delimited.decimal_of(sample),
-        unit=wishes.unit or values.unit_in(header[place]) or "mm",
+        unit=wishes.unit or ("measured" in columns and values.unit_in(header[place])) or "mm",
         zone=zone,
         time_format=wishes.time_format,
     )
@@ -195,24 +215,24 @@ def _columns(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str, t
     taken = {place for places in columns.values() for place in places}
     guesses = _guesses(header).items()
     columns |= {name: guess for name, guess in guesses if name not in mapping and not taken & set(guess)}
-    if "measured" not in columns and "touches" not in columns:
-        raise wrong(
-            "measured",
-            _(
-                "No column is recognised as the measured value. Say which: --map measured=COLUMN. The columns are: {header}."
-            ).format(header=", ".join(header)),
-        )
     return columns
 
 
 def _places(header: tuple[str, ...], column: str) -> tuple[int, ...] | None:
+    """Where a column is: by its name or number, or two that belong together as Date+Time or 2+3."""
+    place = _place(header, column)
+    if place is not None:
+        return (place,)
+    places = [_place(header, part.strip()) for part in column.split("+")]
+    found = tuple(place for place in places if place is not None)
+    return found if len(found) == len(places) else None
+
+
+def _place(header: tuple[str, ...], column: str) -> int | None:
     if column in header:
-        return (header.index(column),)
-    if column.isascii() and column.isdigit() and 1 <= int(column) <= len(header):
-        return (int(column) - 1,)
-    parts = [part.strip() for part in column.split("+")]
-    if len(parts) > 1 and all(part in header for part in parts):
-        return tuple(header.index(part) for part in parts)
+        return header.index(column)
+    if column.isascii() and column.isdigit() and len(column) < 6 and 1 <= int(column) <= len(header):
+        return int(column) - 1
     return None
 
 

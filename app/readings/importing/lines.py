@@ -147,7 +147,7 @@ def _touches(text: str) -> Any:
 
 
 def _json(path: Path, layout: Layout) -> Found:
-    for number, value in _objects(path, layout.kind):
+    for number, value in objects(path, layout.kind):
         if isinstance(value, Flaw):
             yield number, value
             continue
@@ -166,7 +166,8 @@ def _json(path: Path, layout: Layout) -> Found:
             yield number, found
 
 
-def _objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:
+def objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:
+    """What stands in each line of a file of JSON objects, or in each place of a JSON list."""
     if kind == "list":
         yield from enumerate(json.loads(path.read_text("utf-8-sig")), start=1)
         return
