@@ -11,7 +11,7 @@ from app.characteristics import queries, wording
 from app.characteristics.queries import Standing
 from app.characteristics.schemas import CharacteristicChange, CharacteristicIn, warnings_of
 from app.characteristics.tables import Characteristic, ParametersVersion
-from app.core.parameters import BY_R, TWO_POINT_SWITCH, ParameterError, Parameters, Variant, read
+from app.core.parameters import BY_R, TWO_POINT_SWITCH, ParameterError, Parameters, Variant, default_averaging_limit, read
 from app.core.zones import nanometres
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
@@ -104,7 +104,8 @@ def change_characteristic(session: Session, key: str, change: CharacteristicChan
 def merged(current: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """The current set with what was given in its place, for `read`.
 
-    Nominal with deviations, or target with width: what is given replaces what was said the other way.
+    Nominal with deviations, or target with width: what is given replaces what was said the other way. R34 at its default
+    follows R35.
     """
     wanted = dict(current)
     names = {raw: _name_of(raw) for raw in given}
@@ -115,6 +116,8 @@ def merged(current: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, An
         drop = DRAWING
     else:
         drop = ()
+    if wanted.get("averaging_limit") == default_averaging_limit(current["tolerance_width"]):
+        drop = (*drop, "averaging_limit")  # it was left to follow the tolerance, and goes on following it
     for name in (*drop, *names.values()):
         wanted.pop(name, None)
     for raw, value in given.items():

@@ -231,6 +231,11 @@ def mean_nominal(nominal: float, upper_deviation: float, lower_deviation: float)
     )
 
 
+def default_averaging_limit(tolerance_width: float) -> float:
+    """R34 "2/3 of the tolerance", mm: two thirds of R35/2."""
+    return round(tolerance_width / 3, 9)
+
+
 def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
     """Make parameters of what was sent, under names or R numbers; return them with the warnings.
 
@@ -251,7 +256,7 @@ def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
     _target(values, problems)
     if problems:
         raise ParameterError(problems)
-    values.setdefault("averaging_limit", round(values["tolerance_width"] / 3, 9))
+    values.setdefault("averaging_limit", default_averaging_limit(values["tolerance_width"]))
     if values["tool_memory"] != 0 and values["mode"] != Mode.MEASURE_ONLY and "factor" not in values:
         problems.append(Problem("factor", "sign_missing", {}))
     elif values.setdefault("factor", -1.0) == 0:
