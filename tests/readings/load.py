@@ -1,0 +1,78 @@
+"""Machines under load: each sends its readings one after the other and, as the contract says, sends again what was not answered."""
+
+import json
+import random
+import threading
+import time
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from http.client import HTTPConnection, HTTPException
+from typing import Any
+from urllib.parse import urlsplit
+
+
+@dataclass
+class Sender:
+    """One machine: its readings in order, each until it is answered."""
+
+    url: str
+    key: str
+    readings: Iterable[dict[str, Any]]
+    patience: float = 60.0
+    pause: float = 0.0
+    answers: list[dict[str, Any]] = field(default_factory=list)
+    again: int = 0
+    """Readings that were sent more than once."""
+    repeated: int = 0
+    """Of those: readings that had been stored although the answer was lost (200)."""
+
+    def run(self, stop: threading.Event | None = None) -> "Sender":
+        """Send them all. An answer other than 200, 201 or 503 fails."""
+        address = urlsplit(self.url)
+        assert address.hostname is not None
+        connection = HTTPConnection(address.hostname, address.port, timeout=20)
+        for reading in self.readings:
+            if stop is not None and stop.is_set():
+                break
+            body, tries, deadline = json.dumps(reading), 0, time.monotonic() + self.patience
+            while True:
+                tries += 1
+                status = 0
+                try:
+                    connection.request("POST", "/api/v1/readings", body, {"Authorization": f"Bearer {self.key}"})
+                    answer = connection.getresponse()
+                    status, text = answer.status, answer.read()
+                except (OSError, HTTPException):
+                    connection.close()
+                if status in {200, 201}:
+                    break
+                assert status in {0, 503}, text
+                assert time.monotonic() < deadline, "not answered in all this time"
+                time.sleep(0.1)
+            self.again += tries > 1
+            self.repeated += status == 200
+            self.answers.append(json.loads(text))
+            if self.pause:
+                time.sleep(self.pause)
+        connection.close()
+        return self
+
+
+def all_at_once(senders: list[Sender], stop: threading.Event | None = None) -> list[Sender]:
+    """Run every sender in a thread of its own, to its end."""
+    with ThreadPoolExecutor(len(senders)) as pool:
+        return list(pool.map(lambda sender: sender.run(stop), senders))
+
+
+def scattered(characteristic: str, count: int, seed: int, wide: float = 0.004) -> Iterator[dict[str, Any]]:
+    """Readings about 40 mm, some beyond the averaging limit and a few out of tolerance; keys that name them."""
+    chance = random.Random(seed)
+    for number in range(count):
+        measured = round(40 + chance.gauss(0, wide), 6)
+        yield {"characteristic": characteristic, "measured": measured, "key": f"{seed}:{number}"}
+
+
+def ndjson(readings: list[dict[str, Any]]) -> bytes:
+    """One reading per line."""
+    return "\n".join(json.dumps(reading) for reading in readings).encode()
