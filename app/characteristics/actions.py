@@ -11,7 +11,15 @@ from app.characteristics import queries, wording
 from app.characteristics.queries import Standing
 from app.characteristics.schemas import CharacteristicChange, CharacteristicIn, warnings_of
 from app.characteristics.tables import Characteristic, ParametersVersion
-from app.core.parameters import BY_R, TWO_POINT_SWITCH, ParameterError, Parameters, Variant, default_averaging_limit, read
+from app.core.parameters import (
+    BY_R,
+    TWO_POINT_SWITCH,
+    ParameterError,
+    Parameters,
+    Variant,
+    default_averaging_limit,
+    read,
+)
 from app.core.zones import nanometres
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid

@@ -169,9 +169,9 @@ class TestChange:
     def test_an_averaging_limit_left_to_its_default_follows_the_tolerance(self, server: Any) -> None:
         shop = Shop(server)
         change(shop, averaging_limit=None)
-        narrowed = change(shop, lower_deviation=-0.008)["parameters"]
+        narrowed = change(shop, tolerance_width=0.008)["parameters"]
         assert narrowed["averaging_limit"] == pytest.approx(0.008 / 3, abs=1e-9)
-        assert change(shop, averaging_limit=0.003, upper_deviation=0.002)["parameters"]["averaging_limit"] == 0.003
+        assert change(shop, averaging_limit=0.003, tolerance_width=0.01)["parameters"]["averaging_limit"] == 0.003
 
     def test_drawing_and_target_replace_each_other(self, server: Any) -> None:
         shop = Shop(server)
