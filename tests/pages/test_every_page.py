@@ -1,0 +1,188 @@
+"""Every page of the house, opened as people open it: no console error, no foreign request, nothing wider than the screen.
+
+The list is held against the routes of the application, so a new page is in it or the test fails.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from fastapi.routing import APIRoute
+from playwright.sync_api import Browser, Page, expect
+
+from app.main import ROUTERS
+from tests.conftest import Server
+from tests.shop import Person, Shop
+
+SIZES = {"desk": (1280, 800), "large": (1920, 1080), "panel": (800, 1280)}
+
+# By the address of the route: how it is opened, as a function of the shop.
+PAGES = {
+    "/": ["/", "/?show=attention"],
+    "/plant/{machine}": ["/plant/{machine}"],
+    "/characteristics/{characteristic}": [
+        "/characteristics/{characteristic}",
+        "/characteristics/{characteristic}?last=50&scale=true",
+        "/characteristics/{characteristic}?last=all&scale=time",
+        "/characteristics/{characteristic}?first=2&through=5&before=5",
+    ],
+    "/characteristics/{characteristic}/readings/{sequence}": ["/characteristics/{characteristic}/readings/3"],
+    "/alarms": ["/alarms", "/alarms?machine={machine}"],
+    "/alarms/history": ["/alarms/history"],
+    "/alarms/{number}": ["/alarms/{alarm}", "/alarms/{alarm}?action=keep_cutting"],
+    "/tools": ["/tools"],
+    "/machines/{machine}/tools": ["/machines/{machine}/tools?tool=3"],
+    "/machines/{machine}/corrections/{number}": ["/machines/{machine}/corrections/1"],
+    "/machines/{machine}/tools/{number}/{what}": [
+        "/machines/{machine}/tools/3/edit",
+        "/machines/{machine}/tools/3/change",
+    ],
+    "/machines/{machine}/averages/{location}/edit": ["/machines/{machine}/averages/5/edit"],
+    "/setup": ["/setup"],
+    "/setup/characteristics": ["/setup/characteristics"],
+    "/setup/characteristics/new": ["/setup/characteristics/new"],
+    "/setup/characteristics/{characteristic}": ["/setup/characteristics/{characteristic}"],
+    "/setup/machines": ["/setup/machines"],
+    "/setup/machines/new": ["/setup/machines/new"],
+    "/setup/machines/{machine}": ["/setup/machines/{machine}"],
+    "/setup/people": ["/setup/people"],
+    "/setup/audit": ["/setup/audit"],
+    "/account": ["/account"],
+    "/import": ["/import"],
+    "/api/docs": ["/api/docs"],
+}
+SIGNED_OUT = {"/sign-in", "/invitation/{token}"}
+OPENED_ELSEWHERE = {"/import/{token}"}  # needs a file that was sent; tests/imports
+PARTS = {"/plant-summary", "/alarms/count"}  # only ever fetched into a page
+
+
+def routes_of(router: Any) -> Iterator[APIRoute]:
+    """All routes of a router, those of the routers it includes too."""
+    for route in router.routes:
+        if isinstance(route, APIRoute):
+            yield route
+        elif hasattr(route, "original_router"):
+            yield from routes_of(route.original_router)
+
+
+def pages_of_the_house() -> set[str]:
+    """The addresses that answer with a page: GET routes that are not for programs."""
+    found = {route.path for router in ROUTERS for route in routes_of(router) if "GET" in (route.methods or ())}
+    return {path for path in found if not path.startswith(("/api/v1/", "/health/", "/metrics"))}
+
+
+def test_no_page_is_forgotten() -> None:
+    assert pages_of_the_house() == set(PAGES) | SIGNED_OUT | OPENED_ELSEWHERE | PARTS
+
+
+@pytest.fixture(scope="module")
+def shop(server: Server) -> Shop:
+    """A machine with something of everything: a worn tool, held and pending corrections, a long name, no data."""
+    made = Shop(server)
+    for deviation in (0.4, 3.0, 6.1, -12.5, 2.0, 0.2, 350.0):
+        made.read(deviation)
+    made.add(f"{made.characteristic}-empty", tool_memory=4)
+    made.add(f"{made.characteristic}-approval", tool_memory=5, average_memory=6, mode="approval")
+    made.read(6.0, f"{made.characteristic}-approval")
+    made.call(
+        "PATCH",
+        f"/characteristics/{made.characteristic}-empty",
+        name="Concentric recess with a name as long as drawings have them Ø118.750 P7/h6",
+        parameters={"zero_range": 0.0015},
+        reason="A reason that somebody took the time to write down in full, with everything that matters.",
+    )
+    return made
+
+
+@pytest.fixture(scope="module")
+def admin(server: Server) -> Person:
+    return Person(server, "admin")
+
+
+@pytest.fixture(params=SIZES)
+def sized(request: pytest.FixtureRequest, page: Page) -> Page:
+    width, height = SIZES[request.param]
+    page.set_viewport_size({"width": width, "height": height})
+    return page
+
+
+def addresses(shop: Shop) -> list[str]:
+    alarm = shop.alarms()[0]["id"]
+    values: dict[str, Any] = {"machine": shop.machine, "characteristic": shop.characteristic, "alarm": alarm}
+    return [address.format(**values) for opened in PAGES.values() for address in opened]
+
+
+def too_wide(page: Page) -> int:
+    """Pixels by which the page is wider than the screen."""
+    return int(page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth"))
+
+
+def test_every_page_opens_in_order(sized: Page, shop: Shop, admin: Person) -> None:
+    admin.sign_in(sized)
+    wide = []
+    for address in addresses(shop):
+        answer = sized.goto(address)
+        assert answer is not None
+        assert answer.status == 200, address
+        expect(sized.locator("main")).to_be_visible()
+        for chart in sized.locator("plotly-chart").all():
+            expect(chart.locator(".main-svg").first).to_be_attached()
+        if too_wide(sized) > 0:
+            wide.append((address, too_wide(sized)))
+    assert wide == []
+
+
+def test_pages_before_signing_in(sized: Page, shop: Shop) -> None:
+    invitation = shop.call("POST", "/people/invitations", 201, role="viewer")["url"]
+    for address in ("/sign-in", urlsplit(invitation).path):
+        sized.goto(address)
+        expect(sized.locator("h1")).to_have_count(1)
+        assert too_wide(sized) <= 0, address
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_letters_can_be_read_in_both_themes(
+    browser: Browser, server: Server, shop: Shop, admin: Person, scheme: Any
+) -> None:
+    """WCAG AA: 4.5 : 1 for words on their ground, wherever a page sets a colour of its own."""
+    context = browser.new_context(base_url=server.url, color_scheme=scheme, viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    admin.sign_in(page)
+    for address in (
+        "/",
+        f"/characteristics/{shop.characteristic}",
+        f"/characteristics/{shop.characteristic}/readings/7",
+    ):
+        page.goto(address)
+        expect(page.locator("h1")).to_be_visible()
+        assert page.evaluate(CONTRAST) == [], address
+    context.close()
+
+
+# Visible words whose colour is too near to the first opaque ground behind them.
+CONTRAST = """() => {
+  const canvas = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+  const rgba = (colour) => {
+    canvas.clearRect(0, 0, 1, 1); canvas.fillStyle = colour; canvas.fillRect(0, 0, 1, 1);
+    return [...canvas.getImageData(0, 0, 1, 1).data];
+  };
+  const light = ([r, g, b]) => [r, g, b].map((v) => v / 255)
+    .map((v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4).reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+  const ground = (element) => {
+    for (let at = element; at; at = at.parentElement) {
+      const colour = rgba(getComputedStyle(at).backgroundColor);
+      if (colour[3] > 250) return colour;
+    }
+    return [255, 255, 255, 255];
+  };
+  const poor = new Set();
+  for (const element of document.querySelectorAll("main *")) {
+    const words = [...element.childNodes].filter((n) => n.nodeType === 3 && n.data.trim()).map((n) => n.data.trim()).join(" ");
+    if (!words || !element.checkVisibility({ visibilityProperty: true }) || element.closest("svg, .visually-hidden")) continue;
+    const [a, b] = [light(rgba(getComputedStyle(element).color)), light(ground(element))];
+    const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    if (ratio < 4.5) poor.add(`${words.slice(0, 40)}: ${ratio.toFixed(2)}`);
+  }
+  return [...poor];
+}"""
