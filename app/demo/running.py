@@ -113,6 +113,10 @@ class Line:
         """Take over the offsets that the server knows, after a start with an older history."""
         tools = self._tools()
         self.machine.settle({number: tool["offset"] for number, tool in tools.items()})
+        for number, tool in tools.items():
+            waiting = [correction["number"] for correction in tool["open_corrections"]]
+            last = tool["last_correction"]
+            self.machine.edges[number].in_effect = min(waiting) - 1 if waiting else last["number"] if last else 0
 
     def live(self, pace: Pace) -> None:
         """Cut and measure until the plant ends."""

@@ -130,6 +130,24 @@ def wait_for_standstill(line: Line) -> int:
     return serial
 
 
+@pytest.mark.slow
+def test_a_second_run_is_judged_by_what_was_in_effect_before_it(server: Server, filled: list[Line]) -> None:
+    (again,) = lines(server.url, server.key("admin"), 2, threading.Event(), [plant.MILL_1])
+    again.settle()
+    again.pace = filled[2].pace
+    again.machine.stand(again.pace.origin)
+    for _part in range(8):
+        again.machine.cut()
+        again._push(again.machine.measure())
+    again.close()
+    last = readings(server, "plate-w20")[-6:]
+    assert last[0]["key"].startswith(again._run)
+    assert {number for reading in last for number in reading["outstanding"]} <= {
+        reading["correction"]["number"] for reading in last if reading["correction"]
+    }, "what was corrected before is in effect"
+    assert all(abs(reading["decided_deviation"]) < 0.012 for reading in last)
+
+
 def test_setting_up_twice_finds_what_is_there(server: Server) -> None:
     admin = Client(server.url, server.key("admin"), threading.Event())
     spec = plant.MILL_1
