@@ -38,15 +38,15 @@ def number(text: str, decimal: str) -> float:
     if not given:
         raise Unreadable(_("is empty; remove the line if the probe measured nothing"))
     other = "." if decimal == "," else ","
-    if other in given:
-        if decimal in given:
-            raise Unreadable(_("has a point and a comma; write it without a separator of thousands"))
+    if other in given and _NUMBER.fullmatch(given.replace(other, ".")):
         raise Unreadable(
             _("has a {other}, but decimals are read with a {decimal}; say so if all are written with a {other}").format(
                 other=_sign(other), decimal=_sign(decimal)
             )
         )
-    given = given.replace(",", ".")
+    if other in given and _NUMBER.fullmatch(given.replace(other, "").replace(decimal, ".")):
+        raise Unreadable(_("has a point and a comma; write it without a separator of thousands"))
+    given = given.replace(decimal, ".")
     if not _NUMBER.fullmatch(given):
         raise Unreadable(_("is not a number; write it like 39{decimal}9981, without a unit").format(decimal=decimal))
     value = float(given)
