@@ -18,6 +18,7 @@ from app.cli.base import cli, explain, say
 PARTS = (
     "app.cli.serve",
     "app.cli.database",
+    "app.cli.backup",
     "app.cli.people",
     "app.cli.data",
     "app.cli.replay",

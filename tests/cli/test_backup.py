@@ -1,0 +1,69 @@
+"""What is backed up comes back, whole, and over nothing that is there."""
+
+import os
+import stat
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import psycopg
+import pytest
+
+from app.settings import HOUSE
+from tests.conftest import Server, drop_database, in_database
+from tests.shop import Shop
+
+Run = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def inband() -> Run:
+    def run(*words: object, expect: int = 0) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "app", *map(str, words)]
+        done = subprocess.run(command, cwd=HOUSE, capture_output=True, text=True, env=dict(os.environ))
+        assert done.returncode == expect, done.stderr
+        return done
+
+    return run
+
+
+def test_a_backup_of_a_running_server_comes_back_whole(
+    server: Server, postgres: str, inband: Run, tmp_path: Path
+) -> None:
+    shop = Shop(server)
+    shop.read(6.1, key="part-1")
+    file, empty = tmp_path / "inband.dump", in_database(postgres, "restored_backup")
+    inband("backup", file, "--database-url", server.database.dsn)
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+    with psycopg.connect(postgres, autocommit=True) as connection:
+        connection.execute("CREATE DATABASE restored_backup")
+    try:
+        inband("restore", file, "--database-url", empty)
+        readings = "SELECT measured, key, correction FROM reading"
+        with psycopg.connect(server.database.dsn) as before, psycopg.connect(empty) as after:
+            assert after.execute(readings).fetchall() == before.execute(readings).fetchall() == [(40.0061, "part-1", 1)]
+        again = inband("restore", file, "--database-url", empty, expect=1)
+        assert "empty one only" in again.stderr
+    finally:
+        drop_database(empty)
+
+
+def test_a_backup_replaces_no_file(server: Server, inband: Run, tmp_path: Path) -> None:
+    file = tmp_path / "inband.dump"
+    file.write_text("an older backup")
+    refused = inband("backup", file, "--database-url", server.database.dsn, expect=1)
+    assert "is there already" in refused.stderr
+    assert file.read_text() == "an older backup"
+
+
+def test_a_backup_that_fails_leaves_nothing_half_done(server: Server, inband: Run, tmp_path: Path) -> None:
+    nowhere = in_database(server.database.dsn, "no_such_database")
+    refused = inband("backup", tmp_path / "inband.dump", "--database-url", nowhere, expect=1)
+    assert "no_such_database" in refused.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_no_backup_is_refused_in_words(inband: Run, tmp_path: Path) -> None:
+    refused = inband("restore", tmp_path / "nothing.dump", expect=1)
+    assert "There is no file" in refused.stderr

@@ -1,0 +1,187 @@
+"""The documents say what is true: commands run, answers are as printed, lists are complete, links lead somewhere."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.settings import HOUSE, Settings
+from docs import generate
+from tests.conftest import Server
+
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]*)?\)")
+BETWEEN = "----8<----"
+
+# For computers without curl: what the documents use of it.
+CURL = """#!{python}
+import sys, httpx
+words, headers, data, url = sys.argv[1:], {{}}, None, ""
+while words:
+    word = words.pop(0)
+    if word == "-H":
+        name, _, value = words.pop(0).partition(": ")
+        headers[name] = value
+    elif word == "-d":
+        data = words.pop(0).encode()
+    elif word != "-sS":
+        url = word
+print(httpx.request("GET" if data is None else "POST", url, headers=headers, content=data).text, end="")
+"""
+
+
+def blocks(path: Path) -> list[tuple[str, str]]:
+    """Language and text of every fenced block."""
+    return [(kind, text) for kind, text in BLOCK.findall(path.read_text())]
+
+
+def shell(path: Path, server: Server, folder: Path) -> list[str]:
+    """Run the shell blocks of a document one after the other in one shell, against this server; what each printed."""
+    bin_ = folder / ".venv" / "bin"
+    bin_.mkdir(parents=True)
+    (bin_ / "inband").write_text(f'#!/bin/sh\nPYTHONPATH={HOUSE} exec {sys.executable} -m app "$@"\n')
+    if shutil.which("curl") is None:
+        (bin_ / "curl").write_text(CURL.format(python=sys.executable))
+    for program in bin_.iterdir():
+        program.chmod(0o755)
+    script = f"echo '{BETWEEN}'\n".join(f"{text}\necho\n" for kind, text in blocks(path) if kind == "sh")
+    done = subprocess.run(
+        ["sh", "-euc", script.replace("http://127.0.0.1:8000", server.url)],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        env=os.environ
+        | {"PATH": f"{os.environ['PATH']}:{bin_}", "INBAND_DATABASE_URL": server.database.dsn, "NO_PROXY": "*"},
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split(f"{BETWEEN}\n")
+
+
+def parts_that_differ(said: Any, printed: Any, where: str = "") -> list[str]:
+    """Where the printed answer says something else than the real one; it may leave fields out."""
+    if isinstance(printed, dict) and isinstance(said, dict):
+        return [
+            each
+            for name, value in printed.items()
+            for each in parts_that_differ(said.get(name, "nothing"), value, f"{where}.{name}")
+        ]
+    if isinstance(printed, list) and isinstance(said, list) and len(printed) == len(said):
+        return [
+            each for at, value in enumerate(printed) for each in parts_that_differ(said[at], value, f"{where}[{at}]")
+        ]
+    return [] if said == printed else [f"{where}: {printed!r} is printed, {said!r} was answered"]
+
+
+class TestReadme:
+    def test_its_commands_work_and_answer_as_printed(self, server: Server, tmp_path: Path) -> None:
+        readme = HOUSE / "README.md"
+        printed = shell(readme, server, tmp_path)
+        kinds = [kind for kind, _text in blocks(readme)]
+        texts = [text for _kind, text in blocks(readme)]
+        compared = 0
+        for at, kind in enumerate(kinds):
+            if kind == "json":
+                answer = printed[kinds[:at].count("sh") - 1].strip().splitlines()[-1]
+                assert parts_that_differ(json.loads(answer), json.loads(texts[at])) == []
+                compared += 1
+        assert compared >= 5
+
+    def test_it_says_what_it_is_for_in_three_sentences(self) -> None:
+        first = re.search(r"^# Inband\n\n(.*?)\n\n!\[", (HOUSE / "README.md").read_text(), re.DOTALL)
+        assert first
+        assert len(re.findall(r"[.!?](?:\s|$)", first[1])) == 3
+
+    def test_it_names_every_command_and_every_variable(self) -> None:
+        text = (HOUSE / "README.md").read_text()
+        for name, _command in generate.commands():
+            assert f"`{name}`" in text
+        for name in Settings.model_fields:
+            assert f"`INBAND_{name.upper()}`" in text
+
+    def test_the_help_names_the_same_commands(self) -> None:
+        done = subprocess.run(
+            [sys.executable, "-m", "app", "--help"],
+            cwd=HOUSE,
+            capture_output=True,
+            text=True,
+            env=os.environ | {"COLUMNS": "200"},
+        )
+        for name, _command in generate.commands():
+            assert f" {name.split()[1]} " in done.stdout
+
+    def test_the_picture_is_there_and_small(self) -> None:
+        assert 10_000 < (HOUSE / "docs" / "images" / "zone-chart.png").stat().st_size < 200_000
+
+
+class TestEveryDocument:
+    @pytest.mark.parametrize("path", generate.documents(), ids=lambda path: path.relative_to(HOUSE).as_posix())
+    def test_generated_parts_are_up_to_date(self, path: Path) -> None:
+        text = path.read_text()
+        assert text == generate.renewed(text), "run: python -m docs.generate"
+
+    @pytest.mark.parametrize("path", generate.documents(), ids=lambda path: path.relative_to(HOUSE).as_posix())
+    def test_links_lead_somewhere(self, path: Path) -> None:
+        text = path.read_text()
+        for target, heading in LINK.findall(text):
+            if "://" in target:
+                continue
+            found = (path.parent / target).resolve()
+            assert found.exists(), target
+            if heading:
+                headings = re.findall(r"^#+ (.*)$", found.read_text(), re.MULTILINE)
+                assert heading[1:] in {re.sub(r"[^\w -]", "", each.lower()).replace(" ", "-") for each in headings}
+
+    def test_every_document_can_be_reached_from_the_readme(self) -> None:
+        seen: set[Path] = set()
+        todo = [HOUSE / "README.md"]
+        while todo:
+            path = todo.pop()
+            if path in seen or path.suffix != ".md":
+                continue
+            seen.add(path)
+            todo += [
+                (path.parent / target).resolve() for target, _ in LINK.findall(path.read_text()) if "://" not in target
+            ]
+        assert seen == set(generate.documents())
+
+    def test_paths_of_the_tree_exist(self) -> None:
+        for path in generate.documents():
+            for named in re.findall(r"`((?:app|tests|docs|bench|frontend|migrations)/[\w./-]*)`", path.read_text()):
+                assert (HOUSE / named).exists(), f"{path.name}: {named}"
+
+
+class TestReference:
+    @pytest.mark.parametrize("kind", generate.vocabulary())
+    def test_every_word_is_explained(self, kind: str) -> None:
+        text = "".join(path.read_text() for path in (HOUSE / "docs" / "reference").glob("*.md"))
+        missing = [word for word in generate.vocabulary()[kind] if not re.search(rf"`{word}(_total)?`", text)]
+        assert missing == []
+
+    def test_every_event_is_explained(self) -> None:
+        source = "".join(path.read_text() for path in (HOUSE / "app").rglob("*.py"))
+        kinds = set(re.findall(r'"kind": "(\w+)",?\s*"machine"', source)) | {"heartbeat", "hello", "resync"}
+        text = (HOUSE / "docs" / "reference" / "events.md").read_text()
+        assert kinds >= {"reading", "correction", "alarm", "tool", "average", "characteristic", "machine"}
+        assert {kind for kind in kinds if f"| `{kind}` |" not in text} == set()
+
+    def test_a_part_that_nobody_makes_is_an_error(self) -> None:
+        with pytest.raises(KeyError):
+            generate.renewed("<!-- generated: nothing-like-it -->\n<!-- end -->")
+
+
+class TestHowTo:
+    def test_backing_up_works_as_it_is_written(self, server: Server, tmp_path: Path) -> None:
+        text = (HOUSE / "docs" / "how-to" / "back-up.md").read_text()
+        assert "inband backup inband-monday.dump" in text
+        document = tmp_path / "document.md"
+        restore = ".venv/bin/inband restore"  # into a database of its own, not into the one that the test's variable names
+        document.write_text(text.replace(restore, f"env -u INBAND_DATABASE_URL {restore}"))
+        shell(document, server, tmp_path)
+        assert (tmp_path / "inband-monday.dump").stat().st_size > 10_000
+        assert (tmp_path / "restored" / "postgres").is_dir()
