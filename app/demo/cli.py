@@ -14,6 +14,7 @@ from app.demo.client import Ending, Refused
 from app.demo.installing import lines, run_line
 from app.demo.running import Line
 from app.settings import Settings
+from app.web.i18n import _
 
 log = logging.getLogger(__name__)
 
@@ -38,9 +39,9 @@ def demo(
     def prepare(database: Database, settings: Settings) -> None:
         passwords = people.sign_ins(database, settings)
         plant_key.append(people.plant_key(database))
-        say(f"Sign in as one of these (kept for the next start in {people.file_of(settings)}):")
+        say(_("Sign in as one of these (kept for the next start in {file}):").format(file=people.file_of(settings)))
         for name in people.PEOPLE:
-            say(f"  {name:<9} {passwords.get(name, '(the password you have chosen)')}", style="bold")
+            say(f"  {name:<9} {passwords.get(name, _('(the password you have chosen)'))}", style="bold")
 
     def beside(settings: Settings) -> None:
         start(settings, plant_key[0], seed, speed)
@@ -52,7 +53,7 @@ def start(settings: Settings, key: str, seed: int, speed: float) -> None:
     """Set the plant up and let every machine run in a thread of its own until the server's process ends."""
     ending = threading.Event()
     made = lines(f"http://{_here(settings.host)}:{settings.port}", key, seed, ending)
-    say("The plant is starting: it pushes some hours of the past, then goes on live.")
+    say(_("The plant is starting: it pushes some hours of the past, then goes on live."))
     for line in made:
         threading.Thread(target=_run, args=(line, speed), name=f"demo {line.key}", daemon=True).start()
 
@@ -63,7 +64,7 @@ def _run(line: Line, speed: float) -> None:
     except Ending:
         pass
     except Refused as refusal:
-        say(f"The simulated machine {line.key} has ended: {refusal}", style="bold red")
+        say(_("The simulated machine {key} has ended: {why}").format(key=line.key, why=refusal), style="bold red")
     except Exception:
         log.exception("the simulated machine %s has ended", line.key)
 

@@ -17,6 +17,7 @@ from app.errors import InbandError
 from app.machines import queries as machines
 from app.people import actions, queries
 from app.settings import Settings
+from app.web.i18n import _
 
 PEOPLE = {"engineer": "engineer", "operator": "operator", "admin": "admin"}  # name and role
 ACTOR = "inband demo"
@@ -62,11 +63,15 @@ def _refuse_a_real_plant(session: Session, settings: Settings, path: Path) -> No
     present = {machine.key for machine in machines.machines(session)}
     own = {machine.key for machine in plant.MACHINES}
     if present and not (present & own and path.exists()):
-        where = "The database" if settings.database_url else str(settings.data_dir)
+        where = _("The database") if settings.database_url else str(settings.data_dir)
         raise InbandError(
-            f"{where} holds a plant already, and the demonstration would mix its simulated readings into it.",
-            "Give the demonstration a folder of its own: inband demo --data-dir FOLDER. "
-            "To serve what is there: inband serve",
+            _("{where} holds a plant already, and the demonstration would mix its simulated readings into it.").format(
+                where=where
+            ),
+            _(
+                "Give the demonstration a folder of its own: inband demo --data-dir FOLDER. "
+                "To serve what is there: inband serve"
+            ),
         )
 
 

@@ -7,6 +7,7 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -26,6 +27,7 @@ from app.readings.importing.actions import import_readings
 from app.readings.importing.history import Flawed, Summary
 from app.readings.importing.layout import Wishes, look
 from app.settings import HOUSE
+from tests.conftest import RunServer
 
 
 @pytest.fixture
@@ -247,6 +249,26 @@ def test_a_long_file_takes_seconds_and_little_memory(plant: Database, tmp_path: 
     assert grown < 40_000, f"{grown} kB more for 200,000 lines"
     assert took < 120, f"{took:.0f} s"
     assert scalar(plant, "SELECT max(sequence) FROM reading") == 201_000
+
+
+@pytest.mark.slow
+def test_the_machine_goes_on_while_its_past_is_imported(run_server: RunServer, tmp_path: Path) -> None:
+    with run_server() as server:
+        set_up(server.database)
+        path = table(
+            tmp_path / "long.csv", [39.992 + at % 9 / 1000 for at in range(20_000)], begin="2020-01-01T00:00:00Z"
+        )
+        client, pushed = server.client(server.key(machine="lathe-1")), 0
+        importing = threading.Thread(target=run, args=(server.database, path))
+        importing.start()
+        while importing.is_alive() or pushed < 20:
+            body = {"characteristic": "shaft-d40", "measured": 39.992, "key": f"live-{pushed}"}
+            assert client.post("/api/v1/readings", json=body).status_code == 201
+            pushed += 1
+        importing.join()
+        with server.database.begin() as session:
+            found = session.execute(text("SELECT count(*), max(sequence), count(DISTINCT sequence) FROM reading")).one()
+    assert tuple(found) == (20_000 + pushed,) * 3
 
 
 @pytest.mark.slow
