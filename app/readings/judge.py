@@ -60,6 +60,7 @@ class IssuedCorrection:
     sequence: int = 0
     size_error: float = 0.0
     applied_at: datetime | None = None
+    decided_at: datetime | None = None  # a person approved or released it
     applied_by: str | None = None
     offset_after: float | None = None
     superseded_by: int | None = None
@@ -109,6 +110,22 @@ class StreamState:
 
 
 @dataclass(slots=True)
+class Named:
+    """The last correction that a machine had applied when it cut a part: when that was, and when a person let it go."""
+
+    applied_at: datetime | None
+    decided_at: datetime | None
+
+
+class Known(NamedTuple):
+    """A reading in the record whose key has come again."""
+
+    sequence: int
+    measured: float
+    parameters: Parameters
+
+
+@dataclass(slots=True)
 class Step:
     """A change of a tool offset to be written into its history."""
 
@@ -130,7 +147,8 @@ class Ground:
     averages: dict[tuple[int, int], AverageState] = field(default_factory=dict)
     tool_alarms: dict[tuple[int, int, str], OpenAlarm] = field(default_factory=dict)
     last_correction: dict[int, int] = field(default_factory=dict)
-    stored_keys: dict[tuple[int, str], tuple[int, float]] = field(default_factory=dict)
+    named: dict[tuple[int, int], Named] = field(default_factory=dict)
+    stored_keys: dict[tuple[int, str], Known] = field(default_factory=dict)
     verdicts: "list[Verdict]" = field(default_factory=list)
     by_key: "dict[tuple[int, str], Verdict]" = field(default_factory=dict)
     issued: list[IssuedCorrection] = field(default_factory=list)
@@ -203,9 +221,9 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
     """
     stream = ground.streams[entry.characteristic_id]
     parameters = stream.parameters
-    measured, sections = _measured(parameters, reading)
-    if reading.key is not None and (known := _known(ground, entry, reading.key, measured)):
+    if reading.key is not None and (known := _known(ground, entry, reading.key, reading)):
         return known
+    measured, sections = _measured(parameters, reading)
     tool = stream.tool
     in_effect = reading.correction_in_effect
     if in_effect is not None and in_effect > ground.last_correction[entry.machine_id]:
@@ -223,8 +241,9 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
     if tool is not None:
         if tool.corrections and in_effect is not None:
             _confirm(ground, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
-        previous_tool = _cut_before_reset(tool, reading)
-        outstanding = [c for c in tool.corrections if _not_in_effect(c, tool, reading)]
+        last_applied = None if in_effect is None else ground.named.get((tool.machine_id, in_effect))
+        previous_tool = _cut_before_reset(tool, reading, last_applied)
+        outstanding = [c for c in tool.corrections if _not_in_effect(c, tool, reading, last_applied)]
 
     average = stream.average
     decision = decide(
@@ -302,16 +321,18 @@ def _measured(parameters: Parameters, reading: ReadingIn) -> tuple[float, tuple[
     return value.value, value.points
 
 
-def _known(ground: Ground, entry: Entry, key: str, measured: float) -> Verdict | Stored | None:
-    """The first reading with this key, here or in the record; the same key with another value is refused."""
-    here = ground.by_key.get((entry.characteristic_id, key))
-    if here is not None:
-        sequence, value = here.sequence, here.measured
-    else:
-        stored = ground.stored_keys.get((entry.characteristic_id, key))
-        if stored is None:
-            return None
-        sequence, value = stored
+def _known(ground: Ground, entry: Entry, key: str, reading: ReadingIn) -> Verdict | Stored | None:
+    """The first reading with this key, here or in the record; the same key with another value is refused.
+
+    Touches are made into a value as they were then, whatever the characteristic expects by now.
+    """
+    at = (entry.characteristic_id, key)
+    here = ground.by_key.get(at)
+    first = here or ground.stored_keys.get(at)
+    if first is None:
+        return None
+    sequence, value = first.sequence, first.measured
+    measured, _sections = _measured(first.parameters, reading)
     if round(value - measured, DECIMALS) != 0:
         raise Conflict(
             _(
@@ -332,8 +353,9 @@ def _known(ground: Ground, entry: Entry, key: str, measured: float) -> Verdict |
 
 def _confirm(ground: Ground, stream: StreamState, tool: ToolState, in_effect: int, at: datetime) -> None:
     """The machine says it cut with correction `in_effect`: this tool's pending ones up to it are applied."""
+    last = ground.named.get((tool.machine_id, in_effect))
     for correction in tool.corrections:
-        if correction.number > in_effect or correction.status != "pending":
+        if correction.status != "pending" or not _had(correction, in_effect, last):
             continue
         before = tool.offset
         tool.offset = round(before + correction.amount, DECIMALS)
@@ -342,11 +364,28 @@ def _confirm(ground: Ground, stream: StreamState, tool: ToolState, in_effect: in
         actor = f"reading {stream.entry.characteristic} {stream.sequence + 1}"
         correction.status, correction.applied_at, correction.applied_by = "applied", at, actor
         correction.offset_after, correction.changed = tool.offset, True
+        if last is not None and correction.number == in_effect:
+            last.applied_at = at
         ground.steps.append(Step(tool.machine_id, tool.number, at, before, tool.offset, correction.number, actor))
         ground.touched_machines.add(tool.machine_id)
 
 
-def _cut_before_reset(tool: ToolState, reading: ReadingIn) -> bool:
+def _had(correction: IssuedCorrection, in_effect: int, last: Named | None) -> bool:
+    """Whether a machine whose last applied correction was `in_effect` had applied this one too.
+
+    Corrections take effect in the order of their numbers, but one that waited for a person may have been overtaken.
+    """
+    if correction.number == in_effect:
+        return True
+    if correction.number < in_effect:
+        since = last.applied_at if last is not None else None
+        return correction.decided_at is None or since is None or correction.decided_at <= since
+    if last is None or last.decided_at is None or correction.applied_at is None:
+        return False
+    return correction.applied_at < last.decided_at
+
+
+def _cut_before_reset(tool: ToolState, reading: ReadingIn, last: Named | None) -> bool:
     """Whether the part was cut before the tool was changed or its offset edited by hand.
 
     Told by `machined_at`, or by a correction that was applied before that moment and was not yet in effect.
@@ -359,22 +398,24 @@ def _cut_before_reset(tool: ToolState, reading: ReadingIn) -> bool:
         return False
     return any(
         c.status == "applied"
-        and c.number > reading.correction_in_effect
+        and not _had(c, reading.correction_in_effect, last)
         and c.applied_at is not None
         and c.applied_at <= tool.reset_at
         for c in tool.corrections
     )
 
 
-def _not_in_effect(correction: IssuedCorrection, tool: ToolState, reading: ReadingIn) -> bool:
+def _not_in_effect(correction: IssuedCorrection, tool: ToolState, reading: ReadingIn, last: Named | None) -> bool:
     """Whether the part of this reading was cut without that correction, which has been issued since."""
+    if correction.status == "awaiting_approval":
+        return True
     if correction.status not in OUTSTANDING and correction.status != "applied":
         return False
     applied_at = correction.applied_at
     if applied_at is not None and tool.reset_at is not None and applied_at <= tool.reset_at:
         return False  # it went out with the tool, or was written over by hand
     if reading.correction_in_effect is not None:
-        return correction.number > reading.correction_in_effect
+        return not _had(correction, reading.correction_in_effect, last)
     if reading.machined_at is not None:
         return applied_at is None or applied_at > reading.machined_at
     return applied_at is None

@@ -17,7 +17,16 @@ from app.core.parameters import Parameters
 from app.core.zones import Zone
 from app.db.events import PUBLISHED
 from app.db.pipeline import Pipeline
-from app.readings.judge import AverageState, Ground, IssuedCorrection, OpenAlarm, StreamState, ToolState
+from app.readings.judge import (
+    AverageState,
+    Ground,
+    IssuedCorrection,
+    Known,
+    Named,
+    OpenAlarm,
+    StreamState,
+    ToolState,
+)
 from app.readings.records import Entry, Record
 from app.readings.schemas import ReadingIn
 
@@ -31,28 +40,36 @@ SELECT machine_id, last_correction, pg_current_xact_id()::text FROM machine_stat
 WHERE machine_id = ANY($1::int[]) ORDER BY machine_id FOR UPDATE
 """
 # One statement for all that is needed, as one JSON document, because each statement costs more than what it reads here.
-# Corrections of a tool: the open ones, and those applied since the oldest correction or time that a reading names.
+# Corrections of a tool: the open ones, and those applied since the oldest correction or time that a reading names; `named`
+# are the corrections that readings name as the last ones in effect.
 # The row comparison with the keys can only be had from their own index; plain equalities the planner may also answer by
 # walking the primary key through every reading of the characteristic.
 LOAD = """
-WITH doc AS MATERIALIZED (SELECT $1::json AS d)
+WITH doc AS MATERIALIZED (SELECT $1::json AS d),
+named AS MATERIALIZED (
+    SELECT c.machine_id, c.number, c.applied_at, c.decided_at
+    FROM json_to_recordset((SELECT d -> 'named' FROM doc)) AS w(machine_id int, number int)
+    JOIN correction c ON c.machine_id = w.machine_id AND c.number = w.number
+)
 SELECT json_build_object(
     'streams', (
         SELECT json_agg(json_build_array(s.machine_id, s.characteristic_id, s.sequence, s.parameters_version, s.paused_by,
             s.last_measured_at, a.location, a.average, a.empirical_value, t.number, t."offset", t.total, t.reset_at,
             CASE WHEN t.number IS NOT NULL THEN (
-                SELECT json_agg(json_build_array(c.number, c.amount, c.status, c.applied_at) ORDER BY c.number) FROM (
-                    SELECT number, amount, status, applied_at FROM correction
+                SELECT json_agg(json_build_array(c.number, c.amount, c.status, c.applied_at, c.decided_at) ORDER BY c.number) FROM (
+                    SELECT number, amount, status, applied_at, decided_at FROM correction
                     WHERE machine_id = t.machine_id AND tool_memory = t.number
                         AND status IN ('held', 'awaiting_approval', 'pending')
                     UNION ALL
-                    SELECT number, amount, status, applied_at FROM correction
+                    SELECT number, amount, status, applied_at, decided_at FROM correction
                     WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
                         AND number > w.number
                     UNION ALL
-                    SELECT number, amount, status, applied_at FROM correction
+                    SELECT number, amount, status, applied_at, decided_at FROM correction
                     WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
-                        AND applied_at > w.since AND (number <= w.number OR w.number IS NULL)
+                        AND applied_at > least(
+                            w.since, (SELECT min(n.applied_at) FROM named n WHERE n.machine_id = t.machine_id)
+                        ) AND (number <= w.number OR w.number IS NULL)
                 ) c
             ) END))
         FROM json_to_recordset((SELECT d -> 'streams' FROM doc))
@@ -61,8 +78,9 @@ SELECT json_build_object(
         LEFT JOIN average_memory a ON a.machine_id = s.machine_id AND a.location = s.average_memory
         LEFT JOIN tool t ON t.machine_id = s.machine_id AND t.number = s.tool_memory
     ),
+    'named', (SELECT json_agg(json_build_array(machine_id, number, applied_at, decided_at)) FROM named),
     'known', (
-        SELECT json_agg(json_build_array(r.characteristic_id, r.key, r.sequence, r.measured))
+        SELECT json_agg(json_build_array(r.characteristic_id, r.key, r.sequence, r.measured, r.parameters_version))
         FROM json_to_recordset((SELECT d -> 'keys' FROM doc)) AS w(machine_id int, characteristic_id int, key text)
         CROSS JOIN LATERAL (
             SELECT * FROM reading
@@ -201,6 +219,7 @@ class _Issued(msgspec.Struct, array_like=True):
     amount: float
     status: str
     applied_at: datetime | None
+    decided_at: datetime | None
 
 
 class _Stream(msgspec.Struct, array_like=True):
@@ -222,7 +241,8 @@ class _Stream(msgspec.Struct, array_like=True):
 
 class _Loaded(msgspec.Struct):
     streams: list[_Stream]
-    known: list[tuple[int, str, int, float]] | None
+    named: list[tuple[int, int, datetime | None, datetime | None]] | None
+    known: list[tuple[int, str, int, float, int]] | None
 
 
 _loaded = msgspec.json.Decoder(_Loaded)
@@ -237,6 +257,12 @@ async def load(pipeline: Pipeline, book: Book, wanted: Sequence[tuple[Entry, Rea
             {"machine_id": e.machine_id, "characteristic_id": e.characteristic_id, **machines[e.machine_id]}
             for e in entries.values()
         ],
+        "named": [
+            {"machine_id": machine_id, "number": number}
+            for machine_id, number in {
+                (e.machine_id, r.correction_in_effect) for e, r in wanted if r.correction_in_effect is not None
+            }
+        ],
         "keys": [
             {"machine_id": e.machine_id, "characteristic_id": e.characteristic_id, "key": r.key}
             for e, r in wanted
@@ -250,9 +276,13 @@ async def load(pipeline: Pipeline, book: Book, wanted: Sequence[tuple[Entry, Rea
     ground = Ground()
     ground.last_correction = {int(machine_id or 0): int(last or 0) for machine_id, last, _transaction in locked}
     for row in loaded.streams:
-        parameters = book.get((row.characteristic_id, row.version)) or await _look_up(pipeline, book, row)
+        parameters = await _parameters(pipeline, book, row.machine_id, row.characteristic_id, row.version)
         _add_stream(ground, entries[row.characteristic_id], parameters, row)
-    ground.stored_keys = {(c, key): (sequence, measured) for c, key, sequence, measured in loaded.known or ()}
+    for machine_id, number, applied_at, decided_at in loaded.named or ():
+        ground.named[machine_id, number] = Named(applied_at, decided_at)
+    for c, key, sequence, measured, version in loaded.known or ():
+        parameters = await _parameters(pipeline, book, entries[c].machine_id, c, version)
+        ground.stored_keys[c, key] = Known(sequence, measured, parameters)
     return ground, (locked[0][2] or b"").decode()
 
 
@@ -275,10 +305,14 @@ def _machines(wanted: Iterable[tuple[Entry, ReadingIn]]) -> dict[int, dict[str, 
     return machines
 
 
-async def _look_up(pipeline: Pipeline, book: Book, row: _Stream) -> Parameters:
-    wanted = {"machine_id": row.machine_id, "characteristic_id": row.characteristic_id, "version": row.version}
-    (((text,),),) = await pipeline.run(((PARAMETERS, as_json(wanted)),))  # a version that is named is there
-    parameters = book[row.characteristic_id, row.version] = Parameters.from_dict(msgspec.json.decode(text or b""))
+async def _parameters(
+    pipeline: Pipeline, book: Book, machine_id: int, characteristic_id: int, version: int
+) -> Parameters:
+    parameters = book.get((characteristic_id, version))
+    if parameters is None:
+        wanted = {"machine_id": machine_id, "characteristic_id": characteristic_id, "version": version}
+        (((text,),),) = await pipeline.run(((PARAMETERS, as_json(wanted)),))  # a version that is named is there
+        parameters = book[characteristic_id, version] = Parameters.from_dict(msgspec.json.decode(text or b""))
     return parameters
 
 
@@ -297,7 +331,15 @@ def _add_stream(ground: Ground, entry: Entry, parameters: Parameters, row: _Stre
                 row.machine_id, row.tool, row.offset or 0.0, row.total or 0.0, row.reset_at
             )
             tool.corrections = [
-                IssuedCorrection(row.machine_id, c.number, row.tool, c.amount, c.status, applied_at=c.applied_at)
+                IssuedCorrection(
+                    row.machine_id,
+                    c.number,
+                    row.tool,
+                    c.amount,
+                    c.status,
+                    applied_at=c.applied_at,
+                    decided_at=c.decided_at,
+                )
                 for c in row.corrections or ()
             ]
     ground.streams[row.characteristic_id] = StreamState(
