@@ -2,12 +2,13 @@
 # make test    lint, then every test on a real PostgreSQL and in a real browser; ARGS="-k name" for some of them
 # make lint    style, types and the walls between the parts of the house
 # make bench   the benchmarks; each prints ratios
+# make messages  collect what can be translated into frontend/locale/inband.pot
 # make clean   remove what make has made; no data
 
 SHELL := /bin/sh
 .SHELLFLAGS := -eu -c
 .DELETE_ON_ERROR:
-.PHONY: run test lint bench clean
+.PHONY: run test lint bench messages clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -30,6 +31,9 @@ lint: $(VENV)/installed-dev
 
 bench: $(VENV)/installed-dev
 	@for each in single batch chart; do $(BIN)/python -m bench.$$each; done
+
+messages: $(VENV)/installed
+	@$(BIN)/pybabel -q extract -F pyproject.toml --project Inband -o frontend/locale/inband.pot .
 
 clean:
 	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
