@@ -6,7 +6,7 @@ chart, by an index, however many there are.
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from sqlalchemy import select, text
@@ -24,9 +24,10 @@ from app.statistics.queries import Course, Window
 from app.web.i18n import _
 
 MOST_STEPS = 500
-MOST_SAMPLED = 300  # of more corrections than that, so many are shown, evenly spread
+MOST_SAMPLED = 200  # of more corrections than that, so many are shown, evenly spread
 MOST_BEFORE = 5_000  # corrections of a tool's life that are added up to where the chart begins
 MOST_ALARMS = 200
+MOST_MARKS = 24  # side by side, without covering each other
 MOST_CHANGES = 100
 MOST_MOMENTS = 200
 MOST_RUN = 2_000
@@ -67,7 +68,12 @@ def chart_of(session: Session, standing: Standing, window: Window) -> Chart:
     course = statistics.course_of(session, standing.characteristic, window)
     has_memory = parameters.average_memory > 0
     changes = _changes(session, standing, course, window)
+    marks = [*_alarms(session, standing, window), *_change_marks(standing, window, changes)]
+    shown = _thinned(marks, window)
     steps = _steps(session, standing, window, changes)
+    before = _total_before(session, standing, window, changes) if window.count else 0.0
+    if len(shown) < len(marks):
+        steps = _added_up(steps, changes, before)
     return Chart(
         blocks=[
             Block(
@@ -94,22 +100,8 @@ def chart_of(session: Session, standing: Standing, window: Window) -> Chart:
             for reading in course.readings
         ],
         steps=steps,
-        marks=[
-            *_alarms(session, standing, window),
-            *(
-                Mark(
-                    change.sequence,
-                    TOOL_CHANGE if change.kind == "change" else MANUAL_EDIT,
-                    (_("T{number} changed") if change.kind == "change" else _("T{number} offset edited")).format(
-                        number=parameters.tool_memory
-                    ),
-                    f"/machines/{standing.machine.key}/tools?tool={parameters.tool_memory}#tool",
-                )
-                for change in changes
-                if window.first <= change.sequence
-            ),
-        ],
-        total_before=_total_before(session, standing, window, changes) if window.count else 0.0,
+        marks=shown,
+        total_before=before,
         centre=parameters.target + empirical_value_of(session, standing),
     )
 
@@ -137,6 +129,51 @@ def empirical_value_of(session: Session, standing: Standing) -> float:
     location = standing.parameters.average_memory
     found = session.get(AverageMemory, (standing.machine.id, location)) if location else None
     return found.empirical_value if found else 0.0
+
+
+def _change_marks(standing: Standing, window: Window, changes: Sequence[_Change]) -> list[Mark]:
+    number = standing.parameters.tool_memory
+    words = {"change": _("T{number} changed"), "edit": _("T{number} offset edited")}
+    return [
+        Mark(
+            change.sequence,
+            TOOL_CHANGE if change.kind == "change" else MANUAL_EDIT,
+            words[change.kind].format(number=number),
+            f"/machines/{standing.machine.key}/tools?tool={number}#tool",
+        )
+        for change in changes
+        if window.first <= change.sequence
+    ]
+
+
+def _thinned(marks: Sequence[Mark], window: Window) -> list[Mark]:
+    """Where marks of one kind would cover each other, the newest stands for them and says how many; active ones stay."""
+    if len(marks) <= MOST_MARKS:
+        return list(marks)
+    found: dict[tuple[str, int], list[Mark]] = {}
+    for mark in sorted(marks, key=lambda mark: mark.sequence):
+        if not mark.active:
+            found.setdefault((mark.kind, (mark.sequence - window.first) * MOST_MARKS // window.count), []).append(mark)
+    return [mark for mark in marks if mark.active] + [
+        replace(same[-1], text=f"{same[-1].text} ×{len(same)}" if len(same) > 1 else same[-1].text)
+        for same in found.values()
+    ]
+
+
+def _added_up(steps: Sequence[Step], changes: Sequence[_Change], before: float) -> list[Step]:
+    """The same steps, each with the sum after it: where tool changes are left out, a chart cannot begin anew at them."""
+    at_changes = [change.sequence for change in changes if change.kind == "change"]
+    added, total, life = [], before, None
+    for step in steps:
+        place = bisect_right(at_changes, step.sequence)
+        total = total if life in (None, place) else 0.0
+        life = place
+        if step.total is not None:
+            total = step.total
+        elif step.status in COUNTED:
+            total += step.amount
+        added.append(replace(step, total=total))
+    return added
 
 
 def _alarms(session: Session, standing: Standing, window: Window) -> list[Mark]:

@@ -115,7 +115,7 @@ def characteristic_page(
         characteristic=standing.characteristic,
         machine=standing.machine,
         parameters=standing.parameters,
-        version=standing.version,
+        in_force=standing.version,
         table=parameter_table(standing.version.parameters),
         choice=choice,
         scale=scale,
@@ -209,7 +209,7 @@ def _reading(
         reading=found.reading,
         characteristic=standing.characteristic,
         machine=standing.machine,
-        version=version,
+        judged_by=version,
         limits=limits,
         table=parameter_table(version.parameters),
         band=band_picture(

@@ -50,7 +50,7 @@ def environment() -> Environment:
         when=numbers.when,
         ago=numbers.ago,
     )
-    env.globals.update(asset=assets().url, assets=assets(), theme=theme, version=__version__)
+    env.globals.update(asset=assets().url, assets=assets(), theme=theme, inband_version=__version__)
     return env
 
 

@@ -1,6 +1,7 @@
 """Large runs of readings: the pyramid gives what the readings themselves give, and loses no extreme."""
 
 import itertools
+import re
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from typing import Any, NamedTuple
@@ -97,6 +98,36 @@ class TestCourse:
         places.sort()
         assert (places[0][0], places[-1][1]) == (12_345, 56_789)
         assert all(before[1] + 1 == after[0] for before, after in itertools.pairwise(places))
+
+
+class TestFigure:
+    @pytest.fixture
+    def figure(self, large: Large, server: Server) -> dict[str, Any]:
+        client = server.client(server.key())
+        answer = client.get("/api/v1/characteristics/large/figures/zones?last=all&scale=true")
+        assert answer.status_code == 200, answer.text
+        return {trace["meta"]: trace for trace in answer.json()["data"] if "meta" in trace}
+
+    def test_every_extreme_is_on_it_and_opens_its_block(self, large: Large, figure: dict[str, Any]) -> None:
+        words = " ".join(figure["extremes"]["text"])
+        assert all(f"{abs(deviation) * 1000:.1f}" in words for deviation in large.extremes.values())
+        assert re.fullmatch(r"/characteristics/large\?first=\d+&through=\d+", figure["extremes"]["customdata"][0])
+
+    def test_of_thousands_of_corrections_some_are_shown_with_the_sum_of_all(
+        self, large: Large, figure: dict[str, Any]
+    ) -> None:
+        shown = figure["corrections"]
+        assert 100 < len(shown["x"]) < 300
+        newest = COUNT // 97
+        assert shown["x"][-1] == newest * 97
+        since_change = newest - 200_000 // 97
+        assert figure["offset"]["y"][-1] == pytest.approx(-0.4 * since_change, abs=0.5)
+        assert min(figure["offset"]["y"]) < -180  # near the end of a tool's life
+
+    def test_tool_changes_and_alarms_are_on_it(self, large: Large, figure: dict[str, Any]) -> None:
+        words = figure["events"]["text"]
+        assert sum("T3 changed" in text for text in words) == 4
+        assert sum("Oversize" in text for text in words) == 5
 
 
 class TestNumbers:
