@@ -180,7 +180,8 @@ class TestHowTo:
         text = (HOUSE / "docs" / "how-to" / "back-up.md").read_text()
         assert "inband backup inband-monday.dump" in text
         document = tmp_path / "document.md"
-        restore = ".venv/bin/inband restore"  # into a database of its own, not into the one that the test's variable names
+        # Into a database of its own, not into the one that the variable of this test names.
+        restore = ".venv/bin/inband restore"
         document.write_text(text.replace(restore, f"env -u INBAND_DATABASE_URL {restore}"))
         shell(document, server, tmp_path)
         assert (tmp_path / "inband-monday.dump").stat().st_size > 10_000
