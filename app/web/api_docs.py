@@ -31,7 +31,7 @@ class FieldRow(NamedTuple):
 
     name: str
     kind: str
-    meaning: str
+    meaning: Markup
     required: bool
     default: str | None = None
 
@@ -133,7 +133,7 @@ def _operation(made: Json, method: str, path: str, described: Json, address: str
                 list(_fields(made, _media(response).get("schema", {}))),
                 _json(_media(response).get("example")),
             )
-            for status, response in responses.items()
+            for status, response in sorted(responses.items(), reverse=True)  # something new (201) first
             if status < "4"
         ],
         errors=[(status, response["description"]) for status, response in responses.items() if status >= "4"],
@@ -189,7 +189,7 @@ def _parameter(made: Json, parameter: Json) -> FieldRow:
     return FieldRow(
         parameter["name"],
         _kind(made, schema),
-        parameter.get("description", ""),
+        _line(parameter.get("description", "")),
         parameter.get("required", False),
         _default(schema),
     )
@@ -213,7 +213,7 @@ def _fields(made: Json, schema: Json, prefix: str = "", seen: tuple[int, ...] = 
         whole = f"{prefix}.{name}" if prefix else name
         bare = _bare(made, inner)
         meaning = inner.get("description") or bare.get("description", "")
-        yield FieldRow(whole, _kind(made, inner), meaning, name in required, _default(inner))
+        yield FieldRow(whole, _kind(made, inner), _line(meaning), name in required, _default(inner))
         yield from _fields(made, inner, whole, (*seen, id(schema)))
 
 
@@ -277,6 +277,10 @@ def prose(text: str) -> Markup:
         else:
             parts.append(f"<p>{_inline(' '.join(lines))}</p>")
     return Markup("".join(parts))  # noqa: S704 - escaped piece by piece
+
+
+def _line(text: str) -> Markup:
+    return Markup(_inline(text))  # noqa: S704 - escaped piece by piece
 
 
 def _inline(text: str) -> str:
