@@ -12,8 +12,8 @@ def shop(server: Any) -> Shop:
     return Shop(server)
 
 
-def figure(shop: Shop, name: str, status: int = 200, **query: object) -> Any:
-    answer = shop.admin.get(f"/api/v1/characteristics/{shop.characteristic}/figures/{name}", params=query)  # type: ignore[arg-type]
+def figure(shop: Shop, name: str, status: int = 200, **query: Any) -> Any:
+    answer = shop.admin.get(f"/api/v1/characteristics/{shop.characteristic}/figures/{name}", params=query)
     assert answer.status_code == status, answer.text
     return answer.json()
 
@@ -44,7 +44,7 @@ def test_every_reading_is_a_point_that_opens_it(shop: Shop) -> None:
         ({"from": "2026-11-21T08:01:30Z", "to": "2026-11-21T08:03:00Z"}, [3, 4]),
     ],
 )
-def test_which_readings(shop: Shop, query: dict[str, object], shown: list[int]) -> None:
+def test_which_readings(shop: Shop, query: dict[str, Any], shown: list[int]) -> None:
     for minute in range(5):
         shop.read(0.1, measured_at=f"2026-11-21T08:0{minute}:00Z")
     assert trace(figure(shop, "zones", **query), "readings")["x"] == shown
@@ -95,6 +95,6 @@ def test_nothing_measured_yet_is_said_so(shop: Shop) -> None:
         ({"width": "wide"}, "width"),
     ],
 )
-def test_a_wrong_choice_is_named(shop: Shop, query: dict[str, object], field: str) -> None:
+def test_a_wrong_choice_is_named(shop: Shop, query: dict[str, Any], field: str) -> None:
     problem = figure(shop, "zones", 422, **query)
     assert [error["field"] for error in problem["errors"]] == [field]

@@ -194,7 +194,7 @@ class TestInTheBrowser:
 
     def test_names_are_text_everywhere(self, shop: Shop, operator: Person, page: Page) -> None:
         key = f"{shop.characteristic}-x"
-        body = {"key": key, "machine": shop.machine, "name": XSS, "part": XSS, "parameters": PARAMETERS}
+        body: dict[str, Any] = {"key": key, "machine": shop.machine, "name": XSS, "part": XSS, "parameters": PARAMETERS}
         shop.call("POST", "/characteristics", 201, **body)
         shop.read(6.1, key, part=XSS, key=XSS)
         shop.call("POST", f"/readings/{key}/1/exclude", reason=XSS)

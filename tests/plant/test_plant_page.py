@@ -62,7 +62,7 @@ class TestWithoutScripts:
         assert f'id="c-{shop.characteristic}-calm"' not in text
 
     def test_names_are_text(self, shop: Shop, viewer: Person) -> None:
-        body = {"key": f"{shop.characteristic}-x", "machine": shop.machine, "name": XSS, "part": XSS}
+        body: dict[str, Any] = {"key": f"{shop.characteristic}-x", "machine": shop.machine, "name": XSS, "part": XSS}
         shop.call("POST", "/characteristics", 201, **body, parameters=PARAMETERS)
         text = viewer.open(f"/plant/{shop.machine}")
         assert XSS not in text

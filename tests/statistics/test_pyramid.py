@@ -44,7 +44,12 @@ class Large(NamedTuple):
 @pytest.fixture(scope="module")
 def large(server: Server) -> Iterator[Large]:
     shop = Shop(server)
-    body = {"key": "large", "name": "large", "machine": shop.machine, "parameters": PARAMETERS | {"tool_memory": 3}}
+    body: dict[str, Any] = {
+        "key": "large",
+        "name": "large",
+        "machine": shop.machine,
+        "parameters": PARAMETERS | {"tool_memory": 3},
+    }
     shop.call("POST", "/characteristics", 201, **body)
     with psycopg.connect(server.database.dsn, autocommit=True) as connection:
         extremes = fill(connection, "large", COUNT)
