@@ -96,7 +96,7 @@ def test_what_a_column_means_can_be_changed(engineer: Page, shop: Server, tmp_pa
     file.write_text("a;b;c\n1;39,991;02.03.2026 07:00:00\n2;39,992;02.03.2026 07:01:00\n")
     send(engineer, file)
     expect(engineer.locator(".note")).to_contain_text("No column is recognised")
-    engineer.select_option("[name=column_measured]", label="b")
+    engineer.select_option("select[name=column_measured]", label="b")
     expect(engineer.locator(".sheet th small")).to_have_text(["Measured value"])
     engineer.select_option("#f-column_measured_at", label="c")
     expect(engineer.locator(".sheet th small")).to_have_count(2)
@@ -111,7 +111,7 @@ def test_a_file_in_another_encoding_can_still_be_read(engineer: Page, tmp_path: 
     file.write_bytes("measured;part\n39,9911;Žižek\n".encode("cp1250"))
     send(engineer, file)
     expect(engineer.locator(".note").first).to_contain_text("cp1250 for Serbian")
-    engineer.select_option("[name=encoding]", "cp1250")
+    engineer.select_option("select[name=encoding]", "cp1250")
     expect(engineer.locator(".sheet")).to_contain_text("Žižek")
 
 
