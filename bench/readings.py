@@ -9,7 +9,7 @@ from typing import Any
 
 import psycopg
 
-from app.readings.store import BASE_LEVEL, FAN, SUMMARISE_READINGS, SUMMARISE_SUMMARIES, TOP_LEVEL
+from app.readings.statements import BASE_LEVEL, FAN, SUMMARISE_READINGS, SUMMARISE_SUMMARIES, TOP_LEVEL
 
 CORRECTED = 97  # every so many readings a correction
 TOOL_LIFE = 50_000

@@ -15,7 +15,7 @@ from app.errors import FieldError, NotFound, TooLarge
 from app.readings import actions, queries
 from app.readings.answers import ReadingAnswer, ReadingDetail, ReadingRow
 from app.readings.door import Directory, answer_of, said, take
-from app.readings.judge import Stored, Verdict
+from app.readings.ground import Stored, Verdict
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn, decode_many, decode_one
 from app.readings.writer import Outcome, Writer, store_batch

@@ -9,21 +9,21 @@ from datetime import UTC, datetime
 from typing import Any
 
 import msgspec
-import psycopg
-from sqlalchemy.exc import OperationalError
 from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.db.engine import Database
-from app.errors import DatabaseAway, FieldError, InbandError, NotAllowed, NotFound, NotSignedIn, TooLarge
+from app.errors import FieldError, InbandError, NotAllowed, NotFound, NotSignedIn, TooLarge
 from app.people.callers import Caller
 from app.readings import queries
 from app.readings.answers import answer
-from app.readings.judge import Stored, Verdict
+from app.readings.ground import Stored, Verdict
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn, decode_one
 from app.readings.writer import Outcome, Writer
 from app.web.i18n import _
+from app.web.problems import unforeseen
 
 PATH = "/api/v1/readings"
 LARGEST_BODY = 256 * 1024
@@ -82,9 +82,9 @@ class ReadingsDoor:
             status, body, headers = await self._take(secret, receive)
         except InbandError as error:
             status, body, headers = error.status, _json.encode(error.as_problem()), error.headers
-        except (psycopg.OperationalError, OperationalError):
-            away = DatabaseAway()
-            status, body, headers = away.status, _json.encode(away.as_problem()), away.headers
+        except Exception as error:  # noqa: BLE001 - nobody behind us would answer
+            await (await unforeseen(Request(scope), error))(scope, receive, send)
+            return
         kind = b"application/json" if status < 400 else b"application/problem+json"
         await send(
             {

@@ -5,9 +5,7 @@ ground along for the next one, and collects the rows to write. It does no I/O, s
 `inband replay` are decided by the same lines. A reading that is refused leaves the ground as it was.
 """
 
-from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any, NamedTuple
 
 from app.core.acceptance import accepted
 from app.core.compensation import (
@@ -25,193 +23,21 @@ from app.core.parameters import Parameters
 from app.core.probing import TouchError, measured_value
 from app.errors import Conflict, FieldError, Invalid
 from app.offsets.tables import OUTSTANDING
-from app.readings.records import Entry, Record
+from app.readings.ground import (
+    Ground,
+    IssuedCorrection,
+    Named,
+    OpenAlarm,
+    Step,
+    Stored,
+    StreamState,
+    ToolState,
+    Verdict,
+)
+from app.readings.records import Entry
 from app.readings.schemas import ReadingIn
 from app.readings.wording import touch_problem
 from app.web.i18n import _
-
-
-@dataclass(slots=True)
-class OpenAlarm:
-    """An alarm that these readings raise. The writer finds out whether it is active already, or draws a number for it."""
-
-    machine_id: int
-    characteristic_id: int | None
-    tool_memory: int | None
-    kind: str
-    id: int | None = None
-    sequence: int | None = None
-    last_sequence: int | None = None
-    count: int = 0  # readings that raised it now
-    new: bool = True
-    data: dict[str, Any] = field(default_factory=dict)
-
-
-@dataclass(slots=True)
-class IssuedCorrection:
-    """A correction that is open, or was applied after a part under judgement was cut."""
-
-    machine_id: int
-    number: int
-    tool_memory: int
-    amount: float
-    status: str
-    characteristic_id: int = 0
-    sequence: int = 0
-    size_error: float = 0.0
-    applied_at: datetime | None = None
-    decided_at: datetime | None = None  # a person approved or released it
-    applied_by: str | None = None
-    offset_after: float | None = None
-    superseded_by: int | None = None
-    new: bool = False
-    changed: bool = False
-
-
-@dataclass(slots=True)
-class ToolState:
-    """One location of the tool memory, with its corrections in the order of their numbers."""
-
-    machine_id: int
-    number: int
-    offset: float
-    total: float
-    reset_at: datetime | None
-    corrections: list[IssuedCorrection] = field(default_factory=list)
-    changed: bool = False
-
-
-@dataclass(slots=True)
-class AverageState:
-    """One location of the average memory."""
-
-    machine_id: int
-    location: int
-    average: float
-    empirical_value: float
-    changed: bool = False
-
-
-@dataclass(slots=True)
-class StreamState:
-    """The running state of one characteristic."""
-
-    entry: Entry
-    sequence: int
-    version: int
-    parameters: Parameters
-    average: AverageState | None
-    tool: ToolState | None
-    paused_by: int | OpenAlarm | None
-    last_measured_at: datetime | None
-    alarms: dict[str, OpenAlarm] = field(default_factory=dict)
-    before: int = 0  # sequence when it was loaded
-    last: "Verdict | None" = None
-
-
-@dataclass(slots=True)
-class Named:
-    """The last correction that a machine had applied when it cut a part: when that was, and when a person let it go."""
-
-    applied_at: datetime | None
-    decided_at: datetime | None
-
-
-class Known(NamedTuple):
-    """A reading in the record whose key has come again."""
-
-    sequence: int
-    measured: float
-    parameters: Parameters
-
-
-@dataclass(slots=True)
-class Step:
-    """A change of a tool offset to be written into its history."""
-
-    machine_id: int
-    number: int
-    at: datetime
-    offset_before: float
-    offset_after: float
-    correction: int
-    actor: str
-
-
-@dataclass(slots=True)
-class Ground:
-    """Everything the readings of one transaction are judged against, and what it comes to."""
-
-    streams: dict[int, StreamState] = field(default_factory=dict)
-    tools: dict[tuple[int, int], ToolState] = field(default_factory=dict)
-    averages: dict[tuple[int, int], AverageState] = field(default_factory=dict)
-    tool_alarms: dict[tuple[int, int, str], OpenAlarm] = field(default_factory=dict)
-    last_correction: dict[int, int] = field(default_factory=dict)
-    named: dict[tuple[int, int], Named] = field(default_factory=dict)
-    stored_keys: dict[tuple[int, str], Known] = field(default_factory=dict)
-    verdicts: "list[Verdict]" = field(default_factory=list)
-    by_key: "dict[tuple[int, str], Verdict]" = field(default_factory=dict)
-    issued: list[IssuedCorrection] = field(default_factory=list)
-    raised: list[OpenAlarm] = field(default_factory=list)
-    steps: list[Step] = field(default_factory=list)
-    touched_machines: set[int] = field(default_factory=set)
-
-
-@dataclass(slots=True)
-class Verdict:
-    """A decided reading, before its alarms have numbers."""
-
-    stream: StreamState
-    reading: ReadingIn
-    sequence: int
-    version: int
-    parameters: Parameters
-    measured: float
-    measured_at: datetime
-    received_at: datetime
-    late: bool
-    decision: Decision
-    outstanding: list[int]
-    correction: IssuedCorrection | None
-    paused_by: int | OpenAlarm | None
-    alarms: list[OpenAlarm]
-
-    def record(self) -> Record:
-        """The row to store; every alarm has its number by now."""
-        d, r, entry = self.decision, self.reading, self.stream.entry
-        paused_by = self.paused_by.id if isinstance(self.paused_by, OpenAlarm) else self.paused_by
-        return Record(
-            entry.machine_id,
-            entry.characteristic_id,
-            self.sequence,
-            self.measured,
-            d.deviation,
-            d.decided,
-            d.average_before,
-            d.average_after,
-            self.measured_at,
-            self.received_at,
-            r.machined_at,
-            self.version,
-            r.correction_in_effect,
-            self.correction.number if self.correction else None,
-            paused_by,
-            self.late,
-            d.zone.value,
-            d.action.value,
-            d.code.value,
-            r.key,
-            r.part,
-            self.outstanding or None,
-            [alarm.id or 0 for alarm in self.alarms] or None,
-        )
-
-
-class Stored(NamedTuple):
-    """The reading is in the record already: the same key with the same value was sent before."""
-
-    entry: Entry
-    sequence: int
 
 
 def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Verdict | Stored:

@@ -12,8 +12,9 @@ from typing import Any
 from app.core.parameters import Parameters
 from app.errors import InbandError
 from app.readings.answers import answer
+from app.readings.ground import AverageState, Ground, Stored, StreamState, ToolState
 from app.readings.importing.lines import Flaw, Line
-from app.readings.judge import AverageState, Ground, Stored, StreamState, ToolState, judge
+from app.readings.judge import judge
 from app.readings.records import Entry
 
 

@@ -19,7 +19,8 @@ from psycopg import AsyncConnection
 from app.db.engine import LIMITS
 from app.db.pipeline import Pipeline
 from app.errors import DatabaseAway, InbandError, Invalid, OutcomeUnknown
-from app.readings.judge import Stored, Verdict, judge
+from app.readings.ground import Stored, Verdict
+from app.readings.judge import judge
 from app.readings.records import Entry
 from app.readings.schemas import MOST_ERRORS, ReadingIn
 from app.readings.store import Book, load, save

@@ -155,6 +155,13 @@ async def _database(request: Request, error: Exception) -> Response:
     return incident(request, error)
 
 
+async def unforeseen(request: Request, error: Exception) -> Response:
+    """The answer to an error that is not one of our own."""
+    if isinstance(error, sql.DBAPIError | sql.TimeoutError | psycopg.Error):
+        return await _database(request, error)
+    return incident(request, error)
+
+
 def incident(request: Request, error: BaseException) -> Response:
     """An error nobody foresaw: logged in full under a number, told with nothing but that number."""
     number = secrets.token_hex(4)

@@ -10,7 +10,7 @@ import pytest
 from app.core.compensation import Decision, State, decide, deviation_of, outstanding_effect
 from app.core.parameters import Parameters
 from app.core.zones import Zone
-from app.readings.store import BASE_LEVEL, FAN, TOP_LEVEL
+from app.readings.statements import BASE_LEVEL, FAN, TOP_LEVEL
 
 
 def rows(dsn: str, query: str, *values: Any) -> list[tuple[Any, ...]]:

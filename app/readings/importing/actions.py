@@ -7,10 +7,10 @@ from pathlib import Path
 from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from app.readings import queries
+from app.readings.ground import Verdict
 from app.readings.importing.history import MOST_FLAWS, Flawed, Progress, Summary, store_history
 from app.readings.importing.layout import Layout
 from app.readings.importing.lines import Flaw, Line, lines
-from app.readings.judge import Verdict
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn
 from app.readings.writer import store_batch
