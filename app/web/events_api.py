@@ -8,6 +8,7 @@ from starlette.responses import StreamingResponse
 
 from app.web.api import api_router
 from app.web.deps import AnyCaller
+from app.web.fields import LARGEST_ID
 from app.web.live import Live
 
 router = api_router("events")
@@ -24,7 +25,9 @@ async def events(
     request: Request,
     caller: AnyCaller,
     last_event_id: Annotated[str | None, Header(description="Resume after this event.")] = None,
-    after: Annotated[int | None, Query(ge=0, description="The same, for programs that cannot set the header.")] = None,
+    after: Annotated[
+        int | None, Query(ge=0, le=LARGEST_ID, description="The same, for programs that cannot set the header.")
+    ] = None,
 ) -> StreamingResponse:
     """Server-sent events: reading, correction, alarm, tool, average, characteristic, machine; `heartbeat` while all is quiet.
 

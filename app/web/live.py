@@ -7,9 +7,9 @@ send, it gets a ``resync`` and loads its page anew.
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import psycopg
@@ -24,9 +24,15 @@ HEARTBEAT = 5.0  # s; a page that hears nothing for longer says so
 KEPT_HOURS = 6
 MOST_MISSED = 1000  # transactions that a client which comes back is told one by one
 MOST_WAITING = 1000  # events that a slow client may be behind
+ABOUT = ("kind", "machine", "characteristic", "tool", "id", "number", "average_memory", "excluded")
 
-Message = tuple[int, str, dict[str, Any]]
-"""Number, kind, and what changed."""
+
+class Message(NamedTuple):
+    """What is told of one change, ready to be sent; the machine it concerns, None for whatever concerns everybody."""
+
+    number: int
+    machine: str | None
+    frame: bytes
 
 
 class Live:
@@ -35,7 +41,7 @@ class Live:
     def __init__(self, dsn: str) -> None:
         self._dsn = dsn
         self._clients: set[asyncio.Queue[Message | None]] = set()
-        self._last = 0
+        self._last: int | None = None  # the last event that was passed on; None before the journal was seen
         self._tasks: list[asyncio.Task[None]] = []
         self.closing = asyncio.Event()
 
@@ -61,7 +67,8 @@ class Live:
                     self._dsn, autocommit=True, application_name="inband-live", connect_timeout=5
                 ) as conn:
                     await conn.execute(f"LISTEN {CHANNEL}")
-                    self._last = self._last or await _newest(conn)
+                    if self._last is None:
+                        self._last = await _newest(conn)
                     while True:
                         await self._pass_on(conn)
                         async for _ in conn.notifies(timeout=HEARTBEAT, stop_after=1):
@@ -70,29 +77,26 @@ class Live:
             except psycopg.Error as error:
                 log.warning("live events are interrupted: %s", error)
                 await asyncio.sleep(1)
+            except Exception:
+                log.exception("live events met what nobody foresaw")
+                await asyncio.sleep(1)
 
     async def _pass_on(self, conn: AsyncConnection[Any]) -> None:
         cursor = await conn.execute("SELECT id, changes FROM event WHERE id > %s ORDER BY id", (self._last,))
-        latest: dict[tuple[Any, ...], Message] = {}
+        latest: dict[tuple[Any, ...], tuple[int, dict[str, Any]]] = {}
         for number, changes in await cursor.fetchall():
             self._last = number
             for change in changes:
                 # Of a hundred readings of one characteristic since the last look, the last one says it all.
-                about = (
-                    change["kind"],
-                    change.get("machine"),
-                    change.get("characteristic"),
-                    change.get("tool"),
-                    change.get("id", change.get("number")),
-                )
+                about = tuple(map(change.get, ABOUT))
                 latest.pop(about, None)
-                latest[about] = (number, change["kind"], change)
-        for message in latest.values():
+                latest[about] = (number, change)
+        for message in _messages(list(latest.values())):
             for client in self._clients:
                 if client.qsize() < MOST_WAITING:
                     client.put_nowait(message)
                 elif client.qsize() == MOST_WAITING:
-                    client.put_nowait((message[0], "resync", {}))
+                    client.put_nowait(_resync(message.number))
 
     async def _tidy(self) -> None:
         while True:
@@ -109,49 +113,47 @@ class Live:
         self._clients.add(client)
         try:
             yield b"retry: 2000\n\n"
-            sent = self._last if after is None else after
-            yield _frame((sent, "hello", {}))
+            known = self._last if after is None else after
+            yield _frame("hello", {}, known)
+            sent = 0 if known is None else known
             if after is not None:
-                async for message in self._missed(after):
-                    sent = message[0]
-                    if _concerns(message, machine):
-                        yield _frame(message)
+                for message in await self._missed(after):
+                    sent = message.number
+                    if message.machine in {None, machine} or machine is None:
+                        yield message.frame
             while not self.closing.is_set():
                 try:
                     async with asyncio.timeout(HEARTBEAT):
                         next_message = await client.get()
                 except TimeoutError:
-                    yield b"event: heartbeat\ndata: {}\n\n"
+                    # Whoever hears nothing because nothing concerns him is kept up to date all the same.
+                    yield _frame("heartbeat", {}, self._last if client.empty() else None)
                     continue
                 if next_message is None:
                     return
-                if next_message[0] >= sent and _concerns(next_message, machine):
-                    yield _frame(next_message)
+                if next_message.number > sent and (next_message.machine in {None, machine} or machine is None):
+                    yield next_message.frame
         finally:
             self._clients.discard(client)
 
-    async def _missed(self, after: int) -> AsyncIterator[Message]:
+    async def _missed(self, after: int) -> list[Message]:
+        """Everything since event `after`, or one `resync`."""
         try:
             async with await AsyncConnection.connect(self._dsn, autocommit=True, connect_timeout=5) as conn:
                 cursor = await conn.execute("SELECT min(id), max(id) FROM event")
                 row = await cursor.fetchone()
                 oldest, newest = row if row and row[0] is not None else (0, 0)
                 if after > newest or after < oldest - 1:
-                    yield newest, "resync", {}
-                    return
+                    return [_resync(newest)]
                 cursor = await conn.execute(
                     "SELECT id, changes FROM event WHERE id > %s ORDER BY id LIMIT %s", (after, MOST_MISSED + 1)
                 )
                 rows = await cursor.fetchall()
         except psycopg.Error:
-            yield after, "resync", {}
-            return
+            return [_resync(after)]
         if len(rows) > MOST_MISSED:
-            yield newest, "resync", {}
-            return
-        for number, changes in rows:
-            for change in changes:
-                yield number, change["kind"], change
+            return [_resync(newest)]
+        return _messages([(number, change) for number, changes in rows for change in changes])
 
 
 async def _newest(conn: AsyncConnection[Any]) -> int:
@@ -160,10 +162,22 @@ async def _newest(conn: AsyncConnection[Any]) -> int:
     return int(row[0]) if row else 0
 
 
-def _concerns(message: Message, machine: str | None) -> bool:
-    return machine is None or message[2].get("machine") in (None, machine)
+def _messages(changes: Sequence[tuple[int, dict[str, Any]]]) -> list[Message]:
+    """The changes of some transactions, in order. Only the last one of a transaction carries its number.
+
+    Whoever is cut off between two of them comes back with the number before, and is told both again.
+    """
+    made = []
+    for at, (number, change) in enumerate(changes):
+        last = at + 1 == len(changes) or changes[at + 1][0] != number
+        made.append(Message(number, change.get("machine"), _frame(change["kind"], change, number if last else None)))
+    return made
 
 
-def _frame(message: Message) -> bytes:
-    number, kind, change = message
-    return f"id: {number}\nevent: {kind}\ndata: {msgspec.json.encode(change).decode()}\n\n".encode()
+def _resync(number: int) -> Message:
+    return Message(number, None, _frame("resync", {}, number))
+
+
+def _frame(kind: str, change: dict[str, Any], number: int | None) -> bytes:
+    told = "" if number is None else f"id: {number}\n"
+    return f"{told}event: {kind}\ndata: {msgspec.json.encode(change).decode()}\n\n".encode()

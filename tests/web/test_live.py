@@ -1,0 +1,317 @@
+"""Live events over SSE, on a real server: what is told, to whom, and that nothing is missed."""
+
+import json
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from queue import Empty, Queue
+from typing import Any, NamedTuple
+
+import httpx
+import psycopg
+import pytest
+
+from app.web.live import HEARTBEAT, MOST_MISSED
+from tests.conftest import RunServer, Server
+from tests.shop import Shop
+
+
+class Event(NamedTuple):
+    kind: str
+    id: int | None
+    data: dict[str, Any]
+
+
+class Listener:
+    """An open stream, read by a thread as an EventSource reads it."""
+
+    def __init__(self, response: httpx.Response) -> None:
+        self.response = response
+        self.queue: Queue[Event | None] = Queue()
+        self.last_id: int | None = None  # what an EventSource would come back with
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        fields: dict[str, str] = {}
+        try:
+            for line in self.response.iter_lines():
+                if line:
+                    name, _colon, value = line.partition(": ")
+                    fields[name] = value
+                elif "event" in fields:
+                    number = int(fields["id"]) if "id" in fields else None
+                    self.queue.put(Event(fields["event"], number, json.loads(fields["data"])))
+                    fields = {}
+                else:
+                    fields = {}
+        except (httpx.HTTPError, httpx.StreamError):
+            pass
+        self.queue.put(None)
+
+    def next(self, kind: str | None = None, seconds: float = 10) -> Event:
+        """The next event (of this kind); heartbeats and the greeting are passed over."""
+        deadline = time.monotonic() + seconds
+        while True:
+            event = self.queue.get(timeout=max(0.01, deadline - time.monotonic()))
+            assert event is not None, "the stream ended"
+            self.last_id = self.last_id if event.id is None else event.id
+            if event.kind == kind or (kind is None and event.kind not in {"hello", "heartbeat"}):
+                return event
+
+    def quiet(self, seconds: float = 0.5) -> bool:
+        """Whether nothing is told for so long."""
+        try:
+            self.next(seconds=seconds)
+        except Empty:
+            return True
+        return False
+
+
+@contextmanager
+def listening(client: httpx.Client, last_event_id: int | str | None = None, **query: Any) -> Iterator[Listener]:
+    headers = {} if last_event_id is None else {"Last-Event-ID": str(last_event_id)}
+    if last_event_id is None:
+        time.sleep(0.4)  # the server looks ten times a second; what was done before we came may still be told
+    with client.stream("GET", "/api/v1/events", headers=headers, params=query) as response:
+        assert response.status_code == 200
+        assert response.headers["content-type"].startswith("text/event-stream")
+        assert response.headers["cache-control"] == "no-store"
+        listener = Listener(response)
+        listener.next("hello")
+        yield listener
+
+
+@pytest.fixture
+def shop(server: Server) -> Shop:
+    return Shop(server)
+
+
+def test_a_reading_is_told_with_what_it_led_to(shop: Shop) -> None:
+    with listening(shop.admin) as listener:
+        shop.read(350.0)
+        told = {event.kind: event for event in (listener.next(), listener.next(), listener.next())}
+        about = {"machine": shop.machine, "characteristic": shop.characteristic}
+        assert told["reading"].data == about | {"kind": "reading", "sequence": 1}
+        assert told["correction"].data.items() >= (about | {"number": 1, "status": "held", "tool": 3}).items()
+        assert told["alarm"].data.items() >= (about | {"alarm": "tool_worn", "state": "active"}).items()
+        # One transaction, one number, and it comes last.
+        assert [event.id is None for event in told.values()] == [True, True, False]
+        shop.acknowledge(told["alarm"].data["id"], "keep_cutting")
+        kinds = {listener.next().kind, listener.next().kind}
+        assert kinds == {"correction", "alarm"}
+        shop.correction(1, "applied")
+        assert {listener.next().kind, listener.next().kind} == {"correction", "tool"}
+        assert listener.quiet()
+
+
+def test_what_people_set_up_is_told(shop: Shop) -> None:
+    with listening(shop.admin) as listener:
+        other = Shop(shop.server)
+        kinds = {listener.next().kind, listener.next().kind}
+        assert kinds == {"machine", "characteristic"}
+        other.call(
+            "PUT", f"/machines/{other.machine}/averages/5", empirical_value=0.001, reason="Compared with a micrometer"
+        )
+        event = listener.next("average")
+        assert (event.data["machine"], event.data["average_memory"]) == (other.machine, 5)
+
+
+def test_two_averages_of_one_transaction_are_both_told(shop: Shop) -> None:
+    second = f"{shop.characteristic}-b"
+    shop.add(second, average_memory=6)
+    with listening(shop.admin) as listener:
+        shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="Worn")
+        told = {listener.next("average").data["average_memory"], listener.next("average").data["average_memory"]}
+        assert told == {5, 6}
+
+
+def test_an_exclusion_is_not_lost_among_readings(shop: Shop) -> None:
+    shop.read(0.0)
+    with listening(shop.admin) as listener:
+        shop.call("POST", f"/readings/{shop.characteristic}/1/exclude", reason="Chip")
+        shop.read(0.0)
+        told = [listener.next("reading").data, listener.next("reading").data]
+        assert {(data["sequence"], data.get("excluded", False)) for data in told} == {(1, True), (2, False)}
+
+
+def test_of_many_readings_at_once_the_last_is_told(shop: Shop) -> None:
+    with listening(shop.admin) as listener:
+        readings = [{"characteristic": shop.characteristic, "measured": 40.0} for _ in range(2000)]
+        assert shop.admin.post("/api/v1/readings/batch", json=readings).json()["stored"] == 2000
+        assert listener.next("reading").data["sequence"] == 2000
+        assert listener.quiet()
+
+
+def test_a_heartbeat_comes_while_all_is_quiet(shop: Shop) -> None:
+    with listening(shop.admin) as listener:
+        shop.read(0.0)
+        number = listener.next("reading").id
+        assert listener.next("heartbeat", HEARTBEAT + 5).id == number
+
+
+class TestResuming:
+    def test_nothing_is_missed(self, shop: Shop) -> None:
+        with listening(shop.admin) as listener:
+            shop.read(6.0)
+            listener.next("correction")
+            here = listener.last_id
+        assert here is not None
+        for _each in range(3):
+            shop.read(350.0)
+        with listening(shop.admin, here) as listener:
+            told = [listener.next()]
+            while told[-1].data.get("number") != 4:
+                told.append(listener.next())
+            assert listener.next().kind == "alarm"
+            assert [event.data["sequence"] for event in told if event.kind == "reading"] == [2, 3, 4]
+            assert {event.data["number"] for event in told if event.kind == "correction"} == {2, 3, 4}
+            shop.read(0.0)
+            assert listener.next("reading").data["sequence"] == 5
+
+    def test_cut_off_within_a_transaction_it_is_told_whole_again(self, shop: Shop) -> None:
+        shop.read(0.0)
+        with listening(shop.admin, after=0) as listener:
+            while listener.next("reading").data.get("characteristic") != shop.characteristic:
+                pass
+            shop.read(350.0)
+            first = listener.next()
+            assert first.id is None
+            here = listener.last_id  # gone before the rest of it
+        with listening(shop.admin, here) as listener:
+            assert {listener.next().kind for _event in range(3)} == {"reading", "correction", "alarm"}
+
+    def test_a_crowd_that_comes_and_goes_misses_nothing(self, shop: Shop) -> None:
+        """While readings arrive, clients break off at any place and come back; each sees every correction."""
+        count = 40
+
+        def follow(seed: int) -> set[int]:
+            seen: set[int] = set()
+            client = shop.server.client(shop.admin.headers["Authorization"].removeprefix("Bearer "))
+            last = begin
+            deadline = time.monotonic() + 60
+            while len(seen) < count and time.monotonic() < deadline:
+                with listening(client, last) as listener:
+                    listener.last_id = last
+                    for _event in range(6 + seed):
+                        event = listener.next(seconds=20)
+                        assert event.kind != "resync"
+                        if event.kind == "correction" and event.data["machine"] == shop.machine:
+                            seen.add(event.data["number"])
+                            if len(seen) == count:
+                                break
+                    assert listener.last_id is not None
+                    last = listener.last_id
+            return seen
+
+        with listening(shop.admin) as listener:
+            shop.read(0.0)
+            begin = listener.next("reading").id or 0
+        with ThreadPoolExecutor(8) as pool:
+            followers = [pool.submit(follow, seed) for seed in range(8)]
+            for number in range(count):
+                shop.read(6.0, correction_in_effect=number)
+            for follower in followers:
+                assert follower.result(60) == set(range(1, count + 1))
+
+    def test_too_much_missed_is_a_resync(self, shop: Shop) -> None:
+        with psycopg.connect(shop.server.database.dsn, autocommit=True) as connection:
+            (last,) = connection.execute("SELECT max(id) FROM event").fetchone() or (0,)
+            connection.execute(
+                'INSERT INTO event (changes) SELECT \'[{"kind": "reading", "machine": "x"}]\''
+                " FROM generate_series(1, %s)",
+                [MOST_MISSED + 1],
+            )
+            (newest,) = connection.execute("SELECT max(id) FROM event").fetchone() or (0,)
+        with listening(shop.admin, last) as listener:
+            assert listener.next() == Event("resync", newest, {})
+            shop.read(0.0)
+            assert listener.next("reading").data["characteristic"] == shop.characteristic
+        with listening(shop.admin, newest - 5) as listener:
+            assert listener.next("reading").data["machine"] == "x"
+
+    def test_a_number_that_is_not_known_is_a_resync(self, shop: Shop) -> None:
+        with listening(shop.admin, 10**15) as listener:
+            assert listener.next().kind == "resync"
+
+    @pytest.mark.parametrize("number", ["", "x", "-1", "9" * 40, "٣"])
+    def test_a_number_that_is_none_begins_now(self, shop: Shop, number: str) -> None:
+        headers = httpx.Headers([(b"Last-Event-ID", number.encode())])
+        time.sleep(0.4)
+        with shop.admin.stream("GET", "/api/v1/events", headers=headers) as response:
+            assert response.status_code == 200
+            listener = Listener(response)
+            listener.next("hello")
+            assert listener.quiet(0.3)
+
+
+class TestWhoHearsWhat:
+    def test_a_machine_hears_of_itself_alone(self, shop: Shop) -> None:
+        other = Shop(shop.server)
+        with listening(shop.admin) as listener:
+            shop.read(0.0)
+            begin = listener.next("reading").id
+        with (
+            listening(shop.machine_client) as listener,
+            listening(shop.server.client(shop.server.key("viewer"))) as all_,
+        ):
+            other.read(6.0)
+            shop.read(0.0)
+            assert listener.next("reading").data["machine"] == shop.machine
+            assert all_.next("reading").data["machine"] == other.machine
+        with listening(shop.machine_client, begin) as listener:
+            assert listener.next().data["machine"] == shop.machine
+            assert listener.quiet()
+
+    def test_nobody_hears_without_a_key(self, server: Server) -> None:
+        answer = server.client().get("/api/v1/events")
+        assert answer.status_code == 401
+        assert answer.headers["content-type"] == "application/problem+json"
+
+    def test_a_cursor_out_of_range_is_refused(self, shop: Shop) -> None:
+        for after in ("-1", "x", "1" * 30):
+            answer = shop.admin.get("/api/v1/events", params={"after": after})
+            assert answer.status_code == 422, answer.text
+
+
+def test_many_clients_are_all_told(shop: Shop) -> None:
+    key = shop.server.key("viewer")
+    clients = [shop.server.client(key) for _ in range(40)]
+    streams = [client.send(client.build_request("GET", "/api/v1/events"), stream=True) for client in clients]
+    listeners = [Listener(stream) for stream in streams]
+    for listener in listeners:
+        listener.next("hello")
+    begun = time.monotonic()
+    shop.read(6.0)
+    for listener in listeners:
+        assert listener.next("correction").data["machine"] == shop.machine
+    assert time.monotonic() - begun < 5
+    for stream in streams:
+        stream.close()
+
+
+def test_the_stream_goes_on_after_the_database_cut_the_listener_off(shop: Shop) -> None:
+    with listening(shop.admin) as listener, psycopg.connect(shop.server.database.dsn, autocommit=True) as connection:
+        connection.execute(
+            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity"
+            " WHERE application_name = 'inband-live' AND datname = current_database()"
+        )
+        for number in range(4):
+            shop.read(6.0, correction_in_effect=number)
+            time.sleep(0.1)
+        numbers: set[int] = set()
+        while len(numbers) < 4:
+            numbers.add(listener.next("correction").data["number"])
+        assert numbers == {1, 2, 3, 4}
+
+
+def test_streams_end_when_the_server_ends(run_server: RunServer) -> None:
+    with run_server() as server:
+        client = server.client(server.key())
+        with listening(client) as listener:
+            begun = time.monotonic()
+            assert server.stop() == 0
+            assert time.monotonic() - begun < 10
+            while listener.queue.get(timeout=5) is not None:
+                pass
