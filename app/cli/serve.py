@@ -7,6 +7,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable
+from multiprocessing import parent_process
 from types import FrameType
 from typing import Annotated
 
@@ -114,11 +115,11 @@ def create_worker() -> ASGIApp:
     """The application in one of several processes; it ends when the parent, which keeps the database, is killed."""
     from app.main import create_app
 
-    parent = os.getppid()
+    parent = parent_process()  # as it was when we were begun: by now it may be gone already
+    assert parent is not None
 
     def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1)
+        parent.join()
         os.kill(os.getpid(), signal.SIGTERM)
 
     threading.Thread(target=watch, daemon=True).start()

@@ -28,6 +28,7 @@ from app.readings.importing.history import Flawed, Summary
 from app.readings.importing.layout import Wishes, look
 from app.settings import HOUSE
 from tests.conftest import RunServer
+from tests.loops import in_thread
 
 
 @pytest.fixture
@@ -209,15 +210,18 @@ def test_an_unknown_characteristic_is_named(plant: Database, tmp_path: Path) -> 
 
 
 def test_live_readings_go_through_the_same_door_as_any(plant: Database, tmp_path: Path) -> None:
-    summary = run(plant, table(tmp_path / "a.csv", [39.992, 39.9981]), live=True)
+    def live(path: Path) -> Summary:
+        return in_thread(lambda: run(plant, path, live=True))
+
+    summary = live(table(tmp_path / "a.csv", [39.992, 39.9981]))
     assert (summary.stored, summary.corrections) == (2, 1)
     assert stored(plant)[1]["correction"]["amount"] == -0.0061
-    assert run(plant, tmp_path / "a.csv", live=True).repeated == 2
+    assert live(tmp_path / "a.csv").repeated == 2
     with pytest.raises(Flawed) as refusal:
-        run(plant, table(tmp_path / "b.csv", [39.99, 39.99], correction_in_effect=["1", "7"]), live=True)
+        live(table(tmp_path / "b.csv", [39.99, 39.99], correction_in_effect=["1", "7"]))
     assert [(f.line, f.column) for f in refusal.value.flaws] == [(3, "correction_in_effect")]
     with pytest.raises(Invalid, match="10000 lines"):
-        run(plant, table(tmp_path / "c.csv", [39.99] * 10_001), live=True)
+        live(table(tmp_path / "c.csv", [39.99] * 10_001))
 
 
 def test_summaries_for_charts_are_those_of_readings_pushed_one_by_one(plant: Database, tmp_path: Path) -> None:
