@@ -207,7 +207,11 @@ def _followed(item: dict[str, Any]) -> str:
     count = len(item.get("numbers", ())) or len(item.get("sequences", ())) or len(item.get("locations", ()))
     match item["code"]:
         case "tool_restarted":
-            text = _("Tool {tool} begins anew with offset {offset}; the old one cut {parts} parts.")
+            text = ngettext(
+                "Tool {tool} begins anew with offset {offset}; the old one cut {parts} part.",
+                "Tool {tool} begins anew with offset {offset}; the old one cut {parts} parts.",
+                item["parts"],
+            )
         case "tool_changed_already":
             text = _("Tool {tool} had been changed since, so nothing was restarted a second time.")
         case "corrections_superseded":

@@ -9,7 +9,7 @@ from app.errors import NotFound
 from app.offsets import wording
 from app.offsets.actions import Verb
 from app.offsets.queries import AverageRow, CorrectionRow, ToolRow
-from app.web.i18n import _
+from app.web.i18n import _, ngettext
 from app.web.numbers import mm, um
 
 
@@ -68,7 +68,7 @@ def about_correction(row: CorrectionRow, verb: str, counting_on: list[int]) -> Q
     """Asks before a correction is approved, released, rejected or marked applied. counting_on: see the query of that name."""
     c = row.correction
     values = {"number": c.number, "amount": um(c.amount), "tool": c.tool_memory, "machine": row.machine}
-    after = "–" if row.expected is None else f"{plain(row.expected)} mm"
+    after = "–" if row.expected is None else mm(row.expected)
     send_to = f"corrections/{c.number}"
     to_machine = _("The machine fetches it and changes the offset of tool {tool} by {amount}.").format(**values)
     match verb:
@@ -148,7 +148,11 @@ def about_tool(row: ToolRow, what: str) -> Question:
                 _("Tool changed"),
                 f"tools/{number}/change",
                 [
-                    _("The old tool cut {parts} parts. Parts and sum of corrections begin at 0.").format(**values),
+                    ngettext(
+                        "The old tool cut {parts} part. Parts and sum of corrections begin at 0.",
+                        "The old tool cut {parts} parts. Parts and sum of corrections begin at 0.",
+                        row.parts,
+                    ).format(**values),
                     *follows,
                 ],
                 [_("Insert turned"), _("New insert"), _("New tool"), _("Insert chipped")],

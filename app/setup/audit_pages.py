@@ -55,5 +55,19 @@ def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, str]:
         if isinstance(value, dict):
             flat |= _flat(value, f"{prefix}{name}.")
         elif value is not None:
-            flat[prefix + name] = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+            flat[prefix + name] = _said(value)
     return flat
+
+
+def _said(value: Any) -> str:
+    """A value as people read it: what stands in a list is told, not written as JSON."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, list):
+        sets = any(isinstance(item, dict) for item in value)
+        return ("; " if sets else ", ").join(map(_said, value))
+    if isinstance(value, dict):
+        # What followed an alarm is a code with its values; the code says what the values are of.
+        values = [f"{name} {_said(item)}" for name, item in value.items() if name != "code" and item is not None]
+        return f"{value['code']}: {', '.join(values)}" if "code" in value else ", ".join(values)
+    return json.dumps(value, ensure_ascii=False)

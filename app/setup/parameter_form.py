@@ -54,7 +54,7 @@ def factor_choices() -> list[tuple[str, str, str]]:
         ("-1", _("−1"), _("Lathe, offset kept in diameter, outside or inside. Length or face.")),
         ("-0.5", _("−1/2"), _("Lathe, offset kept as radius (L1). Milling radius, outside.")),
         ("0.5", _("+1/2"), _("Milling radius, inside: hole or pocket.")),
-        (OTHER, _("Other"), _("A factor of your own, in the field below.")),
+        (OTHER, _("Other"), _("A factor of your own, in the field beside.")),
     ]
 
 

@@ -56,7 +56,11 @@ def read_json(body: bytes, content_type: str | None) -> Any:
     problems: list[FieldError] = []
     _look(value, (), problems)
     if problems:
-        raise Invalid(_("The request holds values that cannot be used."), errors=problems)
+        raise Invalid(
+            _("The request holds values that cannot be used."),
+            _("Correct the named fields and send it again."),
+            errors=problems,
+        )
     return value
 
 

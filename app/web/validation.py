@@ -12,6 +12,8 @@ from app.web.i18n import _
 
 def field_path(location: Sequence[str | int]) -> str:
     """``("body", "parameters", "zero_range")`` is `parameters.zero_range`; list items are `[17].measured`."""
+    if location and location[0] == "query":  # of several values, the query string does not say which
+        location = [step for step in location if not isinstance(step, int)]
     path = ""
     for step in location[1:] if location and location[0] in {"body", "query", "path", "header"} else location:
         path += f"[{step}]" if isinstance(step, int) else f".{step}" if path else str(step)
