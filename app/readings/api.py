@@ -14,7 +14,7 @@ from app.db.engine import Database
 from app.errors import FieldError, NotFound, TooLarge
 from app.readings import actions, queries
 from app.readings.answers import ReadingAnswer, ReadingDetail, ReadingRow
-from app.readings.door import Directory, answer_of, said, take
+from app.readings.door import Directory, answer_of, take
 from app.readings.ground import Stored, Verdict
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn, decode_many, decode_one
@@ -136,11 +136,7 @@ async def push_batch(
 
     outcomes, counts = await run_in_threadpool(stored)
     if decisions:
-        items = [
-            (await said(outcome, database))[1] if isinstance(outcome, Stored) else answer_of(cast("Verdict", outcome))
-            for outcome in outcomes
-        ]
-        counts = msgspec.json.encode(_counts(outcomes) | {"items": items})
+        counts = await run_in_threadpool(_with_decisions, outcomes, database)
     return Response(counts, 201, media_type="application/json")
 
 
@@ -178,6 +174,23 @@ def _counts(outcomes: list[Outcome]) -> dict[str, Any]:
         "corrections": sum(verdict.correction is not None for verdict in new),
         "alarms": len({id(alarm) for verdict in new for alarm in verdict.alarms if alarm.new}),
     }
+
+
+def _with_decisions(outcomes: list[Outcome], database: Database) -> bytes:
+    repeated: dict[Entry, list[int]] = {}
+    for outcome in outcomes:
+        if isinstance(outcome, Stored):
+            repeated.setdefault(outcome.entry, []).append(outcome.sequence)
+    first: dict[Stored, dict[str, Any]] = {}
+    if repeated:
+        with database.begin() as session:
+            for entry, sequences in repeated.items():
+                found = queries.first_answers(session, entry, sequences)
+                first |= {Stored(entry, sequence): each for sequence, each in found.items()}
+    items = [
+        first[outcome] if isinstance(outcome, Stored) else answer_of(cast("Verdict", outcome)) for outcome in outcomes
+    ]
+    return msgspec.json.encode(_counts(outcomes) | {"items": items})
 
 
 def _entry(session: SessionDep, caller: AnyCaller, characteristic: str) -> Entry:

@@ -134,7 +134,7 @@ async def said(outcome: Outcome, database: Database) -> tuple[int, dict[str, Any
 
 def _stored(database: Database, stored: Stored) -> dict[str, Any]:
     with database.begin() as session:
-        return queries.answer_of(session, stored.entry, stored.sequence)
+        return queries.first_answers(session, stored.entry, [stored.sequence])[stored.sequence]
 
 
 def answer_of(verdict: Verdict) -> dict[str, Any]:

@@ -94,10 +94,18 @@ def record_of(session: Session, entry: Entry, sequence: int) -> Record:
     return Record(*row)
 
 
-def answer_of(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
-    """The answer that this reading was given."""
-    made = answers(session, entry, [record_of(session, entry, sequence)])[0]
-    del made["excluded"]  # the first answer could not know it
+def first_answers(session: Session, entry: Entry, sequences: Iterable[int]) -> dict[int, dict[str, Any]]:
+    """The answers that these readings were given when they came, by sequence."""
+    rows = session.execute(
+        select(*COLUMNS).where(
+            Reading.machine_id == entry.machine_id,
+            Reading.characteristic_id == entry.characteristic_id,
+            Reading.sequence.in_(sequences),
+        )
+    )
+    made = {each["sequence"]: each for each in answers(session, entry, [Record(*row) for row in rows])}
+    for each in made.values():
+        del each["excluded"]  # the first answer could not know it
     return made
 
 
