@@ -154,9 +154,15 @@ class Verdict:
     correction: IssuedCorrection | None
     paused_by: int | OpenAlarm | None
     alarms: list[OpenAlarm]
+    _record: Record | None = None
 
     def record(self) -> Record:
-        """The row to store; every alarm has its number by now."""
+        """The row to store, and to answer from; every alarm has its number by now."""
+        if self._record is None:
+            self._record = self._made()
+        return self._record
+
+    def _made(self) -> Record:
         d, r, entry = self.decision, self.reading, self.stream.entry
         paused_by = self.paused_by.id if isinstance(self.paused_by, OpenAlarm) else self.paused_by
         return Record(

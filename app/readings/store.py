@@ -89,8 +89,13 @@ class _Loaded(msgspec.Struct):
 _loaded = msgspec.json.Decoder(_Loaded)
 
 
-async def load(pipeline: Pipeline, book: Book, wanted: Sequence[tuple[Entry, ReadingIn]]) -> tuple[Ground, str]:
-    """Begin a transaction, lock the machines, load what the readings are judged against; also its transaction id."""
+async def load(
+    pipeline: Pipeline, book: Book, wanted: Sequence[tuple[Entry, ReadingIn]], *, trusting: bool = False
+) -> tuple[Ground, str]:
+    """Begin a transaction, lock the machines, load what the readings are judged against; also its transaction id.
+
+    trusting: take the keys for new ones. If one is not, `save` will fail with a `UniqueViolation`.
+    """
     entries = {entry.characteristic_id: entry for entry, _ in wanted}
     machines = _machines(wanted)
     document = {
@@ -107,7 +112,7 @@ async def load(pipeline: Pipeline, book: Book, wanted: Sequence[tuple[Entry, Rea
         "keys": [
             {"machine_id": e.machine_id, "characteristic_id": e.characteristic_id, "key": r.key}
             for e, r in wanted
-            if r.key is not None
+            if r.key is not None and not trusting
         ],
     }
     _begun, locked, ((text,),) = await pipeline.run(

@@ -58,13 +58,18 @@ async def connect(dsn: str) -> Pipeline:
 
 
 async def transact(
-    pipeline: Pipeline, book: Book, wanted: Sequence[tuple[Entry, ReadingIn]], *, all_or_nothing: bool = False
+    pipeline: Pipeline,
+    book: Book,
+    wanted: Sequence[tuple[Entry, ReadingIn]],
+    *,
+    all_or_nothing: bool = False,
+    trusting: bool = False,
 ) -> list[Outcome]:
     """Decide and store these readings in one transaction, in their order.
 
     Raises `Invalid` naming each refused reading when it is all or nothing, `CommitLost`, and psycopg's errors.
     """
-    ground, transaction = await load(pipeline, book, wanted)
+    ground, transaction = await load(pipeline, book, wanted, trusting=trusting)
     now = datetime.now(UTC)
     outcomes: list[Outcome] = []
     for entry, reading in wanted:
@@ -126,11 +131,14 @@ class Keeper:
         """What becomes of each reading, after the commit. Raises only when it is all or nothing."""
         deadline = monotonic() + PATIENCE
         pause = 0.02
+        trusting = all_or_nothing  # looking up the keys of a batch costs a third of it, and they are new but for once
         while True:
             try:
                 if self._pipeline is None or self._pipeline.closed:
                     self._pipeline = await connect(self.dsn)
-                return await transact(self._pipeline, self.book, wanted, all_or_nothing=all_or_nothing)
+                return await transact(
+                    self._pipeline, self.book, wanted, all_or_nothing=all_or_nothing, trusting=trusting
+                )
             except CommitLost as lost:
                 if (outcomes := await self._settle(lost, deadline)) is not None:
                     return outcomes
@@ -144,8 +152,11 @@ class Keeper:
             except InbandError:
                 await self._roll_back()
                 raise
-            except Exception:
+            except Exception as error:
                 await self._roll_back()
+                if trusting and isinstance(error, psycopg.errors.UniqueViolation):
+                    trusting = False
+                    continue
                 if all_or_nothing:
                     raise
                 if len(wanted) == 1:
