@@ -16,7 +16,7 @@ from app.characteristics.schemas import (
 from app.machines import queries as machines
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, Engineer, SessionDep
-from app.web.fields import LARGEST_SERIAL, Limit, Page, page_of
+from app.web.fields import LARGEST_SERIAL, KeyCursor, Limit, Page, page_of
 
 router = api_router("characteristics")
 CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
@@ -37,7 +37,7 @@ def list_characteristics(
     session: SessionDep,
     caller: AnyCaller,
     machine: Annotated[str | None, Query(description="Only those of this machine.", examples=["lathe-1"])] = None,
-    after: Annotated[str, Query(max_length=64, description="Cursor: the `next` of the page before.")] = "",
+    after: Annotated[KeyCursor, Query(description="Cursor: the `next` of the page before.")] = "",
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[CharacteristicOut]:
     """Characteristics by key; for the key of a machine, those of that machine."""

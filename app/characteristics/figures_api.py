@@ -5,7 +5,6 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import msgspec
 from fastapi import Depends, Path, Query, Response
-from pydantic import AwareDatetime
 
 from app.characteristics import queries
 from app.characteristics.chart import chart_of, run_of
@@ -16,7 +15,7 @@ from app.statistics import queries as statistics
 from app.statistics.queries import Window
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, SessionDep
-from app.web.fields import LARGEST_ID
+from app.web.fields import LARGEST_ID, Moment
 from app.web.i18n import _
 from app.web.theme import ThemeName
 
@@ -49,8 +48,8 @@ def chosen(
     ] = None,
     first: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="From this reading on.")] = None,
     through: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="To this reading, itself included.")] = None,
-    start: Annotated[AwareDatetime | None, Query(alias="from", description="Measured at this moment or later.")] = None,
-    end: Annotated[AwareDatetime | None, Query(alias="to", description="Measured at this moment or earlier.")] = None,
+    start: Annotated[Moment | None, Query(alias="from", description="Measured at this moment or later.")] = None,
+    end: Annotated[Moment | None, Query(alias="to", description="Measured at this moment or earlier.")] = None,
 ) -> Choice:
     """The readings by number, by time, or the last ones; the last 200 if nothing is said."""
     for name, low, high in (("first", first, through), ("from", start, end)):

@@ -120,7 +120,7 @@ class CharacteristicChange(Body):
     unit: Literal["mm"] | None = None
     parameters: GivenParameters | None = None
     parameters_version: Annotated[
-        int | None, Field(ge=1, description="The version you looked at; 409 if there is a newer one.")
+        int | None, Field(strict=True, ge=1, description="The version you looked at; 409 if there is a newer one.")
     ] = None
     reason: Annotated[Reason | None, Field(description="Why; required when parameters change.")] = None
 

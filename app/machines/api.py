@@ -8,7 +8,7 @@ from app.machines import actions, queries
 from app.machines.schemas import MachineChange, MachineIn, MachineOut
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, Engineer, SessionDep
-from app.web.fields import Limit, Page, page_of
+from app.web.fields import KeyCursor, Limit, Page, page_of
 
 router = api_router("machines")
 MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
@@ -26,7 +26,7 @@ def add_machine(session: SessionDep, caller: Engineer, machine: MachineIn, respo
 def list_machines(
     session: SessionDep,
     caller: AnyCaller,
-    after: Annotated[str, Query(max_length=64, description="Cursor: the `next` of the page before.")] = "",
+    after: Annotated[KeyCursor, Query(description="Cursor: the `next` of the page before.")] = "",
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[MachineOut]:
     """All machines by key; for the key of a machine, that machine."""

@@ -3,26 +3,19 @@
 from datetime import UTC, datetime, timedelta
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field, JsonValue
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue
 from pydantic_core import PydanticCustomError
 
 from app.core.parameters import LARGEST_LENGTH
 from app.offsets import wording
 from app.offsets.queries import AverageRow, CorrectionRow, ToolRow
 from app.offsets.tables import Correction
-from app.web.fields import Body, Reason
+from app.web.fields import Body, Moment, Reason
 from app.web.i18n import _
 
 Status = Literal["held", "awaiting_approval", "pending", "applied", "rejected", "superseded"]
 EARLIEST = datetime(2000, 1, 1, tzinfo=UTC)
 AHEAD = timedelta(hours=24)
-
-
-def _written(value: Any) -> Any:
-    """A count of (milli)seconds is not a time here: nobody can tell which it is."""
-    if not isinstance(value, str | datetime):
-        raise PydanticCustomError("datetime_type", "not a time")
-    return value
 
 
 def _sensible(moment: datetime) -> datetime:
@@ -32,7 +25,7 @@ def _sensible(moment: datetime) -> datetime:
 
 
 Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
-Moment = Annotated[AwareDatetime, BeforeValidator(_written), AfterValidator(_sensible)]
+LatelyOrNow = Annotated[Moment, AfterValidator(_sensible)]
 
 CORRECTION: dict[str, JsonValue] = {
     "machine": "lathe-1",
@@ -84,7 +77,7 @@ class AppliedIn(Body):
     offset_after: Annotated[
         Length | None, Field(description="The offset that the control holds now; it is compared with the expected one.")
     ] = None
-    applied_at: Annotated[Moment | None, Field(description="When; if left out, now.")] = None
+    applied_at: Annotated[LatelyOrNow | None, Field(description="When; if left out, now.")] = None
 
 
 class DecisionIn(Body):

@@ -16,6 +16,7 @@ from app.readings.answers import answer
 from app.readings.records import Entry, Record
 from app.readings.tables import Exclusion, Reading, ReadingTouches
 from app.readings.wording import reason
+from app.web.fields import is_slug
 from app.web.i18n import _
 
 COLUMNS = [getattr(Reading, name) for name in Record._fields]
@@ -23,6 +24,8 @@ COLUMNS = [getattr(Reading, name) for name in Record._fields]
 
 def entry_of(session: Session, characteristic: str) -> Entry | None:
     """Where a characteristic is kept, by its key."""
+    if not is_slug(characteristic):
+        return None
     row = session.execute(
         select(Characteristic.machine_id, Machine.key, Characteristic.id, Characteristic.key)
         .join(Machine, Machine.id == Characteristic.machine_id)

@@ -286,7 +286,7 @@ def _time(value: Any) -> str | None:
         )
     try:
         msgspec.convert(value, Moment)
-    except msgspec.ValidationError:
+    except (msgspec.ValidationError, UnicodeEncodeError):
         return _("This is not a time with an offset; write it as 2026-11-21T08:15:02.120+01:00 or …Z.")
     return None
 

@@ -4,14 +4,14 @@ from datetime import datetime
 from typing import Annotated
 
 from fastapi import Path, Query
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.characteristics import queries as characteristics
 from app.errors import FieldError, Invalid
 from app.statistics import queries
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, SessionDep
-from app.web.fields import LARGEST_ID
+from app.web.fields import LARGEST_ID, Moment
 from app.web.i18n import _
 
 router = api_router("statistics")
@@ -69,10 +69,10 @@ def get_statistics(
     caller: AnyCaller,
     characteristic: Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])],
     start: Annotated[
-        AwareDatetime | None, Query(alias="from", description="Measured at this moment or later.", examples=[None])
+        Moment | None, Query(alias="from", description="Measured at this moment or later.", examples=[None])
     ] = None,
     end: Annotated[
-        AwareDatetime | None, Query(alias="to", description="Measured at this moment or earlier.", examples=[None])
+        Moment | None, Query(alias="to", description="Measured at this moment or earlier.", examples=[None])
     ] = None,
     last: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="Only of the last so many readings.")] = None,
 ) -> StatisticsOut:

@@ -7,9 +7,18 @@ Half surrogates are refused by pydantic itself.
 import re
 import unicodedata
 from collections.abc import Callable, Sequence
-from typing import Annotated, Generic, TypeVar
+from datetime import datetime
+from typing import Annotated, Any, Generic, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import (
+    AfterValidator,
+    AwareDatetime,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StringConstraints,
+)
 from pydantic_core import PydanticCustomError
 
 SLUG = r"[a-z0-9][a-z0-9._-]{0,63}"
@@ -43,6 +52,16 @@ def _one_line(text: str) -> str:
     return _readable(text)
 
 
+def _written(value: Any) -> Any:
+    """A count of (milli)seconds is not a time here, not even as text: nobody can tell which of them it is."""
+    if isinstance(value, datetime) or (isinstance(value, str) and "-" in value[1:]):
+        return value
+    raise PydanticCustomError("datetime_type", "not a time")
+
+
+Moment = Annotated[AwareDatetime, BeforeValidator(_written)]
+"""A time with its offset from UTC."""
+
 Slug = Annotated[str, AfterValidator(_slug), Field(json_schema_extra={"pattern": f"^{SLUG}$", "maxLength": 64})]
 """A key that people choose and programs use in addresses."""
 
@@ -50,6 +69,9 @@ Text200 = Annotated[
     str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200), AfterValidator(_one_line)
 ]
 """A name: one line, 1 to 200 characters."""
+
+KeyCursor = Annotated[str, Field(max_length=64), AfterValidator(_one_line)]
+"""A cursor that is the key of the last item seen; empty for the first page."""
 
 Reason = Annotated[
     str,

@@ -1,0 +1,501 @@
+"""Bad input at every endpoint of the OpenAPI document: a problem in words, nothing stored, never a 5xx.
+
+What is tried follows from the document itself, so an endpoint that is added is tried too; what it needs to be called
+rightly stands in `BODIES`, and a test fails while it is missing there.
+"""
+
+import json
+import re
+from collections.abc import Iterator
+from functools import cache
+from typing import Any, NamedTuple
+
+import httpx
+import pytest
+
+from app.main import create_app
+from app.settings import Settings
+from tests.conftest import Server
+from tests.readings.record import counts
+from tests.shop import PARAMETERS, Shop
+
+READING = {"characteristic": "{characteristic}", "measured": 40.0}
+FULL_READING = READING | {
+    "measured_at": "2026-11-21T08:15:02Z",
+    "machined_at": "2026-11-21T08:15:00Z",
+    "part": "SN-1",
+    "key": "bad-input",
+    "correction_in_effect": 0,
+}
+WHY = {"reason": "Compared with a micrometer"}
+BODIES: dict[str, dict[str, Any]] = {
+    "POST /api/v1/machines": {"key": "mill-bad", "name": "Mill", "control": "heidenhain"},
+    "PATCH /api/v1/machines/{machine}": {"name": "Lathe", "control": "fanuc"},
+    "POST /api/v1/machines/{machine}/keys": {"name": "Second control"},
+    "POST /api/v1/characteristics": {
+        "key": "bore-bad",
+        "name": "Bore",
+        "machine": "{machine}",
+        "part": "ring",
+        "unit": "mm",
+        "parameters": PARAMETERS,
+    },
+    "PATCH /api/v1/characteristics/{characteristic}": {
+        "name": "Seat",
+        "part": "shaft",
+        "parameters": PARAMETERS | {"zero_range": 0.002},
+        "reason": "Noisy machine",
+    },
+    "POST /api/v1/readings": FULL_READING,
+    "POST /api/v1/readings/batch": FULL_READING | {"key": "bad-input-2"},  # sent as a list of one
+    "POST /api/v1/readings/{characteristic}/{sequence}/exclude": WHY,
+    "PUT /api/v1/machines/{machine}/tools/{tool}": {"offset": 0.01} | WHY,
+    "POST /api/v1/machines/{machine}/tools/{tool}/change": {"offset": 0.01} | WHY,
+    "PUT /api/v1/machines/{machine}/averages/{location}": {"empirical_value": 0.001} | WHY,
+    "POST /api/v1/corrections/{machine}/{number}/applied": {
+        "offset_after": -0.006,
+        "applied_at": "2026-11-21T08:15:02Z",
+    },
+    "POST /api/v1/corrections/{machine}/{number}/rejected": WHY,
+    "POST /api/v1/corrections/{machine}/{number}/approve": WHY,
+    "POST /api/v1/corrections/{machine}/{number}/release": WHY,
+    "POST /api/v1/alarms/{alarm}/acknowledge": {"action": "tool_replaced", "comment": "Insert was worn", "offset": 0.0},
+    "PATCH /api/v1/people/{person}": {"role": "operator"},
+    "POST /api/v1/people/invitations": {"role": "viewer"},
+    "POST /api/v1/keys": {"name": "Dashboard", "role": "viewer"},
+}
+DOORS = ("POST /api/v1/readings", "POST /api/v1/readings/batch")
+
+# JSON that no field anywhere may take.
+POISON = (
+    "NaN",
+    "Infinity",
+    "-Infinity",
+    "1e400",
+    "-1e400",
+    "9" * 400,
+    "9" * 5000,
+    '"\\u0000"',
+    '"a\\u0000b"',
+    '"\\ud800"',
+    '"\\udc00x"',
+    '{"x": {"y": []}}',
+    "[[[[]]]]",
+    json.dumps("x" * 100_000),
+)
+WRONG = {
+    "string": ("true", "5", "5.5", "[]", '["x"]'),
+    "number": ('"5"', '"five"', "true", "[]", '""'),
+    "integer": ('"5"', "5.5", "true", "[]", "9" * 30, "-" + "9" * 30),
+    "boolean": ("5", '"maybe"', "[]"),
+    "array": ("5", '"x"', "true"),
+    "object": ("5", '"x"', "true", "[]"),
+}
+WRONG_TIMES = ("1763709302", "1763709302120", '"1763709302"', '"2026-11-21T08:15:02"', '"yesterday"', '"2026-13-41"')
+WHOLE = (
+    b"",
+    b" ",
+    b"{",
+    b"[]",
+    b"[1]",
+    b"7",
+    b"true",
+    b'"text"',
+    b"null",
+    b"NaN",
+    b"\xff\xfe{}",
+    b'{"x": "\xc3\x28"}',
+    b'{"x": "\xed\xa0\x80"}',
+    b"[" * 100_000,
+    b'{"x":' * 100_000,
+    b"\x00",
+    b"offset=1&reason=x",
+    b"<offset>1</offset>",
+    b'{"reason": "x"} {"reason": "y"}',
+    b"{'reason': 'x'}",
+)
+BAD_NUMBERS = ("0", "-1", "x", "1.5", "%00", "9" * 30, "%D9%A3", "1e3", "NaN", "0x10", "%20")
+BAD_KEYS = (
+    "nowhere",
+    "%00",
+    "a%00b",
+    "%ED%A0%80",
+    "%FF",
+    "UPPER",
+    "x" * 300,
+    "%F0%9F%98%80",
+    "'%3B--",
+    "-",
+    ".%2e",
+    "%0A",
+)
+LEAKS = (
+    "Traceback",
+    "psycopg",
+    "sqlalchemy",
+    "pydantic",
+    "msgspec",
+    "asyncio",
+    'File "',
+    "SELECT ",
+    "validation error",
+)
+
+
+class Operation(NamedTuple):
+    name: str
+    method: str
+    path: str
+    declared: dict[str, Any]
+
+
+@cache
+def document() -> dict[str, Any]:
+    app: Any = create_app(Settings(database_url="postgresql://nobody@localhost/nothing"))
+    while not hasattr(app, "openapi"):
+        app = app.app
+    made: dict[str, Any] = app.openapi()
+    return made
+
+
+@cache
+def operations() -> tuple[Operation, ...]:
+    return tuple(
+        Operation(f"{method.upper()} {path}", method.upper(), path, declared)
+        for path, methods in document()["paths"].items()
+        for method, declared in methods.items()
+    )
+
+
+def resolved(schema: dict[str, Any]) -> dict[str, Any]:
+    """The schema itself, whatever it refers to or may be besides null."""
+    while True:
+        if "$ref" in schema:
+            schema = document()["components"]["schemas"][schema["$ref"].rpartition("/")[2]]
+        elif len(options := [each for each in schema.get("anyOf", ()) if each.get("type") != "null"]) == 1:
+            schema = options[0]
+        elif len(schema.get("allOf", ())) == 1:
+            schema = schema["allOf"][0]
+        else:
+            return schema
+
+
+WITH_BODY = [each for each in operations() if "requestBody" in each.declared]
+WITH_PATH = [each for each in operations() if "{" in each.path]
+WITH_QUERY = [
+    each
+    for each in operations()
+    if any(parameter["in"] == "query" for parameter in each.declared.get("parameters", ()))
+]
+
+
+def named(operation: Operation) -> str:
+    return operation.name
+
+
+def body_schema(operation: Operation) -> dict[str, Any]:
+    schema = resolved(operation.declared["requestBody"]["content"]["application/json"]["schema"])
+    return resolved(schema["items"]) if schema.get("type") == "array" else schema
+
+
+class Place:
+    """A plant in which every address leads to something that the operation may be done to."""
+
+    def __init__(self, server: Server) -> None:
+        self.shop = shop = Shop(server)
+        self.dsn = server.database.dsn
+        self.approved = f"{shop.characteristic}-a"
+        shop.add(self.approved, mode="approval", tool_memory=4, average_memory=6)
+        shop.read(6.0)
+        awaiting = shop.read(6.0, self.approved)["correction"]["number"]
+        held = shop.read(350.0)
+        name = f"person-{shop.machine}"
+        server.person(name, "viewer")
+        person = next(each for each in shop.call("GET", "/people?limit=1000")["items"] if each["name"] == name)
+        self.values: dict[str, Any] = {
+            "machine": shop.machine,
+            "characteristic": shop.characteristic,
+            "sequence": 1,
+            "tool": 3,
+            "location": 5,
+            "number": 1,
+            "alarm": held["alarms"][0]["id"],
+            "person": next(person[name] for name in ("id", "name", "key") if name in person),
+            "key": shop.call("POST", f"/machines/{shop.machine}/keys", 201, name="second")["id"],
+        }
+        self.numbers = {"approve": awaiting, "release": held["correction"]["number"]}
+
+    def url(self, operation: Operation, **other: Any) -> str:
+        values = dict(self.values)
+        values["number"] = self.numbers.get(operation.path.rpartition("/")[2], values["number"])
+        if operation.path == "/api/v1/keys/{key}":
+            values["key"] = self.shop.call("POST", "/keys", 201, name="third", role="viewer")["id"]
+        return operation.path.format(**(values | other))
+
+    def body(self, operation: Operation) -> dict[str, Any]:
+        return {
+            name: value.format(**self.values) if isinstance(value, str) else value
+            for name, value in BODIES[operation.name].items()
+        }
+
+    def send(self, operation: Operation, content: bytes | str, **headers: str) -> httpx.Response:
+        return self.shop.admin.request(
+            operation.method,
+            self.url(operation),
+            content=content,
+            headers={"Content-Type": "application/json"} | headers,
+        )
+
+
+@pytest.fixture(scope="module")
+def place(server: Server) -> Place:
+    return Place(server)
+
+
+def as_text(operation: Operation, body: dict[str, Any], field: str | None = None, value: str = "") -> str:
+    """The body as JSON text, with one field written in a way that no JSON writer would."""
+    parts = [f"{json.dumps(name)}: {json.dumps(each)}" for name, each in body.items() if name != field]
+    if field is not None:
+        parts.append(f"{json.dumps(field)}: {value}")
+    text = "{" + ", ".join(parts) + "}"
+    return f"[{text}]" if operation.path.endswith("/batch") else text
+
+
+def complaint(answer: httpx.Response, what: str, statuses: range = range(400, 500)) -> str | None:
+    """What is wrong with an answer to bad input; None if it is as it should be."""
+    what = what if len(what) < 200 else what[:100] + " … " + what[-60:]
+    if answer.status_code not in statuses:
+        return f"{what}: {answer.status_code} {answer.text[:200]}"
+    if answer.headers["content-type"] != "application/problem+json":
+        return f"{what}: {answer.headers['content-type']}"
+    problem = answer.json()
+    if not {"type", "title", "status", "detail", "errors"} <= set(problem) or problem["status"] != answer.status_code:
+        return f"{what}: {problem}"
+    sentences = [problem["detail"], *(error["message"] for error in problem["errors"])]
+    if any(len(sentence.split()) < 2 for sentence in sentences) or any(leak in answer.text for leak in LEAKS):
+        return f"{what}: no help in {problem}"
+    if answer.status_code == 422 and not problem["errors"]:
+        return f"{what}: names no field: {problem}"
+    return None
+
+
+def none_of(complaints: Iterator[str | None]) -> None:
+    found = [each for each in complaints if each is not None]
+    assert not found, f"{len(found)}:\n" + "\n".join(found[:40])
+
+
+def test_every_operation_with_a_body_is_tried() -> None:
+    assert {each.name for each in WITH_BODY} == set(BODIES)
+    assert len(operations()) > 40
+
+
+@pytest.mark.parametrize("operation", WITH_BODY, ids=named)
+def test_bad_fields(operation: Operation, place: Place) -> None:
+    before = counts(place.dsn)
+    body, schema = place.body(operation), body_schema(operation)
+
+    def tried(field: str, value: str) -> str | None:
+        return complaint(place.send(operation, as_text(operation, body, field, value)), f"{field}: {value}")
+
+    def each() -> Iterator[str | None]:
+        for field, declared in schema["properties"].items():
+            kind = resolved(declared)
+            bad = [*POISON, *WRONG.get(kind.get("type", "string"), ())]
+            if kind.get("format") == "date-time":
+                bad += WRONG_TIMES
+            if "enum" in kind:
+                bad += ['"nonsense"', '""']
+            for value in bad:
+                yield tried(field, value)
+            if field in schema.get("required", ()):
+                yield tried(field, "null")
+                without = {name: value for name, value in body.items() if name != field}
+                yield complaint(place.send(operation, as_text(operation, without)), f"without {field}")
+        yield tried("colour", '"red"')
+        yield tried("colo\\u0000ur", '"red"')
+        first, value = next(iter(body.items()))
+        doubled = as_text(operation, body).replace("{", f"{{{json.dumps(first)}: {json.dumps(value)}, ", 1)
+        yield complaint(place.send(operation, doubled), "doubled")
+        big = as_text(operation, body, "colour", json.dumps("x" * 1_100_000))
+        yield complaint(place.send(operation, big), "large")
+
+    none_of(each())
+    assert counts(place.dsn) == before
+
+
+@pytest.mark.parametrize("operation", [each for each in WITH_BODY if "characteristics" in each.path], ids=named)
+def test_bad_parameters(operation: Operation, place: Place) -> None:
+    before = counts(place.dsn)
+    body = place.body(operation)
+    parameters = body.pop("parameters")
+    numbers = {f"R{number:02}" for number in (4, 10, 11, 23, 25, 26, 27, 28, 29, 30, 31, 33, 34, 36, 37)}
+    every = resolved(resolved(body_schema(operation)["properties"]["parameters"]))["properties"]
+
+    def each() -> Iterator[str | None]:
+        assert len(every) > 20
+        for name in sorted({*every, *parameters, *numbers}):
+            wrong = () if name == "rejected_may_correct" else ("true",)
+            for value in (*POISON, '"five"', *wrong, "[]", "-1e300", '{"n": 1}', '{"n": 3, "m": 2}'):
+                text = as_text(operation, body, "parameters", as_text(operation, parameters, name, value))
+                yield complaint(place.send(operation, text), f"{name}: {value}", range(422, 423))
+        for unfit in (
+            {"zero_range": 0.006},
+            {"averaging_limit": 0.009},
+            {"wear_limit": 0.007},
+            {"confidence_limit": 0.2},
+            {"weighting_factor": 0.5},
+            {"factor": 0},
+            {"tool_memory": 33},
+            {"average_memory": 21},
+            {"tolerance_width": 0},
+            {"accept": {"n": 2, "m": 1}},
+            {"R33": 0.001, "zero_range": 0.002},
+        ):
+            text = as_text(operation, body | {"parameters": parameters | unfit})
+            yield complaint(place.send(operation, text), str(unfit), range(422, 423))
+
+    none_of(each())
+    assert counts(place.dsn) == before
+
+
+@pytest.mark.parametrize("operation", WITH_BODY, ids=named)
+def test_what_is_no_body(operation: Operation, place: Place) -> None:
+    before = counts(place.dsn)
+    optional = not operation.declared["requestBody"].get("required")
+
+    def each() -> Iterator[str | None]:
+        for content in WHOLE:
+            if (content in {b"", b"null"} and optional) or (content == b"[]" and operation.path.endswith("/batch")):
+                continue  # nothing to do is no mistake
+            yield complaint(place.send(operation, content), repr(content))
+        if operation.name not in DOORS:  # these read what a machine sends whatever it is called
+            good = as_text(operation, place.body(operation))
+            for kind in (
+                "text/plain",
+                "application/x-www-form-urlencoded",
+                "multipart/form-data; boundary=x",
+                "",
+                "json",
+            ):
+                yield complaint(place.send(operation, good, **{"Content-Type": kind}), f"as {kind!r}")
+        yield complaint(place.send(operation, b"\x1f\x8b\x08\x00", **{"Content-Encoding": "gzip"}), "compressed")
+
+    none_of(each())
+    assert counts(place.dsn) == before
+
+
+@pytest.mark.parametrize("operation", WITH_PATH, ids=named)
+def test_bad_addresses(operation: Operation, place: Place) -> None:
+    content = as_text(operation, place.body(operation)) if operation.name in BODIES else None
+    client = place.shop.admin
+
+    def each() -> Iterator[str | None]:
+        for parameter in operation.declared["parameters"]:
+            if parameter["in"] != "path":
+                continue
+            name = parameter["name"]
+            for value in BAD_NUMBERS if resolved(parameter["schema"]).get("type") == "integer" else BAD_KEYS:
+                answer = client.request(
+                    operation.method,
+                    operation.path.format(**(place.values | {name: value})),
+                    content=content,
+                    headers={"Content-Type": "application/json"} if content else {},
+                )
+                yield complaint(answer, f"{name}: {value}")
+
+    before = counts(place.dsn)
+    none_of(each())
+    assert counts(place.dsn) == before
+
+
+@pytest.mark.parametrize("operation", WITH_QUERY, ids=named)
+def test_bad_queries(operation: Operation, place: Place) -> None:
+    before = counts(place.dsn)
+    content = as_text(operation, place.body(operation)) if operation.name in BODIES else None
+    url = place.url(operation)
+    parameters = [each for each in operation.declared["parameters"] if each["in"] == "query"]
+    needed = {p["name"]: place.values.get(p["name"], "1") for p in parameters if p.get("required")}
+
+    def each() -> Iterator[str | None]:
+        for parameter in parameters:
+            name, kind = parameter["name"], resolved(parameter["schema"])
+            several = "anyOf" in kind or kind.get("type") not in {"integer", "number", "boolean"}
+            strict = not several or "enum" in kind or kind.get("format") == "date-time"
+            bad = [
+                "%00",
+                "a%00b",
+                "%ED%A0%80",
+                "x" * 5000,
+                "%FF",
+                "NaN",
+                "-1",
+                "9" * 30,
+                "",
+                "1.5",
+                "'%3B--",
+                "%F0%9F%98%80",
+            ]
+            if kind.get("format") == "date-time":
+                bad += ["1763709302", "2026-11-21T08:15:02", "2026-13-01T00:00:00Z"]
+            if name == "limit":
+                bad += ["0", "1001"]
+            query = "&".join(f"{key}={value}" for key, value in needed.items() if key != name)
+            for value in bad:
+                if operation.path == "/api/v1/events" and not strict:
+                    continue
+                answer = place.shop.admin.request(
+                    operation.method,
+                    f"{url}?{query}&{name}={value}",
+                    content=content if strict else None,
+                    headers={"Content-Type": "application/json"} if content else {},
+                )
+                if answer.status_code < 300 and not strict:
+                    continue  # a text that finds nothing
+                yield complaint(answer, f"{name}={value}")
+
+    none_of(each())
+    assert counts(place.dsn) == before
+
+
+@pytest.mark.parametrize("operation", [each for each in operations() if each.path.startswith("/api/v1/")], ids=named)
+def test_nobody_gets_in_without_a_key(operation: Operation, place: Place) -> None:
+    if "openapi" in operation.path:
+        return
+    content = as_text(operation, place.body(operation)) if operation.name in BODIES else None
+    url = place.url(operation)
+    before = counts(place.dsn)
+    with httpx.Client(base_url=place.shop.server.url) as nobody:
+        for headers in (
+            {},
+            {"Authorization": "Bearer inband_x"},
+            {"Authorization": "Basic YTpi"},
+            {"Cookie": "inband_session=x"},
+        ):
+            answer = nobody.request(
+                operation.method, url, content=content, headers=headers | {"Content-Type": "application/json"}
+            )
+            assert complaint(answer, str(headers), range(401, 402)) is None
+    assert counts(place.dsn) == before
+
+
+@pytest.mark.parametrize("path", sorted(document()["paths"]))
+def test_wrong_methods(path: str, place: Place) -> None:
+    here = [each for each in operations() if re.fullmatch(re.sub(r"\{\w+\}", "[^/]+", each.path), path)]
+    known = {each.method for each in here} | {"HEAD", "OPTIONS"}
+    for method in {"GET", "POST", "PUT", "PATCH", "DELETE", "TRACE"} - known:
+        answer = place.shop.admin.request(method, path.format(**place.values))
+        assert complaint(answer, method, range(405, 406)) is None, answer.text
+        assert set(answer.headers["allow"].replace(" ", "").split(",")) == known - {"HEAD", "OPTIONS"}
+
+
+def test_what_all_this_was_tried_on_can_be_done(server: Server) -> None:
+    """The bodies above are good ones: what was refused was refused for what was changed in them."""
+    for operation in WITH_BODY:
+        place = Place(server)
+        body = place.body(operation)
+        if operation.name == "POST /api/v1/machines":
+            body["key"] = f"mill-{place.shop.machine}"
+        if operation.name == "POST /api/v1/characteristics":
+            body["key"] = f"bore-{place.shop.machine}"
+        answer = place.send(operation, as_text(operation, body))
+        assert answer.status_code in {200, 201, 204}, f"{operation.name}: {answer.text}"
