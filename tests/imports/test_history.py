@@ -92,6 +92,7 @@ def test_a_file_is_judged_line_by_line_and_corrects_nothing(plant: Database, tmp
     assert scalar(plant, "SELECT count(*) FROM tool_event") == 0
     assert scalar(plant, "SELECT count(*) FROM average_memory WHERE average <> 0") == 0
     assert scalar(plant, "SELECT count(*) FROM stream WHERE paused_by IS NOT NULL") == 0
+    assert scalar(plant, "SELECT sum(sequence - sequence_at_tool_change) FROM stream") == 0, "parts of today's tool"
     assert scalar(plant, "SELECT actor FROM audit_entry WHERE action = 'readings imported'") == "tests"
 
 

@@ -78,9 +78,11 @@ SELECT r.machine_id, r.characteristic_id, r.sequence, s.touches FROM staged s
 JOIN reading r ON r.machine_id = %(machine)s AND r.characteristic_id = %(characteristic)s AND r.key = s.key
 WHERE s.touches IS NOT NULL
 """
-# What the plant page shows as the last reading is the newest one, not the one that arrived last.
+# What the plant page shows as the last reading is the newest one, not the one that arrived last. Parts of the past were
+# not cut by the tool that is in the machine now: its count of parts stays.
 MOVE_STREAM = """
-UPDATE stream t SET sequence = t.sequence + %(count)s, last_average = coalesce(t.last_average, 0),
+UPDATE stream t SET sequence = t.sequence + %(count)s, sequence_at_tool_change = t.sequence_at_tool_change + %(count)s,
+    last_average = coalesce(t.last_average, 0),
     last_measured_at = greatest(t.last_measured_at, n.measured_at),
     last_measured = CASE WHEN newer THEN n.measured ELSE t.last_measured END,
     last_deviation = CASE WHEN newer THEN n.deviation ELSE t.last_deviation END,
