@@ -7,7 +7,9 @@ short answer that is a sizeable part of what it costs.
 import asyncio
 from typing import Any, cast
 
-from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
+
+LIVE = "/api/v1/events"
 
 
 class GatheredWrites:
@@ -44,3 +46,10 @@ class OneWriteProtocol(HttpToolsProtocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override] # uvicorn's own signature
         """Put the gathering transport between uvicorn and the socket."""
         super().connection_made(cast("asyncio.Transport", GatheredWrites(transport)))
+
+    def shutdown(self) -> None:
+        """End the stream of a live page at once: it would be waited for in vain, then cut off with a traceback."""
+        super().shutdown()
+        cycle: RequestResponseCycle | None = self.cycle  # none before the first request; uvicorn does not type that
+        if cycle is not None and not cycle.response_complete and cycle.scope["path"] == LIVE:
+            self.transport.close()

@@ -82,6 +82,20 @@ def test_it_ends_in_order(run_server: RunServer, workers: int, number: signal.Si
         assert "Traceback" not in server.stderr.read_text()
 
 
+@pytest.mark.parametrize("workers", [1, 2])
+def test_open_live_pages_neither_delay_the_end_nor_leave_a_traceback(run_server: RunServer, workers: int) -> None:
+    with run_server(workers=workers) as server, ExitStack() as pages:
+        client = server.client(server.key("viewer"))
+        for _ in range(3):
+            page = pages.enter_context(client.stream("GET", "/api/v1/events"))
+            assert next(page.iter_lines()) == "retry: 2000"
+        server.process.send_signal(signal.SIGINT)
+        assert server.process.wait(20) == 0
+        said = server.stderr.read_text()
+        assert "Traceback" not in said
+        assert "Cancel" not in said
+
+
 def test_workers_end_when_their_parent_is_killed(run_server: RunServer) -> None:
     with run_server(workers=2) as server:
         server.kill()
