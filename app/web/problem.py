@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from http import HTTPStatus
 from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
+from app.web.i18n import _
 from app.web.templates import page
 
 
@@ -16,4 +18,6 @@ def problem_page(
 ) -> HTMLResponse:
     """The page for an RFC 9457 problem (`title`, `status`, `detail`, `errors`, `what_to_do`, `incident`)."""
     whole = {"detail": "", "errors": [], "what_to_do": None, "incident": None} | dict(problem)
+    if whole["status"] == HTTPStatus.NOT_FOUND:  # whoever reads a page has no use for the calls of the API
+        whole["what_to_do"] = _("Check the address, or look for it from the plant: an old link may name what is gone.")
     return page(request, "problem.html", status=int(problem["status"]), headers=dict(headers or {}), problem=whole)
