@@ -53,20 +53,25 @@ class Live:
     async def stop(self) -> None:
         """Let every open page go, so that the server can end."""
         self.closing.set()
-        for client in self._clients:
-            client.put_nowait(None)
+        self._let_go()
         for task in self._tasks:
             task.cancel()
             with suppress(asyncio.CancelledError):
                 await task
 
+    def _let_go(self) -> None:
+        for client in self._clients:
+            client.put_nowait(None)
+
     async def _listen(self) -> None:
         while True:
+            listening = False
             try:
                 async with await AsyncConnection.connect(
                     self._dsn, autocommit=True, application_name="inband-live", connect_timeout=5
                 ) as conn:
                     await conn.execute(f"LISTEN {CHANNEL}")
+                    listening = True
                     if self._last is None:
                         self._last = await _newest(conn)
                     while True:
@@ -76,6 +81,8 @@ class Live:
                         await asyncio.sleep(PAUSE)
             except psycopg.Error as error:
                 log.warning("live events are interrupted: %s", error)
+                if not listening:  # the database is away: no page may go on calling itself live
+                    self._let_go()
                 await asyncio.sleep(1)
             except Exception:
                 log.exception("live events met what nobody foresaw")

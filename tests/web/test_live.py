@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from pathlib import Path
 from queue import Empty, Queue
 from typing import Any, NamedTuple
 
@@ -13,6 +14,8 @@ import httpx
 import psycopg
 import pytest
 
+from app.db import migrate
+from app.db.embedded import EmbeddedServer
 from app.web.live import HEARTBEAT, MOST_MISSED
 from tests.conftest import RunServer, Server
 from tests.shop import Shop
@@ -304,6 +307,26 @@ def test_the_stream_goes_on_after_the_database_cut_the_listener_off(shop: Shop) 
         while len(numbers) < 4:
             numbers.add(listener.next("correction").data["number"])
         assert numbers == {1, 2, 3, 4}
+
+
+def test_no_stream_calls_itself_live_while_the_database_is_away(run_server: RunServer, tmp_path: Path) -> None:
+    postgres = EmbeddedServer(tmp_path / "inband", {"fsync": "off"})
+    migrate.upgrade(postgres.start())
+    try:
+        with run_server(postgres.url) as server:
+            shop = Shop(server)
+            with listening(shop.admin) as listener:
+                shop.read(6.0)
+                listener.next("reading")
+                postgres.stop()
+                while listener.queue.get(timeout=5) is not None:
+                    pass
+            postgres.start()
+            with listening(shop.admin) as listener:
+                shop.read(6.0)
+                listener.next("reading")
+    finally:
+        postgres.stop()
 
 
 def test_streams_end_when_the_server_ends(run_server: RunServer) -> None:
