@@ -121,6 +121,7 @@ class Keeper:
         self.dsn = dsn
         self.book = book
         self._pipeline: Pipeline | None = None
+        self._away_since: float | None = None
 
     async def close(self) -> None:
         """Give the connection back."""
@@ -129,21 +130,23 @@ class Keeper:
 
     async def store(self, wanted: Sequence[tuple[Entry, ReadingIn]], *, all_or_nothing: bool = False) -> list[Outcome]:
         """What becomes of each reading, after the commit. Raises only when it is all or nothing."""
-        deadline = monotonic() + PATIENCE
+        # Whoever comes while the database has been away for long is not kept waiting once more.
+        deadline = (monotonic() if self._away_since is None else self._away_since) + PATIENCE
         pause = 0.02
         trusting = all_or_nothing  # looking up the keys of a batch costs a third of it, and they are new but for once
         while True:
             try:
                 if self._pipeline is None or self._pipeline.closed:
                     self._pipeline = await connect(self.dsn)
-                return await transact(
+                outcomes = await transact(
                     self._pipeline, self.book, wanted, all_or_nothing=all_or_nothing, trusting=trusting
                 )
             except CommitLost as lost:
-                if (outcomes := await self._settle(lost, deadline)) is not None:
-                    return outcomes
+                if (settled := await self._settle(lost, deadline)) is not None:
+                    return settled
             except psycopg.OperationalError as error:
                 await self._roll_back()
+                self._away_since = self._away_since or monotonic()
                 if monotonic() + pause > deadline:
                     log.warning("readings could not be stored, the database is away: %s", error)
                     return [DatabaseAway()] * len(wanted)
@@ -151,7 +154,10 @@ class Keeper:
                 pause = min(2 * pause, 0.5)
             except InbandError:
                 await self._roll_back()
-                raise
+                self._away_since = None
+                if not trusting:
+                    raise
+                trusting = False  # what is refused may be a repetition of what was taken under other parameters
             except Exception as error:
                 await self._roll_back()
                 if trusting and isinstance(error, psycopg.errors.UniqueViolation):
@@ -164,6 +170,9 @@ class Keeper:
                     return [_unexpected()]
                 log.exception("%s readings together could not be stored; storing them one by one", len(wanted))
                 return [(await self.store([item]))[0] for item in wanted]
+            else:
+                self._away_since = None
+                return outcomes
 
     async def _roll_back(self) -> None:
         if self._pipeline is not None and not self._pipeline.closed:

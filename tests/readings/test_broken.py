@@ -214,6 +214,12 @@ class TestDatabase:
             assert int(problem.headers["retry-after"]) > 0
             assert problem.json()["type"] == "urn:inband:problem:database-away"
             assert "Nothing of this request was stored" in problem.json()["detail"]
+        # Who comes later is not kept waiting, however many they are.
+        begun = time.monotonic()
+        with ThreadPoolExecutor(20) as pool:
+            answers = [pool.submit(push, shop, key=f"w{number}") for number in range(20)]
+            assert {answer.result().status_code for answer in answers} == {503}
+        assert time.monotonic() - begun < 4
         assert shop.machine_client.get("/api/v1/alarms").status_code == 503
         assert shop.server.client().get("/health/ready").status_code == 503
         assert shop.server.client().get("/health/live").status_code == 200

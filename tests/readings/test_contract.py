@@ -292,6 +292,8 @@ class TestKeys:
         change = {"variant": "single", "repeats": 1}
         shop.call("PATCH", f"/characteristics/{shop.characteristic}", parameters=change, reason="back")
         assert shop.call("POST", "/readings", 200, **body) == first
+        batch = shop.machine_client.post("/api/v1/readings/batch?decisions=true", json=[body])
+        assert (batch.status_code, batch.json()["repeated"], batch.json()["items"]) == (201, 1, [first])
         body["touches"] = [[0.001, 0.004], [40, 40]]
         shop.call("POST", "/readings", 409, **body)
 
