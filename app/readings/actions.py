@@ -42,7 +42,7 @@ def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: s
             )
         ).one()
         raise Conflict(
-            _("Reading %(sequence)s of %(characteristic)s was excluded by %(actor)s on %(at)s already: %(reason)s")
+            _("Reading %(sequence)s of %(characteristic)s was excluded by %(actor)s already, on %(at)s: %(reason)s")
             % {
                 "sequence": sequence,
                 "characteristic": entry.characteristic,
@@ -55,8 +55,8 @@ def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: s
     audit.record(
         session,
         actor,
-        "exclude",
-        f"reading {entry.characteristic} {sequence}",
+        "reading excluded",
+        f"reading/{entry.characteristic}/{sequence}",
         before={"excluded": False},
         after={"excluded": True},
         why=reason,
@@ -94,8 +94,8 @@ def exclude_all(session: Session, entry: Entry, sequences: Sequence[int], actor:
         audit.record(
             session,
             actor,
-            "exclude",
-            f"reading {entry.characteristic}",
+            "readings excluded",
+            f"reading/{entry.characteristic}",
             before={"excluded": False},
             after={"excluded": True, "sequences": made},
             why=reason,
