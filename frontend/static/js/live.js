@@ -68,10 +68,13 @@ function connect() {
   source?.close();
   source = new EventSource(URL_OF_EVENTS);
   source.onopen = hear;
-  source.addEventListener("heartbeat", () => {
-    hasHeartbeat = true;
-    hear();
-  });
+  // Who greets sends heartbeats too. On a busy plant none may ever come: events take their place.
+  for (const sign of ["hello", "heartbeat"]) {
+    source.addEventListener(sign, () => {
+      hasHeartbeat = true;
+      hear();
+    });
+  }
   for (const kind of KINDS) source.addEventListener(kind, (message) => deliver(kind, message));
   source.onerror = () => {
     lose();
