@@ -22,12 +22,14 @@ import contextlib
 import fcntl
 import hashlib
 import importlib.util
+import logging
 import os
 import pwd
 import shutil
 import signal
 import subprocess
 import tempfile
+import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -63,12 +65,17 @@ DEFAULTS = {
 """Written once into postgresql.conf, where people may change them. fsync and synchronous_commit stay on."""
 
 
+LOOK_EVERY = 2.0
+"""Seconds between two looks whether the server still runs."""
+log = logging.getLogger("inband")
+
+
 class EmbeddedServerError(Exception):
     """The embedded PostgreSQL cannot run; the message says why and what to do."""
 
 
 class EmbeddedServer:
-    """The PostgreSQL of one data directory; ``with EmbeddedServer(path) as url: ...``.
+    """The PostgreSQL of one data directory; ``with EmbeddedServer(path) as url: ...`` also starts it again if it dies.
 
     ``options`` are server settings for this start only, such as ``{"fsync": "off"}`` in tests; they have no effect on a
     server that is running already.
@@ -81,12 +88,30 @@ class EmbeddedServer:
         self.options = dict(options or {})
         self._users_lock: int | None = None
         self._log_begins = 0
+        self._ended = threading.Event()
+        self._watch: threading.Thread | None = None
 
     def __enter__(self) -> str:
-        return self.start()
+        url = self.start()
+        self._ended.clear()
+        self._watch = threading.Thread(target=self._keep_alive, name="embedded PostgreSQL", daemon=True)
+        self._watch.start()
+        return url
 
     def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        if self._watch is not None:
+            self._watch.join()
         self.stop()
+
+    def _keep_alive(self) -> None:
+        while not self._ended.wait(LOOK_EVERY):
+            if self.pid is None:
+                log.error("PostgreSQL has ended by itself; starting it again. Its own words: %s", self.log)
+                try:
+                    self.start()
+                except EmbeddedServerError as error:
+                    log.error("%s", error)  # noqa: TRY400 - the message says it all; the next look tries again
 
     @property
     def url(self) -> str:

@@ -308,13 +308,13 @@ def _signal(ground: Ground, stream: StreamState, signal: Signal, sequence: int, 
             ground.tool_alarms[entry.machine_id, parameters.tool_memory, signal.value] = active
         else:
             stream.alarms[signal.value] = active
-        limit = parameters.max_total if of_tool else getattr(parameters, LIMIT_OF.get(signal, ""), None)
-        active.data = {
-            "characteristic": entry.characteristic,
-            "deviation": decision.deviation,
-            "decided": decision.decided,
-            "limit": parameters.tolerance_width / 2 if limit is None else limit,
-        }
+    limit = parameters.max_total if of_tool else getattr(parameters, LIMIT_OF.get(signal, ""), None)
+    active.data = {
+        "characteristic": entry.characteristic,
+        "deviation": decision.deviation,
+        "decided": decision.decided,
+        "limit": parameters.tolerance_width / 2 if limit is None else limit,
+    }
     active.count += 1
     active.last_sequence = sequence
     return active

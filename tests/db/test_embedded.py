@@ -189,6 +189,25 @@ def test_a_killed_server_recovers_at_the_next_start(folder: Path) -> None:
         connection.execute("SELECT FROM kept")
 
 
+def test_a_server_that_dies_while_it_is_used_comes_back(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(embedded, "LOOK_EVERY", 0.1)
+    server = EmbeddedServer(folder / "data")
+    with server as url:
+        with psycopg.connect(url) as connection:
+            connection.execute("CREATE TABLE kept AS SELECT 1 AS one")
+        first = server.pid
+        assert first is not None
+        os.kill(first, signal.SIGKILL)
+        for _ in range(200):
+            if server.pid not in {None, first}:
+                break
+            time.sleep(0.1)
+        server.start()  # waits until it takes connections
+        with psycopg.connect(url) as connection:
+            assert connection.execute("SELECT one FROM kept").fetchone() == (1,)
+    assert server.pid is None, "the last one out stops it all the same"
+
+
 def test_a_pid_file_whose_number_now_belongs_to_another_program_is_stale(folder: Path) -> None:
     with EmbeddedServer(folder / "data"):
         pass
