@@ -75,6 +75,8 @@ def test_two_servers_on_one_database_decide_like_one(run_server: RunServer, para
             history(dsn, shop.characteristic) + history(dsn, shared), key=lambda reading: reading["received_at"]
         )
         assert len({reading["correction"] for reading in mixed if reading["correction"]}) > 2
+        # Each waited for the other's lock; neither ran into what the other had written.
+        assert "could not be stored" not in one.stderr.read_text() + other.stderr.read_text()
 
 
 def _confirming(shop: Shop, characteristic: str, count: int, seed: int) -> Iterator[dict[str, Any]]:
@@ -99,6 +101,7 @@ def test_workers_of_one_server_decide_like_one(run_server: RunServer, parameters
         must_replay(parameters, stored)
         must_be_stored(server.database.dsn, [answer for sender in senders for answer in sender.answers])
         must_hold(server.database.dsn)
+        assert "could not be stored" not in server.stderr.read_text()
 
 
 def test_what_cannot_be_taken_fails_alone_in_its_commit(shop: Shop) -> None:
