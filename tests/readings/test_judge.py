@@ -1,6 +1,5 @@
 """Deciding in memory, without web and database: properties of a sequence of readings."""
 
-import asyncio
 from datetime import UTC, datetime
 from typing import Any
 
@@ -17,6 +16,7 @@ from app.readings.judge import judge
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn
 from app.readings.writer import CommitLost, _status, connect, transact
+from tests.loops import run
 from tests.shop import PARAMETERS
 
 ENTRY = Entry(1, "lathe-1", 1, "shaft")
@@ -176,4 +176,4 @@ def test_a_commit_whose_number_another_transaction_got_is_not_taken_for_done(dat
         assert await _status(pipeline.connection, CommitLost("9999999999", outcomes)) is None
         await pipeline.connection.close()
 
-    asyncio.run(ask())
+    run(ask())
