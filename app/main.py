@@ -77,11 +77,9 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         writer.start()
         live.start()
-        # What has been made so far stays for good: the collector need not walk it again, which halves the p99. What
-        # comes now lives as long as its request, mostly without cycles, so it need not be looked at so often either.
+        # What has been made so far stays for good: the collector need not walk it again, which halves the p99.
         gc.collect()
         gc.freeze()
-        gc.set_threshold(50_000, 20, 20)
         yield
         await live.stop()
         await writer.stop()
