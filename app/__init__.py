@@ -8,6 +8,7 @@ The map of the house. Whoever knows the shop floor knows where to look:
     readings         the door: probe readings come in, are decided, stored and answered together
     offsets          tool memory (R10), average memory (R11), corrections and their life
     alarms           what needs a person, and what follows when one acknowledges it
+    plant            the first page: every machine and characteristic at a glance
     statistics       what the readings say together: counts, spread, charts of ten million points
     setup            the pages where all of that is set up
     people           who may do what: sign-in, sessions, roles, personal keys
