@@ -19,6 +19,7 @@ The map of the house. Whoever knows the shop floor knows where to look:
     web              the browser kit: templates, problem pages, live events, translation
     db               PostgreSQL: engine, column types, migrations, the embedded server
     cli              the command `inband`
+    rounds.py        what has to be looked after although nobody asks, once a minute
     settings.py      every setting with its meaning; unsafe values are refused
     errors.py        every error that people or machines may see
     main.py          create_app(): the wiring

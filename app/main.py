@@ -27,6 +27,7 @@ from app.readings import api as readings
 from app.readings.door import Directory, ReadingsDoor
 from app.readings.importing import pages as import_pages
 from app.readings.writer import Writer
+from app.rounds import Chore, Rounds
 from app.settings import Settings
 from app.setup import pages as setup_pages
 from app.statistics import api as statistics
@@ -63,6 +64,9 @@ ROUTERS: tuple[APIRouter, ...] = (
     import_pages.router,
 )
 
+# What is looked after once a minute; see app.rounds.
+CHORES: tuple[Chore, ...] = ()
+
 
 def create_app(settings: Settings | None = None) -> ASGIApp:
     """Make the application for one server process. Without settings they come from the environment."""
@@ -71,17 +75,19 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
         raise RuntimeError("no database: `inband serve` starts one, or set INBAND_DATABASE_URL")
     database = Database(settings.database_url, pool_size=settings.pool_size)
     keys, directory = KeyRing(database), Directory(database)
-    writer, live = Writer(database.dsn), Live(database.dsn)
+    writer, live, rounds = Writer(database.dsn), Live(database.dsn), Rounds(database, CHORES)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         writer.start()
         live.start()
+        rounds.start()
         # What has been made so far stays for good: the collector need not walk it again, which halves the p99.
         gc.collect()
         gc.freeze()
         yield
         await live.stop()
+        await rounds.stop()
         await writer.stop()
         database.close()
 
