@@ -12,13 +12,17 @@ class Machine(Base):
     """A machine tool; `key` is its name in addresses and readings."""
 
     __tablename__ = "machine"
-    __table_args__ = (CheckConstraint("control IN ('sinumerik', 'fanuc', 'heidenhain', 'other')", name="control"),)
+    __table_args__ = (
+        CheckConstraint("control IN ('sinumerik', 'fanuc', 'heidenhain', 'other')", name="control"),
+        CheckConstraint("corrections_expire_after > 0", name="corrections_expire_after"),
+    )
 
     id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True)
     key: Mapped[str] = mapped_column(unique=True)
     name: Mapped[str]
     control: Mapped[str]
     created_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    corrections_expire_after: Mapped[float | None]  # h that a correction waits to be fetched and confirmed
 
 
 class MachineState(Base):

@@ -15,7 +15,10 @@ class Tool(Base):
     """One location of the tool memory (R10, 1-32): the offset that the control is known to hold."""
 
     __tablename__ = "tool"
-    __table_args__ = (CheckConstraint("number BETWEEN 1 AND 32", name="number"),)
+    __table_args__ = (
+        CheckConstraint("number BETWEEN 1 AND 32", name="number"),
+        CheckConstraint("sister BETWEEN 1 AND 32 AND sister <> number", name="sister"),
+    )
 
     machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), primary_key=True, autoincrement=False)
     number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
@@ -23,6 +26,15 @@ class Tool(Base):
     total: Mapped[float] = mapped_column(server_default="0")  # applied corrections since the tool was changed
     changed_at: Mapped[datetime | None]  # tool changed
     reset_at: Mapped[datetime | None]  # tool changed or offset edited by hand: parts cut before say nothing
+    paused_by: Mapped[int | None] = mapped_column(BigInteger)  # the alarm that asks which offset is true
+    parts_kept: Mapped[int] = mapped_column(server_default="0")  # cut by characteristics that have left this tool
+    edge: Mapped[str | None]  # D number, or what the cutting edge is called
+    name: Mapped[str | None]
+    kind: Mapped[str | None]
+    planned_parts: Mapped[int | None]
+    planned_total: Mapped[float | None]  # wear life: the sum of corrections at which the edge is spent
+    sister: Mapped[int | None]  # R10 of the tool that goes on when this one is worn
+    life_told: Mapped[bool] = mapped_column(server_default="false")  # the alarm of this life was raised
 
 
 class ToolEvent(Base):
@@ -44,6 +56,9 @@ class ToolEvent(Base):
     offset_after: Mapped[float]
     correction: Mapped[int | None]
     parts: Mapped[int | None]  # parts cut with the tool that went out, for a change
+    total: Mapped[float | None]  # the sum of its corrections
+    edge: Mapped[str | None]  # what it was called
+    name: Mapped[str | None]
     actor: Mapped[str]
     reason: Mapped[str | None]
 

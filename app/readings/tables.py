@@ -39,6 +39,8 @@ class Stream(Base):
     last_deviation: Mapped[float | None]
     last_average: Mapped[float | None]
     last_zone: Mapped[str | None]
+    level: Mapped[float | None]  # the deviation expected without any correction of the tool (plausible_jump)
+    level_sequence: Mapped[int | None] = mapped_column(BigInteger)  # the reading that moved it last
 
 
 class Reading(Base):
