@@ -21,6 +21,7 @@ def label(name: str) -> str:
         "wait": _("Wait"),
         "axis": _("Measuring axis"),
         "direction": _("Probing direction"),
+        "feature": _("Outside or inside"),
         "nominal": _("Nominal"),
         "upper_deviation": _("Upper deviation"),
         "lower_deviation": _("Lower deviation"),
@@ -51,6 +52,7 @@ def explanation(name: str) -> str | None:
         "repeats": _("At the same point; the mean counts. Usual: 1 to 10."),
         "index": _("Degrees between points, or mm along Z."),
         "wait": _("Seconds before measuring goes on after indexing."),
+        "feature": _("From which side the surface is touched: with the direction it says where the probe starts."),
         "target": _("Aimed at: the middle of the tolerance."),
         "tolerance_width": _("Upper minus lower limit."),
         "zero_range": _("Up to here a deviation is scatter: nothing is corrected."),
@@ -83,6 +85,7 @@ def choice(name: str, value: str) -> str:
         },
         "axis": {"X": "X", "Y": "Y", "Z": "Z"},
         "direction": {"positive": _("Positive (+)"), "negative": _("Negative (−)")},
+        "feature": {"outside": _("Outside (shaft, web)"), "inside": _("Inside (bore, pocket)")},
         "mode": {
             "automatic": _("Automatic"),
             "approval": _("Approval by a person"),
@@ -163,6 +166,9 @@ def sentence(problem: Problem) -> str:
             "milling radius −0.5 outside, +0.5 inside"
         ),
         "factor_zero": _("The factor must not be 0: nothing would ever be corrected. To only measure, set R10 to 0"),
+        "sections": _(
+            "{name} {points} do not fit acceptance by {sections} sections; say {sections}, or leave it out"
+        ).format(name=name, points=data.get("points"), sections=data.get("sections")),
         "accept": _('Acceptance must be {"n": n, "m": m} with whole numbers, 1 ≤ n ≤ m ≤ 100, for example 2 of 3'),
     }.get(problem.code, problem.code)
 

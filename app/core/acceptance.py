@@ -18,8 +18,12 @@ def accepted(parameters: Parameters, sections: Sequence[float], empirical_value:
     """
     if parameters.accept_m == 1:
         return True
-    inside = sum(
-        within_tolerance(deviation_of(value, parameters.target, empirical_value), parameters.limits)
+    return len(sections) - sections_outside(parameters, sections, empirical_value) >= parameters.accept_n
+
+
+def sections_outside(parameters: Parameters, sections: Sequence[float], empirical_value: float = 0.0) -> int:
+    """How many sections (values in mm) lie out of tolerance; the lathe line adds them up in its variable #513."""
+    return sum(
+        not within_tolerance(deviation_of(value, parameters.target, empirical_value), parameters.limits)
         for value in sections
     )
-    return inside >= parameters.accept_n

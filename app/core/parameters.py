@@ -43,6 +43,13 @@ class Direction(StrEnum):
     NEGATIVE = "negative"
 
 
+class Feature(StrEnum):
+    """Whether the surface is touched from outside (shaft, spigot, web) or from inside (bore, slot, pocket)."""
+
+    OUTSIDE = "outside"
+    INSIDE = "inside"
+
+
 class Mode(StrEnum):
     """What becomes of a computed correction."""
 
@@ -62,6 +69,7 @@ ENUMS: dict[str, type[StrEnum]] = {
     "variant": Variant,
     "axis": Axis,
     "direction": Direction,
+    "feature": Feature,
     "mode": Mode,
     "wear_policy": WearPolicy,
 }
@@ -88,6 +96,7 @@ class Parameters:
     wait: float | None = None
     axis: Axis = Axis.X
     direction: Direction = Direction.POSITIVE
+    feature: Feature = Feature.OUTSIDE
     path_factor: float = 1.0
     nominal: float | None = None
     upper_deviation: float | None = None
@@ -127,7 +136,8 @@ class Parameters:
         values = dict(stored)
         accept = values.pop("accept")
         for name, enum in ENUMS.items():
-            values[name] = enum(values[name])
+            if name in values:
+                values[name] = enum(values[name])
         return cls(**values, accept_n=accept["n"], accept_m=accept["m"])
 
 
@@ -174,6 +184,7 @@ FIELDS: tuple[Field, ...] = (
     Field("wait", "R04", Kind.NUMBER, lowest=0, highest=3600),
     Field("axis", "R30", Kind.CHOICE, default="X", choices=_choices(Axis), codes=(1, 2)),
     Field("direction", "R31", Kind.CHOICE, default="positive", choices=_choices(Direction), codes=(0, 1)),
+    Field("feature", None, Kind.CHOICE, default="outside", choices=_choices(Feature)),
     Field("nominal", "R42", Kind.LENGTH),
     Field("upper_deviation", "R40", Kind.LENGTH),
     Field("lower_deviation", "R41", Kind.LENGTH),
@@ -202,7 +213,7 @@ class Problem(NamedTuple):
     """Something wrong with a parameter set: where, what (a code with values), and how bad.
 
     Codes: required, unknown, twice, not_a_number, not_whole, not_a_choice, not_yes_no, range, order, target_missing,
-    target_twice, tolerance_sign, sign_missing, factor_zero, accept, and the warning source_range.
+    target_twice, tolerance_sign, sign_missing, factor_zero, accept, sections, and the warning source_range.
     """
 
     field: str
@@ -262,6 +273,7 @@ def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
     elif values.setdefault("factor", -1.0) == 0:
         problems.append(Problem("factor", "factor_zero", {}))
     problems.extend(_order(values))
+    problems.extend(_sections(values))
     if problems:
         raise ParameterError(problems)
     for name, enum in ENUMS.items():
@@ -329,6 +341,14 @@ def _accept(accept: Any, problems: list[Problem]) -> tuple[int, int]:
         problems.append(Problem("accept", "accept", {}))
         return 1, 1
     return n, m  # type: ignore[return-value]
+
+
+def _sections(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """Acceptance n of m needs m sections: R23 says so many points (twice as many for two points each), or nothing."""
+    sections, points = values["accept_m"], values["points"]
+    two_point = values["variant"] == Variant.TWO_POINT
+    if sections > 1 and points not in ({1, 2, sections, 2 * sections} if two_point else {1, sections}):
+        yield Problem("points", "sections", {"points": points, "sections": sections})
 
 
 def _target(values: dict[str, Any], problems: list[Problem]) -> None:

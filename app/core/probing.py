@@ -9,8 +9,11 @@ from math import fsum
 from typing import NamedTuple
 
 from app.core.compensation import DECIMALS
-from app.core.parameters import Parameters, Variant
+from app.core.parameters import Axis, Direction, Feature, Parameters, Variant
 from app.core.zones import nanometres
+
+Touches = Sequence[Sequence[float | None] | None]
+"""One list of repeats per point, mm; None where the probe did not trigger."""
 
 
 class Measured(NamedTuple):
@@ -23,42 +26,118 @@ class Measured(NamedTuple):
 class TouchError(ValueError):
     """Touches that cannot be made into a reading.
 
-    code: ``points`` (wrong number of points), ``repeats`` (wrong number at a point), ``window``
-    (outside ±a). point and repeat count from 1; expected and got are counts or mm.
+    code: ``points`` (wrong number of points), ``repeats`` (wrong number at a point), ``missing`` (the probe did not
+    trigger), ``window`` (outside ±a), ``distance`` (two points further from or nearer to each other than ±a). point and
+    repeat count from 1 and name the first that is missing, too many or outside; expected and got are counts or mm.
     """
 
     def __init__(
-        self, code: str, *, point: int | None = None, repeat: int | None = None, expected: float, got: float
+        self, code: str, *, point: int, repeat: int | None = None, expected: float, got: float | None = None
     ) -> None:
         super().__init__(code, point, repeat, expected, got)
         self.code, self.point, self.repeat, self.expected, self.got = code, point, repeat, expected, got
 
 
+class Travel(NamedTuple):
+    """Where the probe's measuring move starts and where it ends if nothing triggers, on the measuring axis, mm."""
+
+    start: float
+    end: float
+
+
 def points_expected(parameters: Parameters) -> int:
-    """How many points a reading has: two where the variant itself says so, R23 otherwise."""
-    if parameters.variant in (Variant.INDEXED, Variant.TWO_POINT):
-        return max(2, parameters.points)
-    return parameters.points
+    """How many points a reading has: R23, and no fewer than the variant and the sections of n of m need.
+
+    >>> from app.core.parameters import read
+    >>> drawing = {"R32": 62.0, "R35": 0.03, "R33": 0, "R37": 0.3, "R36": 1.0}
+    >>> points_expected(read(drawing | {"R25": 1})[0])
+    2
+    >>> points_expected(read(drawing | {"variant": "two_point", "accept": {"n": 2, "m": 3}})[0])
+    6
+    """
+    if parameters.variant is Variant.TWO_POINT:
+        pairs = parameters.accept_m if parameters.accept_m > 1 else (parameters.points + 1) // 2
+        return 2 * pairs
+    least = 2 if parameters.variant is Variant.INDEXED else 1
+    return max(least, parameters.points, parameters.accept_m)
 
 
-def measured_value(parameters: Parameters, touches: Sequence[Sequence[float]]) -> Measured:
+def measured_value(parameters: Parameters, touches: Touches) -> Measured:
     """Make one measured value (mm) of the touches, one list of repeats per point.
 
     single, indexed, round, along: the mean over the points of the mean over the repeats;
-    two_point: the distance between the two points' means. Raises `TouchError`.
+    two_point: the mean over the pairs of points of the distance between their means. Raises `TouchError`.
     """
     expected = points_expected(parameters)
     if len(touches) != expected:
-        raise TouchError("points", expected=expected, got=len(touches))
-    two_point = parameters.variant is Variant.TWO_POINT
-    means: list[float] = []
+        raise TouchError("points", point=min(len(touches), expected) + 1, expected=expected, got=len(touches))
+    found = [_repeats(parameters, at, repeats or ()) for at, repeats in enumerate(touches, start=1)]
+    if parameters.variant is Variant.TWO_POINT:
+        _refuse_distances(parameters, found)
+    else:
+        _refuse_outside(parameters, found)
+    means = tuple(round(fsum(repeats) / len(repeats), DECIMALS) for repeats in found)
+    sections = sections_of(parameters, [fsum(repeats) / len(repeats) for repeats in found])
+    return Measured(round(fsum(sections) / len(sections), DECIMALS), means)
+
+
+def sections_of(parameters: Parameters, points: Sequence[float]) -> tuple[float, ...]:
+    """One value (mm) per section of the part: each point, or for two points the distance of each pair."""
+    if parameters.variant is Variant.TWO_POINT:
+        return tuple(round(abs(b - a), DECIMALS) for a, b in zip(points[::2], points[1::2], strict=True))
+    return tuple(points)
+
+
+def start_and_end(parameters: Parameters) -> Travel:
+    """Start = programmed ± a, end = behind the surface by a; the other point of two lies opposite.
+
+    The probe starts on the free side of the surface: outside a shaft, inside a bore. On X and Y, which count from the
+    middle of the part, inside/outside with the direction R31 says which half is touched: an outside surface moving in
+    the negative direction in the positive half, moving in the positive direction in the negative half. On Z, which
+    counts from a face, the direction alone says from where the probe comes.
+
+    >>> from app.core.parameters import read
+    >>> bore = {"R32": 62.0, "R35": 0.03, "R33": 0, "R37": 0.3, "R36": 1.0, "R28": 2, "feature": "inside", "R31": 0}
+    >>> start_and_end(read(bore)[0])
+    Travel(start=60.0, end=64.0)
+    >>> start_and_end(read(bore | {"feature": "outside"})[0])
+    Travel(start=-64.0, end=-60.0)
+    """
+    forward = 1.0 if parameters.direction is Direction.POSITIVE else -1.0
+    side = 1.0
+    if parameters.axis is not Axis.Z:
+        side = forward if parameters.feature is Feature.INSIDE else -forward
+    surface = side * parameters.target
+    return Travel(
+        round(surface - forward * parameters.window, DECIMALS) + 0.0,
+        round(surface + forward * parameters.window, DECIMALS) + 0.0,
+    )
+
+
+def _repeats(parameters: Parameters, point: int, repeats: Sequence[float | None]) -> list[float]:
+    """The touches at one point, all there."""
+    if len(repeats) != parameters.repeats:
+        first_wrong = min(len(repeats), parameters.repeats) + 1
+        raise TouchError("repeats", point=point, repeat=first_wrong, expected=parameters.repeats, got=len(repeats))
+    there = [touch for touch in repeats if touch is not None]
+    if len(there) != len(repeats):
+        raise TouchError("missing", point=point, repeat=list(repeats).index(None) + 1, expected=parameters.repeats)
+    return there
+
+
+def _refuse_outside(parameters: Parameters, touches: Sequence[Sequence[float]]) -> None:
+    window = nanometres(parameters.window)
     for point, repeats in enumerate(touches, start=1):
-        if len(repeats) != parameters.repeats:
-            raise TouchError("repeats", point=point, expected=parameters.repeats, got=len(repeats))
-        if not two_point:
-            for repeat, touch in enumerate(repeats, start=1):
-                if nanometres(abs(touch - parameters.target)) > nanometres(parameters.window):
-                    raise TouchError("window", point=point, repeat=repeat, expected=parameters.window, got=touch)
-        means.append(fsum(repeats) / len(repeats))
-    value = abs(means[1] - means[0]) if two_point else fsum(means) / len(means)
-    return Measured(round(value, DECIMALS), tuple(round(mean, DECIMALS) for mean in means))
+        for repeat, touch in enumerate(repeats, start=1):
+            if nanometres(abs(touch - parameters.target)) > window:
+                raise TouchError("window", point=point, repeat=repeat, expected=parameters.window, got=touch)
+
+
+def _refuse_distances(parameters: Parameters, touches: Sequence[Sequence[float]]) -> None:
+    """Where two surfaces lie is not programmed, how far they are apart is: each pair of touches is held against that."""
+    window = nanometres(parameters.window)
+    for second in range(1, len(touches), 2):
+        for repeat, (a, b) in enumerate(zip(touches[second - 1], touches[second], strict=True), start=1):
+            distance = round(abs(b - a), DECIMALS)
+            if nanometres(abs(distance - parameters.target)) > window:
+                raise TouchError("distance", point=second + 1, repeat=repeat, expected=parameters.window, got=distance)

@@ -159,11 +159,30 @@ def _note(code: str, record: Record, parameters: Parameters) -> str:
 def touch_problem(error: TouchError) -> str:
     """What is wrong with the touches, naming point and repeat."""
     values = {"point": error.point, "repeat": error.repeat, "expected": error.expected, "got": error.got}
+    few = (error.got or 0) < error.expected
     match error.code:
+        case "points" if few:
+            text = _(
+                "%(got)s points came, %(expected)s are expected: point %(point)s is missing. "
+                "Send one list of touches per point."
+            )
         case "points":
-            text = _("%(got)s points came, %(expected)s are expected: one list of touches per point.")
+            text = _("%(got)s points came, %(expected)s are expected: point %(point)s is one too many.")
+        case "repeats" if few:
+            text = _(
+                "Point %(point)s has %(got)s touches, %(expected)s are expected (R27): repeat %(repeat)s is missing."
+            )
         case "repeats":
-            text = _("Point %(point)s has %(got)s touches, %(expected)s are expected (R27).")
+            text = _(
+                "Point %(point)s has %(got)s touches, %(expected)s are expected (R27): repeat %(repeat)s is one too many."
+            )
+        case "missing":
+            text = _("Point %(point)s, repeat %(repeat)s: the touch is missing, the probe did not trigger.")
+        case "distance":
+            text = _(
+                "Point %(point)s, repeat %(repeat)s: its distance of %(got)s mm from the point before lies more than "
+                "%(expected)s mm (R28) from the programmed dimension."
+            )
         case _:
             text = _(
                 "Point %(point)s, repeat %(repeat)s: the touch at %(got)s mm lies more than %(expected)s mm (R28) "

@@ -1,0 +1,101 @@
+"""What a measuring variant yields beside the value (domain §4), and how well the probe repeats itself.
+
+==================  =========================================================================
+one point, indexed  run-out = half-difference of the sides (of more than two, half their range)
+several points      out-of-roundness = range of the points' means
+round the part
+several points      taper = slope of the least-squares line through the points' means, per mm
+along the part      of length (R26 between points) and over the whole length
+two points          nothing beside the distance, which is the value
+==================  =========================================================================
+
+With repeats (R27 > 1) in every variant: the largest range of the repeats at one point, and their pooled standard
+deviation ``s = sqrt(sum of squares about each point's mean / sum of (repeats - 1))``. Lengths are mm.
+"""
+
+from collections.abc import Sequence
+from math import fsum, sqrt
+from typing import NamedTuple
+
+from app.core.compensation import DECIMALS
+from app.core.parameters import Parameters, Variant
+
+POINTS_FOR_A_SHAPE = 2
+
+
+class Results(NamedTuple):
+    """The variant's own results; None where the variant has no such thing.
+
+    run_out, out_of_roundness: mm, never negative. taper: how much larger the end is than the beginning, mm over the
+    length; slope: the same in mm per mm, None where the spacing R26 is not said. repeat_range, repeat_deviation: of the
+    repeats, mm. sections_outside: sections out of tolerance; rejected: too many of them. Both only with n of m.
+    """
+
+    run_out: float | None = None
+    out_of_roundness: float | None = None
+    taper: float | None = None
+    slope: float | None = None
+    repeat_range: float | None = None
+    repeat_deviation: float | None = None
+    sections_outside: int | None = None
+    rejected: bool | None = None
+
+
+NOTHING = Results()
+
+
+def results_of(parameters: Parameters, touches: Sequence[Sequence[float]], points: Sequence[float]) -> Results:
+    """The results of one reading; touches: one list of repeats per point, points: their means, mm.
+
+    >>> from app.core.parameters import read
+    >>> bore = {"R32": 62.0, "R35": 0.03, "R33": 0, "R37": 0.3, "R36": 1.0, "R25": 3, "R23": 3, "R26": 10}
+    >>> found = results_of(read(bore)[0], [[62.0], [62.002], [62.004]], [62.0, 62.002, 62.004])
+    >>> found.taper, found.slope
+    (0.004, 0.0002)
+    """
+    run_out = out_of_roundness = taper = slope = repeat_range = repeat_deviation = None
+    if len(points) >= POINTS_FOR_A_SHAPE:
+        spread = round(max(points) - min(points), DECIMALS)
+        if parameters.variant is Variant.INDEXED:
+            run_out = round(spread / 2, DECIMALS)
+        elif parameters.variant is Variant.ROUND:
+            out_of_roundness = spread
+        elif parameters.variant is Variant.ALONG:
+            step = fitted_step(points)
+            taper = round(step * (len(points) - 1), DECIMALS) + 0.0
+            slope = round(step / parameters.index, DECIMALS) + 0.0 if parameters.index else None
+    if parameters.repeats > 1:
+        repeat_range = round(max(max(repeats) - min(repeats) for repeats in touches), DECIMALS)
+        repeat_deviation = _pooled_deviation(touches)
+    if run_out is out_of_roundness is taper is repeat_range is None:
+        return NOTHING
+    return Results(run_out, out_of_roundness, taper, slope, repeat_range, repeat_deviation)
+
+
+def fitted_step(points: Sequence[float]) -> float:
+    """How much the least-squares line through evenly spaced points rises from one to the next, mm.
+
+    ``b = sum (i - i_mean) y_i / sum (i - i_mean)^2``
+
+    >>> fitted_step([1.0, 3.0, 2.0])
+    0.5
+    """
+    middle = (len(points) - 1) / 2
+    mean = fsum(points) / len(points)
+    above = fsum((at - middle) * (point - mean) for at, point in enumerate(points))
+    return above / fsum((at - middle) ** 2 for at in range(len(points)))
+
+
+def fitted_points(points: Sequence[float]) -> list[float]:
+    """Where the least-squares line runs at each of evenly spaced points, mm.
+
+    >>> fitted_points([1.0, 3.0, 2.0])
+    [1.5, 2.0, 2.5]
+    """
+    middle, mean, step = (len(points) - 1) / 2, fsum(points) / len(points), fitted_step(points)
+    return [mean + (at - middle) * step for at in range(len(points))]
+
+
+def _pooled_deviation(touches: Sequence[Sequence[float]]) -> float:
+    squares = fsum((touch - fsum(repeats) / len(repeats)) ** 2 for repeats in touches for touch in repeats)
+    return round(sqrt(squares / sum(len(repeats) - 1 for repeats in touches)), DECIMALS)
