@@ -1,0 +1,18 @@
+"""Statistical process control: control charts, run rules, capability, gauge studies.
+
+Limits are estimated once, from a baseline that somebody has chosen (`shewhart.individuals_baseline` …), and readings are
+judged by them afterwards (`shewhart.chart_of` …): nothing in here estimates a limit from the readings it judges.
+Constants are computed (`constants`), results are frozen and say where they come from, and what cannot be said of too few
+readings is refused with a `Refusal` that says how many are missing.
+
+    constants    d2, d3, c4 and the factors of control charts, for any subgroup size
+    spread       estimates of sigma, each with its degrees of freedom
+    shewhart     individuals, moving range, X-bar, R and S charts, unequal subgroups too
+    ewma         exponentially weighted and plain moving averages
+    cusum        tabular cumulative sums with headstart
+    rules        the Nelson and the Western Electric rules, all signals as runs of points
+    chance       how often they fire though nothing has happened
+    capability   Cp to Cpm with intervals, parts out of tolerance
+    normality    Anderson-Darling, Shapiro-Wilk
+    gauge        type 1, bias, linearity, gauge R&R, and what they say about R33
+"""
