@@ -11,27 +11,22 @@ from typing import Any, Literal, NamedTuple
 from sqlalchemy import select, update
 from sqlalchemy.orm import Session
 
-from app.alarms import actions as alarms
 from app.alarms.tables import Alarm
 from app.audit.actions import record
 from app.core.compensation import DECIMALS
-from app.core.zones import nanometres
 from app.db.events import publish
 from app.errors import Conflict
 from app.machines.queries import lock_machines
 from app.machines.tables import Machine
 from app.offsets import queries, wording
-from app.offsets.news import alarm_raised, average_changed, correction_changed, tool_changed
-from app.offsets.queries import OFFSET_TOLERANCE
+from app.offsets.news import average_changed, correction_changed, tool_changed
 from app.offsets.tables import OPEN, AverageMemory, Correction, Tool, ToolEvent
 from app.people.callers import Caller
 from app.readings.tables import Stream
-from app.web.i18n import _
 
 Verb = Literal["rejected", "approve", "release"]
 FROM: dict[str, tuple[str, ...]] = {"rejected": OPEN, "approve": ("awaiting_approval",), "release": ("held",)}
 INTO = {"rejected": "rejected", "approve": "pending", "release": "pending"}
-BY_READING = "reading "  # how `applied_by` begins when a reading confirmed it (`correction_in_effect`)
 SAID = {"rejected": "correction rejected", "approve": "correction approved", "release": "correction released"}
 
 
@@ -51,104 +46,17 @@ class Restarted(NamedTuple):
     parts: int
 
 
-def mark_applied(
-    session: Session,
-    machine: Machine,
-    number: int,
-    caller: Caller,
-    *,
-    offset_after: float | None = None,
-    applied_at: datetime | None = None,
-) -> Decided:
-    """A pending correction is in the offset now. Saying so twice is harmless.
-
-    A reported offset that differs from the expected one raises *offset differs* and becomes the known offset.
-    Raises `NotFound`; `Conflict` for a correction that is not pending, or when another offset is reported the second time.
-    """
-    correction = _locked(session, machine, number)
-    if correction.status == "applied":
-        if offset_after is None or not _differs(offset_after, correction.offset_after):
-            return Decided(correction)
-        if not (correction.applied_by or "").startswith(BY_READING):
-            raise _other_offset(correction, machine, offset_after)
-        # A reading said that it is in effect; only now the machine says what its offset is.
-        tool = queries.tool(session, machine, correction.tool_memory)
-        late = offset_after - (correction.offset_after or 0.0)
-        return _reported(session, machine, correction, tool, caller, tool.offset, tool.offset + late, datetime.now(UTC))
-    _must_be(correction, machine, "applied", ("pending",))
-    tool = queries.tool(session, machine, correction.tool_memory)
-    now = datetime.now(UTC)
-    at = min(now, applied_at or now)
-    correction.status, correction.applied_at = "applied", at
-    tool.total = round(tool.total + correction.amount, DECIMALS) + 0.0
-    expected = round(tool.offset + correction.amount, DECIMALS) + 0.0
-    if caller.kind != "machine":  # what a machine does all day stands in the history of its tools
-        _record_status(session, machine, correction, caller, "correction applied", "pending", None)
-    reported = expected if offset_after is None else offset_after
-    return _reported(session, machine, correction, tool, caller, expected, reported, at)
-
-
-def _reported(
-    session: Session,
-    machine: Machine,
-    correction: Correction,
-    tool: Tool,
-    caller: Caller,
-    expected: float,
-    reported: float,
-    at: datetime,
-) -> Decided:
-    """The correction is applied, and this is the offset now; another one than expected raises an alarm."""
-    before, tool.offset = tool.offset, round(reported, DECIMALS) + 0.0
-    correction.offset_after, correction.applied_by = tool.offset, caller.name
-    session.add(
-        ToolEvent(
-            machine_id=machine.id,
-            number=tool.number,
-            at=at,
-            kind="correction",
-            offset_before=before,
-            offset_after=tool.offset,
-            correction=correction.number,
-            actor=caller.name,
-        )
-    )
-    changes = [correction_changed(session, machine, correction), tool_changed(machine, tool.number)]
-    note = None
-    if _differs(tool.offset, expected):
-        alarm = alarms.raise_for_tool(
-            session,
-            machine.id,
-            tool.number,
-            "offset_differs",
-            {
-                "correction": correction.number,
-                "expected": expected,
-                "reported": tool.offset,
-                "limit": OFFSET_TOLERANCE / 1e6,
-            },
-        )
-        changes.append(alarm_raised(machine, alarm))
-        note = wording.offset_differs(alarm.id, expected, tool.offset)
-    publish(session, *changes)
-    return Decided(correction, note)
-
-
-def _differs(offset: float, known: float | None) -> bool:
-    return known is not None and abs(nanometres(offset - known)) > OFFSET_TOLERANCE
-
-
 def decide(session: Session, machine: Machine, number: int, verb: Verb, reason: str, caller: Caller) -> Decided:
     """Reject a correction that is not applied yet, approve one that awaits it, or release a held one.
 
     Raises `NotFound`; `Conflict` when the correction's status does not permit it.
     """
-    correction = _locked(session, machine, number)
-    _must_be(correction, machine, verb, FROM[verb])
+    correction = locked(session, machine, number)
+    must_be(correction, machine, verb, FROM[verb])
     before = correction.status
     correction.status, correction.reason = INTO[verb], reason
     correction.decided_at, correction.decided_by = datetime.now(UTC), caller.name
-    _record_status(session, machine, correction, caller, SAID[verb], before, reason)
+    record_status(session, machine, correction, caller, SAID[verb], before, reason)
     publish(session, correction_changed(session, machine, correction))
     if before == "held":
         alarm = _wear_alarm(session, correction)
@@ -193,14 +101,11 @@ def _set_offset(
     parts = queries.parts_cut(session, machine.id, number)
     tool.offset, tool.reset_at = round(offset, DECIMALS) + 0.0, now
     on_it = (Stream.machine_id == machine.id) & (Stream.tool_memory == number)
+    begun: dict[str, Any] = {"level": None, "level_sequence": None}
     if kind == "change":
-        tool.total, tool.changed_at = 0.0, now
-        session.execute(
-            update(Stream)
-            .where(on_it)
-            .values(sequence_at_tool_change=Stream.sequence)
-            .execution_options(synchronize_session=False)
-        )
+        tool.total, tool.changed_at, tool.parts_kept, tool.life_told = 0.0, now, 0, False
+        begun["sequence_at_tool_change"] = Stream.sequence
+    session.execute(update(Stream).where(on_it).values(begun).execution_options(synchronize_session=False))
     session.add(
         ToolEvent(
             machine_id=machine.id,
@@ -210,12 +115,15 @@ def _set_offset(
             offset_before=before["offset"],
             offset_after=tool.offset,
             parts=parts if kind == "change" else None,
+            total=before["total"] if kind == "change" else None,
+            edge=tool.edge if kind == "change" else None,
+            name=tool.name if kind == "change" else None,
             actor=caller.name,
             reason=reason,
         )
     )
-    fallen = _supersede(session, machine, number, now, caller, reason)
-    begun = _restart_averages(
+    fallen = supersede(session, machine, number, now, caller.name, reason)
+    averages = restart_averages(
         session, machine, session.scalars(select(Stream.average_memory).where(on_it).distinct()).all(), now
     )
     after: dict[str, Any] = {"offset": tool.offset, "total": tool.total}
@@ -227,9 +135,9 @@ def _set_offset(
         session,
         tool_changed(machine, number),
         *(correction_changed(session, machine, correction) for correction in fallen),
-        *(average_changed(machine, location) for location in begun),
+        *(average_changed(machine, location) for location in averages),
     )
-    return Restarted(tool, [correction.number for correction in fallen], begun, parts)
+    return Restarted(tool, [correction.number for correction in fallen], averages, parts)
 
 
 def set_empirical_value(
@@ -243,7 +151,13 @@ def set_empirical_value(
     memory = queries.average(session, machine, location)
     before = {"empirical_value": memory.empirical_value, "average": memory.average}
     memory.empirical_value = round(empirical_value, DECIMALS) + 0.0
-    _restart_averages(session, machine, [location], datetime.now(UTC))
+    restart_averages(session, machine, [location], datetime.now(UTC))
+    session.execute(
+        update(Stream)
+        .where(Stream.machine_id == machine.id, Stream.average_memory == location)
+        .values(level=None, level_sequence=None)
+        .execution_options(synchronize_session=False)
+    )
     session.refresh(memory)
     after = {"empirical_value": memory.empirical_value, "average": memory.average}
     subject = f"average/{machine.key}/{location}"
@@ -252,39 +166,30 @@ def set_empirical_value(
     return memory
 
 
-def _locked(session: Session, machine: Machine, number: int) -> Correction:
+def locked(session: Session, machine: Machine, number: int) -> Correction:
     lock_machines(session, [machine.id])
     return queries.correction(session, machine, number)
 
 
-def _must_be(correction: Correction, machine: Machine, verb: str, statuses: tuple[str, ...]) -> None:
+def must_be(correction: Correction, machine: Machine, verb: str, statuses: tuple[str, ...]) -> None:
     if correction.status not in statuses:
         detail, instead = wording.refused(correction, machine.key, verb)
         raise Conflict(detail, instead, correction_status=correction.status)
 
 
-def _other_offset(correction: Correction, machine: Machine, offset_after: float) -> Conflict:
-    return Conflict(
-        _(
-            "Correction {number} of {machine} was confirmed with the offset {known} mm already, not {reported} mm. Nothing was changed."
-        ).format(number=correction.number, machine=machine.key, known=correction.offset_after, reported=offset_after),
-        _("Tell the offset as it is now by a manual edit of tool {tool}.").format(tool=correction.tool_memory),
-        correction_status=correction.status,
-    )
-
-
-def _supersede(
-    session: Session, machine: Machine, number: int, now: datetime, caller: Caller, reason: str
+def supersede(
+    session: Session, machine: Machine, number: int, now: datetime, who: str | None, reason: str
 ) -> Sequence[Correction]:
+    """All that is open for this tool falls. who: None for the system itself, whose reason is then a code of `wording`."""
     fallen = queries.open_corrections(session, machine, number)
     for correction in fallen:
         correction.status, correction.reason = "superseded", reason
-        correction.decided_at, correction.decided_by = now, caller.name
+        correction.decided_at, correction.decided_by = now, who
     session.flush()
     return fallen
 
 
-def _restart_averages(session: Session, machine: Machine, locations: Sequence[int], now: datetime) -> list[int]:
+def restart_averages(session: Session, machine: Machine, locations: Sequence[int], now: datetime) -> list[int]:
     begun = session.scalars(
         update(AverageMemory)
         .where(AverageMemory.machine_id == machine.id, AverageMemory.location.in_(locations))
@@ -306,7 +211,7 @@ def _wear_alarm(session: Session, correction: Correction) -> int | None:
     )
 
 
-def _record_status(
+def record_status(
     session: Session,
     machine: Machine,
     correction: Correction,

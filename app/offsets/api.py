@@ -5,7 +5,7 @@ from typing import Annotated, Any
 from fastapi import Path, Query
 
 from app.machines.queries import machine_named
-from app.offsets import actions, queries, wording
+from app.offsets import actions, confirming, queries, wording
 from app.offsets.figures import OffsetChange, offset_figure
 from app.offsets.schemas import (
     AppliedIn,
@@ -184,13 +184,14 @@ def mark_applied(
 ) -> CorrectionOut:
     """Confirm that the correction is in the offset now. Confirming twice is harmless.
 
-    An `offset_after` that differs from `offset_expected` by more than 0.0005 mm raises the alarm *offset differs*; the
-    reported offset is the known one from then on.
+    An `offset_after` that differs from `offset_expected` by more than 0.0005 mm raises the alarm *offset differs*: nothing
+    is corrected through this tool until somebody has said which offset is true. If it is the offset that later pending
+    corrections of the tool lead to, those are confirmed with this one.
     """
     found = machine_named(session, machine)
     caller.must_at(found.id, "operator")
     given = applied or AppliedIn()
-    done = actions.mark_applied(
+    done = confirming.mark_applied(
         session, found, number, caller, offset_after=given.offset_after, applied_at=given.applied_at
     )
     return correction_out(queries.row_of(session, found, done.correction), done.note)

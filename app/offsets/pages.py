@@ -11,7 +11,7 @@ from starlette.responses import RedirectResponse
 from app.errors import Conflict, Invalid
 from app.machines import queries as machines
 from app.machines.queries import machine_named
-from app.offsets import actions, asking, queries, wording
+from app.offsets import actions, asking, confirming, queries, wording
 from app.offsets.asking import Question
 from app.offsets.schemas import AppliedIn, DecisionIn, EmpiricalValueIn, ToolChange, ToolEdit
 from app.offsets.tables import OPEN
@@ -142,7 +142,7 @@ def decide(
     try:
         if verb == "applied":
             applied = parsed(AppliedIn, {"offset_after": length(form.get("offset_after"))})
-            actions.mark_applied(session, shown, number, caller, offset_after=applied.offset_after)
+            confirming.mark_applied(session, shown, number, caller, offset_after=applied.offset_after)
         else:
             decision = parsed(DecisionIn, {"reason": words(form, "reason")})
             actions.decide(session, shown, number, asking.verb(verb), decision.reason, caller)

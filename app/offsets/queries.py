@@ -26,7 +26,7 @@ OFFSET_TOLERANCE = 500  # nm between expected and reported offset: a control rou
 class ToolRow(NamedTuple):
     """One location of the tool memory (R10) and what uses it.
 
-    parts: cut since the tool was changed, by the characteristic on it that has counted most.
+    parts: cut since the tool was changed, by the characteristic on it that has counted most, and by those that have left.
     last: the correction issued last, whatever has become of it. open: held, awaiting approval and pending ones.
     """
 
@@ -138,7 +138,10 @@ def tools(
         open_of[found.tool_memory].append(found)
     on_it, parts = _streams(session, machine)
     return [
-        ToolRow(row, parts[row.number], on_it[row.number], last_of.get(row.number), open_of[row.number]) for row in rows
+        ToolRow(
+            row, row.parts_kept + parts[row.number], on_it[row.number], last_of.get(row.number), open_of[row.number]
+        )
+        for row in rows
     ]
 
 
@@ -161,14 +164,11 @@ def _streams(session: Session, machine: Machine) -> tuple[dict[int, list[str]], 
 
 def parts_cut(session: Session, machine_id: int, number: int) -> int:
     """Parts cut with the tool in this location since it was changed."""
-    return (
-        session.scalar(
-            select(func.max(Stream.sequence - Stream.sequence_at_tool_change)).where(
-                Stream.machine_id == machine_id, Stream.tool_memory == number
-            )
-        )
-        or 0
+    counted = select(func.max(Stream.sequence - Stream.sequence_at_tool_change)).where(
+        Stream.machine_id == machine_id, Stream.tool_memory == number
     )
+    kept = select(Tool.parts_kept).where(Tool.machine_id == machine_id, Tool.number == number)
+    return (session.scalar(counted) or 0) + (session.scalar(kept) or 0)
 
 
 def averages(

@@ -7,6 +7,29 @@ from app.offsets.tables import Correction
 from app.web.i18n import _, ngettext
 from app.web.numbers import mm, um
 
+# Why the system itself dropped a correction, as it is stored: the word, and what goes with it.
+EXPIRED = "expired after hours:"
+PAUSED = "offset differs, alarm:"
+
+
+def why(correction: Correction) -> str | None:
+    """What was said when it was decided; the system's own reasons in words."""
+    reason = correction.reason
+    if reason is None or correction.decided_by is not None:
+        return reason
+    if reason.startswith(EXPIRED):
+        hours = reason.removeprefix(EXPIRED).strip()
+        return _("expired: nobody had it applied within {hours} h").format(hours=hours)
+    if reason.startswith(PAUSED):
+        alarm = reason.removeprefix(PAUSED).strip()
+        return _("the machine holds another offset than it was computed for (alarm {alarm})").format(alarm=alarm)
+    return reason
+
+
+def has_expired(correction: Correction) -> bool:
+    """Whether it was dropped because it was never applied in time."""
+    return correction.decided_by is None and (correction.reason or "").startswith(EXPIRED)
+
 
 def status_word(status: str) -> str:
     """A correction's status as it stands inside a sentence."""
@@ -23,7 +46,7 @@ def status_word(status: str) -> str:
 def status_explained(status: str) -> str:
     """What it waits for, or what became of it."""
     return {
-        "held": _("Waits for an operator: its reading said that the tool is worn."),
+        "held": _("Waits for an operator: its reading said that the tool is worn, or was not plausible."),
         "awaiting_approval": _("Waits until somebody approves it."),
         "pending": _("Waits for the machine to apply it."),
         "applied": _("Is in the offset."),
@@ -51,12 +74,14 @@ def _how_it_stands(correction: Correction, machine: str) -> str:
         "machine": machine,
         "who": correction.decided_by or _("the system"),
         "at": moment(correction.decided_at),
-        "why": correction.reason or "–",
+        "why": why(correction) or "–",
         "tool": correction.tool_memory,
     }
     match correction.status:
         case "held":
-            text = _("Correction {number} of {machine} is held: its reading said that tool {tool} is worn.")
+            text = _(
+                "Correction {number} of {machine} is held: its reading said that tool {tool} is worn, or was not plausible."
+            )
         case "awaiting_approval":
             text = _("Correction {number} of {machine} still awaits approval.")
         case "pending":
@@ -69,6 +94,8 @@ def _how_it_stands(correction: Correction, machine: str) -> str:
         case _ if correction.superseded_by is not None:
             values["by"] = correction.superseded_by
             text = _("Correction {number} of {machine} was superseded by correction {by}.")
+        case _ if has_expired(correction):
+            text = _("Correction {number} of {machine} was superseded on {at}: {why}.")
         case _:
             text = _("Correction {number} of {machine} was superseded by {who} on {at}: {why}")
     return text.format(**values)
@@ -77,6 +104,11 @@ def _how_it_stands(correction: Correction, machine: str) -> str:
 def _instead(correction: Correction, verb: str) -> str:
     closed = correction.status in {"rejected", "superseded"}
     if verb == "applied":
+        if has_expired(correction):
+            return _(
+                "If the machine has not applied it, leave it out: the next reading decides anew. If it has, read the offset "
+                "at the control and tell it by a manual edit of tool {tool}, PUT /api/v1/machines/…/tools/{tool}."
+            ).format(tool=correction.tool_memory)
         if closed:
             return _(
                 "It must not be in the offset. If the machine has applied it, take {amount} back out of the offset, "
@@ -93,7 +125,7 @@ def _instead(correction: Correction, verb: str) -> str:
         return _("There is nothing left to do: the next reading asks for a new correction if one is needed.")
     return {
         "pending": _("It needs no release. Reject it if it must not be applied."),
-        "held": _("It is released, not approved: its tool is worn."),
+        "held": _("It is released, not approved: its alarm asks an operator."),
         "awaiting_approval": _("It is approved, not released: it is not held."),
     }.get(correction.status, "")
 
@@ -137,11 +169,13 @@ def still_active(alarm: int) -> str:
     ).format(alarm=alarm)
 
 
-def offset_differs(alarm: int, expected: float, reported: float) -> str:
+def offset_differs(alarm: int, expected: float, reported: float, fallen: list[int]) -> str:
     """Said to the machine that reported another offset than expected."""
-    return _(
-        "The machine holds {reported}, expected was {expected}. The reported offset counts from now on; alarm {alarm} says so."
+    said = _(
+        "The machine holds {reported}, expected was {expected}. Nothing is corrected through this tool until somebody has "
+        "said at alarm {alarm} which of them is true."
     ).format(reported=mm(reported), expected=mm(expected), alarm=alarm)
+    return " ".join(filter(None, (said, edit_note(fallen))))
 
 
 def event_word(kind: str) -> str:
