@@ -123,7 +123,7 @@ def test_pairs_as_published(case: dict[str, Any]) -> None:
     assert found.deviation is not None
     if "G" in case:
         furthest = case["differences"][case["outlier"]]
-        assert (furthest - case["mean"]) / found.deviation == pytest.approx(case["G"], abs=5e-5)
+        assert (furthest - case["mean"]) / found.deviation == pytest.approx(case["G"], abs=1e-4)  # printed cut off
     else:
         assert found.deviation == pytest.approx(case["deviation"], abs=1e-6)
         assert found.low == pytest.approx(case["low"], abs=1e-7)
