@@ -154,6 +154,7 @@ class Verdict:
     correction: IssuedCorrection | None
     paused_by: int | OpenAlarm | None
     alarms: list[OpenAlarm]
+    compensated: float | None
     _record: Record | None = None
 
     def record(self) -> Record:
@@ -189,6 +190,7 @@ class Verdict:
             r.part,
             self.outstanding or None,
             [alarm.id or 0 for alarm in self.alarms] or None,
+            self.compensated,
         )
 
 

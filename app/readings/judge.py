@@ -71,6 +71,7 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
         previous_tool = _cut_before_reset(tool, reading, last_applied)
         outstanding = [c for c in tool.corrections if _not_in_effect(c, tool, reading, last_applied)]
 
+    compensated = None if previous_tool else _compensated(tool, outstanding)
     average = stream.average
     decision = decide(
         parameters,
@@ -116,6 +117,7 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
         correction,
         paused_by,
         alarms,
+        compensated,
     )
     stream.last = verdict
     ground.verdicts.append(verdict)
@@ -245,6 +247,17 @@ def _not_in_effect(correction: IssuedCorrection, tool: ToolState, reading: Readi
     if reading.machined_at is not None:
         return applied_at is None or applied_at > reading.machined_at
     return applied_at is None
+
+
+def _compensated(tool: ToolState | None, outstanding: list[IssuedCorrection]) -> float:
+    """The corrections of this tool's life that were in effect when the part was cut, summed, mm; what it wore lies behind them."""
+    if tool is None:
+        return 0.0
+    total = tool.total
+    for correction in outstanding:
+        if correction.status == "applied":
+            total -= correction.amount
+    return round(total, DECIMALS) + 0.0
 
 
 def _issued_total(tool: ToolState | None) -> float:

@@ -39,3 +39,4 @@ class Record(NamedTuple):
     part: str | None
     outstanding: list[int] | None
     alarms: list[int] | None
+    compensated: float | None

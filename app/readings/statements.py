@@ -77,7 +77,8 @@ ALARM_NUMBERS = "SELECT nextval('alarm_id') FROM generate_series(1, $1::int)"
 _READING = """machine_id int4, characteristic_id int4, sequence int8, measured float8, deviation float8, decided float8,
     average_before float8, average_after float8, measured_at timestamptz, received_at timestamptz,
     machined_at timestamptz, parameters_version int4, correction_in_effect int4, correction int4, paused_by int8,
-    late bool, zone text, action text, code text, key text, part text, outstanding int4[], alarms int8[]"""
+    late bool, zone text, action text, code text, key text, part text, outstanding int4[], alarms int8[],
+    compensated float8"""
 _COLUMNS = ", ".join(Record._fields)
 COPY_TYPES = [column.split()[1] for column in _READING.split(",")]
 MOVE_STREAMS = """

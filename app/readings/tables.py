@@ -81,6 +81,8 @@ class Reading(Base):
     part: Mapped[str | None]
     outstanding: Mapped[list[int] | None] = mapped_column(ARRAY(Integer))
     alarms: Mapped[list[int] | None] = mapped_column(ARRAY(BigInteger))
+    # Corrections since the tool change that were in effect when the part was cut, summed; None where nobody knows.
+    compensated: Mapped[float | None]
 
 
 class ReadingTouches(Base):
