@@ -7,7 +7,7 @@ Half surrogates are refused by pydantic itself.
 import re
 import unicodedata
 from collections.abc import Callable, Sequence
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from typing import Annotated, Any, Generic, TypeVar
 
 from pydantic import (
@@ -20,6 +20,8 @@ from pydantic import (
     StringConstraints,
 )
 from pydantic_core import PydanticCustomError
+
+from app.web.i18n import _
 
 SLUG = r"[a-z0-9][a-z0-9._-]{0,63}"
 _SLUG = re.compile(SLUG)
@@ -61,6 +63,19 @@ def _written(value: Any) -> Any:
 
 Moment = Annotated[AwareDatetime, BeforeValidator(_written)]
 """A time with its offset from UTC."""
+
+EARLIEST = datetime(2000, 1, 1, tzinfo=UTC)
+AHEAD = timedelta(hours=24)
+
+
+def _sensible(moment: datetime) -> datetime:
+    if moment < EARLIEST or moment > datetime.now(UTC) + AHEAD:
+        raise PydanticCustomError("moment", _("is more than a day ahead, or before 2000; check the machine's clock"))
+    return moment
+
+
+LatelyOrNow = Annotated[Moment, AfterValidator(_sensible)]
+"""When something happened at a machine, by its clock."""
 
 Slug = Annotated[str, AfterValidator(_slug), Field(json_schema_extra={"pattern": f"^{SLUG}$", "maxLength": 64})]
 """A key that people choose and programs use in addresses."""
