@@ -17,8 +17,10 @@ from collections.abc import Sequence
 from math import fsum, sqrt
 from typing import NamedTuple
 
+from app.core.acceptance import sections_outside
 from app.core.compensation import DECIMALS
 from app.core.parameters import Parameters, Variant
+from app.core.probing import Touches, sections_of
 
 POINTS_FOR_A_SHAPE = 2
 
@@ -41,11 +43,12 @@ class Results(NamedTuple):
     rejected: bool | None = None
 
 
-NOTHING = Results()
+def results_of(
+    parameters: Parameters, touches: Touches, points: Sequence[float], empirical_value: float = 0.0
+) -> Results | None:
+    """The results of one reading, if there are any. touches and points as `measured_value` has taken and made them, mm.
 
-
-def results_of(parameters: Parameters, touches: Sequence[Sequence[float]], points: Sequence[float]) -> Results:
-    """The results of one reading; touches: one list of repeats per point, points: their means, mm.
+    The sections of n of m are judged with the empirical value (mm), as the value is.
 
     >>> from app.core.parameters import read
     >>> bore = {"R32": 62.0, "R35": 0.03, "R33": 0, "R37": 0.3, "R36": 1.0, "R25": 3, "R23": 3, "R26": 10}
@@ -65,11 +68,17 @@ def results_of(parameters: Parameters, touches: Sequence[Sequence[float]], point
             taper = round(step * (len(points) - 1), DECIMALS) + 0.0
             slope = round(step / parameters.index, DECIMALS) + 0.0 if parameters.index else None
     if parameters.repeats > 1:
-        repeat_range = round(max(max(repeats) - min(repeats) for repeats in touches), DECIMALS)
-        repeat_deviation = _pooled_deviation(touches)
-    if run_out is out_of_roundness is taper is repeat_range is None:
-        return NOTHING
-    return Results(run_out, out_of_roundness, taper, slope, repeat_range, repeat_deviation)
+        repeats = [[touch for touch in point or () if touch is not None] for point in touches]
+        repeat_range = round(max(max(point) - min(point) for point in repeats), DECIMALS)
+        repeat_deviation = _pooled_deviation(repeats)
+    outside = rejected = None
+    if parameters.accept_m > 1:
+        sections = sections_of(parameters, points)
+        outside = sections_outside(parameters, sections, empirical_value)
+        rejected = len(sections) - outside < parameters.accept_n
+    if run_out is out_of_roundness is taper is repeat_range is outside is None:
+        return None
+    return Results(run_out, out_of_roundness, taper, slope, repeat_range, repeat_deviation, outside, rejected)
 
 
 def fitted_step(points: Sequence[float]) -> float:

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from app.core.compensation import Action, needs_approval
 from app.core.parameters import Parameters
+from app.core.variants import Results
 from app.readings.records import Record
 from app.readings.wording import reason
 
@@ -19,6 +20,7 @@ def answer(
     *,
     correction: tuple[int, float] | None,
     alarms: Iterable[tuple[int, str]],
+    results: Results | None = None,
 ) -> dict[str, Any]:
     """The answer to the machine. `correction` is (R10, amount in mm) of the one this reading led to.
 
@@ -49,6 +51,7 @@ def answer(
         "decided_deviation": record.decided,
         "outstanding": record.outstanding or [],
         "zone": record.zone,
+        "results": None if results is None else results._asdict(),
         "average_before": record.average_before,
         "average_after": record.average_after,
         "action": record.action,
@@ -72,6 +75,7 @@ ANSWER: dict[str, JsonValue] = {
     "decided_deviation": 0.0061,
     "outstanding": [],
     "zone": "full",
+    "results": None,
     "average_before": 0.0012,
     "average_after": 0.0,
     "action": "correct",
@@ -117,6 +121,21 @@ class WhySo(BaseModel):
     ]
 
 
+class VariantResults(BaseModel):
+    """What the measuring variant yields beside the value; null where it has no such thing. Lengths in mm."""
+
+    run_out: Annotated[float | None, Field(description="Part indexed (R25 = 1): half-difference of the sides.")]
+    out_of_roundness: Annotated[float | None, Field(description="Points round (R25 = 2): their range.")]
+    taper: Annotated[
+        float | None, Field(description="Points along (R25 = 3): rise of the least-squares line over the length.")
+    ]
+    slope: Annotated[float | None, Field(description="The same per mm; null where the spacing R26 is not said.")]
+    repeat_range: Annotated[float | None, Field(description="Largest range of the repeats (R27) at one point.")]
+    repeat_deviation: Annotated[float | None, Field(description="Pooled standard deviation of the repeats.")]
+    sections_outside: Annotated[int | None, Field(description="With acceptance n of m: sections out of tolerance.")]
+    rejected: Annotated[bool | None, Field(description="With acceptance n of m: too many sections are outside.")]
+
+
 class ReadingAnswer(BaseModel):
     """The answer to one reading. Lengths in mm; `deviation` is raw, `decided_deviation` counts outstanding corrections."""
 
@@ -138,6 +157,9 @@ class ReadingAnswer(BaseModel):
         list[int], Field(description="Numbers of the corrections that were not in effect yet when the part was cut.")
     ]
     zone: Annotated[str, Field(description="zero, average, full, oversize, undersize, wear or probe_fault.")]
+    results: Annotated[
+        VariantResults | None, Field(description="Of touches, what the variant yields beside the value.")
+    ]
     average_before: Annotated[float, Field(description="Running average M before this reading.")]
     average_after: Annotated[float, Field(description="M after it; 0 after a correction.")]
     action: Annotated[

@@ -146,6 +146,7 @@ def answer_of(verdict: Verdict) -> dict[str, Any]:
         verdict.parameters,
         correction=(correction.tool_memory, correction.amount) if correction else None,
         alarms=[(alarm.id or 0, alarm.kind) for alarm in verdict.alarms],
+        results=verdict.results,
     )
 
 

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from app.core.compensation import Decision
 from app.core.parameters import Parameters
+from app.core.variants import Results
 from app.readings.records import Entry, Record
 from app.readings.schemas import ReadingIn
 
@@ -155,6 +156,7 @@ class Verdict:
     paused_by: int | OpenAlarm | None
     alarms: list[OpenAlarm]
     compensated: float | None
+    results: Results | None = None
     _record: Record | None = None
 
     def record(self) -> Record:

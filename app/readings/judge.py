@@ -7,7 +7,6 @@ ground along for the next one, and collects the rows to write. It does no I/O, s
 
 from datetime import UTC, datetime
 
-from app.core.acceptance import accepted
 from app.core.compensation import (
     DECIMALS,
     Action,
@@ -21,6 +20,7 @@ from app.core.compensation import (
 )
 from app.core.parameters import Parameters
 from app.core.probing import TouchError, measured_value
+from app.core.variants import results_of
 from app.errors import Conflict, FieldError, Invalid
 from app.offsets.tables import OUTSTANDING
 from app.readings.ground import (
@@ -49,7 +49,7 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
     parameters = stream.parameters
     if reading.key is not None and (known := _known(ground, entry, reading.key, reading)):
         return known
-    measured, sections = _measured(parameters, reading)
+    measured, points = _measured(parameters, reading)
     tool = stream.tool
     in_effect = reading.correction_in_effect
     if in_effect is not None and in_effect > ground.last_correction[entry.machine_id]:
@@ -73,6 +73,8 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
 
     compensated = None if previous_tool else _compensated(tool, outstanding)
     average = stream.average
+    empirical_value = average.empirical_value if average else 0.0
+    results = results_of(parameters, reading.touches or (), points, empirical_value) if points else None
     decision = decide(
         parameters,
         State(
@@ -80,11 +82,10 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
             _issued_total(tool) if parameters.max_total is not None else 0.0,
             stream.paused_by is not None,
         ),
-        deviation_of(measured, parameters.target, average.empirical_value if average else 0.0),
+        deviation_of(measured, parameters.target, empirical_value),
         outstanding=outstanding_effect((c.amount for c in outstanding), parameters.factor) if outstanding else 0.0,
         previous_tool=previous_tool,
-        accepted=parameters.accept_m == 1
-        or accepted(parameters, sections, average.empirical_value if average else 0.0),
+        accepted=results is None or not results.rejected,
     )
     paused_by = stream.paused_by
     alarms = [_signal(ground, stream, signal, sequence, decision) for signal in decision.signals]
@@ -118,6 +119,7 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
         paused_by,
         alarms,
         compensated,
+        results=results,
     )
     stream.last = verdict
     ground.verdicts.append(verdict)
@@ -127,7 +129,7 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
 
 
 def _measured(parameters: Parameters, reading: ReadingIn) -> tuple[float, tuple[float, ...]]:
-    """The value, and one value per section where the part is accepted by n of m."""
+    """The value, and the mean at each point if it came as touches."""
     if reading.touches is None:
         if parameters.accept_m > 1:
             raise Invalid(

@@ -9,17 +9,19 @@ from sqlalchemy.orm import Session
 from app.alarms.tables import Alarm
 from app.characteristics import queries as characteristics
 from app.characteristics.tables import Characteristic
+from app.core.variants import Results
 from app.errors import NotFound
 from app.machines.tables import Machine
 from app.offsets.tables import Correction
 from app.readings.answers import answer
 from app.readings.records import Entry, Record
-from app.readings.tables import Exclusion, Reading, ReadingTouches
+from app.readings.tables import Exclusion, Reading, ReadingResults, ReadingTouches
 from app.readings.wording import reason
 from app.web.fields import is_slug
 from app.web.i18n import _
 
 COLUMNS = [getattr(Reading, name) for name in Record._fields]
+_RESULTS = [getattr(ReadingResults, name) for name in Results._fields]
 
 
 def entry_of(session: Session, characteristic: str) -> Entry | None:
@@ -64,6 +66,7 @@ def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[
             )
         )
     }
+    results = _results(session, entry, [record.sequence for record in records])
     return [
         answer(
             entry.characteristic,
@@ -73,10 +76,23 @@ def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[
             ),
             correction=corrections.get(record.correction) if record.correction is not None else None,
             alarms=[(number, kinds[number]) for number in record.alarms or () if number in kinds],
+            results=results.get(record.sequence),
         )
         | {"excluded": excluded.get(record.sequence)}
         for record in records
     ]
+
+
+def _results(session: Session, entry: Entry, sequences: list[int]) -> dict[int, Results]:
+    """What the variants of these readings yielded beside the value, of those that have anything."""
+    rows = session.execute(
+        select(ReadingResults.sequence, *_RESULTS).where(
+            ReadingResults.machine_id == entry.machine_id,
+            ReadingResults.characteristic_id == entry.characteristic_id,
+            ReadingResults.sequence.in_(sequences),
+        )
+    )
+    return {sequence: Results(*found) for sequence, *found in rows}
 
 
 def record_of(session: Session, entry: Entry, sequence: int) -> Record:

@@ -47,6 +47,7 @@ def replay(
             parameters,
             correction=(made.tool_memory, made.amount) if made else None,
             alarms=[(number, alarm.kind) for number, alarm in enumerate(verdict.alarms, start=1)],
+            results=verdict.results,
         )
         if tool is not None and made is not None and made.status != "held":
             tool.total += made.amount

@@ -30,8 +30,14 @@ class ReadingIn(Struct, forbid_unknown_fields=True, gc=False):
     characteristic: Annotated[str, Meta(min_length=1, max_length=64, description="The key of the characteristic.")]
     measured: Annotated[Length | None, Meta(description="The size, mm.")] = None
     touches: Annotated[
-        Annotated[list[Annotated[list[Length], Meta(max_length=MOST_REPEATS)]], Meta(max_length=MOST_POINTS)] | None,
-        Meta(description="In place of measured: one list per point (R23), each with its repeats (R27)."),
+        Annotated[
+            list[Annotated[list[Length | None], Meta(max_length=MOST_REPEATS)] | None], Meta(max_length=MOST_POINTS)
+        ]
+        | None,
+        Meta(
+            description="In place of measured: one list per point (R23), each with its repeats (R27). null stands for a "
+            "touch that is missing; it is refused by the number of its point and repeat."
+        ),
     ] = None
     measured_at: Annotated[Moment | None, Meta(description="When it was measured; if left out, when it came in.")] = (
         None
@@ -308,16 +314,16 @@ def _text(limit: int) -> Callable[[Any], str | None]:
 
 
 def _touches(value: Any) -> str | None:
-    if not isinstance(value, list) or not all(isinstance(point, list) for point in value):
+    if not isinstance(value, list) or not all(point is None or isinstance(point, list) for point in value):
         return _("Touches are one list per point, each with its repeats: [[39.998, 39.9982], [39.9979, 39.9981]].")
-    if len(value) > MOST_POINTS or any(len(point) > MOST_REPEATS for point in value):
+    if len(value) > MOST_POINTS or any(len(point or ()) > MOST_REPEATS for point in value):
         return _("No more than %(points)s points with %(repeats)s repeats each.") % {
             "points": MOST_POINTS,
             "repeats": MOST_REPEATS,
         }
     for at, point in enumerate(value, start=1):
-        for repeat, touch in enumerate(point, start=1):
-            if problem := _number(touch):
+        for repeat, touch in enumerate(point or (), start=1):
+            if touch is not None and (problem := _number(touch)):
                 return _("Point %(point)s, repeat %(repeat)s: %(problem)s") % {
                     "point": at,
                     "repeat": repeat,

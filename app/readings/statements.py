@@ -4,6 +4,7 @@ Rows travel as JSON because the server takes it apart with `json_to_recordset`, 
 and for sixty-four.
 """
 
+from app.core.variants import Results
 from app.core.zones import Zone
 from app.db.events import PUBLISHED
 from app.readings.records import Record
@@ -108,6 +109,12 @@ TOUCHES = """
 INSERT INTO reading_touches (machine_id, characteristic_id, sequence, touches)
 SELECT * FROM json_to_recordset($1) AS r(machine_id int, characteristic_id int, sequence bigint, touches jsonb)
 """
+_RESULTS = """machine_id int, characteristic_id int, sequence bigint, run_out float8, out_of_roundness float8, taper float8,
+    slope float8, repeat_range float8, repeat_deviation float8, sections_outside smallint, rejected bool"""
+RESULTS = f"""
+INSERT INTO reading_results (machine_id, characteristic_id, sequence, {", ".join(Results._fields)})
+SELECT * FROM json_to_recordset($1) AS r({_RESULTS})
+"""  # noqa: S608 - made of constants
 COUNTERS = """
 UPDATE machine_state m SET last_correction = n.last_correction
 FROM json_to_recordset($1) AS n(machine_id int, last_correction int) WHERE m.machine_id = n.machine_id

@@ -34,6 +34,7 @@ from app.readings.statements import (
     PARAMETERS,
     RAISE,
     REPEAT,
+    RESULTS,
     SAVE,
     STEPS,
     SUMMARISE_READINGS,
@@ -292,6 +293,19 @@ def _rarer(ground: Ground) -> Iterable[tuple[str, list[Any]]]:
             }
             for v in ground.verdicts
             if v.reading.touches is not None
+        ],
+    )
+    yield (
+        RESULTS,
+        [
+            {
+                "machine_id": v.stream.entry.machine_id,
+                "characteristic_id": v.stream.entry.characteristic_id,
+                "sequence": v.sequence,
+                **v.results._asdict(),
+            }
+            for v in ground.verdicts
+            if v.results is not None
         ],
     )
     if ground.touched_machines:

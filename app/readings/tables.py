@@ -96,6 +96,37 @@ class ReadingTouches(Base):
     touches: Mapped[list[Any]]
 
 
+class ReadingResults(Base):
+    """What the measuring variant of a reading yields beside its value; only for readings that have any of it.
+
+    mm, as `app.core.variants.Results` says. sections_outside and rejected: by the acceptance n of m.
+    """
+
+    __tablename__ = "reading_results"
+    __table_args__ = (
+        Index(
+            "reading_results_outside_idx",
+            "machine_id",
+            "characteristic_id",
+            "sequence",
+            postgresql_include=["sections_outside", "rejected"],
+            postgresql_where=text("sections_outside > 0"),
+        ),
+    )
+
+    machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    characteristic_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    sequence: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    run_out: Mapped[float | None]
+    out_of_roundness: Mapped[float | None]
+    taper: Mapped[float | None]
+    slope: Mapped[float | None]
+    repeat_range: Mapped[float | None]
+    repeat_deviation: Mapped[float | None]
+    sections_outside: Mapped[int | None] = mapped_column(SmallInteger)
+    rejected: Mapped[bool | None]
+
+
 class Exclusion(Base):
     """A reading taken out of the statistics, never out of the record."""
 

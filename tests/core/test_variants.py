@@ -11,14 +11,16 @@ from hypothesis import strategies as st
 
 from app.core.parameters import Parameters
 from app.core.probing import measured_value
-from app.core.variants import NOTHING, Results, fitted_points, results_of
+from app.core.variants import Results, fitted_points, results_of
 
 Made = Callable[..., Parameters]
 touch = st.floats(39.0, 40.98).map(lambda value: round(value, 6))
 
 
 def results(parameters: Parameters, touches: list[list[float]]) -> Results:
-    return results_of(parameters, touches, measured_value(parameters, touches).points)
+    found = results_of(parameters, touches, measured_value(parameters, touches).points)
+    assert found is not None
+    return found
 
 
 def test_the_half_difference_of_two_sides_is_run_out(shaft: Made) -> None:
@@ -60,7 +62,16 @@ def test_repeats_tell_how_well_the_probe_repeats_itself(shaft: Made) -> None:
 def test_where_the_variant_says_nothing_there_is_nothing(shaft: Made, parameters: dict[str, Any]) -> None:
     made = shaft(**parameters)
     touches = [[-20.0], [19.99]] if made.variant == "two_point" else [[39.99]]
-    assert results(made, touches) == NOTHING
+    assert results_of(made, touches, measured_value(made, touches).points) is None
+
+
+def test_sections_out_of_tolerance_are_counted_with_the_empirical_value(shaft: Made) -> None:
+    """Limits 39.984 and 40.000, EV +1 µm: 40.001 lies on the limit and is good, 40.0011 and 39.9849 are outside."""
+    parameters = shaft(points=3, accept={"n": 2, "m": 3})
+    good = results_of(parameters, [[40.001], [40.0011], [39.99]], [40.001, 40.0011, 39.99], empirical_value=0.001)
+    assert good == Results(sections_outside=1, rejected=False)
+    bad = results_of(parameters, [[40.001], [40.0011], [39.9849]], [40.001, 40.0011, 39.9849], empirical_value=0.001)
+    assert bad == Results(sections_outside=2, rejected=True)
 
 
 @given(st.lists(touch, min_size=2, max_size=20), st.floats(0.5, 50))

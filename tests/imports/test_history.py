@@ -187,6 +187,11 @@ def test_touches_are_kept_and_checked(plant: Database, tmp_path: Path) -> None:
     run(plant, path)
     assert stored(plant)[0]["measured"] == 39.99805
     assert scalar(plant, "SELECT touches FROM reading_touches") == good["touches"]
+    with plant.begin() as session:  # sides 39.9981 and 39.9980; of the repeats 0.2 µm each: sqrt((2 + 2) / 2) * 0.1 µm
+        found = session.execute(
+            text("SELECT run_out, repeat_range, repeat_deviation, rejected FROM reading_results")
+        ).one()
+    assert tuple(found) == (0.00005, 0.0002, 0.000141421, None)
 
 
 def test_parameters_changed_in_the_middle_stop_it(plant: Database, tmp_path: Path) -> None:

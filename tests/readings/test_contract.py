@@ -43,8 +43,8 @@ class TestZones:
         answer = shop.read(1.0, key="k1", part="SN-1", measured_at=AT)
         assert set(answer) == {
             *("characteristic", "sequence", "key", "part", "measured", "measured_at", "received_at", "late"),
-            *("deviation", "decided_deviation", "outstanding", "zone", "average_before", "average_after", "action"),
-            *("correction", "alarms", "reason", "parameters_version"),
+            *("deviation", "decided_deviation", "outstanding", "zone", "results", "average_before", "average_after"),
+            *("action", "correction", "alarms", "reason", "parameters_version"),
         }
         assert datetime.fromisoformat(answer.pop("measured_at")) == datetime.fromisoformat(AT)
         assert abs(datetime.fromisoformat(answer.pop("received_at")) - datetime.now(UTC)) < timedelta(minutes=1)
@@ -59,6 +59,7 @@ class TestZones:
             "decided_deviation": 0.001,
             "outstanding": [],
             "zone": "zero",
+            "results": None,
             "average_before": 0.0,
             "average_after": 0.0005,
             "action": "none",

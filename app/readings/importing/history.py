@@ -17,10 +17,10 @@ from sqlalchemy.orm import Session
 from app.audit import actions as audit
 from app.characteristics import queries as characteristics
 from app.characteristics.queries import Standing
-from app.core.acceptance import accepted
 from app.core.compensation import Code, State, decide, deviation_of
 from app.core.parameters import Mode, Parameters
 from app.core.probing import TouchError, measured_value
+from app.core.variants import Results, results_of
 from app.core.zones import Zone
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
@@ -37,11 +37,12 @@ Progress = Callable[[], None]
 
 STAGE = """
 CREATE TEMPORARY TABLE staged (line bigint, key text, measured float8, deviation float8, average_before float8,
-    average_after float8, measured_at timestamptz, machined_at timestamptz, zone text, part text, touches jsonb
+    average_after float8, measured_at timestamptz, machined_at timestamptz, zone text, part text, touches jsonb, results jsonb
 ) ON COMMIT DROP
 """
 COPY = """
-COPY staged (line, key, measured, deviation, average_before, average_after, measured_at, machined_at, zone, part, touches)
+COPY staged (line, key, measured, deviation, average_before, average_after, measured_at, machined_at, zone, part, touches,
+    results)
 FROM STDIN
 """
 # The same key with another value, in the record or further up in the file.
@@ -78,6 +79,13 @@ SELECT r.machine_id, r.characteristic_id, r.sequence, s.touches FROM staged s
 JOIN reading r ON r.machine_id = %(machine)s AND r.characteristic_id = %(characteristic)s AND r.key = s.key
 WHERE s.touches IS NOT NULL
 """
+RESULTS = f"""
+INSERT INTO reading_results (machine_id, characteristic_id, sequence, {", ".join(Results._fields)})
+SELECT r.machine_id, r.characteristic_id, r.sequence, {", ".join(f"f.{name}" for name in Results._fields)} FROM staged s
+JOIN reading r ON r.machine_id = %(machine)s AND r.characteristic_id = %(characteristic)s AND r.key = s.key
+CROSS JOIN LATERAL jsonb_populate_record(NULL::reading_results, s.results) f
+WHERE s.results IS NOT NULL
+"""  # noqa: S608 - made of the names of our columns
 # What the plant page shows as the last reading is the newest one, not the one that arrived last. Parts of the past were
 # not cut by the tool that is in the machine now: its count of parts stays.
 MOVE_STREAM = """
@@ -139,17 +147,18 @@ class _Judge:
 
     def row(self, line: Line) -> tuple[Any, ...] | Flaw:
         reading, parameters = line.reading, self.parameters
-        measured, sections = float(reading.measured or 0.0), tuple[float, ...]()
+        measured, results = float(reading.measured or 0.0), None
         if reading.touches is not None:
             try:
-                measured, sections = measured_value(parameters, reading.touches)
+                measured, points = measured_value(parameters, reading.touches)
+                results = results_of(parameters, reading.touches, points, self.empirical_value)
             except TouchError as error:
                 return Flaw(line.number, "touches", "", touch_problem(error))
         decision = decide(
             parameters,
             State(self.average),
             deviation_of(measured, parameters.target, self.empirical_value),
-            accepted=not sections or accepted(parameters, sections, self.empirical_value),
+            accepted=results is None or not results.rejected,
         )
         self.average = decision.average_after
         return (
@@ -164,6 +173,7 @@ class _Judge:
             decision.zone.value,
             reading.part,
             None if reading.touches is None else msgspec.json.encode(reading.touches).decode(),
+            None if results is None else msgspec.json.encode(results._asdict()).decode(),
         )
 
 
@@ -289,6 +299,7 @@ def _move_over(cursor: Cursor[Any], entry: Entry, version: int, now: datetime, s
         return
     summary.first_sequence, summary.last_sequence = before + 1, before + summary.stored
     cursor.execute(TOUCHES, where)
+    cursor.execute(RESULTS, where)
     cursor.execute(MOVE_STREAM, where | {"count": summary.stored, "now": now})
     for statement, rows in full_blocks([(entry, before, summary.last_sequence)]):
         RawCursor(cursor.connection).execute(statement, (as_json(rows),))
