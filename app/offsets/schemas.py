@@ -1,31 +1,20 @@
 """Tool memory, averages and corrections as JSON. Lengths in mm."""
 
-from datetime import UTC, datetime, timedelta
+from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from app.core.parameters import LARGEST_LENGTH
+from app.core.tool_life import Plan, use_of
 from app.offsets import wording
 from app.offsets.queries import AverageRow, CorrectionRow, ToolRow
 from app.offsets.tables import Correction
-from app.web.fields import Body, Moment, Reason
-from app.web.i18n import _
+from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Reason
 
+DESCRIBED = ("edge", "name", "kind", "planned_parts", "planned_total", "sister")
 Status = Literal["held", "awaiting_approval", "pending", "applied", "rejected", "superseded"]
-EARLIEST = datetime(2000, 1, 1, tzinfo=UTC)
-AHEAD = timedelta(hours=24)
-
-
-def _sensible(moment: datetime) -> datetime:
-    if moment < EARLIEST or moment > datetime.now(UTC) + AHEAD:
-        raise PydanticCustomError("moment", _("is more than a day ahead, or before 2000; check the machine's clock"))
-    return moment
-
-
 Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
-LatelyOrNow = Annotated[Moment, AfterValidator(_sensible)]
 
 CORRECTION: dict[str, JsonValue] = {
     "machine": "lathe-1",
@@ -66,6 +55,15 @@ TOOL: dict[str, JsonValue] = {
     "last_correction": LAST,
     "open_corrections": [LAST],
     "characteristics": ["shaft-d40"],
+    "edge": "D1",
+    "name": "T03 finishing",
+    "kind": "DCMT 11T304",
+    "planned_parts": 400,
+    "planned_total": 0.05,
+    "sister": 13,
+    "life_used": 0.5275,
+    "parts_left": 189,
+    "paused_by": None,
 }
 
 
@@ -85,6 +83,18 @@ class DecisionIn(Body):
 
     model_config = ConfigDict(json_schema_extra={"example": {"reason": "insert looked at, still good"}})
 
+    reason: Reason
+
+
+class DecisionsIn(Body):
+    """Why several corrections are approved together."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"numbers": [17, 18], "reason": "part measured, agrees"}})
+
+    numbers: Annotated[
+        list[Annotated[int, Field(strict=True, ge=1, le=LARGEST_SERIAL)]],
+        Field(min_length=1, max_length=1000, description="Which ones; all of them, or none if one cannot be approved."),
+    ]
     reason: Reason
 
 
@@ -183,6 +193,18 @@ class ToolOut(BaseModel):
     last_correction: Annotated[CorrectionBrief | None, Field(description="The one issued last, and its status.")]
     open_corrections: list[CorrectionBrief]
     characteristics: Annotated[list[str], Field(description="Which characteristics correct it.")]
+    edge: Annotated[str | None, Field(description="The cutting edge: D number or name.")]
+    name: Annotated[str | None, Field(description="What the tool is called.")]
+    kind: Annotated[str | None, Field(description="Type of tool or insert.")]
+    planned_parts: Annotated[int | None, Field(description="Planned tool life in parts.")]
+    planned_total: Annotated[float | None, Field(description="Planned wear life: the sum of corrections, mm.")]
+    sister: Annotated[int | None, Field(description="R10 of the sister tool.")]
+    life_used: Annotated[float | None, Field(description="Share of the planned life that is used; 1 is all of it.")]
+    parts_left: Annotated[int | None, Field(description="Parts until the planned life is reached, at the wear so far.")]
+    paused_by: Annotated[
+        int | None,
+        Field(description="Number of the alarm that asks which offset is true; nothing is corrected till then."),
+    ]
 
 
 class ToolSet(ToolOut):
@@ -270,6 +292,7 @@ def tool_set(row: ToolRow, machine: str, superseded: list[int]) -> ToolSet:
 
 
 def _tool(row: ToolRow, machine: str) -> dict[str, Any]:
+    use = use_of(Plan(row.tool.planned_parts, row.tool.planned_total), row.parts, row.tool.total)
     return {
         "machine": machine,
         "tool_memory": row.tool.number,
@@ -281,6 +304,10 @@ def _tool(row: ToolRow, machine: str) -> dict[str, Any]:
         "last_correction": None if row.last is None else _brief(row.last),
         "open_corrections": [_brief(c) for c in row.open],
         "characteristics": row.characteristics,
+        **{name: getattr(row.tool, name) for name in DESCRIBED},
+        "life_used": None if use.share is None else round(use.share, 4),
+        "parts_left": use.left,
+        "paused_by": row.tool.paused_by,
     }
 
 
