@@ -71,6 +71,8 @@ def c4(n: int) -> float:
     (0.94, 0.9896)
     """
     _check(n)
+    if n > 1000:  # where two large logarithms would cancel, the series is exact
+        return 1 - 1 / (4 * n) - 7 / (32 * n**2) - 19 / (128 * n**3)
     return exp(0.5 * log(2 / (n - 1)) + lgamma(n / 2) - lgamma((n - 1) / 2))
 
 
