@@ -7,8 +7,10 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from app.characteristics import queries, wording
 from app.characteristics.tables import ParametersVersion
-from app.core.parameters import FIELDS, Kind, ParameterError, Parameters, read
+from app.core.parameters import FIELDS, Kind, ParameterError, Parameters, Problem, read
+from app.core.zones import nanometres
 from app.errors import FieldError
+from app.machines.tables import Machine
 from app.web.fields import Body, Reason, Slug, Text200
 
 PARAMETERS: dict[str, JsonValue] = {
@@ -34,6 +36,7 @@ PARAMETERS: dict[str, JsonValue] = {
     "wear_policy": "hold",
     "max_step": None,
     "max_total": None,
+    "plausible_jump": None,
 }
 CHARACTERISTIC: dict[str, JsonValue] = {
     "key": "shaft-d40",
@@ -174,12 +177,16 @@ class VersionOut(BaseModel):
     parameters: Annotated[dict[str, Any], Field(json_schema_extra=parameters_schema())]
 
 
-def warnings_of(parameters: Parameters) -> list[FieldError]:
-    """What of a set is outside the ranges printed for the control."""
+def warnings_of(parameters: Parameters, machine: Machine) -> list[FieldError]:
+    """What of a set is outside the ranges printed for the control, or finer than the machine's probe tells."""
     try:
-        return wording.field_errors(read(parameters.as_dict())[1])
+        unusual = read(parameters.as_dict())[1]
     except ParameterError:  # made when rules were others
-        return []
+        unusual = []
+    if nanometres(parameters.zero_range) < nanometres(machine.zero_range_floor):
+        values = {"value": parameters.zero_range, "floor": machine.zero_range_floor}
+        unusual.append(Problem("zero_range", "signal_path", values, warning=True))
+    return wording.field_errors(unusual)
 
 
 def characteristic_out(standing: queries.Standing) -> CharacteristicOut:
@@ -193,7 +200,7 @@ def characteristic_out(standing: queries.Standing) -> CharacteristicOut:
         parameters=wording.in_order(version.parameters),
         parameters_version=version.version,
         created_at=characteristic.created_at,
-        warnings=[Warned(field=field, message=message) for field, message in warnings_of(standing.parameters)],
+        warnings=[Warned(field=field, message=message) for field, message in warnings_of(standing.parameters, machine)],
     )
 
 

@@ -40,6 +40,7 @@ def label(name: str) -> str:
         "wear_policy": _("Beyond the wear limit"),
         "max_step": _("Largest step"),
         "max_total": _("Largest sum"),
+        "plausible_jump": _("Largest plausible jump"),
     }.get(name, name)
 
 
@@ -68,6 +69,9 @@ def explanation(name: str) -> str | None:
         "max_step": _("A larger correction is cut to this. Empty: no limit."),
         "max_total": _(
             "Sum of corrections per tool: beyond it nothing is corrected and an alarm is raised. Empty: no limit."
+        ),
+        "plausible_jump": _(
+            "A reading further than this from the level of those before is marked, and its correction held. Empty: off."
         ),
         "rejected_may_correct": _("A part outside n of m also corrects the tool."),
     }.get(name)
@@ -161,6 +165,7 @@ def sentence(problem: Problem) -> str:
         "tolerance_sign": _(
             "R40 upper deviation must be greater than R41 lower deviation; check the signs (h6 is 0 and −0.016)"
         ),
+        "signal_path": _signal_path(problem, name),
         "sign_missing": _(
             "The factor is missing: it says which way the offset acts. Lathe diameter −1, radius −0.5, length −1; "
             "milling radius −0.5 outside, +0.5 inside"
@@ -218,6 +223,15 @@ def _target_twice(problem: Problem, name: str) -> str:
     return _(
         "{name} {value} does not agree with nominal and deviations, which give {computed}; say only one of the two"
     ).format(name=name, value=millimetres(problem.data["value"]), computed=millimetres(problem.data["computed"]))
+
+
+def _signal_path(problem: Problem, name: str) -> str:
+    if problem.code != "signal_path":
+        return ""
+    return _(
+        "{name} {value} is finer than the probe tells: through the PLC a touch is uncertain by {floor}, the probing feed "
+        "times the delay of the signal"
+    ).format(name=name, value=millimetres(problem.data["value"]), floor=millimetres(problem.data["floor"]))
 
 
 class HasParameters(Protocol):

@@ -50,6 +50,7 @@ class Signal(StrEnum):
     PROBE_FAULT = "probe_fault"
     ACCEPTANCE = "acceptance"
     OFFSET_LIMIT = "offset_limit"
+    IMPLAUSIBLE = "implausible"
 
 
 class Code(StrEnum):
@@ -68,6 +69,7 @@ class Code(StrEnum):
     BEFORE_TOOL_CHANGE = "before_tool_change"
     OFFSET_LIMIT = "offset_limit"
     REJECTED = "rejected"
+    IMPLAUSIBLE = "implausible"
     IMPORTED = "imported"
 
 
@@ -76,7 +78,7 @@ class State(NamedTuple):
 
     average: M, the running average of this characteristic's memory location R11, mm.
     total: sum of the corrections of the tool since it was changed, issued ones included, in offset units (mm).
-    paused: compensation is paused by a probe fault that nobody has acknowledged yet.
+    paused: compensation is paused by an alarm that nobody has acknowledged yet: a probe fault, or an offset that differs.
     """
 
     average: float = 0.0
@@ -154,6 +156,7 @@ def decide(
     outstanding: float = 0.0,
     previous_tool: bool = False,
     accepted: bool = True,
+    jump: bool = False,
 ) -> Decision:
     """Decide one reading (domain §3).
 
@@ -164,6 +167,8 @@ def decide(
         says nothing about the offset of today.
     accepted: the n-of-m verdict over the part's sections (domain §6); a rejected part corrects
         nothing unless the characteristic allows it.
+    jump: neither wear nor scatter explains it (`plausibility.is_jump`): what it asks for is computed in full and held, and
+        it says nothing to the average. In the wear zone the alarm *tool worn* asks the same already.
 
     >>> p = Parameters(target=10.0, tolerance_width=0.04, zero_range=0.004, averaging_limit=0.0133,
     ...                wear_limit=0.3, confidence_limit=1.0, weighting_factor=2, factor=-1, tool_memory=1, average_memory=1)
@@ -209,20 +214,27 @@ def decide(
     if not accepted and not parameters.rejected_may_correct:
         return verdict(Action.NONE, Code.REJECTED)
 
+    held = parameters.wear_policy is WearPolicy.HOLD
+    if jump and not (zone is Zone.WEAR and held):
+        signals.append(Signal.IMPLAUSIBLE)
+        if zone is Zone.ZERO or parameters.measures_only:
+            return verdict(Action.NONE, Code.IMPLAUSIBLE)
+
     # What the zone asks for: the error to remove, what M becomes with and without a correction.
     updated = average_of(before, decided, parameters.weighting_factor)
     if zone is Zone.ZERO:
         return verdict(Action.NONE, Code.WITHIN_ZERO_RANGE, updated)
     if parameters.measures_only:
         return verdict(Action.NONE, Code.MEASURE_ONLY, before if zone is Zone.WEAR else updated)
-    if zone is Zone.AVERAGE:
+    if Signal.IMPLAUSIBLE in signals:
+        size_error, code, after, without = decided, Code.IMPLAUSIBLE, before, before
+    elif zone is Zone.AVERAGE:
         if abs(nanometres(updated)) <= limits.zero_range:
             return verdict(Action.NONE, Code.AVERAGE_KEPT, updated)
         size_error, code, after, without = updated, Code.AVERAGED_DEVIATION, 0.0, updated
     elif zone is Zone.FULL:
         size_error, code, after, without = decided, Code.FULL_DEVIATION, 0.0, before
     elif zone is Zone.WEAR:
-        held = parameters.wear_policy is WearPolicy.HOLD
         code = Code.TOOL_WORN_HELD if held else Code.TOOL_WORN_RELEASED
         size_error, after, without = decided, before, before
     else:
@@ -235,7 +247,7 @@ def decide(
     if parameters.max_total is not None and _exceeds(state.total, amount, parameters.max_total):
         signals.append(Signal.OFFSET_LIMIT)
         return verdict(Action.NONE, Code.OFFSET_LIMIT, without)
-    action = Action.HOLD if code is Code.TOOL_WORN_HELD else Action.CORRECT
+    action = Action.HOLD if code in {Code.TOOL_WORN_HELD, Code.IMPLAUSIBLE} else Action.CORRECT
     return verdict(action, code, after, size_error, amount, clamped)
 
 

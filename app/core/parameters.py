@@ -108,6 +108,7 @@ class Parameters:
     wear_policy: WearPolicy = WearPolicy.HOLD
     max_step: float | None = None
     max_total: float | None = None
+    plausible_jump: float | None = None
 
     @cached_property
     def limits(self) -> Limits:
@@ -202,6 +203,7 @@ FIELDS: tuple[Field, ...] = (
     Field("wear_policy", None, Kind.CHOICE, default="hold", choices=_choices(WearPolicy)),
     Field("max_step", None, Kind.LENGTH, lowest=0),
     Field("max_total", None, Kind.LENGTH, lowest=0),
+    Field("plausible_jump", None, Kind.LENGTH, lowest=0.000001),
 )
 BY_NAME: dict[str, Field] = {field.name: field for field in FIELDS}
 BY_R: dict[str, str] = {field.r: field.name for field in FIELDS if field.r}

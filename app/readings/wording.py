@@ -26,7 +26,8 @@ def reason(record: Record, parameters: Parameters, amount: float | None = None) 
 
 
 def _notes(record: Record, parameters: Parameters, amount: float | None) -> tuple[tuple[str, bool], ...]:
-    size_error = record.decided if record.zone != Zone.AVERAGE else _averaged(record, parameters)
+    in_full = record.zone != Zone.AVERAGE or record.code == Code.IMPLAUSIBLE
+    size_error = record.decided if in_full else _averaged(record, parameters)
     return (
         ("outstanding", record.outstanding is not None),
         (
@@ -76,6 +77,7 @@ _WORDED: dict[str, Callable[[Record, Parameters], float | int | None]] = {
     "wear": _of_parameters("wear_limit"),
     "confidence": _of_parameters("confidence_limit"),
     "total": _of_parameters("max_total"),
+    "jump": _of_parameters("plausible_jump"),
     "n": _of_parameters("accept_n"),
     "m": _of_parameters("accept_m"),
 }
@@ -128,7 +130,17 @@ def _sentence(record: Record, parameters: Parameters) -> str:
         case Code.OFFSET_LIMIT:
             text = _(
                 "Deviation %(deviation)s asks for a correction, but the corrections of this tool would exceed %(total)s in all. "
-                "Nothing is corrected until the tool is changed."
+                "Nothing is corrected until the tool is changed, or the largest sum is raised."
+            )
+        case Code.IMPLAUSIBLE if record.correction is None:
+            text = _(
+                "Deviation %(deviation)s lies more than the plausible %(jump)s from the level of the readings before: neither "
+                "wear nor scatter explains it. It is marked, and the average is left as it was."
+            )
+        case Code.IMPLAUSIBLE:
+            text = _(
+                "Deviation %(deviation)s lies more than the plausible %(jump)s from the level of the readings before: neither "
+                "wear nor scatter explains it. Correction %(number)s is held until somebody decides."
             )
         case Code.REJECTED:
             text = _(
