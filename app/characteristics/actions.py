@@ -24,7 +24,8 @@ from app.core.zones import nanometres
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
 from app.machines import queries as machines
-from app.offsets.tables import AverageMemory
+from app.offsets import queries as offsets
+from app.offsets.tables import AverageMemory, Tool
 from app.readings.tables import Stream
 from app.web.i18n import _
 
@@ -40,6 +41,7 @@ __all__ = [
 
 DRAWING = ("nominal", "upper_deviation", "lower_deviation")
 TARGET = ("target", "tolerance_width")
+OF_LEVEL = ("target", "factor", "tool_memory", "average_memory", "plausible_jump")
 
 
 def add_characteristic(session: Session, given: CharacteristicIn, actor: str) -> Standing:
@@ -214,17 +216,23 @@ def _change_parameters(
         "tool_memory": new.tool_memory,
         "average_memory": new.average_memory,
     }
-    if new.tool_memory != old.tool_memory:
+    other_tool = new.tool_memory != old.tool_memory
+    parts = offsets.parts_cut(session, machine.id, old.tool_memory) if other_tool else 0
+    if other_tool:
         values["sequence_at_tool_change"] = Stream.sequence  # parts cut with the other tool are not this one's
+    if any(getattr(new, name) != getattr(old, name) for name in OF_LEVEL):
+        values |= {"level": None, "level_sequence": None}  # what was expected was expected under the old ones
     session.execute(
         update(Stream)
         .where(Stream.machine_id == machine.id, Stream.characteristic_id == characteristic.id)
         .values(values)
         .execution_options(synchronize_session=False)
     )
+    if other_tool:
+        _keep_parts(session, machine.id, old.tool_memory, parts)
     now = Standing(characteristic, machine, made)
     changes = [_changed(now)]
-    if nanometres(new.target) != nanometres(old.target) and new.average_memory:
+    if (other_tool or nanometres(new.target) != nanometres(old.target)) and new.average_memory:
         _restart_average(session, machine.id, new.average_memory)
         changes.append({"kind": "average", "machine": machine.key, "average_memory": new.average_memory})
     before, after = _differences(old.as_dict(), new.as_dict())
@@ -232,8 +240,19 @@ def _change_parameters(
     return now, changes
 
 
+def _keep_parts(session: Session, machine_id: int, tool_memory: int, parts: int) -> None:
+    """The tool that a characteristic has left has cut these parts, although nobody counts them on it any more."""
+    lost = parts - offsets.parts_cut(session, machine_id, tool_memory)
+    session.execute(
+        update(Tool)
+        .where(Tool.machine_id == machine_id, Tool.number == tool_memory)
+        .values(parts_kept=Tool.parts_kept + lost)
+        .execution_options(synchronize_session=False)
+    )
+
+
 def _restart_average(session: Session, machine_id: int, location: int) -> None:
-    """M was the average about another target: it begins again at 0."""
+    """M was the average about another target, or of another tool: it begins again at 0."""
     session.execute(
         update(AverageMemory)
         .where(AverageMemory.machine_id == machine_id, AverageMemory.location == location)

@@ -16,6 +16,7 @@ __all__ = ["MachineChange", "MachineIn", "add_machine", "change_machine"]
 
 TOOL_LOCATIONS = 32
 AVERAGE_LOCATIONS = 20
+MAY_BE_NOTHING = {"corrections_expire_after", "signal_jitter"}
 
 
 def add_machine(session: Session, machine: MachineIn, actor: str) -> Machine:
@@ -29,7 +30,7 @@ def add_machine(session: Session, machine: MachineIn, actor: str) -> Machine:
             _("Choose another key, or change the machine that is there."),
             errors=[FieldError("key", _("is taken"))],
         )
-    made = Machine(key=machine.key, name=machine.name, control=machine.control)
+    made = Machine(**machine.model_dump())
     session.add(made)
     session.flush()
     session.add(MachineState(machine_id=made.id))
@@ -53,7 +54,8 @@ def change_machine(session: Session, key: str, change: MachineChange, actor: str
             _("Change the name instead, or set up another machine."),
             errors=[FieldError("key", _("cannot be changed"))],
         )
-    wanted = change.model_dump(exclude={"key"}, exclude_unset=True, exclude_none=True)
+    said = change.model_dump(exclude={"key"}, exclude_unset=True)
+    wanted = {name: value for name, value in said.items() if value is not None or name in MAY_BE_NOTHING}
     before = {name: getattr(machine, name) for name in wanted}
     if before == wanted:
         return machine

@@ -5,12 +5,49 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
+from app.core.uncertainty import DEFAULT_DELAY, DEFAULT_FEED
 from app.web.fields import Body, Slug, Text200
 
 Control = Annotated[
     Literal["sinumerik", "fanuc", "heidenhain", "other"], Field(description="Which family its control belongs to.")
 ]
-MACHINE: dict[str, JsonValue] = {"key": "lathe-1", "name": "Lathe 1, hall B", "control": "sinumerik"}
+ExpireAfter = Annotated[
+    float,
+    Field(
+        strict=True,
+        gt=0,
+        le=87_600,
+        allow_inf_nan=False,
+        description="Hours after which a correction that was not applied is superseded; null: never.",
+    ),
+]
+Path = Annotated[
+    Literal["direct", "plc"],
+    Field(description="How the probe's signal comes to the control: directly, or through the PLC, which delays it."),
+]
+Delay = Annotated[
+    float, Field(ge=0, le=1000, allow_inf_nan=False, description="Of the way through the PLC, ms; at most 0.25 as a rule.")
+]
+Jitter = Annotated[
+    float,
+    Field(
+        ge=0,
+        le=1000,
+        allow_inf_nan=False,
+        description="By how much the delay varies, ms; null if nobody has measured it: then the whole delay counts.",
+    ),
+]
+Feed = Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False, description="Probing feed, mm/min.")]
+MACHINE: dict[str, JsonValue] = {
+    "key": "lathe-1",
+    "name": "Lathe 1, hall B",
+    "control": "sinumerik",
+    "corrections_expire_after": 8.0,
+    "signal_path": "plc",
+    "signal_delay": 0.25,
+    "signal_jitter": None,
+    "probing_feed": 150.0,
+}
 
 
 class MachineIn(Body):
@@ -21,6 +58,11 @@ class MachineIn(Body):
     key: Annotated[Slug, Field(description="Its name in addresses and keys; it stays for good.")]
     name: Annotated[Text200, Field(description="What people call it.")]
     control: Control
+    corrections_expire_after: ExpireAfter | None = None
+    signal_path: Path = "direct"
+    signal_delay: Delay = DEFAULT_DELAY
+    signal_jitter: Jitter | None = None
+    probing_feed: Feed = DEFAULT_FEED
 
 
 class MachineChange(Body):
@@ -31,16 +73,35 @@ class MachineChange(Body):
     key: Annotated[Slug | None, Field(description="May be sent along, unchanged.")] = None
     name: Text200 | None = None
     control: Control | None = None
+    corrections_expire_after: ExpireAfter | None = None
+    signal_path: Path | None = None
+    signal_delay: Delay | None = None
+    signal_jitter: Jitter | None = None
+    probing_feed: Feed | None = None
 
 
 class MachineOut(BaseModel):
     """A machine."""
 
     model_config = ConfigDict(
-        from_attributes=True, json_schema_extra={"example": MACHINE | {"created_at": "2026-11-21T07:00:00Z"}}
+        from_attributes=True, json_schema_extra={
+            "example": MACHINE
+            | {"position_uncertainty": 0.000625, "zero_range_floor": 0.000625, "created_at": "2026-11-21T07:00:00Z"}
+        },
     )
 
     key: str
     name: str
     control: Control
+    corrections_expire_after: float | None
+    signal_path: Path
+    signal_delay: Delay
+    signal_jitter: Jitter | None
+    probing_feed: Feed
+    position_uncertainty: Annotated[
+        float, Field(description="Probing feed x delay, mm: how far the axis moves on; 0 on the direct path.")
+    ]
+    zero_range_floor: Annotated[
+        float, Field(description="What of it varies from touch to touch, mm; a smaller R33 is warned of.")
+    ]
     created_at: datetime

@@ -5,6 +5,7 @@ from datetime import datetime
 from sqlalchemy import CheckConstraint, ForeignKey, Identity, func
 from sqlalchemy.orm import Mapped, mapped_column
 
+from app.core.uncertainty import SignalPath, position_uncertainty, zero_range_floor
 from app.db.base import Base
 
 
@@ -15,6 +16,7 @@ class Machine(Base):
     __table_args__ = (
         CheckConstraint("control IN ('sinumerik', 'fanuc', 'heidenhain', 'other')", name="control"),
         CheckConstraint("corrections_expire_after > 0", name="corrections_expire_after"),
+        CheckConstraint("signal_path IN ('direct', 'plc')", name="signal_path"),
     )
 
     id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True)
@@ -23,6 +25,23 @@ class Machine(Base):
     control: Mapped[str]
     created_at: Mapped[datetime] = mapped_column(server_default=func.now())
     corrections_expire_after: Mapped[float | None]  # h that a correction waits to be fetched and confirmed
+    signal_path: Mapped[str] = mapped_column(server_default="direct")  # of the probe: to the control, or through the PLC
+    signal_delay: Mapped[float] = mapped_column(server_default="0.25")  # ms, of the way through the PLC
+    signal_jitter: Mapped[float | None]  # ms by which the delay varies, if somebody has measured it
+    probing_feed: Mapped[float] = mapped_column(server_default="150")  # mm/min
+
+    @property
+    def position_uncertainty(self) -> float:
+        """How far the axis moves on until the signal has come through the PLC, mm; 0 on the direct path."""
+        plc = self.signal_path == SignalPath.PLC
+        return position_uncertainty(self.probing_feed, self.signal_delay) if plc else 0.0
+
+    @property
+    def zero_range_floor(self) -> float:
+        """The part of it that varies from touch to touch, mm: a smaller R33 would correct what nobody has measured."""
+        return zero_range_floor(
+            SignalPath(self.signal_path), self.probing_feed, self.signal_delay, self.signal_jitter
+        )
 
 
 class MachineState(Base):

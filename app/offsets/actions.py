@@ -65,6 +65,26 @@ def decide(session: Session, machine: Machine, number: int, verb: Verb, reason: 
     return Decided(correction, wording.counted_on(counting))
 
 
+def approve_all(
+    session: Session, machine: Machine, numbers: Sequence[int], reason: str, caller: Caller
+) -> list[Correction]:
+    """Approve these corrections together: all of them, or none when one cannot be approved any more.
+
+    Raises `NotFound`; `Conflict` naming the first that somebody else has decided about, and how it stands.
+    """
+    lock_machines(session, [machine.id])
+    approved = [queries.correction(session, machine, number) for number in sorted(set(numbers))]
+    for correction in approved:
+        must_be(correction, machine, "approve", FROM["approve"])
+    now = datetime.now(UTC)
+    for correction in approved:
+        correction.status, correction.reason = INTO["approve"], reason
+        correction.decided_at, correction.decided_by = now, caller.name
+        record_status(session, machine, correction, caller, SAID["approve"], "awaiting_approval", reason)
+    publish(session, *(correction_changed(session, machine, correction) for correction in approved))
+    return approved
+
+
 def edit_tool(session: Session, machine: Machine, number: int, offset: float, reason: str, caller: Caller) -> Restarted:
     """Somebody has set the offset by hand and says what it is now.
 

@@ -12,6 +12,7 @@ from app.offsets.schemas import (
     AverageOut,
     CorrectionOut,
     DecisionIn,
+    DecisionsIn,
     EmpiricalValueIn,
     Status,
     ToolChange,
@@ -216,6 +217,19 @@ def approve_correction(
     found = machine_named(session, machine)
     done = actions.decide(session, found, number, "approve", decision.reason, caller)
     return correction_out(queries.row_of(session, found, done.correction), done.note)
+
+
+@router.post("/corrections/{machine}/approve", responses=problems(404, 409))
+def approve_corrections(
+    session: SessionDep, caller: Operator, machine: MachineKey, decision: DecisionsIn
+) -> Page[CorrectionOut]:
+    """A person approves several corrections together, such as all that wait for one tool.
+
+    All of them or none: if somebody has decided about one meanwhile, the answer is 409 and says who and how.
+    """
+    found = machine_named(session, machine)
+    approved = actions.approve_all(session, found, decision.numbers, decision.reason, caller)
+    return Page(items=[correction_out(row) for row in queries.rows_of(session, found, approved)])
 
 
 @router.post("/corrections/{machine}/{number}/release", responses=problems(404, 409))

@@ -129,3 +129,138 @@ def offset_figure(changes: Sequence[OffsetChange], *, theme: ThemeName = "light"
             ],
         ),
     }
+
+
+@dataclass(frozen=True)
+class LifeBar:
+    """One edge in the chart of lives. total: sum of its corrections, mm; ended_at is None for the present one."""
+
+    parts: int
+    total: float | None
+    ended_at: datetime | None
+    edge: str | None = None
+
+
+def lives_figure(
+    lives: Sequence[LifeBar],
+    *,
+    usual: float | None = None,
+    planned_parts: int | None = None,
+    planned_total: float | None = None,
+    theme: ThemeName = "light",
+) -> dict[str, Any]:
+    """Parts cut per edge, and below the sum of its corrections, oldest first; the present edge hatched."""
+    colours = palette(theme)
+    at = list(range(len(lives)))
+    names = [_("now") if life.ended_at is None else life.ended_at.strftime("%d.%m.") for life in lives]
+    present = [life.ended_at is None for life in lives]
+    traces = [
+        {
+            "type": "bar",
+            "meta": meta,
+            "name": name,
+            "x": at,
+            "y": values,
+            "yaxis": axis,
+            "marker": {
+                "color": colours.steady if meta == "parts" else colours.correction,
+                "pattern": {"shape": ["/" if now else "" for now in present], "fillmode": "overlay"},
+            },
+            "width": 0.7,
+            "text": texts,
+            "textposition": "none",
+            "hovertemplate": "%{text}<extra></extra>",
+        }
+        for meta, name, axis, values, texts in (
+            (
+                "parts",
+                _("Parts"),
+                "y",
+                [life.parts for life in lives],
+                [_life_text(life, str(life.parts), _("parts")) for life in lives],
+            ),
+            (
+                "total",
+                _("Sum of corrections"),
+                "y2",
+                [None if life.total is None else life.total * 1000 for life in lives],
+                [_life_text(life, um(life.total), _("corrected in all")) for life in lives],
+            ),
+        )
+    ]
+    lines = [
+        (value, axis, dash, text)
+        for value, axis, dash, text in (
+            (usual, "y", "dot", _("median {n}").format(n=f"{usual or 0:g}")),
+            (planned_parts, "y", "dash", _("planned {n}").format(n=planned_parts)),
+            (None if planned_total is None else planned_total * 1000, "y2", "dash", _("planned")),
+            (None if planned_total is None else -planned_total * 1000, "y2", "dash", ""),
+        )
+        if value is not None
+    ]
+    return {
+        "data": traces,
+        "layout": layout(
+            theme,
+            margin={"l": 70, "t": 14, "r": 92, "b": 34},
+            xaxis={
+                "tickvals": at,
+                "ticktext": names,
+                "range": [-0.6, max(len(lives) - 0.4, 3.4)],
+                "showgrid": False,
+                "fixedrange": True,
+                "anchor": "y2",
+                "tickangle": 0,
+            },
+            yaxis={
+                "domain": [0.56, 1],
+                "rangemode": "tozero",
+                "nticks": 4,
+                "title": {"text": _("Parts"), "font": {"size": 13, "color": colours.quiet}},
+                "fixedrange": True,
+            },
+            yaxis2={
+                "domain": [0, 0.44],
+                "anchor": "x",
+                "nticks": 4,
+                "tickformat": "+.0f",
+                "color": colours.quiet,
+                "gridcolor": colours.grid,
+                "zeroline": True,
+                "zerolinecolor": colours.faint,
+                "title": {"text": _("Sum, µm"), "font": {"size": 13, "color": colours.quiet}},
+                "fixedrange": True,
+            },
+            shapes=[
+                {
+                    "type": "line",
+                    "xref": "paper",
+                    "x0": 0,
+                    "x1": 1,
+                    "yref": axis,
+                    "y0": value,
+                    "y1": value,
+                    "line": {"color": colours.faint if dash == "dot" else colours.ink, "width": 1.5, "dash": dash},
+                }
+                for value, axis, dash, _text in lines
+            ],
+            annotations=[
+                {
+                    "xref": "paper",
+                    "x": 1,
+                    "xanchor": "left",
+                    "yref": axis,
+                    "y": value,
+                    "text": text,
+                    "showarrow": False,
+                    "font": {"size": 12, "color": colours.quiet},
+                }
+                for value, axis, _dash, text in lines
+                if text
+            ],
+        ),
+    }
+
+
+def _life_text(life: LifeBar, value: str, what: str) -> str:
+    return f"<b>{life.edge or _('Edge')}</b><br>{value} {what}"
