@@ -17,6 +17,8 @@ from app.characteristics import pages as characteristic_pages
 from app.db.engine import Database
 from app.machines import api as machines
 from app.offsets import api as offsets
+from app.offsets import chores as offset_chores
+from app.offsets import edges_api
 from app.offsets import pages as offset_pages
 from app.people import api as people
 from app.people import keys_api
@@ -48,6 +50,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     readings.push,
     readings.router,
     offsets.router,
+    edges_api.router,
     alarms.router,
     events_api.router,
     people.router,
@@ -65,7 +68,10 @@ ROUTERS: tuple[APIRouter, ...] = (
 )
 
 # What is looked after once a minute; see app.rounds.
-CHORES: tuple[Chore, ...] = ()
+CHORES: tuple[Chore, ...] = (
+    Chore("corrections expire", offset_chores.expire_corrections),
+    Chore("tool lives are told", offset_chores.tell_tool_lives),
+)
 
 
 def create_app(settings: Settings | None = None) -> ASGIApp:

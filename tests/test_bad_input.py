@@ -30,7 +30,7 @@ FULL_READING = READING | {
 WHY = {"reason": "Compared with a micrometer"}
 BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/machines": {"key": "mill-bad", "name": "Mill", "control": "heidenhain"},
-    "PATCH /api/v1/machines/{machine}": {"name": "Lathe", "control": "fanuc"},
+    "PATCH /api/v1/machines/{machine}": {"name": "Lathe", "control": "fanuc", "corrections_expire_after": 8.0},
     "POST /api/v1/machines/{machine}/keys": {"name": "Second control"},
     "POST /api/v1/characteristics": {
         "key": "bore-bad",
@@ -51,6 +51,16 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/readings/{characteristic}/{sequence}/exclude": WHY,
     "PUT /api/v1/machines/{machine}/tools/{tool}": {"offset": 0.01} | WHY,
     "POST /api/v1/machines/{machine}/tools/{tool}/change": {"offset": 0.01} | WHY,
+    "PATCH /api/v1/machines/{machine}/tools/{tool}": {
+        "edge": "D1",
+        "name": "T03",
+        "kind": "DCMT 11T304",
+        "planned_parts": 400,
+        "planned_total": 0.05,
+        "sister": 13,
+    },
+    "POST /api/v1/machines/{machine}/tools/{tool}/switch": WHY,
+    "POST /api/v1/corrections/{machine}/approve": {"numbers": [1]} | WHY,
     "PUT /api/v1/machines/{machine}/averages/{location}": {"empirical_value": 0.001} | WHY,
     "POST /api/v1/corrections/{machine}/{number}/applied": {
         "offset_after": -0.006,
