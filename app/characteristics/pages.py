@@ -21,6 +21,7 @@ from app.characteristics.figures_api import Choice, Chosen
 from app.characteristics.queries import Standing
 from app.characteristics.wording import history, in_order, label, worded
 from app.core.parameters import BY_NAME
+from app.core.probing import start_and_end
 from app.errors import InbandError
 from app.plant import queries as plant
 from app.plant.wording import state_word
@@ -115,6 +116,7 @@ def characteristic_page(
         characteristic=standing.characteristic,
         machine=standing.machine,
         parameters=standing.parameters,
+        travel=start_and_end(standing.parameters),
         in_force=standing.version,
         table=parameter_table(standing.version.parameters),
         choice=choice,

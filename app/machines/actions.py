@@ -40,7 +40,7 @@ def add_machine(session: Session, machine: MachineIn, actor: str) -> Machine:
     ):
         numbers = select(literal(made.id), func.generate_series(1, locations))
         session.execute(insert(table).from_select(["machine_id", column.key], numbers))
-    record(session, actor, "machine added", f"machine/{made.key}", None, machine.model_dump())
+    record(session, actor, "machine added", f"machine/{made.key}", None, machine.model_dump(exclude_defaults=True))
     publish(session, {"kind": "machine", "machine": made.key})
     return made
 

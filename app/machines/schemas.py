@@ -21,12 +21,13 @@ ExpireAfter = Annotated[
         description="Hours after which a correction that was not applied is superseded; null: never.",
     ),
 ]
-Path = Annotated[
+SignalWay = Annotated[
     Literal["direct", "plc"],
     Field(description="How the probe's signal comes to the control: directly, or through the PLC, which delays it."),
 ]
 Delay = Annotated[
-    float, Field(ge=0, le=1000, allow_inf_nan=False, description="Of the way through the PLC, ms; at most 0.25 as a rule.")
+    float,
+    Field(ge=0, le=1000, allow_inf_nan=False, description="Of the way through the PLC, ms; at most 0.25 as a rule."),
 ]
 Jitter = Annotated[
     float,
@@ -59,7 +60,7 @@ class MachineIn(Body):
     name: Annotated[Text200, Field(description="What people call it.")]
     control: Control
     corrections_expire_after: ExpireAfter | None = None
-    signal_path: Path = "direct"
+    signal_path: SignalWay = "direct"
     signal_delay: Delay = DEFAULT_DELAY
     signal_jitter: Jitter | None = None
     probing_feed: Feed = DEFAULT_FEED
@@ -74,7 +75,7 @@ class MachineChange(Body):
     name: Text200 | None = None
     control: Control | None = None
     corrections_expire_after: ExpireAfter | None = None
-    signal_path: Path | None = None
+    signal_path: SignalWay | None = None
     signal_delay: Delay | None = None
     signal_jitter: Jitter | None = None
     probing_feed: Feed | None = None
@@ -84,7 +85,8 @@ class MachineOut(BaseModel):
     """A machine."""
 
     model_config = ConfigDict(
-        from_attributes=True, json_schema_extra={
+        from_attributes=True,
+        json_schema_extra={
             "example": MACHINE
             | {"position_uncertainty": 0.000625, "zero_range_floor": 0.000625, "created_at": "2026-11-21T07:00:00Z"}
         },
@@ -94,7 +96,7 @@ class MachineOut(BaseModel):
     name: str
     control: Control
     corrections_expire_after: float | None
-    signal_path: Path
+    signal_path: SignalWay
     signal_delay: Delay
     signal_jitter: Jitter | None
     probing_feed: Feed

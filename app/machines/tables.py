@@ -25,7 +25,8 @@ class Machine(Base):
     control: Mapped[str]
     created_at: Mapped[datetime] = mapped_column(server_default=func.now())
     corrections_expire_after: Mapped[float | None]  # h that a correction waits to be fetched and confirmed
-    signal_path: Mapped[str] = mapped_column(server_default="direct")  # of the probe: to the control, or through the PLC
+    # Of the probe's signal: direct to the control, or through the PLC.
+    signal_path: Mapped[str] = mapped_column(server_default="direct")
     signal_delay: Mapped[float] = mapped_column(server_default="0.25")  # ms, of the way through the PLC
     signal_jitter: Mapped[float | None]  # ms by which the delay varies, if somebody has measured it
     probing_feed: Mapped[float] = mapped_column(server_default="150")  # mm/min
@@ -39,9 +40,7 @@ class Machine(Base):
     @property
     def zero_range_floor(self) -> float:
         """The part of it that varies from touch to touch, mm: a smaller R33 would correct what nobody has measured."""
-        return zero_range_floor(
-            SignalPath(self.signal_path), self.probing_feed, self.signal_delay, self.signal_jitter
-        )
+        return zero_range_floor(SignalPath(self.signal_path), self.probing_feed, self.signal_delay, self.signal_jitter)
 
 
 class MachineState(Base):

@@ -160,7 +160,7 @@ def _characteristic(
         machine=standing.machine,
         version=standing.version,
         problem=problem,
-        warnings=actions.warnings_of(standing.parameters),
+        warnings=actions.warnings_of(standing.parameters, standing.machine),
         history=history(queries.versions(session, characteristic)),
         **_form(typed, errors or {}),
     )

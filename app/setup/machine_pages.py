@@ -11,15 +11,17 @@ from starlette.responses import RedirectResponse
 from app.characteristics import queries as characteristics
 from app.errors import InbandError
 from app.machines import actions, queries
-from app.machines.actions import MachineChange, MachineIn
+from app.machines.actions import MAY_BE_NOTHING, MachineChange, MachineIn
 from app.people import actions as people
 from app.people import queries as people_queries
 from app.setup.frame import setup_page
 from app.web.deps import AddressDep, Caller, Engineer, FormDep, SessionDep, Viewer
-from app.web.forms import by_field, parsed
+from app.web.forms import by_field, length, parsed
 from app.web.i18n import _
 
 router = APIRouter()
+NUMBERS = ("signal_delay", "signal_jitter", "probing_feed")
+SHOWN = ("name", "control", "signal_path", *NUMBERS)
 
 
 def controls() -> list[tuple[str, str]]:
@@ -29,6 +31,10 @@ def controls() -> list[tuple[str, str]]:
         ("heidenhain", "Heidenhain"),
         ("other", _("Other")),
     ]
+
+
+def signal_paths() -> list[tuple[str, str]]:
+    return [("direct", _("Direct to the control")), ("plc", _("Through the PLC"))]
 
 
 @router.get("/setup/machines")
@@ -89,7 +95,7 @@ def send_machine(
     request: Request, session: SessionDep, caller: Engineer, address: AddressDep, machine: str, form: FormDep
 ) -> Response:
     try:
-        actions.change_machine(session, machine, parsed(MachineChange, form), caller.name)
+        actions.change_machine(session, machine, _change(form), caller.name)
     except InbandError as error:
         if not error.errors:
             raise
@@ -97,6 +103,14 @@ def send_machine(
             request, session, caller, address, machine, status=error.status, typed=form, errors=by_field(error)
         )
     return RedirectResponse(f"/setup/machines/{quote(machine)}?done=changed", 303)
+
+
+def _change(form: Mapping[str, str]) -> MachineChange:
+    """What was typed; an emptied field that may be empty is said as nothing."""
+    typed = {name: length(form[name]) for name in NUMBERS if name in form}
+    change = parsed(MachineChange, {**form, **typed})
+    emptied = [name for name in MAY_BE_NOTHING if name in form and not form[name].strip()]
+    return change.model_copy(update=dict.fromkeys(emptied))
 
 
 @router.post("/setup/machines/{machine}/keys")
@@ -118,6 +132,11 @@ def send_revoke_machine_key(session: SessionDep, caller: Engineer, machine: str,
     found = queries.machine_named(session, machine)
     people.revoke_key(session, key, caller.name, machine=found.key)
     return RedirectResponse(f"/setup/machines/{found.key}?done=revoked", 303)
+
+
+def _shown(value: Any) -> str:
+    """A value as it is typed."""
+    return f"{value:g}" if isinstance(value, float) else str(value or "")
 
 
 def _machine(
@@ -142,9 +161,10 @@ def _machine(
         "machines",
         status=status,
         machine=machine,
-        typed=typed or {"name": machine.name, "control": machine.control},
+        typed=typed or {name: _shown(getattr(machine, name)) for name in SHOWN},
         errors=errors or {},
         controls=controls(),
+        signal_paths=signal_paths(),
         keys=people_queries.machine_keys(session, machine.id),
         characteristics=measured,
         new_key=new_key,
