@@ -34,6 +34,16 @@ class Pipeline:
         """Whether the connection is of no use any more."""
         return self.connection.closed
 
+    def look(self) -> None:
+        """See whether the server has ended the idle connection meanwhile, which it says by itself.
+
+        Raises psycopg's `OperationalError`. Found out only after statements were sent, nobody knew what became of them.
+        """
+        pgconn = self.connection.pgconn
+        for _last_words_then_end in range(2):
+            pgconn.consume_input()
+            pgconn.is_busy()
+
     async def run(self, steps: Sequence[Step]) -> list[Rows]:
         """Run the statements in their order; the rows of each.
 

@@ -46,6 +46,7 @@ def lock_machines(session: Session, machine_ids: Iterable[int]) -> dict[int, Mac
     """Hold these machines until the transaction ends, always in the same order, and return their states.
 
     Whoever changes anything of a machine (readings, corrections, tools, averages, alarms, parameters) does this first.
+    It moves the versions of the machines: what the writers of readings remember of them is not true any more.
     """
     states = session.scalars(
         select(MachineState)
@@ -53,5 +54,8 @@ def lock_machines(session: Session, machine_ids: Iterable[int]) -> dict[int, Mac
         .order_by(MachineState.machine_id)
         .with_for_update()
         .execution_options(populate_existing=True)
-    )
+    ).all()
+    for state in states:
+        state.version += 1
+    session.flush()
     return {state.machine_id: state for state in states}

@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from sqlalchemy import CheckConstraint, ForeignKey, Identity, func
+from sqlalchemy import BigInteger, CheckConstraint, ForeignKey, Identity, func
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.core.uncertainty import SignalPath, position_uncertainty, zero_range_floor
@@ -44,10 +44,15 @@ class Machine(Base):
 
 
 class MachineState(Base):
-    """The lock of a machine, and the number of its last correction (gap-free per machine)."""
+    """The lock of a machine, and the number of its last correction (gap-free per machine).
+
+    version: moves whenever anything of the machine changes, so that the writer of readings knows whether what it has in
+    memory still is what the database holds.
+    """
 
     __tablename__ = "machine_state"
     __table_args__ = ({"postgresql_with": {"fillfactor": 50}},)
 
     machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), primary_key=True, autoincrement=False)
     last_correction: Mapped[int] = mapped_column(server_default="0")
+    version: Mapped[int] = mapped_column(BigInteger, server_default="0")

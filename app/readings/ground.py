@@ -1,4 +1,8 @@
-"""What the readings of one transaction are judged against, as it was loaded under the machines' locks, and what they come to."""
+"""What readings are judged against, and what the readings of one transaction come to.
+
+The ground is loaded under the machines' locks and moved along by what is decided on it. It may be kept in memory for the
+next transaction, which then must see that the machines' versions have not moved (`statements.GUARD`).
+"""
 
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -9,6 +13,10 @@ from app.core.parameters import Parameters
 from app.core.variants import Results
 from app.readings.records import Entry, Record
 from app.readings.schemas import ReadingIn
+
+# What memory holds of a tool's past grows with it; beyond this it is loaded anew, and then is short again.
+MOST_CORRECTIONS = 100
+MOST_NAMED = 10_000
 
 
 @dataclass(slots=True)
@@ -59,6 +67,17 @@ class ToolState:
     reset_at: datetime | None
     corrections: list[IssuedCorrection] = field(default_factory=list)
     changed: bool = False
+    # Of the applied corrections there are those with a higher number than `since_number`, and those applied after `since`.
+    since_number: int | None = None
+    since: datetime | None = None
+
+    def settle(self) -> None:
+        """What was decided is committed."""
+        if self.changed or self.corrections:
+            self.changed = False
+            self.corrections = [c for c in self.corrections if c.status not in {"rejected", "superseded"}]
+            for correction in self.corrections:
+                correction.new = correction.changed = False
 
 
 @dataclass(slots=True)
@@ -127,6 +146,7 @@ class Ground:
     averages: dict[tuple[int, int], AverageState] = field(default_factory=dict)
     tool_alarms: dict[tuple[int, int, str], OpenAlarm] = field(default_factory=dict)
     last_correction: dict[int, int] = field(default_factory=dict)
+    versions: dict[int, int] = field(default_factory=dict)
     named: dict[tuple[int, int], Named] = field(default_factory=dict)
     stored_keys: dict[tuple[int, str], Known] = field(default_factory=dict)
     verdicts: "list[Verdict]" = field(default_factory=list)
@@ -135,6 +155,53 @@ class Ground:
     raised: list[OpenAlarm] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
     touched_machines: set[int] = field(default_factory=set)
+
+    def knows(self, entry: Entry, reading: ReadingIn) -> bool:
+        """Whether everything is here that this reading is judged against, if the versions are still true."""
+        stream = self.streams.get(entry.characteristic_id)
+        if stream is None:
+            return False
+        tool, number = stream.tool, reading.correction_in_effect
+        if tool is None or (number is None and reading.machined_at is None):
+            return True
+        if len(tool.corrections) > MOST_CORRECTIONS:
+            return False
+        if number is None:
+            return tool.since is not None and reading.machined_at is not None and reading.machined_at >= tool.since
+        if tool.since_number is None or number < tool.since_number:
+            return False
+        named = self.named.get((entry.machine_id, number))
+        if named is None:
+            return number == 0
+        return named.applied_at is None or (tool.since is not None and named.applied_at >= tool.since)
+
+    def clear(self) -> None:
+        """Forget everything that was loaded."""
+        self.streams, self.tools, self.averages = {}, {}, {}
+        self.last_correction, self.versions, self.named = {}, {}, {}
+
+    def settle(self) -> None:
+        """What was decided is committed: make ready for the next transaction."""
+        for verdict in self.verdicts:
+            stream = verdict.stream
+            if stream.last is None:
+                continue
+            stream.before, stream.last = stream.sequence, None
+            stream.alarms.clear()
+            if isinstance(stream.paused_by, OpenAlarm):
+                stream.paused_by = stream.paused_by.id
+            if stream.average is not None:
+                stream.average.changed = False
+            if stream.tool is not None:
+                stream.tool.settle()
+        for machine_id in {verdict.stream.entry.machine_id for verdict in self.verdicts}:
+            self.versions[machine_id] += 1
+        if len(self.named) > MOST_NAMED:
+            self.named = {}
+        self.named.update({(c.machine_id, c.number): Named(None, None) for c in self.issued})
+        self.verdicts, self.by_key, self.stored_keys = [], {}, {}
+        self.tool_alarms, self.issued, self.raised, self.steps = {}, [], [], []
+        self.touched_machines = set()
 
 
 @dataclass(slots=True)

@@ -10,8 +10,18 @@ from app.db.events import PUBLISHED
 from app.readings.records import Record
 
 LOCK = """
-SELECT machine_id, last_correction, pg_current_xact_id()::text FROM machine_state
+SELECT machine_id, last_correction, version FROM machine_state
 WHERE machine_id = ANY($1::int[]) ORDER BY machine_id FOR UPDATE
+"""
+# Ends the transaction (by a division by zero) unless every machine is still at the version that its readings were decided
+# on; moves the versions on. With several machines LOCK comes first, because an update takes rows in any order.
+GUARD = """
+WITH moved AS (
+    UPDATE machine_state m SET version = m.version + 1
+    FROM json_to_recordset($1) AS w(machine_id int, version bigint)
+    WHERE m.machine_id = w.machine_id AND m.version = w.version RETURNING 1
+)
+SELECT 1 / (count(*) = json_array_length($1))::int FROM moved
 """
 # One statement for all that is needed, as one JSON document, because each statement costs more than what it reads here.
 # Corrections of a tool: the open ones, and those applied since the oldest correction or time that a reading names; `named`

@@ -1,4 +1,4 @@
-"""Loading the ground under the machines' locks, and writing what was decided: two round trips and one commit.
+"""Loading the ground under the machines' locks, and writing what was decided: one round trip each.
 
 Rows travel as one JSON document per statement: the server takes it apart with `json_to_recordset`, which measured
 faster than arrays for one row and for sixty-four. Large batches send their readings by binary COPY.
@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from app.core.parameters import Parameters
-from app.db.pipeline import Pipeline
+from app.db.pipeline import Pipeline, Step
 from app.readings.ground import AverageState, Ground, IssuedCorrection, Known, Named, OpenAlarm, StreamState, ToolState
 from app.readings.records import Entry, Record
 from app.readings.schemas import ReadingIn
@@ -27,6 +27,7 @@ from app.readings.statements import (
     COPY_TYPES,
     COUNTERS,
     FAN,
+    GUARD,
     ISSUE,
     LOAD,
     LOCK,
@@ -91,9 +92,9 @@ _loaded = msgspec.json.Decoder(_Loaded)
 
 
 async def load(
-    pipeline: Pipeline, book: Book, wanted: Sequence[tuple[Entry, ReadingIn]], *, trusting: bool = False
-) -> tuple[Ground, str]:
-    """Begin a transaction, lock the machines, load what the readings are judged against; also its transaction id.
+    pipeline: Pipeline, book: Book, ground: Ground, wanted: Sequence[tuple[Entry, ReadingIn]], *, trusting: bool = False
+) -> None:
+    """Begin a transaction, lock the machines, bring what the readings are judged against into the ground.
 
     trusting: take the keys for new ones. If one is not, `save` will fail with a `UniqueViolation`.
     """
@@ -120,17 +121,22 @@ async def load(
         (("BEGIN", None), (LOCK, _array(machines)), (LOAD, as_json(document)))
     )
     loaded = _loaded.decode(text or b"")
-    ground = Ground()
-    ground.last_correction = {int(machine_id or 0): int(last or 0) for machine_id, last, _transaction in locked}
-    for row in loaded.streams:
-        parameters = await _parameters(pipeline, book, row.machine_id, row.characteristic_id, row.version)
-        _add_stream(ground, entries[row.characteristic_id], parameters, row)
+    states = [(int(machine_id or 0), int(last or 0), int(version or 0)) for machine_id, last, version in locked]
+    if any(ground.versions.get(machine_id, version) != version for machine_id, _last, version in states):
+        ground.clear()
+    for machine_id, last, version in states:
+        ground.last_correction[machine_id], ground.versions[machine_id] = last, version
     for machine_id, number, applied_at, decided_at in loaded.named or ():
         ground.named[machine_id, number] = Named(applied_at, decided_at)
+        if applied_at is not None:
+            since = machines[machine_id]["since"]
+            machines[machine_id]["since"] = applied_at if since is None else min(since, applied_at)
+    for row in loaded.streams:
+        parameters = await _parameters(pipeline, book, row.machine_id, row.characteristic_id, row.version)
+        _add_stream(ground, entries[row.characteristic_id], parameters, row, **machines[row.machine_id])
     for c, key, sequence, measured, version in loaded.known or ():
         parameters = await _parameters(pipeline, book, entries[c].machine_id, c, version)
         ground.stored_keys[c, key] = Known(sequence, measured, parameters)
-    return ground, (locked[0][2] or b"").decode()
 
 
 def _array(numbers: Iterable[int]) -> str:
@@ -163,7 +169,9 @@ async def _parameters(
     return parameters
 
 
-def _add_stream(ground: Ground, entry: Entry, parameters: Parameters, row: _Stream) -> None:
+def _add_stream(
+    ground: Ground, entry: Entry, parameters: Parameters, row: _Stream, number: int | None, since: datetime | None
+) -> None:
     memory = tool = None
     if row.location is not None:
         memory = ground.averages.get((row.machine_id, row.location))
@@ -177,18 +185,19 @@ def _add_stream(ground: Ground, entry: Entry, parameters: Parameters, row: _Stre
             tool = ground.tools[row.machine_id, row.tool] = ToolState(
                 row.machine_id, row.tool, row.offset or 0.0, row.total or 0.0, row.reset_at
             )
-            tool.corrections = [
-                IssuedCorrection(
-                    row.machine_id,
-                    c.number,
-                    row.tool,
-                    c.amount,
-                    c.status,
-                    applied_at=c.applied_at,
-                    decided_at=c.decided_at,
-                )
-                for c in row.corrections or ()
-            ]
+        tool.since_number, tool.since = number, since
+        tool.corrections = [
+            IssuedCorrection(
+                row.machine_id,
+                c.number,
+                row.tool,
+                c.amount,
+                c.status,
+                applied_at=c.applied_at,
+                decided_at=c.decided_at,
+            )
+            for c in row.corrections or ()
+        ]
     ground.streams[row.characteristic_id] = StreamState(
         entry,
         row.sequence,
@@ -202,26 +211,37 @@ def _add_stream(ground: Ground, entry: Entry, parameters: Parameters, row: _Stre
     )
 
 
-async def save(pipeline: Pipeline, ground: Ground) -> None:
-    """Write everything that was decided on this ground and commit it."""
-    await _number_alarms(pipeline, ground)
+async def save(pipeline: Pipeline, ground: Ground, *, begun: bool) -> None:
+    """Write everything that was decided on this ground and commit it.
+
+    begun: the machines are locked already; otherwise all of it happens in one round trip. Raises `Moved` when somebody
+    has changed a machine since the ground was loaded, and psycopg's errors.
+    """
+    touched = list({id(verdict.stream): verdict.stream for verdict in ground.verdicts}.values())
+    opening = [*_opening(ground, {stream.entry.machine_id for stream in touched}, begun=begun)]
+    if ground.raised:
+        await _number_alarms(pipeline, ground, opening)
+        opening = []
     records = [verdict.record() for verdict in ground.verdicts]
-    touched = [stream for stream in ground.streams.values() if stream.last is not None]
     copying = len(records) >= COPY_FROM
+    averages = {id(stream.average): stream.average for stream in touched}.values()
     document = {
         "streams": [_stream_row(stream) for stream in touched],
         "averages": [
             {"machine_id": a.machine_id, "location": a.location, "average": a.average}
-            for a in ground.averages.values()
-            if a.changed
+            for a in averages
+            if a is not None and a.changed
         ],
         "readings": [] if copying else [record._asdict() for record in records],
         "changes": _changes(ground, touched),
     }
     if copying:
+        await pipeline.run(opening)
+        opening = []
         await _copy(pipeline, records)
     await pipeline.run(
         (
+            *opening,
             *((statement, as_json(rows)) for statement, rows in _rarer(ground) if rows),
             (SAVE, as_json(document)),
             *(
@@ -233,11 +253,22 @@ async def save(pipeline: Pipeline, ground: Ground) -> None:
     )
 
 
-async def _number_alarms(pipeline: Pipeline, ground: Ground) -> None:
+def _opening(ground: Ground, machines: set[int], *, begun: bool) -> Iterable[Step]:
+    """What makes sure that the ground is true, and stays so until the commit."""
+    if not begun:
+        yield "BEGIN", None
+        if len(machines) > 1:
+            yield LOCK, _array(machines)
+    yield (
+        GUARD,
+        as_json([{"machine_id": machine_id, "version": ground.versions[machine_id]} for machine_id in machines]),
+    )
+
+
+async def _number_alarms(pipeline: Pipeline, ground: Ground, opening: list[Step]) -> None:
     """Find the alarms that are active for the same trouble already, and draw numbers for the others."""
-    if not ground.raised:
-        return
-    (rows,) = await pipeline.run(((ACTIVE_ALARMS, _array(ground.last_correction)),))
+    machines = {alarm.machine_id for alarm in ground.raised}
+    *_opened, rows = await pipeline.run([*opening, (ACTIVE_ALARMS, _array(machines))])
     active = {
         (int(machine or 0), _number(characteristic), _number(tool), (kind or b"").decode()): _number(alarm)
         for machine, characteristic, tool, kind, alarm in rows
@@ -313,16 +344,17 @@ def _rarer(ground: Ground) -> Iterable[tuple[str, list[Any]]]:
             COUNTERS,
             [{"machine_id": m, "last_correction": ground.last_correction[m]} for m in ground.touched_machines],
         )
-        yield ISSUE, [c for tool in ground.tools.values() for c in tool.corrections if c.new]
+        tools = _tools(ground)
+        yield ISSUE, [c for tool in tools for c in tool.corrections if c.new]
         yield (
             CHANGE_CORRECTIONS,
-            [c for tool in ground.tools.values() for c in tool.corrections if c.changed and not c.new],
+            [c for tool in tools for c in tool.corrections if c.changed and not c.new],
         )
         yield (
             MOVE_TOOLS,
             [
                 {"machine_id": t.machine_id, "number": t.number, "offset": t.offset, "total": t.total}
-                for t in ground.tools.values()
+                for t in tools
                 if t.changed
             ],
         )
@@ -332,8 +364,10 @@ def _rarer(ground: Ground) -> Iterable[tuple[str, list[Any]]]:
         yield REPEAT, [alarm for alarm in ground.raised if not alarm.new]
 
 
-def _full(touched: list[StreamState]) -> Iterable[tuple[str, list[dict[str, int]]]]:
-    return full_blocks([(stream.entry, stream.before, stream.sequence) for stream in touched])
+def _tools(ground: Ground) -> list[ToolState]:
+    """The tools that the decided readings have to do with."""
+    tools = {id(verdict.stream.tool): verdict.stream.tool for verdict in ground.verdicts}
+    return [tool for tool in tools.values() if tool is not None]
 
 
 def full_blocks(spans: list[tuple[Entry, int, int]]) -> Iterable[tuple[str, list[dict[str, int]]]]:
@@ -370,7 +404,7 @@ def _changes(ground: Ground, touched: list[StreamState]) -> list[dict[str, Any]]
     ]
     streams = {stream.entry.machine_id: stream.entry.machine for stream in touched}
     characteristics = {stream.entry.characteristic_id: stream.entry.characteristic for stream in touched}
-    for tool in ground.tools.values():
+    for tool in _tools(ground) if ground.touched_machines else ():
         changes.extend(
             {
                 "kind": "correction",

@@ -1,9 +1,14 @@
 """Group commit: readings that arrive together are decided and stored together, and none is answered before the commit.
 
 One writer per process takes what is waiting, without gathering: while one transaction commits, the next readings
-collect. A reading that is refused fails alone. When the connection breaks, nothing of the open transaction is stored
-and it is done again; when it breaks during the commit, the database is asked how it ended (`pg_xact_status`), so that a
-reading is neither lost nor stored twice.
+collect. A reading that is refused fails alone.
+
+What readings are judged against stays in memory after the commit. The next ones are decided on it at once, and lock,
+proof that it still is what the database holds (`statements.GUARD`), rows and commit travel together. When somebody
+else has changed the machine meanwhile, nothing is stored, and it is done again on what is loaded under the lock.
+
+When the connection breaks, it is done again as well; when it breaks after the commit was sent, the database is asked
+whether the readings are there, so that none is lost or stored twice.
 """
 
 import asyncio
@@ -12,7 +17,6 @@ import logging
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from time import monotonic
-from typing import Any
 
 import psycopg
 from psycopg import AsyncConnection
@@ -20,7 +24,7 @@ from psycopg import AsyncConnection
 from app.db.engine import LIMITS
 from app.db.pipeline import Pipeline
 from app.errors import DatabaseAway, InbandError, Invalid, OutcomeUnknown
-from app.readings.ground import Stored, Verdict
+from app.readings.ground import Ground, Stored, Verdict
 from app.readings.judge import judge
 from app.readings.records import Entry
 from app.readings.schemas import MOST_ERRORS, ReadingIn
@@ -36,14 +40,23 @@ MOST_WAITING = 20_000
 PATIENCE = 5.0  # s that a reading waits for a database that is away, before it is answered 503
 
 
-class CommitLost(Exception):
-    """The connection broke after COMMIT was sent; `transaction` tells the database which one is meant."""
+SHY = 16  # transactions that load what they need, after one whose memory was not true any more
 
-    def __init__(self, transaction: str, outcomes: list[Outcome]) -> None:
-        super().__init__(transaction)
-        self.transaction = transaction
+
+class CommitLost(Exception):
+    """The connection broke after COMMIT was sent: these outcomes are true if their readings are in the database."""
+
+    def __init__(self, outcomes: list[Outcome]) -> None:
+        super().__init__()
         self.outcomes = outcomes
 
+
+class Doubtful(Exception):
+    """A reading would be refused, but what it is refused by has not been asked of the database."""
+
+
+# The ground is not true any more, a key is known already, or a refused reading may be the repetition of a stored one.
+MISTRUST = (psycopg.errors.DivisionByZero, psycopg.errors.UniqueViolation, Doubtful)
 
 # Every statement of the writer finds its rows by an index, however small the tables are when it is first planned; planned
 # anew each time, the planning would cost more than the work.
@@ -61,6 +74,7 @@ async def connect(dsn: str) -> Pipeline:
 async def transact(
     pipeline: Pipeline,
     book: Book,
+    ground: Ground,
     wanted: Sequence[tuple[Entry, ReadingIn]],
     *,
     all_or_nothing: bool = False,
@@ -68,9 +82,13 @@ async def transact(
 ) -> list[Outcome]:
     """Decide and store these readings in one transaction, in their order.
 
-    Raises `Invalid` naming each refused reading when it is all or nothing, `CommitLost`, and psycopg's errors.
+    trusting: take the ground for true and the keys for new ones; `MISTRUST` is raised when they are not, or may not be.
+    Raises `Invalid` naming each refused reading when it is all or nothing, `CommitLost`, and psycopg's errors. The ground
+    is of no use then.
     """
-    ground, transaction = await load(pipeline, book, wanted, trusting=trusting)
+    begun = not trusting or not all(ground.knows(entry, reading) for entry, reading in wanted)
+    if begun:
+        await load(pipeline, book, ground, wanted, trusting=trusting)
     now = datetime.now(UTC)
     outcomes: list[Outcome] = []
     for entry, reading in wanted:
@@ -78,17 +96,21 @@ async def transact(
             outcomes.append(judge(ground, entry, reading, now))
         except InbandError as refusal:
             outcomes.append(refusal)
+    if trusting and any(isinstance(outcome, InbandError) for outcome in outcomes):
+        raise Doubtful
     if all_or_nothing:
         refuse_all(outcomes)
     if not ground.verdicts:
         await pipeline.run(ROLLBACK)
+        ground.settle()
         return outcomes
     try:
-        await save(pipeline, ground)
+        await save(pipeline, ground, begun=begun)
     except psycopg.Error as error:
         if pipeline.closed:
-            raise CommitLost(transaction, outcomes) from error
+            raise CommitLost(outcomes) from error
         raise
+    ground.settle()
     return outcomes
 
 
@@ -121,6 +143,8 @@ class Keeper:
     def __init__(self, dsn: str, book: Book) -> None:
         self.dsn = dsn
         self.book = book
+        self._ground = Ground()
+        self._shy = 0
         self._pipeline: Pipeline | None = None
         self._away_since: float | None = None
 
@@ -134,15 +158,17 @@ class Keeper:
         # Whoever comes while the database has been away for long is not kept waiting once more.
         deadline = (monotonic() if self._away_since is None else self._away_since) + PATIENCE
         pause = 0.02
-        trusting = all_or_nothing  # looking up the keys of a batch costs a third of it, and they are new but for once
+        trusting = not self._shy
         while True:
             try:
                 if self._pipeline is None or self._pipeline.closed:
                     self._pipeline = await connect(self.dsn)
+                self._pipeline.look()
                 outcomes = await transact(
-                    self._pipeline, self.book, wanted, all_or_nothing=all_or_nothing, trusting=trusting
+                    self._pipeline, self.book, self._ground, wanted, all_or_nothing=all_or_nothing, trusting=trusting
                 )
             except CommitLost as lost:
+                self._ground = Ground()
                 if (settled := await self._settle(lost, deadline)) is not None:
                     return settled
             except psycopg.OperationalError as error:
@@ -156,13 +182,13 @@ class Keeper:
             except InbandError:
                 await self._roll_back()
                 self._away_since = None
-                if not trusting:
-                    raise
-                trusting = False  # what is refused may be a repetition of what was taken under other parameters
+                raise
             except Exception as error:
                 await self._roll_back()
-                if trusting and isinstance(error, psycopg.errors.UniqueViolation):
+                if trusting and isinstance(error, MISTRUST):
                     trusting = False
+                    if isinstance(error, psycopg.errors.DivisionByZero):
+                        self._shy = SHY
                     continue
                 if all_or_nothing:
                     raise
@@ -173,9 +199,11 @@ class Keeper:
                 return [(await self.store([item]))[0] for item in wanted]
             else:
                 self._away_since = None
+                self._shy = max(0, self._shy - 1)
                 return outcomes
 
     async def _roll_back(self) -> None:
+        self._ground = Ground()
         if self._pipeline is not None and not self._pipeline.closed:
             try:
                 await self._pipeline.run(ROLLBACK)
@@ -188,37 +216,31 @@ class Keeper:
         while True:
             try:
                 self._pipeline = await connect(self.dsn)
-                status = await _status(self._pipeline.connection, lost)
-            except psycopg.OperationalError:
-                status = "in progress"
-            if status != "in progress":
-                return lost.outcomes if status == "committed" else None
+                return lost.outcomes if await committed(self._pipeline, lost) else None
+            except psycopg.OperationalError as error:
+                log.warning("how a commit ended cannot be asked yet: %s", error)
             if monotonic() + pause > deadline:
                 return [OutcomeUnknown() if isinstance(o, Verdict) else o for o in lost.outcomes]
             await asyncio.sleep(pause)
             pause = min(2 * pause, 0.5)
 
 
-async def _status(conn: AsyncConnection[Any], lost: CommitLost) -> str | None:
-    """What became of a transaction: ``committed``, ``aborted``, ``in progress``; None if the database knows nothing of it.
+async def committed(pipeline: Pipeline, lost: CommitLost) -> bool:
+    """Whether the transaction whose commit was sent has stored its readings; if not, it cannot any more.
 
-    A server that crashed may give the numbers of its last transactions to others, so the readings themselves are looked
-    for as well.
+    Under the lock of a machine it has either ended or not begun, and moving the version keeps it from beginning.
     """
-    try:
-        cursor = await conn.execute("SELECT pg_xact_status(%s::xid8)", (lost.transaction,))
-        row = await cursor.fetchone()
-    except psycopg.DataError:  # a number that this server has not given to anybody yet
-        return None
-    if row is None or row[0] != "committed":
-        return None if row is None else row[0]
     first = next(outcome for outcome in lost.outcomes if isinstance(outcome, Verdict))
     entry = first.stream.entry
-    cursor = await conn.execute(
-        "SELECT 1 FROM reading WHERE machine_id = %s AND characteristic_id = %s AND sequence = %s AND received_at = %s",
-        (entry.machine_id, entry.characteristic_id, first.sequence, first.received_at),
-    )
-    return "committed" if await cursor.fetchone() else None
+    async with pipeline.connection.transaction():
+        await pipeline.connection.execute(
+            "UPDATE machine_state SET version = version + 1 WHERE machine_id = %s", (entry.machine_id,)
+        )
+        cursor = await pipeline.connection.execute(
+            "SELECT 1 FROM reading WHERE machine_id = %s AND characteristic_id = %s AND sequence = %s AND received_at = %s",
+            (entry.machine_id, entry.characteristic_id, first.sequence, first.received_at),
+        )
+        return await cursor.fetchone() is not None
 
 
 def store_batch(dsn: str, book: Book, wanted: Sequence[tuple[Entry, ReadingIn]]) -> list[Outcome]:

@@ -5,6 +5,8 @@ Revises: 0008
 Create Date: 2026-11-21
 """
 
+from alembic import op
+
 revision = "0009"
 down_revision: str | None = "0008"
 branch_labels = None
@@ -12,8 +14,8 @@ depends_on = None
 
 
 def upgrade() -> None:
-    pass
+    op.execute("ALTER TABLE machine_state ADD COLUMN version bigint NOT NULL DEFAULT 0")
 
 
 def downgrade() -> None:
-    pass
+    op.execute("ALTER TABLE machine_state DROP COLUMN version")

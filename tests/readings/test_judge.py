@@ -11,11 +11,13 @@ from hypothesis import given, settings
 from app.core.parameters import Parameters, read
 from app.db.engine import Database
 from app.errors import Conflict, InbandError, Invalid
+from app.machines.queries import lock_machines
 from app.readings.ground import AverageState, Ground, Stored, StreamState, ToolState, Verdict
 from app.readings.judge import judge
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn
-from app.readings.writer import CommitLost, _status, connect, transact
+from app.readings.store import Book
+from app.readings.writer import CommitLost, committed, connect, transact
 from tests.loops import run
 from tests.shop import PARAMETERS
 
@@ -148,8 +150,7 @@ def test_a_key_that_is_known_is_compared_by_value_only() -> None:
     assert isinstance(decided(made, [ReadingIn("shaft", measured=40.0062, key="k")])[0], Conflict)
 
 
-def test_a_commit_whose_number_another_transaction_got_is_not_taken_for_done(database: Database) -> None:
-    """A database that crashes forgets the last numbers it gave and gives them again: the reading itself must be there."""
+def shaft_in_database(database: Database) -> None:
     with psycopg.connect(database.dsn, autocommit=True) as connection:
         connection.execute("INSERT INTO machine (key, name, control) VALUES ('lathe-1', 'Lathe', 'other')")
         connection.execute("INSERT INTO machine_state (machine_id) VALUES (1) ON CONFLICT DO NOTHING")
@@ -163,17 +164,47 @@ def test_a_commit_whose_number_another_transaction_got_is_not_taken_for_done(dat
             "INSERT INTO stream (machine_id, characteristic_id, parameters_version, tool_memory, average_memory)"
             " VALUES (1, 1, 1, 0, 0)"
         )
-        (other,) = connection.execute("SELECT pg_current_xact_id()::text").fetchone() or ("",)
+
+
+def test_a_transaction_that_was_asked_after_cannot_commit_later(database: Database) -> None:
+    """A backend may still hold what a lost connection sent; once its readings were looked for, it comes too late."""
+    shaft_in_database(database)
+    reading = [(ENTRY, ReadingIn("shaft", measured=40.0))]
 
     async def ask() -> None:
-        pipeline = await connect(database.dsn)
-        outcomes = await transact(pipeline, {}, [(ENTRY, ReadingIn("shaft", measured=40.0))])
+        pipeline, made = await connect(database.dsn), Ground()
+        await transact(pipeline, {}, made, reading, trusting=True)
+        outcomes = await transact(pipeline, {}, made, reading, trusting=True)
         (verdict,) = outcomes
         assert isinstance(verdict, Verdict)
-        assert await _status(pipeline.connection, CommitLost(other, outcomes)) == "committed"
-        verdict.sequence = 2
-        assert await _status(pipeline.connection, CommitLost(other, outcomes)) is None
-        assert await _status(pipeline.connection, CommitLost("9999999999", outcomes)) is None
+        assert verdict.sequence == 2
+        assert await committed(pipeline, CommitLost(outcomes))
+        with pytest.raises(psycopg.errors.DivisionByZero):
+            await transact(pipeline, {}, made, reading, trusting=True)
+        await pipeline.run((("ROLLBACK", None),))
+        verdict.sequence = 3
+        assert not await committed(pipeline, CommitLost(outcomes))
+        await pipeline.connection.close()
+
+    run(ask())
+
+
+def test_what_is_remembered_is_not_believed_when_the_machine_has_changed(database: Database) -> None:
+    shaft_in_database(database)
+
+    async def ask() -> None:
+        pipeline, made = await connect(database.dsn), Ground()
+        book: Book = {}
+        for wanted in range(1, 4):
+            (verdict,) = await transact(
+                pipeline, book, made, [(ENTRY, ReadingIn("shaft", measured=40.0))], trusting=True
+            )
+            assert isinstance(verdict, Verdict)
+            assert verdict.sequence == wanted
+        with database.begin() as session:
+            lock_machines(session, [1])
+        with pytest.raises(psycopg.errors.DivisionByZero):
+            await transact(pipeline, book, made, [(ENTRY, ReadingIn("shaft", measured=40.0))], trusting=True)
         await pipeline.connection.close()
 
     run(ask())
