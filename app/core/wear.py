@@ -1,0 +1,277 @@
+"""True wear behind a closed loop: the wear curve, wear per part with its uncertainty, and how long an edge will do.
+
+Compensation hides wear: sizes stay where they are and the offset moves instead. The *wear curve* puts the two together
+again. With D the deviation of a part and S the sum of the corrections that were in effect when it was cut, counted from
+the tool change (mm of offset; a correction of ``factor x e`` removes the size error e)::
+
+    w = D + S / factor
+
+is the deviation that the part would have had, had nothing been corrected since the tool was changed. A fresh edge begins
+with S = 0, so with its setting error. Whatever was decided and however late it took effect, w is wear plus scatter.
+
+*Wear per part* is the slope of the least-squares line through the newest readings, as far back as they follow one line
+(`fit`). Its standard error counts positively autocorrelated scatter by the effective number of readings
+n (1 - rho) / (1 + rho), rho the lag-1 autocorrelation of the residuals (Santer et al. 2000, J. Geophys. Res. 105, 7337,
+eq. 6; rho freed of its bias of -(2 + 4 rho)/n after Marriott and Pope 1954, Biometrika 41, 390). It assumes that
+scatter is of one size, and that wear goes on as it did: an edge that breaks cannot be foretold.
+
+*Parts left* to a limit is where that line, continued, reaches it. The interval is Fieller's (1954, J. R. Stat. Soc. B
+16, 175) with the scatter of a single part added: outside of it the limit lies out of the 95 % prediction interval of a
+part, so its lower end is when single parts begin to lie beyond. Lengths are mm.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+Values = NDArray[np.float64]
+
+LONGEST, SHORTEST, FEWEST = 400, 30, 12  # readings that a line is fitted to
+SHORTER = 0.7  # what is kept of a run that does not follow one line
+LEVEL = 0.95  # of confidence, two-sided
+BREAK = 0.001  # so rarely scatter alone makes one line look like two
+OUTLIER = 5.0  # standard deviations from its neighbours
+NEAR = 5  # readings on either side of a step of the reference that say whether the parts moved
+
+
+class Step(NamedTuple):
+    """A change of the reference that the record tells of, and nobody says whether the parts moved with it.
+
+    sequence: the first reading after it. size: by how much (mm of size) the wear curve must be lifted from there on if
+    the sizes moved: offset change / factor for an edit by hand, the change of the empirical value for that.
+    """
+
+    sequence: int
+    size: float
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """The line through the newest readings: w = level + slope x (sequence - last). mm, and mm per part.
+
+    first, last: sequences it was fitted from and to; count: readings it was fitted to; left_out: outliers between them.
+    slope_error, level_error: standard errors. scatter: standard deviation about the line. correlation: rho. effective: how
+    many independent readings it is worth. centre, spread: mean of sequence - last, and sum of squares about it.
+    """
+
+    first: int
+    last: int
+    count: int
+    left_out: int
+    level: float
+    level_error: float
+    slope: float
+    slope_error: float
+    scatter: float
+    correlation: float
+    effective: float
+    centre: float
+    spread: float
+
+    @property
+    def quantile(self) -> float:
+        """Student's t for `LEVEL`."""
+        return float(stats.t.ppf((1 + LEVEL) / 2, max(1.0, self.effective - 2)))
+
+    @property
+    def slope_interval(self) -> tuple[float, float]:
+        """The confidence interval of the wear per part."""
+        half = self.quantile * self.slope_error
+        return self.slope - half, self.slope + half
+
+    @property
+    def is_wear(self) -> bool:
+        """Whether wear is to be seen: its interval does not hold 0."""
+        low, high = self.slope_interval
+        return low > 0 or high < 0
+
+    def at(self, ahead: float) -> float:
+        """The w of the part that comes so many parts after the last."""
+        return self.level + self.slope * ahead
+
+    def half_width(self, ahead: float, *, single: bool = False) -> float:
+        """Half the confidence interval of the line so many parts after the last; of a single part, with its scatter."""
+        inflation = self.count / self.effective
+        line = inflation * (1 / self.count + (ahead - self.centre) ** 2 / self.spread)
+        return self.quantile * self.scatter * sqrt(line + (1.0 if single else 0.0))
+
+
+class Forecast(NamedTuple):
+    """Parts until the line reaches a limit, with its interval; 0 = reached. high is inf where nobody can say."""
+
+    parts: float
+    low: float
+    high: float
+
+
+def wear(deviation: Values, compensated: Values, factor: float) -> Values:
+    """The wear curve, mm: D + S / factor.
+
+    >>> wear(np.array([0.007, 0.0, 0.002]), np.array([0.0, -0.007, -0.007]), -1.0).round(6).tolist()
+    [0.007, 0.007, 0.009]
+    """
+    return deviation + compensated / factor
+
+
+def joined(sequence: NDArray[np.int64], curve: Values, steps: Sequence[Step]) -> tuple[Values, float]:
+    """The curve with its reference the same throughout, and by how much its end was lifted in all.
+
+    An offset typed in by hand moves the parts, or only tells what the control has held all along; an empirical value moves
+    with the probe, or only becomes known. Wear goes on over both, so of the two readings the one holds by which the
+    curve goes on where it was.
+
+    >>> s, w = np.arange(1, 11), np.array([0.0] * 5 + [-0.5] * 5)
+    >>> joined(s, w, [Step(6, 0.5)])[0].tolist() == [0.0] * 10, joined(s, w * 0, [Step(6, 0.5)])[0].tolist() == [0.0] * 10
+    (True, True)
+    """
+    made, lifted = curve.copy(), 0.0
+    for step in sorted(steps):
+        at = int(np.searchsorted(sequence, step.sequence))
+        if not 0 < at < len(made):
+            continue
+        jump = float(np.median(made[at : at + NEAR]) - np.median(made[max(0, at - NEAR) : at]))
+        if abs(jump + step.size) < abs(jump):
+            made[at:] += step.size
+            lifted += step.size
+    return made, lifted
+
+
+def scatter_of(curve: Values) -> float:
+    """The standard deviation of the scatter alone, told by successive differences, so that wear and drift do not count.
+
+    Mean moving range / d2 (d2 = 1.128, ISO 7870-2), ranges beyond four times the mean left out: a step is no scatter.
+
+    >>> round(scatter_of(np.array([0.0, 1.128, 0.0, 1.128, 0.0])), 3)
+    1.0
+    """
+    ranges = np.abs(np.diff(curve))
+    for _pass in range(2):
+        if ranges.size:
+            ranges = ranges[ranges <= 4 * ranges.mean()]
+    return float(ranges.mean() / 1.128379) if ranges.size else 0.0
+
+
+def outliers(curve: Values) -> NDArray[np.bool_]:
+    """Single readings far from their neighbours (a chip under the stylus): further than `OUTLIER` standard deviations
+    from the median of the five readings about them.
+    """
+    if len(curve) < FEWEST:
+        return np.zeros(len(curve), dtype=bool)
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(curve, 5), axis=1)
+    medians = np.concatenate((np.repeat(middle[:1], 2), middle, np.repeat(middle[-1:], 2)))
+    return np.asarray(np.abs(curve - medians) > max(OUTLIER * scatter_of(curve), 1e-9))
+
+
+def fit(sequence: NDArray[np.int64], curve: Values) -> Fit | None:
+    """The line through the newest readings, ascending; None of fewer than `FEWEST`.
+
+    Of the newest `LONGEST`, as many as follow one line: while two lines, one through each half, do significantly better
+    (Chow 1960, Econometrica 28, 591, with F divided by the loss of effective readings), the older readings are left, down to `SHORTEST`.
+    So the run-in of a fresh edge, warming up, or a chipped edge end the past.
+
+    >>> f = fit(np.arange(1, 41), np.arange(40) * 0.0001 + np.array([0.001, -0.001] * 20))
+    >>> f.count, round(f.slope, 5), f.is_wear
+    (40, 0.0001, True)
+    """
+    sequence, curve = sequence[-LONGEST:], curve[-LONGEST:]
+    good = ~outliers(curve)
+    x, y = sequence[good].astype(np.float64), curve[good]
+    while len(x) * SHORTER >= SHORTEST and _breaks(x, y):
+        keep = int(len(x) * SHORTER)
+        x, y = x[-keep:], y[-keep:]
+    if len(x) < FEWEST:
+        return None
+    last = int(sequence[-1])
+    x = x - last
+    centre, count = float(x.mean()), len(x)
+    spread = float(((x - centre) ** 2).sum())
+    slope = float(((x - centre) * y).sum() / spread)
+    residual = y - y.mean() - slope * (x - centre)
+    rho = _correlation(residual)
+    effective = max(4.0, count * (1 - rho) / (1 + rho))
+    scatter = sqrt(float((residual**2).sum()) / max(1.0, count - 2))
+    inflation = count / effective
+    return Fit(
+        first=int(x[0]) + last,
+        last=last,
+        count=count,
+        left_out=int((sequence >= x[0] + last).sum()) - count,
+        level=float(y.mean()) - slope * centre,
+        level_error=scatter * sqrt(inflation * (1 / count + centre**2 / spread)),
+        slope=slope,
+        slope_error=scatter * sqrt(inflation / spread),
+        scatter=scatter,
+        correlation=rho,
+        effective=effective,
+        centre=centre,
+        spread=spread,
+    )
+
+
+def forecast(fit: Fit, limit: float) -> Forecast | None:
+    """Parts until w reaches `limit` (mm), one that lies the way that it wears; None where no wear is to be seen.
+
+    A limit that the line has passed already is reached: 0 parts.
+
+    >>> w = np.arange(40) * 0.0001 + np.array([0.001, -0.001] * 20)
+    >>> f = forecast(fit(np.arange(1, 41), w), 0.0139)
+    >>> round(f.parts), round(f.low), round(f.high)
+    (105, 70, 163)
+    """
+    if not fit.is_wear:
+        return None
+    # (c + b u - L)^2 = T^2 (1 + v/n + v u^2 / Sxx) about the centre of the readings, u = parts - centre.
+    inflation, reach = fit.count / fit.effective, fit.quantile * fit.scatter
+    gap = fit.at(fit.centre) - limit
+    square = fit.slope**2 - reach**2 * inflation / fit.spread
+    half = fit.slope * gap
+    rest = gap**2 - reach**2 * (1 + inflation / fit.count)
+    parts = (limit - fit.level) / fit.slope
+    root = sqrt(max(0.0, half**2 - square * rest))
+    if square <= 0:
+        return Forecast(max(0.0, parts), 0.0, inf)
+    low, high = (-half - root) / square + fit.centre, (-half + root) / square + fit.centre
+    return Forecast(max(0.0, parts), max(0.0, low), max(0.0, high))
+
+
+def _correlation(residual: Values) -> float:
+    """Lag-1 autocorrelation of the residuals of a line, freed of its bias, never below 0."""
+    squares = float((residual**2).sum())
+    if squares <= 0:
+        return 0.0
+    rho = float((residual[1:] * residual[:-1]).sum()) / squares
+    rho += (2 + 4 * rho) / len(residual)
+    return min(0.95, max(0.0, rho))
+
+
+def _nearby(y: Values) -> float:
+    """Autocorrelation of neighbours, which a bend or a step in the course does not raise.
+
+    Differences of first neighbours have the variance 2 s^2 (1 - rho), those of second ones 2 s^2 (1 - rho^2) under AR(1).
+    """
+    one, two = scatter_of(y), (scatter_of(y[::2]) + scatter_of(y[1::2])) / 2
+    return min(0.9, max(0.0, (two / one) ** 2 - 1)) if one > 0 else 0.0
+
+
+def _squares(x: Values, y: Values) -> float:
+    """Sum of squares about the line through these readings."""
+    centred = x - x.mean()
+    residual = y - y.mean() - centred * ((centred * y).sum() / (centred**2).sum())
+    return float((residual**2).sum())
+
+
+def _breaks(x: Values, y: Values) -> bool:
+    """Whether two lines describe these readings significantly better than one."""
+    half = len(x) // 2
+    whole = _squares(x, y)
+    parts = _squares(x[:half], y[:half]) + _squares(x[half:], y[half:])
+    if parts <= 1e-18 * len(x):
+        return whole > 1e-18 * len(x)
+    rho = _nearby(y)
+    f = (whole - parts) / 2 / (parts / (len(x) - 4)) * (1 - rho) / (1 + rho)
+    return bool(stats.f.sf(f, 2, len(x) - 4) < BREAK)

@@ -1,0 +1,205 @@
+"""The wear curve, the line through it and the forecast, by hand and against planted wear."""
+
+import numpy as np
+import pytest
+
+from app.core.wear import (
+    FEWEST,
+    LONGEST,
+    Fit,
+    Forecast,
+    Step,
+    Values,
+    fit,
+    forecast,
+    joined,
+    outliers,
+    scatter_of,
+    wear,
+)
+
+
+def line(count: int, slope: float, scatter: float, seed: int, level: float = 0.0, rho: float = 0.0) -> Values:
+    noise = np.random.default_rng(seed).normal(0.0, scatter, count)
+    for at in range(1, count if rho else 0):
+        noise[at] = rho * noise[at - 1] + np.sqrt(1 - rho**2) * noise[at]
+    values: Values = level + slope * np.arange(count) + noise
+    return values
+
+
+def fitted(curve: Values) -> Fit:
+    found = fit(np.arange(1, len(curve) + 1), curve)
+    assert found is not None
+    return found
+
+
+# --- the curve
+
+
+@pytest.mark.parametrize("factor", [-1.0, -0.5, 0.5])
+def test_a_correction_does_not_show_in_the_curve(factor: float) -> None:
+    """A part is 7 µm too large; the correction factor x 7 µm takes it to 0: the curve stays at 7 µm."""
+    assert wear(np.array([0.007, 0.0]), np.array([0.0, factor * 0.007]), factor) == pytest.approx([0.007, 0.007])
+
+
+def test_an_edit_that_moved_the_parts_is_taken_out_and_one_that_only_told_is_not() -> None:
+    sequence = np.arange(1, 21)
+    flat = np.full(20, 0.001)
+    moved = flat - 0.25 * (sequence >= 11)  # 0.25 mm typed in, factor -1: the parts came out 0.25 smaller
+    curve, lifted = joined(sequence, moved, [Step(11, 0.25)])
+    assert curve == pytest.approx(flat)
+    assert lifted == 0.25
+    curve, lifted = joined(sequence, flat, [Step(11, 0.25)])  # only the true offset was told
+    assert curve == pytest.approx(flat)
+    assert lifted == 0
+
+
+def test_a_step_before_or_after_all_readings_changes_nothing() -> None:
+    sequence, curve = np.arange(5, 15), np.zeros(10)
+    for at in (1, 5, 15, 99):
+        made, lifted = joined(sequence, curve, [Step(at, -1.0)])
+        assert lifted == 0
+        assert made == pytest.approx(curve)
+
+
+def test_steps_add_up() -> None:
+    sequence = np.arange(1, 31)
+    curve = 0.0 - 0.1 * (sequence >= 11) + 0.03 * (sequence >= 21)
+    made, lifted = joined(sequence, curve, [Step(21, -0.03), Step(11, 0.1)])
+    assert made == pytest.approx(np.zeros(30))
+    assert lifted == pytest.approx(0.07)
+
+
+# --- scatter and outliers
+
+
+def test_scatter_does_not_count_wear_steps_or_chips() -> None:
+    curve = line(400, 0.0001, 0.001, seed=2)
+    curve[200:] += 0.3
+    curve[50] += 0.02
+    assert scatter_of(curve) == pytest.approx(0.001, rel=0.1)
+    assert scatter_of(np.zeros(1)) == 0.0
+
+
+def test_scatter_is_told_of_rounded_sizes_too() -> None:
+    rounded = np.round(line(4000, 0.0, 0.0008, seed=1), 3)
+    assert scatter_of(rounded) == pytest.approx(np.sqrt(0.0008**2 + 0.001**2 / 12), rel=0.08)
+
+
+def test_a_chip_under_the_stylus_is_an_outlier_and_a_step_is_none() -> None:
+    curve = line(100, 0.0, 0.001, seed=4)
+    curve[40] += 0.009
+    curve[70:] += 0.009
+    assert np.flatnonzero(outliers(curve)).tolist() == [40]
+
+
+def test_wear_without_scatter_has_no_outliers() -> None:
+    assert not outliers(line(50, 0.0001, 0.0, seed=1)).any()
+
+
+# --- the line
+
+
+def test_the_line_is_that_of_the_textbook() -> None:
+    """w = 1, 2, 4 … by the formulas of simple regression, worked out apart from the code."""
+    y = np.array([0.0, 1, 3, 2, 4, 6, 5, 7, 9, 8, 10, 12]) / 1000
+    found = fitted(y)
+    slope, intercept = np.polyfit(np.arange(1, 13), y, 1)
+    residual = y - intercept - slope * np.arange(1, 13)
+    scatter = np.sqrt((residual**2).sum() / 10)
+    assert found.slope == pytest.approx(slope)
+    assert found.level == pytest.approx(intercept + 12 * slope)
+    assert found.scatter == pytest.approx(scatter)
+    assert found.correlation == 0.0  # neighbours scatter against each other
+    assert found.slope_error == pytest.approx(scatter / np.sqrt(143))  # sum of squares of 1 … 12 about its mean
+    assert found.level_error == pytest.approx(scatter * np.sqrt(1 / 12 + 5.5**2 / 143))
+    assert found.quantile == pytest.approx(2.228, abs=0.001)  # t, 10 degrees of freedom
+
+
+def test_too_few_readings_make_no_line() -> None:
+    assert fit(np.arange(FEWEST - 1), np.zeros(FEWEST - 1)) is None
+
+
+def test_gaps_count_as_parts() -> None:
+    """Excluded readings and parts of the tool before leave gaps; the parts were cut all the same."""
+    sequence = np.arange(1, 101)
+    keep = sequence % 3 != 0
+    found = fit(sequence[keep], (0.0002 * sequence)[keep])
+    assert found is not None
+    assert found.slope == pytest.approx(0.0002)
+
+
+@pytest.mark.parametrize("count", [20, 60, 200, LONGEST])
+@pytest.mark.parametrize("rho", [0.0, 0.4])
+def test_the_interval_of_the_slope_holds_the_planted_wear_nineteen_times_in_twenty(count: int, rho: float) -> None:
+    held = sum(
+        low <= 0.00005 <= high
+        for low, high in (fitted(line(count, 0.00005, 0.001, seed, rho=rho)).slope_interval for seed in range(400))
+    )
+    assert held >= 400 * (0.95 if not rho else 0.93) - 14  # 3 standard deviations; few autocorrelated readings say less
+
+
+def test_run_in_and_chips_end_the_past() -> None:
+    parts = np.arange(400)
+    run_in = 0.02 * (1 - np.exp(-parts / 20)) + line(400, 0.00005, 0.0005, seed=1)
+    assert fitted(run_in).slope == pytest.approx(0.00005, rel=0.1)
+    chipped = line(400, 0.00005, 0.0005, seed=1)
+    chipped[330:] += 0.01
+    found = fitted(chipped)
+    assert found.first > 320
+    assert abs(found.slope - 0.00005) < 4 * found.slope_error
+
+
+def test_one_line_is_rarely_taken_for_two() -> None:
+    whole = [fitted(line(200, 0.00005, 0.001, seed)) for seed in range(300)]
+    assert sum(found.first > 1 for found in whole) <= 3
+
+
+def test_outliers_are_left_out_and_counted() -> None:
+    curve = line(100, 0.0001, 0.0005, seed=6)
+    curve[[30, 60]] += 0.02
+    found = fitted(curve)
+    assert (found.count, found.left_out) == (98, 2)
+    assert found.slope == pytest.approx(0.0001, rel=0.1)
+
+
+# --- the forecast
+
+
+def test_the_forecast_reaches_the_limit_where_the_line_does() -> None:
+    found = fitted(line(100, 0.0001, 0.00001, seed=1))
+    told = forecast(found, 0.0199)
+    assert told is not None
+    assert told.parts == pytest.approx(100, abs=1)
+    assert told.low < told.parts < told.high
+
+
+def test_at_both_ends_of_the_interval_the_limit_is_on_the_edge_of_what_a_part_may_be() -> None:
+    found = fitted(line(60, -0.0002, 0.002, seed=3))
+    told = forecast(found, -0.05)
+    assert told is not None
+    for end in (told.low, told.high):
+        assert abs(found.at(end) + 0.05) == pytest.approx(found.half_width(end, single=True))
+
+
+def test_no_wear_no_number() -> None:
+    assert forecast(fitted(line(60, 0.0, 0.001, seed=3)), 0.05) is None
+
+
+def test_a_limit_that_was_passed_is_reached() -> None:
+    told = forecast(fitted(line(100, 0.0001, 0.0001, seed=1)), 0.005)
+    assert told is not None
+    assert told.parts == told.low == 0
+
+
+def test_parts_begin_to_lie_beyond_at_the_lower_end_as_often_as_the_interval_says() -> None:
+    beyond = within = total = 0
+    for seed in range(600):
+        told = forecast(fitted(line(100, 0.0001, 0.002, seed)), 0.03)
+        assert isinstance(told, Forecast)
+        when = np.random.default_rng(10_000 + seed).normal(0.0, 0.002)
+        total += 1
+        beyond += 0.0001 * (99 + told.low) + when >= 0.03
+        within += told.low <= (0.03 - 0.0099) / 0.0001 <= told.high
+    assert beyond / total == pytest.approx(0.025, abs=0.02)
+    assert within / total >= 0.95
