@@ -1,0 +1,7 @@
+"""Program text of the controls: read, and written so that it can be read again. One file per control.
+
+lines        what all of them share: verdicts per line, programs found, numbers, what R text cannot say
+sinumerik    `L05` and `L15`, R assignments, the later names such as `_TZL`
+fanuc        the macro variables of the lathe line, #500 to #513
+corrections  pending corrections as text that changes nothing when it is run twice
+"""

@@ -1,0 +1,367 @@
+"""L05, L15 and R assignments: as the sources print them, as people type them, as we write them, and mutilated."""
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.core.parameters import Parameters, read
+from app.core.programs import sinumerik
+from app.core.programs.lines import ProgramError, ProgramKind, ProgramText, Verdict, written
+from app.core.programs.sinumerik_writing import Calibration, write_calibration, write_measuring
+from tests.core.programs.conftest import parameter_sets
+
+# Domain §10, with values in place of the xx of the source.
+L05 = """L05
+N5 M73
+N10 G4 X5
+N15 R115 R211 R221 R230 R273 R281 R292 R301 R311
+N20 R32199.852 R330.001 R340.01 R361
+N25 L92
+N30 M17
+"""
+L15 = """L15
+N5 R103 R115 R240 R251 R26180 R273 R281 R292 R301
+N10 R330.001 R440.0053 R361 R370.3 R400 R41-0.016 R4240
+N15 L75
+N20 L93
+N25 M17
+"""
+SHAFT = {"nominal": 40.0, "upper_deviation": 0.0, "lower_deviation": -0.016}
+
+
+def codes(text: ProgramText, line: int) -> list[str]:
+    return [note.code for note in text.lines[line - 1].notes]
+
+
+def parameters_of(text: str) -> dict[str, Any]:
+    program = sinumerik.read(text).program
+    assert program is not None
+    return program.parameters
+
+
+def parameters_in(text: str) -> dict[str, Any]:
+    """The parameters of a text, or nothing where nothing is in it."""
+    program = sinumerik.read(text).program
+    return {} if program is None else program.parameters
+
+
+class TestSource:
+    def test_the_calibration_subprogram(self) -> None:
+        program = sinumerik.read(L05).program
+        assert program is not None
+        assert program.kind is ProgramKind.CALIBRATION
+        assert program.parameters == {
+            "average_memory": 5,
+            "repeats": 3,
+            "axis": "X",
+            "direction": "negative",
+            "zero_range": 0.001,
+            "averaging_limit": 0.01,
+            "confidence_limit": 1.0,
+            "weighting_factor": 2.0,
+            "path_factor": 1.0,
+            "gauge": 199.852,
+            "surface": "free",
+            "probe": "axial",
+        }
+
+    def test_the_measuring_subprogram_with_the_misprint(self) -> None:
+        text = sinumerik.read(L15)
+        assert text.program is not None
+        assert text.program.kind is ProgramKind.MEASURING
+        assert text.program.parameters == SHAFT | {
+            "tool_memory": 3,
+            "average_memory": 5,
+            "variant": "indexed",
+            "repeats": 3,
+            "index": 180.0,
+            "axis": "X",
+            "zero_range": 0.001,
+            "averaging_limit": 0.0053,
+            "wear_limit": 0.3,
+            "confidence_limit": 1.0,
+            "weighting_factor": 2.0,
+            "path_factor": 1.0,
+        }
+        assert "r44_for_r34" in codes(text, 3)
+        assert [line.verdict for line in text.lines] == [Verdict.UNDERSTOOD] * 5 + [Verdict.IGNORED]
+        parameters, _warnings = read(text.program.parameters | {"factor": -1})
+        assert (parameters.target, parameters.tolerance_width) == (39.992, 0.016)
+
+    def test_both_in_one_text(self) -> None:
+        text = sinumerik.read(L05 + L15)
+        assert [program.kind for program in text.programs] == [ProgramKind.CALIBRATION, ProgramKind.MEASURING]
+        assert [(program.first_line, program.last_line) for program in text.programs] == [(1, 7), (8, 13)]
+        assert text.programs[1].parameters == parameters_of(L15)
+        assert text.program == text.programs[1]
+
+    def test_the_form_without_l75(self) -> None:
+        found = parameters_of("N5 R103 R115\nN10 R3239.992 R330.001 R440.0053 R350.016 R361 R370.3\nN15 L93\nN20 M17")
+        assert (found["target"], found["tolerance_width"], found["averaging_limit"]) == (39.992, 0.016, 0.0053)
+
+    def test_the_part_program_around_them_is_passed_over(self) -> None:
+        text = sinumerik.read("%123\nN5 G0 G53 X300 Z450\nN10 G59 Z137.5\nN150 T1030\nN155 M05\nN165 X206\nN300 M30")
+        assert {line.verdict for line in text.lines} == {Verdict.IGNORED}
+        assert text.programs == ()
+
+    def test_its_placeholders_are_named(self) -> None:
+        text = sinumerik.read("N15 R11xx R21xx\nN20 R32xxx.xxx R33xx\nN10 R32*xxx.xxx")
+        assert [line.verdict for line in text.lines] == [Verdict.NOT_UNDERSTOOD] * 3
+        assert [note.data["r"] for line in text.lines for note in line.notes] == ["R11", "R21", "R32", "R33", "R32"]
+
+    def test_its_explanations_are_named(self) -> None:
+        text = sinumerik.read("N5 M73 uključivanje IC kamere\nN25 L92")
+        assert codes(text, 1) == ["words", "unknown"]
+        assert text.lines[0].notes[1].data == {"text": "uključivanje IC kamere"}
+
+    def test_results_of_a_calibration(self) -> None:
+        program = sinumerik.read("R42=199.852 R43=199.8534\nR44=0.0014 R46=5 R47=30 R49=0.0012").program
+        assert program is not None
+        assert program.kind is ProgramKind.RESULTS
+        assert program.results == {
+            "R42": 199.852,
+            "R43": 199.8534,
+            "R44": 0.0014,
+            "R46": 5.0,
+            "R47": 30.0,
+            "R49": 0.0012,
+        }
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("N10 R33=0.001 R34=0.01", {"zero_range": 0.001, "averaging_limit": 0.01}),
+        ("n10 r33 = 0,001 r34= .01", {"zero_range": 0.001, "averaging_limit": 0.01}),
+        ("R33=0.001R34=0.01", {"zero_range": 0.001, "averaging_limit": 0.01}),
+        ("R42=10,5,R40=0", {"nominal": 10.5, "upper_deviation": 0.0}),
+        ("R 33=+0.001", {"zero_range": 0.001}),
+        ("R33=1EX-3", {"zero_range": 0.001}),
+        ("R33=1E-3 R34=0.01", {"zero_range": 0.001, "averaging_limit": 0.01}),
+        ("R033=2 (R33=3) ; R33=4", {"zero_range": 2.0}),
+        ("R33=0.001(scatter)R34=0.01", {"zero_range": 0.001, "averaging_limit": 0.01}),
+        ("R240", {"variant": None}),
+        ("R24 0 R25 2 R23 4 R2690", {"variant": "round", "points": 4, "index": 90.0}),
+        ("R045", {"wait": 5.0}),
+        ("R4=5", {"wait": 5.0}),
+        ("R3210", {"target": 10.0}),
+        ("R32*10", {"target": 10.0}),
+        ("R41-0.016", {"lower_deviation": -0.016}),
+        ("_TZL=0.001 [_TNUM]=3 _evnum = 5", {"zero_range": 0.001, "tool_memory": 3, "average_memory": 5}),
+        ("_NMSP=1 _FA=2 _K=3 _MA=1 _MD=1", {"repeats": 1, "path_factor": 2.0, "weighting_factor": 3.0, "axis": "X"}),
+        ("_SETVAL=40 _TUL=0 _TLL=-0.016", SHAFT),
+        ("_TMV=0.01 _TSA=1 _TDIF=0.3", {"averaging_limit": 0.01, "confidence_limit": 1.0, "wear_limit": 0.3}),
+        ("R24=1 R25=0", {"variant": "two_point"}),
+        ("/N5 R33=0.001", {"zero_range": 0.001}),
+        ("R33=0.001 R33=0.002", {"zero_range": 0.002}),
+    ],
+)
+def test_forms_of_an_assignment(text: str, found: dict[str, Any]) -> None:
+    read_from = parameters_in(text)
+    assert {name: read_from.get(name) for name in found} == found
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("R33=R50*2", "expression"),
+        ("R33=0.016/3", "expression"),
+        ("R33=(0.001)", "expression"),
+        ("R33=SIN(30)", "expression"),
+        ("R33=1 -5", "expression"),
+        ("R33=0.0.1", "expression"),
+        ("R33=0,001,5", "expression"),
+        ("R33=", "no_value"),
+        ("R33", "no_value"),
+        ("R240=1", "unknown_r"),
+        ("R5012", "unknown_r"),
+        ("R4", "unknown"),
+        ("L99", "unknown"),
+        ("R33=" + "9" * 400, "too_large"),
+        ("R33=1E999", "too_large"),
+        ("R33=٣", "expression"),
+        ("(INBAND FACTOR=left)", "bad_setting"),
+        ("(INBAND NONSENSE=1)", "bad_setting"),
+        ("x" * 2000, "too_long"),
+    ],
+)
+def test_what_is_not_understood_is_named_and_not_taken(text: str, code: str) -> None:
+    found = sinumerik.read(text)
+    assert found.lines[0].verdict is Verdict.NOT_UNDERSTOOD
+    assert code in codes(found, 1)
+    assert parameters_in(text) == {}
+
+
+def test_a_calculation_does_not_leave_the_value_before_it_standing() -> None:
+    """On the control R33 has another value by then, and nobody here knows which."""
+    assert parameters_of("R33=0.001 R34=0.01\nR33=R50*2") == {"averaging_limit": 0.01}
+    assert parameters_of("R33=R50*2\nR33=0.001") == {"zero_range": 0.001}
+
+
+def test_the_last_assignment_counts_and_the_one_before_is_named() -> None:
+    text = sinumerik.read("R33=0.001\nN20 R33=0.002")
+    again = next(note for note in text.lines[1].notes if note.code == "again")
+    assert again.data == {"r": "R33", "before": 0.001, "line": 1}
+
+
+def test_l75_wins_over_a_target_and_a_target_over_a_drawing_without_it() -> None:
+    drawing = "R40=0 R41=-0.016 R42=40"
+    with_it = sinumerik.read(f"R32=39 R35=1\n{drawing}\nL75\nL93")
+    assert with_it.program is not None
+    assert with_it.program.parameters == SHAFT
+    assert codes(with_it, 1)[-2:] == ["l75_wins", "l75_wins"]
+    without = sinumerik.read(f"R32=39 R35=1\n{drawing}\nL93")
+    assert without.program is not None
+    assert without.program.parameters == {"target": 39.0, "tolerance_width": 1.0}
+    assert codes(without, 2)[-3:] == ["not_used"] * 3
+    alone = sinumerik.read(f"{drawing}\nL93").program
+    assert alone is not None
+    assert [note.code for note in alone.notes] == ["l75_missing"]
+
+
+def test_a_second_cycle_finds_what_was_assigned_for_the_first() -> None:
+    text = sinumerik.read("R11=5 R27=2 R21=1 R22=1 R23=0 R32=50\nL92\nR10=3 R32=40 R35=0.016\nL93\nM17")
+    assert [program.kind.value for program in text.programs] == ["calibration", "measuring"]
+    assert text.programs[1].parameters | {"target": 40.0} == text.programs[1].parameters
+    assert (text.programs[1].parameters["repeats"], "points" in text.programs[1].parameters) == (2, False)
+
+
+def test_line_ends_and_marks_of_all_systems() -> None:
+    for text in ("R33=1\r\nR34=2\r\n", "\ufeffR33=1\rR34=2", "R33=1\nR34=2"):
+        assert parameters_of(text) == {"zero_range": 1.0, "averaging_limit": 2.0}
+        assert len(sinumerik.read(text).lines) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("", "empty"),
+        (" \n\t\r\n", "empty"),
+        ("R33=1\0", "binary"),
+        ("\x01\x02\x03\x04\x05\x06\x07\x08\x0e\x0f", "binary"),
+        ("R33=1\n" * 70_000, "too_long"),
+        ("\n" * 20_000 + "R", "too_many_lines"),
+    ],
+)
+def test_what_is_no_program_text_is_refused(text: str, code: str) -> None:
+    with pytest.raises(ProgramError) as caught:
+        sinumerik.read(text)
+    assert caught.value.code == code
+
+
+# --- writing and reading
+
+
+@given(parameter_sets(), st.text(st.characters(exclude_categories=["Cc", "Cs"]), max_size=40))
+def test_a_characteristic_survives_its_program_text(parameters: Parameters, name: str) -> None:
+    name = name.strip()
+    text = write_measuring(parameters, {"characteristic": "shaft-d40", "name": name})
+    found = sinumerik.read(text)
+    assert text.isascii()
+    assert not [line for line in found.lines if line.verdict is Verdict.NOT_UNDERSTOOD]
+    assert found.program is not None
+    assert found.program.about.get("name", "") == name
+    again, _warnings = read(found.program.parameters)
+    assert again == parameters
+    assert write_measuring(again, found.program.about) == text
+
+
+@given(parameter_sets(), st.floats(0.001, 1000), st.booleans(), st.booleans())
+def test_a_calibration_survives_its_program_text(
+    parameters: Parameters, gauge: float, free: bool, radial: bool
+) -> None:
+    program = sinumerik.read(write_calibration(Calibration(parameters, gauge, free, radial), {})).program
+    assert program is not None
+    assert program.kind is ProgramKind.CALIBRATION
+    expected = {
+        "gauge": gauge,
+        "surface": "free" if free else "groove",
+        "probe": "radial" if radial else "axial",
+        **{
+            name: getattr(parameters, name)
+            for name in ("average_memory", "repeats", "axis", "direction", "weighting_factor", "path_factor")
+            + ("zero_range", "averaging_limit", "confidence_limit")
+        },
+    }
+    assert program.parameters == expected
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_numbers_are_written_without_exponent_and_read_back_exactly(value: float) -> None:
+    text = written(value)
+    assert float(text) == value
+    assert "e" not in text.lower()
+
+
+def test_the_blocks_are_those_of_the_source() -> None:
+    parameters, _warnings = read(parameters_of(L15) | {"factor": -1})
+    assert write_measuring(parameters, {"name": "Seat Ø40"}).splitlines() == [
+        "L15 (MEASURING SUBPROGRAM)",
+        "(INBAND NAME=Seat {D8}40)",
+        "(INBAND FACTOR=-1)",
+        "N5 R10=3 R11=5 R24=0 R25=1 R26=180 R27=3 R28=1 R29=2 R30=1 R31=0",
+        "N10 R33=0.001 R34=0.0053 R36=1 R37=0.3 R40=0 R41=-0.016 R42=40",
+        "N15 L75",
+        "N20 L93",
+        "N25 M17",
+    ]
+    assert write_calibration(Calibration(parameters, 199.852), {}).splitlines() == [
+        "L05 (CALIBRATION SUBPROGRAM)",
+        "N5 M73 (PROBE RECEIVER ON)",
+        "N10 G4 X5",
+        "N15 R11=5 R21=1 R22=1 R23=0 R27=3 R28=1 R29=2 R30=1 R31=0",
+        "N20 R32=199.852 R33=0.001 R34=0.0053 R36=1",
+        "N25 L92",
+        "N30 M17",
+    ]
+
+
+# --- mutilated
+
+
+@st.composite
+def mutilated(draw: st.DrawFn) -> str:
+    text = draw(st.sampled_from([L05, L15, L05 + L15]))
+    for _ in range(draw(st.integers(1, 6))):
+        at, to = sorted(draw(st.tuples(st.integers(0, len(text)), st.integers(0, len(text)))))
+        text = draw(
+            st.sampled_from(
+                [
+                    text[:at] + text[to:],
+                    text[to:] + text[at:to] + text[:at],
+                    text[:at] + draw(st.text(max_size=8)) + text[at:],
+                ]
+            )
+        )
+    return text
+
+
+@given(
+    st.one_of(
+        mutilated(),
+        st.text(),
+        st.text("RLNM0123456789=.,-+*()[]_#%;/ \n\rXTZe"),
+        st.binary().map(lambda b: b.decode("latin-1")),
+    )
+)
+def test_nothing_breaks_the_reader_and_nothing_is_dropped(text: str) -> None:
+    try:
+        found = sinumerik.read(text)
+    except ProgramError:
+        return
+    assert [line.number for line in found.lines] == list(range(1, len(found.lines) + 1))
+    assert all(line.notes for line in found.lines)
+    taken = {note.data["name"] for line in found.lines for note in line.notes if note.code == "assigned"}
+    for program in found.programs:
+        read_from = set(program.parameters) - {"gauge", "surface", "probe"}
+        assert read_from <= taken | {"variant", "nominal", "averaging_limit"} | {
+            note.data["name"] for line in found.lines for note in line.notes if note.code == "setting"
+        }
+
+
+def test_a_megabyte_of_anything_is_answered_quickly() -> None:
+    for piece in ("R33=R", "(", "R33=1 ", "R24 ", "[[[[", "_A=", "N" * 50, "=" * 30, "IF "):
+        text = "\n".join(piece * (900 // len(piece)) for _ in range(200))
+        assert len(sinumerik.read(text).lines) == 200
