@@ -2,16 +2,18 @@
 
 tool_replaced   open corrections of the tool are superseded, averages and tool life begin again (once per tool change,
                 however many alarms the worn tool has raised)
-keep_cutting    the held correction is released to the machine
+keep_cutting    the held correction is released to the machine; a jump was true, and readings are expected there from now on
 false_reading   the readings behind it are excluded; what they led to is withdrawn unless it is applied already
-noted           nothing else
+sister_tool     the characteristics of the tool correct its sister from now on
+offset_set      this offset is true: handled as a manual edit (*offset differs* only, which a person answers so)
+noted           nothing else; at *offset differs* the offset that the machine has reported is true
 
-Whichever it is, a characteristic that was paused by the alarm goes on.
+Whichever it is, a characteristic or a tool that was paused by the alarm goes on.
 """
 
 from collections.abc import Callable
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from sqlalchemy import select, update
 from sqlalchemy.orm import Session
@@ -25,25 +27,35 @@ from app.errors import Conflict, FieldError, Invalid
 from app.machines.queries import lock_machines
 from app.offsets import actions as offsets
 from app.offsets import queries as offset_queries
-from app.offsets.tables import Correction
+from app.offsets import sisters
+from app.offsets.news import tool_changed
+from app.offsets.tables import Correction, Tool
 from app.people.callers import Caller
 from app.readings import actions as readings
 from app.readings import queries as reading_queries
 from app.readings.tables import Stream
 from app.web.i18n import _
 
-Action = Literal["tool_replaced", "keep_cutting", "false_reading", "noted"]
-ACTIONS: tuple[Action, ...] = ("tool_replaced", "keep_cutting", "false_reading", "noted")
+Action = Literal["tool_replaced", "keep_cutting", "false_reading", "sister_tool", "offset_set", "noted"]
+ACTIONS: tuple[Action, ...] = get_args(Action)
 Outcome = list[dict[str, Any]]
 NO_OFFSET = 0.0
 
 
 def acknowledge(
-    session: Session, number: int, action: Action, comment: str, caller: Caller, *, offset: float | None = None
+    session: Session,
+    number: int,
+    action: Action,
+    comment: str,
+    caller: Caller,
+    *,
+    offset: float | None = None,
+    changed_by: str | None = None,
 ) -> AlarmRow:
     """Say what an active alarm was.
 
-    ``offset`` (mm) is what the new tool starts with, for `tool_replaced` only.
+    ``offset`` (mm) is what the new tool starts with (`tool_replaced`), or the one that is true (`offset_set`, where
+    ``changed_by`` says who has changed it at the control).
     Raises `NotFound`; `Conflict` when somebody was first, saying who; `Invalid` when the action cannot be meant.
     """
     lock_machines(session, [queries.alarm(session, number).alarm.machine_id])
@@ -57,20 +69,14 @@ def acknowledge(
             acknowledged_at=alarm.acknowledged_at.isoformat(),
             action=alarm.action,
         )
-    if offset is not None and action != "tool_replaced":
-        wrong = _("is only meant with the action tool_replaced: it is what the new tool starts with")
-        raise Invalid(f"offset: {wrong}.", _("Leave it out."), errors=[FieldError("offset", wrong)])
-    if action == "tool_replaced" and alarm.tool_memory is None:
-        wrong = _("cannot be tool_replaced: this alarm is about no tool, its characteristic only measures (R10 = 0)")
-        raise Invalid(
-            f"action: {wrong}.", _("Choose false_reading or noted instead."), errors=[FieldError("action", wrong)]
-        )
-
+    _refuse(row, action, offset, changed_by)
     follows: dict[Action, Callable[[], Outcome]] = {
         "tool_replaced": lambda: _tool_replaced(session, row, comment, caller, offset),
         "keep_cutting": lambda: _keep_cutting(session, row, comment, caller),
         "false_reading": lambda: _false_reading(session, row, comment, caller),
-        "noted": lambda: [] if row.held is None else [{"code": "still_held", "number": row.held.number}],
+        "sister_tool": lambda: _sister_tool(session, row, comment, caller),
+        "offset_set": lambda: _offset_set(session, row, comment, caller, offset, changed_by),
+        "noted": lambda: _noted(session, row, comment, caller),
     }
     outcome = [*follows[action](), *_resume(session, row)]
     alarm.acknowledged_at, alarm.acknowledged_by = datetime.now(UTC), caller.name
@@ -100,6 +106,43 @@ def acknowledge(
     return queries.alarm(session, number)
 
 
+def _refuse(row: AlarmRow, action: Action, offset: float | None, changed_by: str | None) -> None:
+    """Raises `Invalid` for an action that cannot be meant by this alarm."""
+    wrong: list[FieldError] = []
+    if offset is not None and action not in {"tool_replaced", "offset_set"}:
+        wrong.append(
+            FieldError(
+                "offset",
+                _(
+                    "is only meant with the actions tool_replaced (what the new tool starts with) and offset_set (the one that "
+                    "is true); leave it out"
+                ),
+            )
+        )
+    if action == "offset_set":
+        if row.alarm.kind != "offset_differs":
+            wrong.append(FieldError("action", _("offset_set answers alarms of the kind offset_differs only")))
+        elif offset is None:
+            wrong.append(FieldError("offset", _("is missing: say which offset is true, in mm")))
+    elif changed_by is not None:
+        wrong.append(FieldError("changed_by", _("is only meant with the action offset_set; leave it out")))
+    if action in {"tool_replaced", "sister_tool"} and row.alarm.tool_memory is None:
+        wrong.append(
+            FieldError(
+                "action",
+                _("cannot be {action}: this alarm is about no tool, its characteristic only measures (R10 = 0)").format(
+                    action=action
+                ),
+            )
+        )
+    if wrong:
+        raise Invalid(
+            "; ".join(f"{each.field}: {each.message}" for each in wrong),
+            _("Choose another action, or correct the named fields. The alarm is still active."),
+            errors=wrong,
+        )
+
+
 def _tool_replaced(session: Session, row: AlarmRow, comment: str, caller: Caller, offset: float | None) -> Outcome:
     """A tool that was changed since the alarm was last raised is not changed again, unless its offset is said."""
     alarm, machine = row.alarm, row.machine
@@ -121,12 +164,85 @@ def _tool_replaced(session: Session, row: AlarmRow, comment: str, caller: Caller
 
 
 def _keep_cutting(session: Session, row: AlarmRow, comment: str, caller: Caller) -> Outcome:
-    if row.held is not None:
-        released = offsets.decide(session, row.machine, row.held.number, "release", comment, caller).correction
-        return [{"code": "correction_released", "number": released.number, "amount": released.amount}]
-    if row.alarm.kind != "tool_worn":
+    if row.alarm.kind not in queries.HOLDING:
         return []
-    return [{"code": "nothing_held"}]
+    outcome: Outcome = []
+    true = True
+    if row.alarm.kind == "implausible":
+        true = _level_follows(session, row)
+    if row.held is not None and not true:
+        outcome.append(_withdraw(session, row, row.held, comment, caller))
+    elif row.held is not None:
+        released = offsets.decide(session, row.machine, row.held.number, "release", comment, caller).correction
+        outcome.append({"code": "correction_released", "number": released.number, "amount": released.amount})
+    elif row.alarm.kind == "tool_worn":
+        outcome.append({"code": "nothing_held"})
+    if row.alarm.kind == "implausible":
+        outcome.append({"code": "level_followed" if true else "level_disagrees"})
+    return outcome
+
+
+def _level_follows(session: Session, row: AlarmRow) -> bool:
+    """Expect readings where the jump has led, unless readings since then lie where they were expected before."""
+    alarm = row.alarm
+    stream = session.get(Stream, (alarm.machine_id, alarm.characteristic_id), populate_existing=True)
+    last = alarm.last_sequence or alarm.sequence
+    if stream is None or last is None:
+        return True
+    if stream.level_sequence is not None and stream.level_sequence > last:
+        return False
+    stream.level = reading_queries.uncorrected_of(session, alarm.machine_id, stream.characteristic_id, last)
+    stream.level_sequence = last
+    if row.held is not None and stream.average_memory:  # corrected in full: the average begins again, as after any such
+        offsets.restart_averages(session, row.machine, [stream.average_memory], datetime.now(UTC))
+    session.flush()
+    return True
+
+
+def _sister_tool(session: Session, row: AlarmRow, comment: str, caller: Caller) -> Outcome:
+    """A tool that was switched for another alarm of the same trouble is not switched again."""
+    number = row.alarm.tool_memory
+    assert number is not None
+    tool = offset_queries.tool(session, row.machine, number)
+    if tool.sister is not None and not sisters.on_tool(session, row.machine, number):
+        return [{"code": "switched_already", "tool": number, "sister": tool.sister}]
+    done = sisters.switch_to_sister(session, row.machine, number, comment, caller)
+    outcome: Outcome = [
+        {"code": "switched", "tool": number, "sister": done.sister, "characteristics": done.characteristics}
+    ]
+    if done.superseded:
+        outcome.append({"code": "corrections_superseded", "numbers": done.superseded})
+    if done.averages:
+        outcome.append({"code": "averages_restarted", "locations": done.averages})
+    return outcome
+
+
+def _offset_set(
+    session: Session, row: AlarmRow, comment: str, caller: Caller, offset: float | None, changed_by: str | None
+) -> Outcome:
+    """The true offset, as a manual edit; one that was told by hand since the alarm was last raised needs no other."""
+    number = row.alarm.tool_memory
+    assert number is not None
+    tool = offset_queries.tool(session, row.machine, number)
+    if offset is None and tool.reset_at is not None and tool.reset_at >= row.alarm.last_at:
+        return [{"code": "offset_told_already", "tool": number, "offset": tool.offset}]
+    true = tool.offset if offset is None else offset
+    reason = comment if changed_by is None else _("{who}: {why}").format(who=changed_by, why=comment)
+    done = offsets.edit_tool(session, row.machine, number, true, reason, caller)
+    outcome: Outcome = [{"code": "offset_set", "tool": number, "offset": done.tool.offset}]
+    if changed_by is not None:
+        outcome[0]["changed_by"] = changed_by
+    if done.superseded:
+        outcome.append({"code": "corrections_superseded", "numbers": done.superseded})
+    if done.averages:
+        outcome.append({"code": "averages_restarted", "locations": done.averages})
+    return outcome
+
+
+def _noted(session: Session, row: AlarmRow, comment: str, caller: Caller) -> Outcome:
+    if row.alarm.kind == "offset_differs":
+        return _offset_set(session, row, comment, caller, None, None)
+    return [] if row.held is None else [{"code": "still_held", "number": row.held.number}]
 
 
 def _false_reading(session: Session, row: AlarmRow, comment: str, caller: Caller) -> Outcome:
@@ -156,11 +272,20 @@ def _withdraw(session: Session, row: AlarmRow, correction: Correction, comment: 
 
 
 def _resume(session: Session, row: AlarmRow) -> Outcome:
+    """What was paused by this alarm goes on."""
+    at = {"machine_id": row.alarm.machine_id, "paused_by": row.alarm.id}
     paused = session.scalars(
         update(Stream)
-        .where(Stream.machine_id == row.alarm.machine_id, Stream.paused_by == row.alarm.id)
+        .filter_by(**at)
         .values(paused_by=None)
         .returning(Stream.characteristic_id)
+        .execution_options(synchronize_session=False)
+    ).all()
+    tools = session.scalars(
+        update(Tool)
+        .filter_by(**at)
+        .values(paused_by=None)
+        .returning(Tool.number)
         .execution_options(synchronize_session=False)
     ).all()
     keys = session.scalars(
@@ -168,4 +293,7 @@ def _resume(session: Session, row: AlarmRow) -> Outcome:
         .where(Characteristic.machine_id == row.alarm.machine_id, Characteristic.id.in_(paused))
         .order_by(Characteristic.key)
     )
-    return [{"code": "resumed", "characteristic": key} for key in keys]
+    if tools:
+        publish(session, *(tool_changed(row.machine, number) for number in tools))
+    resumed: Outcome = [{"code": "resumed", "characteristic": key} for key in keys]
+    return resumed + [{"code": "tool_resumed", "tool": number} for number in sorted(tools)]

@@ -1,5 +1,6 @@
 """Raising alarms that do not come from a reading. Readings raise theirs in `app.readings`; people acknowledge in `acknowledging`."""
 
+from datetime import UTC, datetime
 from typing import Any
 
 from sqlalchemy import func, select
@@ -33,3 +34,47 @@ def raise_for_tool(session: Session, machine_id: int, tool_memory: int, kind: st
         active.data = data
     session.flush()
     return active
+
+
+def raise_for_place(session: Session, machine_id: int, kind: str, data: dict[str, Any]) -> Alarm:
+    """Raise an alarm about a location of a memory (`memory` and `location` in its data); the machine is locked.
+
+    While it is active, one more counts on it.
+    """
+    active = _of_place(session, machine_id, kind, data)
+    if active is None:
+        active = Alarm(machine_id=machine_id, kind=kind, data=data)
+        session.add(active)
+    else:
+        active.count += 1
+        active.last_at = func.clock_timestamp()
+        active.data = data
+    session.flush()
+    return active
+
+
+def settle_for_place(
+    session: Session, machine_id: int, kind: str, data: dict[str, Any], by: str, comment: str, outcome: dict[str, Any]
+) -> Alarm | None:
+    """End an alarm about this location, because what it asked for has been done; None if there is none."""
+    active = _of_place(session, machine_id, kind, data)
+    if active is None:
+        return None
+    active.acknowledged_at, active.acknowledged_by = datetime.now(UTC), by
+    active.action, active.comment, active.outcome = "noted", comment, [outcome]
+    session.flush()
+    return active
+
+
+def _of_place(session: Session, machine_id: int, kind: str, data: dict[str, Any]) -> Alarm | None:
+    return session.scalars(
+        select(Alarm)
+        .where(
+            Alarm.machine_id == machine_id,
+            Alarm.kind == kind,
+            Alarm.data["memory"].astext == data["memory"],
+            Alarm.data["location"].astext == str(data["location"]),
+            Alarm.acknowledged_at.is_(None),
+        )
+        .execution_options(populate_existing=True)
+    ).one_or_none()

@@ -64,11 +64,15 @@ def acknowledge_alarm(session: SessionDep, caller: Operator, alarm: Number, give
     - `tool_replaced`: open corrections of the tool are superseded, its averages and its life begin again, with `offset`
     - `keep_cutting`: the held correction is released to the machine
     - `false_reading`: the readings behind the alarm are excluded, and what they asked for is withdrawn
-    - `noted`: nothing else
+    - `sister_tool`: the characteristics of the tool correct its sister from now on
+    - `offset_set`: *offset differs* only: `offset` is true, `changed_by` has changed it; handled as a manual edit
+    - `noted`: nothing else; at *offset differs* the reported offset is true
 
-    After a probe fault the paused characteristic goes on, whichever it was. Acknowledging twice is 409 and says who was
+    After a probe fault the paused characteristic goes on, after *offset differs* the paused tool, whichever it was. Acknowledging twice is 409 and says who was
     first.
     """
     return alarm_out(
-        acknowledging.acknowledge(session, alarm, given.action, given.comment, caller, offset=given.offset)
+        acknowledging.acknowledge(
+            session, alarm, given.action, given.comment, caller, offset=given.offset, changed_by=given.changed_by
+        )
     )

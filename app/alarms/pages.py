@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.responses import RedirectResponse
 
 from app.alarms import acknowledging, queries, wording
+from app.alarms.outcomes import outcomes
 from app.alarms.queries import AlarmRow
 from app.alarms.schemas import AcknowledgeIn
 from app.errors import Conflict, Invalid
@@ -54,6 +55,7 @@ def board(
         done=queries.alarm(session, done) if done else None,
         late=queries.alarm(session, late) if late else None,
         wording=wording,
+        outcomes=outcomes,
         address=address,
     )
 
@@ -81,6 +83,7 @@ def history(request: Request, session: SessionDep, machine: MachineFilter = None
         older=address("/alarms/history", **here, before=rows[-1].alarm.id) if more else None,
         newest=address("/alarms/history", **here) if before else None,
         wording=wording,
+        outcomes=outcomes,
         address=address,
     )
 
@@ -119,6 +122,7 @@ def _alarm(
         form=form or {},
         errors=by_field(error) if error else {},
         wording=wording,
+        outcomes=outcomes,
         address=address,
     )
 
@@ -128,11 +132,21 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
     """The second touch. Sent twice, or after somebody else, it changes nothing and says so."""
     machine = form.get("machine") or None
     try:
+        offset = length(form.get("offset"))
+        if form.get("true") in {"reported", "expected"}:
+            offset = queries.alarm(session, number).alarm.data.get(form["true"])
         given = parsed(
             AcknowledgeIn,
-            {"action": form.get("action"), "comment": words(form, "comment"), "offset": length(form.get("offset"))},
+            {
+                "action": form.get("action"),
+                "comment": words(form, "comment"),
+                "offset": offset,
+                "changed_by": form.get("changed_by"),
+            },
         )
-        acknowledging.acknowledge(session, number, given.action, given.comment, caller, offset=given.offset)
+        acknowledging.acknowledge(
+            session, number, given.action, given.comment, caller, offset=given.offset, changed_by=given.changed_by
+        )
     except Conflict:
         alarm = queries.alarm(session, number).alarm
         again = alarm.acknowledged_by == caller.name and alarm.action == form.get("action")

@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
-from sqlalchemy import Select, any_, func, literal, select
+from sqlalchemy import Select, any_, exists, func, literal, select
 from sqlalchemy.orm import Session, aliased
 
 from app.alarms.tables import Alarm
 from app.characteristics.tables import Characteristic
 from app.errors import NotFound
 from app.machines.tables import Machine
-from app.offsets.tables import OPEN, Correction
+from app.offsets.tables import OPEN, Correction, Tool
 from app.readings.tables import Reading
 from app.web.fields import LARGEST_ID
 from app.web.i18n import _
@@ -24,37 +24,50 @@ KINDS = (
     "acceptance",
     "offset_limit",
     "offset_differs",
+    "calibration_overdue",
+    "calibration_refused",
     "signal",
+    "implausible",
+    "tool_life",
 )
+HOLDING = ("tool_worn", "implausible")  # kinds that a correction is held for
 
 
 class AlarmRow(NamedTuple):
-    """An alarm with the names of what it is about, and the correction that is held because of it."""
+    """An alarm with the names of what it is about, the correction that is held because of it, and the sister of its tool."""
 
     alarm: Alarm
     machine: Machine
     characteristic: Characteristic | None
     held: Correction | None
+    sister: int | None
 
 
-def _rows() -> Select[Alarm, Machine, Characteristic, Correction]:
+def _rows() -> Select[Alarm, Machine, Characteristic, Correction, int | None]:
     held = aliased(Correction)
     return (
-        select(Alarm, Machine, Characteristic, held)
+        select(Alarm, Machine, Characteristic, held, Tool.sister)
         .join(Machine, Machine.id == Alarm.machine_id)
         .outerjoin(
             Characteristic,
             (Characteristic.machine_id == Alarm.machine_id) & (Characteristic.id == Alarm.characteristic_id),
         )
-        .outerjoin(  # a tool has one held correction at most: a newer one supersedes it
+        .outerjoin(  # a tool has one held correction at most: a newer one supersedes it; its reading names its alarms
             held,
             (held.machine_id == Alarm.machine_id)
             & (held.tool_memory == Alarm.tool_memory)
             & (held.characteristic_id == Alarm.characteristic_id)
             & (held.status == "held")
-            & (Alarm.kind == "tool_worn")
-            & Alarm.acknowledged_at.is_(None),
+            & Alarm.kind.in_(HOLDING)
+            & Alarm.acknowledged_at.is_(None)
+            & exists().where(
+                Reading.machine_id == held.machine_id,
+                Reading.characteristic_id == held.characteristic_id,
+                Reading.sequence == held.sequence,
+                Alarm.id == any_(Reading.alarms),
+            ),
         )
+        .outerjoin(Tool, (Tool.machine_id == Alarm.machine_id) & (Tool.number == Alarm.tool_memory))
         .execution_options(populate_existing=True)
     )
 
@@ -89,7 +102,7 @@ def alarms(
     return [AlarmRow(*row) for row in session.execute(wanted)]
 
 
-def _filtered(state: State, machine_id: int | None) -> Select[Alarm, Machine, Characteristic, Correction]:
+def _filtered(state: State, machine_id: int | None) -> Select[Alarm, Machine, Characteristic, Correction, int | None]:
     wanted = _rows()
     if machine_id is not None:
         wanted = wanted.where(Alarm.machine_id == machine_id)

@@ -5,11 +5,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
-from app.alarms import wording
+from app.alarms import outcomes, wording
 from app.alarms.acknowledging import Action
 from app.alarms.queries import AlarmRow
 from app.core.parameters import LARGEST_LENGTH
-from app.web.fields import Body, Reason
+from app.web.fields import Body, Reason, Text200
 
 ALARM: dict[str, JsonValue] = {
     "id": 41,
@@ -69,8 +69,12 @@ class AcknowledgeIn(Body):
             strict=True,
             ge=-LARGEST_LENGTH,
             le=LARGEST_LENGTH,
-            description="With `tool_replaced`: the offset that the new tool starts with; 0 if left out.",
+            description="With `tool_replaced`: the offset that the new tool starts with; 0 if left out. With `offset_set`: "
+            "the one that is true, mm.",
         ),
+    ] = None
+    changed_by: Annotated[
+        Text200 | None, Field(description="With `offset_set`: who has changed the offset at the control.")
     ] = None
 
 
@@ -141,5 +145,5 @@ def alarm_out(row: AlarmRow) -> AlarmOut:
         acknowledged_by=alarm.acknowledged_by,
         action=alarm.action,  # type: ignore[arg-type] # only `acknowledge` writes it
         comment=alarm.comment,
-        outcome=[Followed(**item) for item in wording.outcomes(alarm.outcome)] if done else None,
+        outcome=[Followed(**item) for item in outcomes.outcomes(alarm.outcome)] if done else None,
     )

@@ -1,14 +1,13 @@
 """The sentences about alarms: what is wrong, what to do, what each action brings about, and what followed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from app.alarms.queries import AlarmRow
 from app.alarms.tables import Alarm
+from app.calibration.wording import refusal
 from app.web.i18n import _, ngettext
 from app.web.numbers import mm, um, um_limit
-
-MOST_NUMBERS = 5  # in one sentence
 
 
 def kind_word(kind: str) -> str:
@@ -21,6 +20,10 @@ def kind_word(kind: str) -> str:
         "acceptance": _("Not accepted"),
         "offset_limit": _("Offset limit"),
         "offset_differs": _("Offset differs"),
+        "calibration_overdue": _("Calibration overdue"),
+        "calibration_refused": _("Calibration refused"),
+        "implausible": _("Implausible jump"),
+        "tool_life": _("Tool life reached"),
         "signal": _("Signal"),
     }.get(kind, kind)
 
@@ -36,6 +39,13 @@ def sentence(row: AlarmRow) -> str:
         "expected": mm(data.get("expected")),
         "reported": mm(data.get("reported")),
         "correction": data.get("correction"),
+        "parts": data.get("parts"),
+        "planned_parts": data.get("planned_parts"),
+        "total": um(data.get("total")),
+        "planned_total": um_limit(data.get("planned_total") or 0.0),
+        "place": place(data),
+        "passed": _passed(data),
+        "why": refusal(data) if alarm.kind == "calibration_refused" else "",
     }
     match alarm.kind:
         case "oversize":
@@ -55,21 +65,61 @@ def sentence(row: AlarmRow) -> str:
             text = _("Too many sections of the part are out of tolerance: it is not accepted.")
         case "offset_limit":
             text = _(
-                "The corrections of tool {tool} have come to their limit {limit} in all: nothing more is corrected."
+                "The corrections of tool {tool} have come to their limit {limit} in all: nothing more is corrected that would "
+                "exceed it."
             )
         case "offset_differs":
             text = _(
-                "After correction {correction} the machine holds {reported} in tool {tool}; {expected} was expected. "
-                "Was it changed at the control?"
+                "After correction {correction} the machine holds {reported} in tool {tool}; {expected} was expected. Who "
+                "changed it at the control, and why? Nothing is corrected through this tool until that is said."
             )
+        case "implausible":
+            text = _(
+                "Deviation {deviation} lies more than {limit} from the level of the readings before: neither wear nor scatter "
+                "explains it. Wrong part, wrong tool, or a chip on the stylus?"
+            )
+        case "tool_life" if data.get("by") == "parts":
+            text = _("Tool {tool} has cut {parts} parts; its planned life is {planned_parts}.")
+        case "tool_life":
+            text = _("The corrections of tool {tool} sum up to {total}; its planned wear life is {planned_total}.")
+        case "calibration_overdue":
+            text = _("The probe has not been calibrated for {passed}: {place}.")
+        case "calibration_refused":
+            text = _("A calibration was refused and changes nothing: {place}. {why}")
         case _:
             text = str(data.get("text") or kind_word(alarm.kind))
     return text.format(**values) if alarm.kind in _KNOWN else text
 
 
 _KNOWN = frozenset(
-    {"oversize", "undersize", "tool_worn", "probe_fault", "acceptance", "offset_limit", "offset_differs"}
+    {
+        "oversize",
+        "undersize",
+        "tool_worn",
+        "probe_fault",
+        "acceptance",
+        "offset_limit",
+        "offset_differs",
+        "implausible",
+        "tool_life",
+        "calibration_overdue",
+        "calibration_refused",
+    }
 )
+
+
+def place(data: Mapping[str, Any]) -> str:
+    """The location of a memory that an alarm is about."""
+    if data.get("memory") == "tool":
+        return _("offset of the probe, R10 = {location}").format(location=data.get("location"))
+    return _("empirical value R11 = {location}").format(location=data.get("location"))
+
+
+def _passed(data: Mapping[str, Any]) -> str:
+    parts, days = data.get("parts"), data.get("days")
+    if parts is not None:
+        return ngettext("{n} part", "{n} parts", parts).format(n=parts)
+    return ngettext("{n} day", "{n} days", int(days or 0)).format(n=int(days or 0))
 
 
 def what_to_do(kind: str) -> str:
@@ -80,8 +130,16 @@ def what_to_do(kind: str) -> str:
         "tool_worn": _("Look at the cutting edge."),
         "probe_fault": _("Clean the stylus, look at chips, coolant and the program. Then say what it was."),
         "acceptance": _("Measure the part by hand and confirm."),
-        "offset_limit": _("Change the tool, or look for what drifts."),
-        "offset_differs": _("Look at the control which offset is right. The reported one counts from now on."),
+        "offset_limit": _(
+            "Change the tool, or look for what drifts. If the limit is too narrow, an engineer raises the largest sum in Set-up."
+        ),
+        "offset_differs": _("Look at the control which offset is true, and say so."),
+        "implausible": _(
+            "Look at the part and the stylus, and whether the right tool has cut it. Then say what it was."
+        ),
+        "tool_life": _("Change the tool, or go on with its sister."),
+        "calibration_overdue": _("Calibrate it; that ends this alarm."),
+        "calibration_refused": _("Clean stylus and gauge and look at the program, then calibrate again."),
     }.get(kind, _("Look at it and say what it was."))
 
 
@@ -91,6 +149,8 @@ def action_word(action: str) -> str:
         "tool_replaced": _("Tool replaced"),
         "keep_cutting": _("Keep cutting"),
         "false_reading": _("False reading"),
+        "sister_tool": _("Switch to sister tool"),
+        "offset_set": _("Say which offset is true"),
         "noted": _("Noted"),
     }.get(action, action)
 
@@ -99,16 +159,21 @@ def offered(row: AlarmRow) -> list[str]:
     """The actions that make sense for this alarm, the likeliest first."""
     alarm = row.alarm
     order = {
-        "tool_worn": ["tool_replaced", "keep_cutting", "false_reading", "noted"],
+        "tool_worn": ["tool_replaced", "keep_cutting", "sister_tool", "false_reading", "noted"],
         "probe_fault": ["false_reading", "noted", "tool_replaced"],
-        "offset_limit": ["tool_replaced", "noted"],
-        "offset_differs": ["noted"],
+        "offset_limit": ["tool_replaced", "sister_tool", "noted"],
+        "offset_differs": ["offset_set", "tool_replaced"],
+        "implausible": ["false_reading", "keep_cutting", "tool_replaced", "sister_tool", "noted"],
+        "tool_life": ["tool_replaced", "sister_tool", "noted"],
+        "calibration_overdue": ["noted"],
+        "calibration_refused": ["noted"],
     }.get(alarm.kind, ["noted", "tool_replaced", "false_reading"])
     return [
         action
         for action in order
         if not (action == "tool_replaced" and alarm.tool_memory is None)
-        and not (action == "keep_cutting" and row.held is None)
+        and not (action == "keep_cutting" and row.held is None and alarm.kind != "implausible")
+        and not (action == "sister_tool" and row.sister is None)
     ]
 
 
@@ -124,12 +189,32 @@ def consequences(row: AlarmRow, action: str) -> list[str]:
                 )
             )
             said.append(_("Corrections computed for the old tool are dropped."))
-        case "keep_cutting" if held is not None:
-            said.append(
-                _("Correction {number} of {amount} is released: the machine applies it to tool {tool}.").format(
-                    number=held.number, amount=um(held.amount), tool=held.tool_memory
+        case "keep_cutting":
+            if alarm.kind == "implausible":
+                said.append(_("The reading was true: the next ones are expected at its level."))
+            if held is not None:
+                said.append(
+                    _("Correction {number} of {amount} is released: the machine applies it to tool {tool}.").format(
+                        number=held.number, amount=um(held.amount), tool=held.tool_memory
+                    )
                 )
-            )
+        case "sister_tool":
+            said += [
+                _(
+                    "What corrected tool {tool} corrects tool {sister} from now on: a new version of the parameters."
+                ).format(tool=alarm.tool_memory, sister=row.sister),
+                _("Corrections computed for tool {tool} are dropped; the running averages begin at 0.").format(
+                    tool=alarm.tool_memory
+                ),
+                _("Select tool {sister} at the machine before the next part.").format(sister=row.sister),
+            ]
+        case "offset_set":
+            said += [
+                _("It is handled as a manual edit of tool {tool}: the running averages begin at 0.").format(
+                    tool=alarm.tool_memory
+                ),
+                _("Parts cut until now say nothing about it; then correcting goes on."),
+            ]
         case "false_reading":
             said.append(
                 ngettext(
@@ -158,11 +243,32 @@ def comments(kind: str, action: str) -> list[str]:
         "tool_replaced": [_("Insert turned"), _("New insert"), _("New tool"), _("Insert chipped")],
         "keep_cutting": [_("Edge looked at, still good"), _("Until the end of the batch"), _("Replaced at next stop")],
         "false_reading": [_("Chip on the stylus"), _("Coolant on the part"), _("Part not clamped right")],
+        "sister_tool": [_("Edge worn"), _("Insert chipped"), _("Planned life reached")],
         "noted": [_("Seen"), _("Part set aside"), _("Measured by hand, part is good"), _("Measured by hand, scrap")],
     }
     special = {
         ("probe_fault", "noted"): [_("Stylus replaced"), _("Program corrected"), _("Probe calibrated")],
-        ("offset_differs", "noted"): [_("Offset at the control is right"), _("Offset was typed in by hand"), _("Seen")],
+        ("offset_differs", "offset_set"): [
+            _("Part measured by hand"),
+            _("Tool was changed"),
+            _("Typed in by mistake"),
+            _("Program was loaded"),
+            _("Nobody knows"),
+        ],
+        ("implausible", "false_reading"): [
+            _("Chip on the stylus"),
+            _("Wrong part"),
+            _("Part not clamped right"),
+            _("Coolant on the part"),
+        ],
+        ("implausible", "keep_cutting"): [
+            _("Part measured, agrees"),
+            _("Edge looked at, still good"),
+            _("New material"),
+        ],
+        ("tool_life", "noted"): [_("Edge looked at, still good"), _("Until the end of the batch"), _("Seen")],
+        ("calibration_overdue", "noted"): [_("At the end of the batch"), _("At the change of shift"), _("Seen")],
+        ("calibration_refused", "noted"): [_("Stylus cleaned"), _("Gauge cleaned"), _("Wrong gauge"), _("Seen")],
         ("offset_limit", "noted"): [_("Seen"), _("Limit is looked at")],
     }
     return special.get((kind, action), common.get(action, [_("Seen")]))
@@ -177,75 +283,3 @@ def was_first(alarm: Alarm) -> str:
         action=action_word(alarm.action or ""),
         comment=alarm.comment,
     )
-
-
-def numbers(values: Sequence[int]) -> str:
-    """Numbers in a sentence, not more than one reads: `4, 5, 6 … 812`."""
-    if len(values) <= MOST_NUMBERS:
-        return ", ".join(map(str, values))
-    return f"{', '.join(map(str, values[: MOST_NUMBERS - 1]))} … {values[-1]}"
-
-
-def outcomes(outcome: Sequence[dict[str, Any]] | None) -> list[dict[str, Any]]:
-    """What followed, each with its sentence."""
-    if outcome is None:
-        return []
-    if not outcome:
-        return [{"code": "nothing_else", "text": _("Nothing else was changed.")}]
-    return [{**item, "text": _followed(item)} for item in outcome]
-
-
-def _followed(item: dict[str, Any]) -> str:
-    values = {
-        **item,
-        "offset": mm(item.get("offset")),
-        "amount": um(item.get("amount")),
-        "numbers": numbers(item.get("numbers", ())),
-        "sequences": numbers(item.get("sequences", ())),
-        "locations": numbers(item.get("locations", ())),
-    }
-    count = len(item.get("numbers", ())) or len(item.get("sequences", ())) or len(item.get("locations", ()))
-    match item["code"]:
-        case "tool_restarted":
-            text = ngettext(
-                "Tool {tool} begins anew with offset {offset}; the old one cut {parts} part.",
-                "Tool {tool} begins anew with offset {offset}; the old one cut {parts} parts.",
-                item["parts"],
-            )
-        case "tool_changed_already":
-            text = _("Tool {tool} had been changed since, so nothing was restarted a second time.")
-        case "corrections_superseded":
-            text = ngettext("Correction {numbers} was dropped.", "Corrections {numbers} were dropped.", count)
-        case "averages_restarted":
-            text = ngettext(
-                "The running average R11 = {locations} begins at 0.",
-                "The running averages R11 = {locations} begin at 0.",
-                count,
-            )
-        case "correction_released":
-            text = _("Correction {number} of {amount} was released to the machine.")
-        case "nothing_held":
-            text = _("No correction was held any more.")
-        case "still_held":
-            text = _("Correction {number} is still held.")
-        case "readings_excluded":
-            text = ngettext(
-                "Reading {sequences} of {characteristic} was excluded.",
-                "Readings {sequences} of {characteristic} were excluded.",
-                count,
-            )
-        case "readings_excluded_before":
-            text = ngettext(
-                "Reading {sequences} of {characteristic} had been excluded before.",
-                "Readings {sequences} of {characteristic} had been excluded before.",
-                count,
-            )
-        case "correction_withdrawn":
-            text = _("Correction {number} of {amount} was withdrawn.")
-        case "correction_applied":
-            text = _("Correction {number} of {amount} is in the offset already; the next readings correct it.")
-        case "resumed":
-            text = _("Compensation of {characteristic} goes on.")
-        case _:
-            return str(item["code"])
-    return text.format(**values)

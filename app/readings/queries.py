@@ -9,11 +9,14 @@ from sqlalchemy.orm import Session
 from app.alarms.tables import Alarm
 from app.characteristics import queries as characteristics
 from app.characteristics.tables import Characteristic
+from app.core.plausibility import uncorrected
 from app.core.variants import Results
 from app.errors import NotFound
 from app.machines.tables import Machine
 from app.offsets.tables import Correction
 from app.readings.answers import answer
+from app.readings.by_hand import queries as by_hand
+from app.readings.by_hand.wording import as_json as in_json
 from app.readings.records import Entry, Record
 from app.readings.tables import Exclusion, Reading, ReadingResults, ReadingTouches
 from app.readings.wording import reason
@@ -113,6 +116,21 @@ def record_of(session: Session, entry: Entry, sequence: int) -> Record:
     return Record(*row)
 
 
+def uncorrected_of(session: Session, machine_id: int, characteristic_id: int, sequence: int) -> float | None:
+    """What a reading would have deviated by without the corrections its part was cut with, mm; None if nobody knows."""
+    row = session.execute(
+        select(Reading.deviation, Reading.compensated, Reading.parameters_version).where(
+            Reading.machine_id == machine_id,
+            Reading.characteristic_id == characteristic_id,
+            Reading.sequence == sequence,
+        )
+    ).one_or_none()
+    if row is None or row.compensated is None:
+        return None
+    parameters = characteristics.parameters_of(session, machine_id, characteristic_id, row.parameters_version)
+    return uncorrected(row.deviation, row.compensated, parameters.factor)
+
+
 def first_answers(session: Session, entry: Entry, sequences: Iterable[int]) -> dict[int, dict[str, Any]]:
     """The answers that these readings were given when they came, by sequence."""
     rows = session.execute(
@@ -138,7 +156,9 @@ def detail(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
             ReadingTouches.sequence == sequence,
         )
     )
+    found = by_hand.of_readings(session, entry.machine_id, entry.characteristic_id, [sequence])
     return answers(session, entry, [record])[0] | {
+        "by_hand": [in_json(each) for each in found.get(sequence, ())],
         "touches": touches,
         "machined_at": record.machined_at,
         "correction_in_effect": record.correction_in_effect,

@@ -1,0 +1,98 @@
+"""What followed from an acknowledgement, in sentences."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from app.web.i18n import _, ngettext
+from app.web.numbers import mm, um
+
+MOST_NUMBERS = 5  # in one sentence
+
+
+def numbers(values: Sequence[int]) -> str:
+    """Numbers in a sentence, not more than one reads: `4, 5, 6 … 812`."""
+    if len(values) <= MOST_NUMBERS:
+        return ", ".join(map(str, values))
+    return f"{', '.join(map(str, values[: MOST_NUMBERS - 1]))} … {values[-1]}"
+
+
+def outcomes(outcome: Sequence[dict[str, Any]] | None) -> list[dict[str, Any]]:
+    """What followed, each with its sentence."""
+    if outcome is None:
+        return []
+    if not outcome:
+        return [{"code": "nothing_else", "text": _("Nothing else was changed.")}]
+    return [{**item, "text": _followed(item)} for item in outcome]
+
+
+def _followed(item: dict[str, Any]) -> str:
+    values = {
+        **item,
+        "offset": mm(item.get("offset")),
+        "amount": um(item.get("amount")),
+        "numbers": numbers(item.get("numbers", ())),
+        "sequences": numbers(item.get("sequences", ())),
+        "locations": numbers(item.get("locations", ())),
+        "characteristics": ", ".join(item.get("characteristics", ())),
+    }
+    count = len(item.get("numbers", ())) or len(item.get("sequences", ())) or len(item.get("locations", ()))
+    match item["code"]:
+        case "tool_restarted":
+            text = ngettext(
+                "Tool {tool} begins anew with offset {offset}; the old one cut {parts} part.",
+                "Tool {tool} begins anew with offset {offset}; the old one cut {parts} parts.",
+                item["parts"],
+            )
+        case "tool_changed_already":
+            text = _("Tool {tool} had been changed since, so nothing was restarted a second time.")
+        case "corrections_superseded":
+            text = ngettext("Correction {numbers} was dropped.", "Corrections {numbers} were dropped.", count)
+        case "averages_restarted":
+            text = ngettext(
+                "The running average R11 = {locations} begins at 0.",
+                "The running averages R11 = {locations} begin at 0.",
+                count,
+            )
+        case "correction_released":
+            text = _("Correction {number} of {amount} was released to the machine.")
+        case "nothing_held":
+            text = _("No correction was held any more.")
+        case "still_held":
+            text = _("Correction {number} is still held.")
+        case "readings_excluded":
+            text = ngettext(
+                "Reading {sequences} of {characteristic} was excluded.",
+                "Readings {sequences} of {characteristic} were excluded.",
+                count,
+            )
+        case "readings_excluded_before":
+            text = ngettext(
+                "Reading {sequences} of {characteristic} had been excluded before.",
+                "Readings {sequences} of {characteristic} had been excluded before.",
+                count,
+            )
+        case "correction_withdrawn":
+            text = _("Correction {number} of {amount} was withdrawn.")
+        case "correction_applied":
+            text = _("Correction {number} of {amount} is in the offset already; the next readings correct it.")
+        case "calibrated":
+            text = _("Calibration {number} was made.")
+        case "switched":
+            text = _("Tool {sister} goes on for tool {tool}; corrected by {characteristics}.")
+        case "switched_already":
+            text = _("Tool {sister} had taken over from tool {tool} already, so nothing was switched a second time.")
+        case "offset_set":
+            text = _("The offset of tool {tool} is {offset}.")
+        case "offset_told_already":
+            text = _("The offset of tool {tool} had been set by hand since, to {offset}.")
+        case "level_followed":
+            text = _("The next readings are expected where the jump has led.")
+        case "level_disagrees":
+            text = _("Readings since then lie where they were expected before the jump, so nothing of it is corrected.")
+        case "tool_resumed":
+            text = _("Compensation through tool {tool} goes on.")
+        case "resumed":
+            text = _("Compensation of {characteristic} goes on.")
+        case _:
+            return str(item["code"])
+    return text.format(**values)
