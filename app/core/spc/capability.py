@@ -1,0 +1,291 @@
+"""Capability: how wide the tolerance is, measured by the spread of the process.
+
+========  ==============================================================================
+Cp, Pp    (upper - lower) / (6 sigma)                                   two-sided limits only
+Cpk, Ppk  min((upper - mean), (mean - lower)) / (3 sigma)               the sides there are
+Cpm       (upper - lower) / (6 sqrt(s^2 + (mean - target)^2))           two-sided, with a target
+========  ==============================================================================
+
+Cp and Cpk take the sigma within (what the process could do), Pp, Ppk and Cpm the overall one (what it did). Sources:
+Montgomery, chapter 8; Kotz and Johnson, Process capability indices (1993); ISO 22514-2 for the percentile method;
+R. H. Kushler and P. Hurley, Confidence bounds for capability indices, J. Qual. Technol. 24 (1992) for the intervals.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from math import inf, sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+from scipy.special import ndtr, ndtri
+from scipy.stats import binom, chi2
+
+from app.core.spc.constants import NODES, WEIGHTS
+from app.core.spc.normality import FEWEST_FOR_ANDERSON, anderson_darling
+from app.core.spc.refusal import Floats, Reason, Refused, checked
+from app.core.spc.spread import Sigma, mean_of, moving_range, overall
+
+FEWEST_READINGS = 20
+"""Below it there is no index at all: with 20 readings the interval of Cp already reaches from 0.69 to 1.31 of it."""
+ENOUGH_READINGS = 100
+"""ISO 22514-2 asks for 100 readings and more for a preliminary number."""
+ENOUGH_FOR_PERCENTILES = 1000
+"""Fewer readings hold on average less than 1.35 values beyond each of the 0.135 % percentiles."""
+BELOW, ABOVE = 0.00135, 0.99865
+"""The percentiles that take the place of -3 sigma and +3 sigma (ISO 22514-2: X0.135 % and X99.865 %)."""
+
+
+class Caution(StrEnum):
+    """What a number should not be read without."""
+
+    FEW_READINGS = "few_readings"
+    NOT_IN_CONTROL = "not_in_control"
+    NOT_NORMAL = "not_normal"
+    FEW_FOR_PERCENTILES = "few_for_percentiles"
+    COMPENSATED = "compensated"
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Specification limits in the unit of the readings; None where a side has none."""
+
+    lower: float | None
+    upper: float | None
+    target: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse limits that limit nothing, or that are crossed."""
+        if self.lower is None and self.upper is None:
+            raise Refused(Reason.NO_LIMITS)
+        if self.lower is not None and self.upper is not None and not self.lower < self.upper:
+            raise Refused(Reason.LIMITS_CROSSED)
+
+
+@dataclass(frozen=True, slots=True)
+class Index:
+    """A capability index with its two-sided confidence interval; the method of the interval in `interval`."""
+
+    value: float
+    low: float | None
+    high: float | None
+    interval: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Capability:
+    """Everything said of one set of readings; an index is None where the limits do not define it.
+
+    ppm: parts per million expected out of tolerance under a normal distribution; observed: counted.
+    """
+
+    readings: int
+    mean: float
+    within: Sigma
+    overall: Sigma
+    confidence: float
+    cp: Index | None
+    cpk: Index
+    pp: Index | None
+    ppk: Index
+    cpm: Index | None
+    ppm_within: float
+    ppm_overall: float
+    ppm_observed: float
+    cautions: tuple[Caution, ...]
+
+
+def capability(
+    values: ArrayLike,
+    limits: Limits,
+    *,
+    within: Sigma | None = None,
+    confidence: float = 0.95,
+    minimum: int = FEWEST_READINGS,
+    cautions: tuple[Caution, ...] = (),
+) -> Capability:
+    """All indices. `within`: sigma from subgroups; without it the mean moving range gives it.
+
+    `cautions`: what the caller knows (a compensated process, a chart of its own that is out of control); passed on with what
+    is found here: few readings, more of them beyond 3 sigma than chance explains, a distribution that is not normal.
+
+    >>> c = capability([10, 12, 11, 13, 12], Limits(6, 16), minimum=5)
+    >>> round(c.cp.value, 4), round(c.cpk.value, 4), round(c.pp.value, 4), round(c.ppk.value, 4)
+    (1.2538, 1.1033, 1.4618, 1.2864)
+    """
+    if not 0 < confidence < 1:
+        raise ValueError(f"a confidence lies between 0 and 1, not at {confidence}")
+    x = checked(values, at_least=max(2, minimum))
+    mean, total = mean_of(x), overall(x)
+    inner = within or moving_range(x)
+    if not (inner.value > 0 and total.value > 0):
+        raise Refused(Reason.NO_VARIATION)
+    found = [*cautions]
+    if len(x) < ENOUGH_READINGS:
+        found.append(Caution.FEW_READINGS)
+    if not in_control(x, mean, inner):
+        found.append(Caution.NOT_IN_CONTROL)
+    if not looks_normal(x):
+        found.append(Caution.NOT_NORMAL)
+    return Capability(
+        readings=len(x),
+        mean=mean,
+        within=inner,
+        overall=total,
+        confidence=confidence,
+        cp=_spread_index(limits, inner, confidence),
+        cpk=_centred_index(limits, mean, inner, len(x), confidence),
+        pp=_spread_index(limits, total, confidence),
+        ppk=_centred_index(limits, mean, total, len(x), confidence),
+        cpm=_cpm(limits, mean, total, len(x), confidence),
+        ppm_within=expected_ppm(limits, mean, inner.value),
+        ppm_overall=expected_ppm(limits, mean, total.value),
+        ppm_observed=observed_ppm(limits, x),
+        cautions=tuple(dict.fromkeys(found)),
+    )
+
+
+def _spread_index(limits: Limits, sigma: Sigma, confidence: float) -> Index | None:
+    """Cp or Pp. Interval: value sqrt(chi2(q, df)/df), exact for the root of a variance (Montgomery, eq. 8.20)."""
+    if limits.lower is None or limits.upper is None:
+        return None
+    value = (limits.upper - limits.lower) / (6 * sigma.value)
+    low, high = _chi_square(value, sigma.degrees_of_freedom, confidence)
+    return Index(value, low, high, "chi_square")
+
+
+def _chi_square(value: float, freedom: float, confidence: float) -> tuple[float, float]:
+    tail = (1 - confidence) / 2
+    return (
+        value * sqrt(float(chi2.ppf(tail, freedom)) / freedom),
+        value * sqrt(float(chi2.ppf(1 - tail, freedom)) / freedom),
+    )
+
+
+def _centred_index(limits: Limits, mean: float, sigma: Sigma, readings: int, confidence: float) -> Index:
+    """Cpk or Ppk. One-sided limits have an exact interval (non-central t); two-sided ones that of Bissell.
+
+    Bissell (1990), How reliable is your capability index?, Appl. Stat. 39: value -/+ z sqrt(1/(9n) + value^2/(2 df)).
+    """
+    sides = []
+    if limits.upper is not None:
+        sides.append((limits.upper - mean) / (3 * sigma.value))
+    if limits.lower is not None:
+        sides.append((mean - limits.lower) / (3 * sigma.value))
+    value = min(sides)
+    if len(sides) == 1:
+        low, high = _noncentral(value, readings, sigma.degrees_of_freedom, confidence)
+        return Index(value, low, high, "noncentral_t")
+    reach = float(-ndtri((1 - confidence) / 2)) * sqrt(1 / (9 * readings) + value**2 / (2 * sigma.degrees_of_freedom))
+    return Index(value, value - reach, value + reach, "bissell")
+
+
+def _noncentral(value: float, readings: int, freedom: float, confidence: float) -> tuple[float, float]:
+    """Exact: 3 sqrt(n) C^ is a non-central t with df degrees of freedom and non-centrality 3 sqrt(n) C (Chou, Owen and Borrego 1990).
+
+    P(T <= t) = E Phi(t S - non-centrality) over S = sqrt(chi2/df), by Gauss-Legendre over all of S that has a weight.
+    """
+    scale = 3 * sqrt(readings)
+    near, tail = value * scale, (1 - confidence) / 2
+    low, high = (sqrt(float(chi2.ppf(q, freedom)) / freedom) for q in (1e-15, 1 - 1e-15))
+    s = (low + high) / 2 + (high - low) / 2 * NODES
+    density = WEIGHTS * chi2.pdf(s * s * freedom, freedom) * s
+    density /= density.sum()
+
+    def bound(share: float) -> float:
+        def away(noncentrality: float) -> float:
+            return float(density @ ndtr(near * s - noncentrality)) - share
+
+        return float(brentq(away, min(near * low, near * high) - 12, max(near * low, near * high) + 12)) / scale
+
+    return bound(1 - tail), bound(tail)
+
+
+def _cpm(limits: Limits, mean: float, sigma: Sigma, readings: int, confidence: float) -> Index | None:
+    """Cpm (Taguchi's index; Chan, Cheng and Spiring 1988), for the target, else the middle of the tolerance.
+
+    With tau^2 = s^2 + (mean - target)^2, s as for Pp. Interval: chi-square with the degrees of freedom
+    n (1 + d^2)^2 / (1 + 2 d^2), d = (mean - target)/s (Boyles 1991, The Taguchi capability index, J. Qual. Technol. 23).
+    """
+    if limits.lower is None or limits.upper is None:
+        return None
+    target = (limits.lower + limits.upper) / 2 if limits.target is None else limits.target
+    off = (mean - target) / sigma.value
+    value = (limits.upper - limits.lower) / (6 * sigma.value * sqrt(1 + off * off))
+    freedom = readings * (1 + off * off) ** 2 / (1 + 2 * off * off)
+    low, high = _chi_square(value, freedom, confidence)
+    return Index(value, low, high, "boyles")
+
+
+def expected_ppm(limits: Limits, mean: float, sigma: float) -> float:
+    """Parts per million beyond the limits under a normal distribution.
+
+    >>> round(expected_ppm(Limits(-3.0, 3.0), 0.0, 1.0), 1)
+    2699.8
+    """
+    above = 0.0 if limits.upper is None else float(ndtr(-(limits.upper - mean) / sigma))
+    below = 0.0 if limits.lower is None else float(ndtr(-(mean - limits.lower) / sigma))
+    return (above + below) * 1e6
+
+
+def observed_ppm(limits: Limits, values: Floats) -> float:
+    """Parts per million that were beyond the limits; a value on a limit is good."""
+    below = 0 if limits.lower is None else int((values < limits.lower).sum())
+    above = 0 if limits.upper is None else int((values > limits.upper).sum())
+    return (below + above) / len(values) * 1e6
+
+
+def in_control(values: Floats, mean: float, within: Sigma) -> bool:
+    """Whether no more readings lie beyond 3 sigma than chance brings in 999 of 1000 cases (binomial, 0.27 % each)."""
+    beyond = int((np.abs(values - mean) > 3 * within.value).sum())
+    return beyond <= int(binom.ppf(0.999, len(values), 2 * ndtr(-3.0)))
+
+
+def looks_normal(values: Floats) -> bool:
+    """Whether Anderson-Darling leaves p >= 0.005, on at most 5000 readings taken evenly: of more, rounding alone would be seen."""
+    if len(values) < FEWEST_FOR_ANDERSON:
+        return True
+    at = np.linspace(0, len(values) - 1, min(len(values), 5000)).round().astype(np.int64)
+    return anderson_darling(values[at]).p_value >= 0.005
+
+
+@dataclass(frozen=True, slots=True)
+class PercentileCapability:
+    """Ppk and Pp without a distribution: from the percentiles that hold the middle 99.73 % of the readings."""
+
+    readings: int
+    median: float
+    low: float
+    high: float
+    pp: float | None
+    ppk: float
+    ppm_observed: float
+    cautions: tuple[Caution, ...]
+
+
+def percentile(values: ArrayLike, limits: Limits, *, minimum: int = ENOUGH_READINGS) -> PercentileCapability:
+    """ISO 22514-2: Pp = (U - L)/(X99.865 - X0.135), Ppk = min((U - X50)/(X99.865 - X50), (X50 - L)/(X50 - X0.135)).
+
+    Percentiles of the readings as they are, median-unbiased (Hyndman and Fan, type 8). Of fewer than 1000 readings they are
+    hardly more than the extremes, and the result says so.
+
+    >>> c = percentile(np.arange(2001.0), Limits(-500, 2500))
+    >>> round(c.median), round(c.ppk, 3)
+    (1000, 1.503)
+    """
+    x = checked(values, at_least=max(2, minimum))
+    low, median, high = (float(each) for each in np.quantile(x, [BELOW, 0.5, ABOVE], method="median_unbiased"))
+    if not low < median < high:
+        raise Refused(Reason.NO_VARIATION)
+    upper = inf if limits.upper is None else (limits.upper - median) / (high - median)
+    lower = inf if limits.lower is None else (median - limits.lower) / (median - low)
+    return PercentileCapability(
+        readings=len(x),
+        median=median,
+        low=low,
+        high=high,
+        pp=None if limits.lower is None or limits.upper is None else (limits.upper - limits.lower) / (high - low),
+        ppk=min(upper, lower),
+        ppm_observed=observed_ppm(limits, x),
+        cautions=(Caution.FEW_FOR_PERCENTILES,) if len(x) < ENOUGH_FOR_PERCENTILES else (),
+    )

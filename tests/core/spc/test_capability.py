@@ -1,0 +1,202 @@
+"""Capability and normality: hand cases, invariances, intervals that hold what they promise, refusals and cautions."""
+
+from collections.abc import Callable
+from math import sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import anderson, nct
+
+from app.core.spc.capability import (
+    Capability,
+    Caution,
+    Limits,
+    capability,
+    expected_ppm,
+    observed_ppm,
+    percentile,
+)
+from app.core.spc.normality import anderson_darling, shapiro_wilk
+from app.core.spc.refusal import Reason, Refused
+from app.core.spc.spread import pooled, subgroups
+
+READINGS = st.lists(st.integers(-300, 300), min_size=20, max_size=80).filter(lambda values: len(set(values)) > 8)
+
+
+def of(values: list[float], lower: float, upper: float) -> Capability:
+    return capability(values, Limits(lower, upper))
+
+
+@given(values=READINGS, shift=st.integers(-50, 50), scale=st.sampled_from([0.001, 2.0, 100.0]))
+@settings(max_examples=60, deadline=None)
+def test_indices_do_not_know_the_unit(values: list[int], shift: int, scale: float) -> None:
+    before = of([float(value) for value in values], -350, 350)
+    after = of([scale * (value + shift) for value in values], scale * (shift - 350), scale * (shift + 350))
+    for name in ("cp", "cpk", "pp", "ppk", "cpm"):
+        old, new = getattr(before, name), getattr(after, name)
+        assert (new.value, new.low, new.high) == pytest.approx((old.value, old.low, old.high), rel=1e-6)
+    assert after.ppm_overall == pytest.approx(before.ppm_overall, rel=1e-6, abs=1e-9)
+    assert after.ppm_observed == before.ppm_observed
+
+
+@given(values=READINGS)
+@settings(max_examples=60, deadline=None)
+def test_a_mirrored_process_is_as_capable(values: list[int]) -> None:
+    before = of([float(value) for value in values], -310, 380)
+    after = of([-float(value) for value in values], -380, 310)
+    assert after.cpk.value == pytest.approx(before.cpk.value)
+    assert after.ppk.value == pytest.approx(before.ppk.value)
+    assert after.ppm_within == pytest.approx(before.ppm_within, rel=1e-9, abs=1e-9)
+
+
+@given(values=READINGS)
+@settings(max_examples=60, deadline=None)
+def test_no_index_is_larger_than_the_centred_one(values: list[int]) -> None:
+    found = of([float(value) for value in values], -310, 380)
+    assert found.cp
+    assert found.pp
+    assert found.cpm
+    assert found.cpk.value <= found.cp.value + 1e-12
+    assert found.ppk.value <= found.pp.value + 1e-12
+    assert found.cpm.value <= found.pp.value + 1e-12
+
+
+def test_one_sided_limits_have_one_sided_indices_alone() -> None:
+    values = np.random.default_rng(3).normal(10, 1, size=60)
+    found = capability(values, Limits(None, 13.0))
+    assert (found.cp, found.pp, found.cpm) == (None, None, None)
+    assert found.ppk.value == pytest.approx((13 - values.mean()) / (3 * values.std(ddof=1)))
+    assert found.ppk.interval == "noncentral_t"
+
+
+def test_the_one_sided_interval_is_that_of_the_non_central_t() -> None:
+    values = np.random.default_rng(4).normal(10, 1, size=35)
+    index = capability(values, Limits(None, 13.0)).ppk
+    scale = 3 * sqrt(35)
+    assert index.low is not None
+    assert index.high is not None
+    assert nct.cdf(index.value * scale, 34, index.low * scale) == pytest.approx(0.975, abs=1e-9)
+    assert nct.cdf(index.value * scale, 34, index.high * scale) == pytest.approx(0.025, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "lower", "truth"), [("cp", -4.0, 4 / 3), ("cpk", -4.0, 4 / 3), ("ppk", None, 4 / 3), ("cpm", -4.0, 4 / 3)]
+)
+def test_intervals_hold_the_truth_as_often_as_they_say(name: str, lower: float | None, truth: float) -> None:
+    rng = np.random.default_rng(12)
+    held = 0
+    for _ in range(600):
+        index = getattr(capability(rng.normal(size=40), Limits(lower, 4.0)), name)
+        held += index.low <= truth <= index.high
+    # The minimum of two sides lies below the truth a little more often than its interval allows for.
+    assert held / 600 == pytest.approx(0.95, abs=0.03)
+
+
+def test_sigma_from_subgroups_is_taken_where_it_is_given() -> None:
+    values = np.random.default_rng(5).normal(size=100)
+    sigma = pooled(subgroups(values, 5))
+    found = capability(values, Limits(-5, 5), within=sigma)
+    assert found.within is sigma
+    assert found.cp
+    assert found.cp.value == pytest.approx(10 / (6 * sigma.value))
+
+
+def test_parts_out_of_tolerance_are_counted_and_expected() -> None:
+    assert observed_ppm(Limits(0.0, 2.0), np.array([0.0, 1.0, 2.0, 2.5])) == 250_000
+    assert observed_ppm(Limits(None, 2.0), np.array([-9.0, 1.0, 2.0, 2.5])) == 250_000
+    assert expected_ppm(Limits(-6, 6), 1.5, 1.0) == pytest.approx(3.3977, abs=1e-4)  # the 3.4 ppm of six sigma
+
+
+class TestCautions:
+    def test_good_data_carries_its_numbers(self) -> None:
+        assert capability(np.random.default_rng(7).normal(size=300), Limits(-5, 5)).cautions == ()
+
+    def test_few_readings(self) -> None:
+        assert Caution.FEW_READINGS in capability(np.random.default_rng(7).normal(size=99), Limits(-5, 5)).cautions
+
+    def test_a_process_that_drifts_is_not_in_control(self) -> None:
+        drifting = np.random.default_rng(7).normal(size=300) + np.linspace(0, 20, 300)
+        assert Caution.NOT_IN_CONTROL in capability(drifting, Limits(-50, 50)).cautions
+
+    def test_a_skewed_process_is_not_normal(self) -> None:
+        skewed = np.random.default_rng(7).exponential(size=400)
+        assert Caution.NOT_NORMAL in capability(skewed, Limits(None, 10)).cautions
+
+    def test_what_the_caller_knows_is_passed_on_once(self) -> None:
+        values = np.random.default_rng(7).normal(size=50)
+        found = capability(values, Limits(-5, 5), cautions=(Caution.COMPENSATED, Caution.FEW_READINGS))
+        assert found.cautions == (Caution.COMPENSATED, Caution.FEW_READINGS)
+
+
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("values", "reason"),
+        [([], Reason.TOO_FEW_READINGS), ([1.0] * 19, Reason.TOO_FEW_READINGS), ([1.0] * 50, Reason.NO_VARIATION)],
+    )
+    def test_readings_that_carry_no_number(self, values: list[float], reason: Reason) -> None:
+        with pytest.raises(Refused) as refused:
+            of(values, 0, 2)
+        assert refused.value.reason is reason
+
+    def test_limits_that_limit_nothing_or_are_crossed(self) -> None:
+        for lower, upper, reason in ((None, None, Reason.NO_LIMITS), (2, 1, Reason.LIMITS_CROSSED)):
+            with pytest.raises(Refused) as refused:
+                Limits(lower, upper)
+            assert refused.value.reason is reason
+
+    def test_a_confidence_that_is_none(self) -> None:
+        with pytest.raises(ValueError, match="confidence"):
+            capability([1.0, 2.0], Limits(0, 2), confidence=95)
+
+
+class TestPercentiles:
+    def test_of_normal_readings_they_agree_with_the_indices(self) -> None:
+        values = np.random.default_rng(9).normal(10, 2, size=400_000)
+        by_percentile = percentile(values, Limits(0, 22))
+        assert by_percentile.ppk == pytest.approx(capability(values, Limits(0, 22)).ppk.value, rel=0.02)
+        assert by_percentile.cautions == ()
+
+    def test_of_a_skewed_process_they_tell_what_happens(self) -> None:
+        values = np.random.default_rng(9).exponential(size=100_000)
+        found = percentile(values, Limits(None, 6.6077))  # the true 99.865 % point
+        assert found.ppk == pytest.approx(1.0, abs=0.03)
+        assert found.pp is None
+
+    def test_of_few_readings_they_say_so_or_are_refused(self) -> None:
+        values = np.random.default_rng(9).normal(size=999)
+        assert percentile(values, Limits(-9, 9)).cautions == (Caution.FEW_FOR_PERCENTILES,)
+        with pytest.raises(Refused):
+            percentile(values[:99], Limits(-9, 9))
+        with pytest.raises(Refused):
+            percentile([1.0] * 100, Limits(0, 2))
+
+
+class TestNormality:
+    def test_the_statistic_is_scipys(self) -> None:
+        values = np.random.default_rng(2).gamma(3, size=80)
+        found = anderson(values, "norm", method="interpolated")
+        assert anderson_darling(values).statistic == pytest.approx(float(found.statistic), abs=1e-10)
+
+    def test_p_is_what_it_says_when_nothing_is_wrong(self) -> None:
+        rng = np.random.default_rng(13)
+        p = np.array([anderson_darling(rng.normal(size=30)).p_value for _ in range(4000)])
+        for level in (0.01, 0.05, 0.25, 0.5):
+            assert (p <= level).mean() == pytest.approx(level, abs=4 * sqrt(level * (1 - level) / 4000) + 0.005)
+
+    def test_a_far_outlier_is_no_nan(self) -> None:
+        found = anderson_darling([0.0] * 20 + [1e-9] * 20 + [1e9])
+        assert (np.isfinite(found.statistic), found.p_value) == (True, 0.0)
+
+    def test_what_they_cannot_test_is_refused(self) -> None:
+        wrongs: list[Callable[[], object]] = [
+            lambda: anderson_darling([1.0] * 7),
+            lambda: anderson_darling([1.0] * 20),
+            lambda: shapiro_wilk([1.0, 2.0]),
+            lambda: shapiro_wilk([3.0] * 20),
+            lambda: shapiro_wilk(np.arange(5001.0)),
+        ]
+        for wrong in wrongs:
+            with pytest.raises(Refused):
+                wrong()

@@ -1,0 +1,180 @@
+"""Gauge studies: what is put in comes out, and half a study is refused."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.core.spc.constants import d2, d2_star
+from app.core.spc.gauge import crossed, linearity, single, zero_range
+from app.core.spc.gauge.crossed import by_anova, by_average_and_range
+from app.core.spc.refusal import Reason, Refused
+from app.core.uncertainty import SignalPath, zero_range_floor
+
+
+def study(
+    parts: int = 200,
+    operators: int = 40,
+    trials: int = 3,
+    *,
+    equipment: float = 1.0,
+    appraiser: float = 0.7,
+    both: float = 0.0,
+) -> np.ndarray:
+    rng = np.random.default_rng(21)
+    return (
+        rng.normal(0, 3, size=(parts, 1, 1))
+        + rng.normal(0, appraiser, size=(1, operators, 1))
+        + rng.normal(0, 1, size=(parts, operators, 1)) * both
+        + rng.normal(0, equipment, size=(parts, operators, trials))
+    )
+
+
+class TestCrossed:
+    def test_the_components_that_were_put_in_come_out(self) -> None:
+        found = by_anova(study(both=0.5))
+        assert found.equipment == pytest.approx(1.0, rel=0.02)
+        assert found.appraiser == pytest.approx(0.7, rel=0.25)
+        assert found.interaction == pytest.approx(0.5, rel=0.05)
+        assert found.part == pytest.approx(3.0, rel=0.1)
+        assert not found.pooled
+        assert found.total**2 == pytest.approx(found.grr**2 + found.part**2)
+
+    def test_an_interaction_that_chance_explains_is_pooled(self) -> None:
+        readings = study(20, 3)
+        p_value = {line.source: line.p_value for line in by_anova(readings).table}["interaction"]
+        found = by_anova(readings, pooled_above=p_value - 1e-9)
+        assert (found.pooled, found.interaction) == (True, None)
+        left = readings - readings.mean(axis=2, keepdims=True)
+        assert found.equipment > by_anova(readings, pooled_above=p_value).equipment
+        assert by_anova(readings, pooled_above=p_value).equipment == pytest.approx(((left**2).sum() / 120) ** 0.5)
+
+    def test_ranges_agree_with_the_analysis_of_variance(self) -> None:
+        readings = study(30, 3)
+        anova, ranges = by_anova(readings), by_average_and_range(readings)
+        assert ranges.equipment == pytest.approx(anova.equipment, rel=0.1)
+        assert ranges.part == pytest.approx(anova.part, rel=0.2)
+
+    def test_one_operator_has_no_reproducibility(self) -> None:
+        readings = study(10, 1)
+        for found in (by_anova(readings), by_average_and_range(readings)):
+            assert found.appraiser == 0
+            assert found.grr == found.equipment
+        assert [line.source for line in by_anova(readings).table] == ["part", "repeatability", "total"]
+
+    def test_squares_add_up(self) -> None:
+        table = {line.source: line for line in by_anova(study(10, 3)).table}
+        parts = ("part", "operator", "interaction", "repeatability")
+        assert sum(table[source].squares for source in parts) == pytest.approx(table["total"].squares)
+        assert sum(table[source].freedom for source in parts) == table["total"].freedom
+
+    def test_few_ranges_are_divided_by_duncans_constant(self) -> None:
+        readings = study(5, 3, 2)
+        found = by_average_and_range(readings)
+        assert found.equipment == pytest.approx(np.ptp(readings, axis=2).mean() / d2_star(2, 15))
+        many = study(8, 2, 2)
+        assert by_average_and_range(many).equipment == pytest.approx(np.ptp(many, axis=2).mean() / d2(2))
+
+    @given(shift=st.floats(-1e3, 1e3), scale=st.sampled_from([-2.0, 0.001, 10.0]))
+    def test_they_move_and_stretch_with_their_readings(self, shift: float, scale: float) -> None:
+        readings = study(6, 3, 2, both=1.0)
+        for evaluate in (by_anova, by_average_and_range):
+            before, after = evaluate(readings), evaluate(shift + scale * readings)
+            for name in ("equipment", "appraiser", "part", "grr"):
+                assert getattr(after, name) == pytest.approx(abs(scale) * getattr(before, name), rel=1e-6, abs=1e-9)
+            assert after.ndc == before.ndc
+
+    @pytest.mark.parametrize(("shape", "what"), [((1, 3, 2), "parts"), ((5, 0, 2), "operators"), ((5, 3, 1), "trials")])
+    def test_half_a_study_is_refused_by_what_it_lacks(self, shape: tuple[int, int, int], what: str) -> None:
+        with pytest.raises(Refused) as refused:
+            by_anova(np.ones(shape))
+        assert (refused.value.reason, refused.value.what) == (Reason.INCOMPLETE_STUDY, what)
+
+    def test_a_missing_reading_and_equal_readings_are_refused(self) -> None:
+        readings = study(5, 2)
+        readings[0, 0, 0] = np.nan
+        for wrong in (readings, np.ones((5, 2, 2))):
+            for evaluate in (by_anova, by_average_and_range):
+                with pytest.raises(Refused):
+                    evaluate(wrong)
+        with pytest.raises(ValueError, match="shape"):
+            crossed.by_anova([[1.0, 2.0]])
+
+    def test_percentages(self) -> None:
+        found = by_anova(study(10, 3))
+        assert found.percent(found.total) == pytest.approx(100)
+        assert found.percent_tolerance(0.001, 0.060) == pytest.approx(10)
+
+
+class TestSingle:
+    def test_bias_takes_from_cgk_what_it_takes_of_the_tolerance(self) -> None:
+        rng = np.random.default_rng(31)
+        values = rng.normal(size=50)
+        values = (values - values.mean()) / values.std(ddof=1)
+        # s = 1 µm, bias 1 µm, tolerance 60 µm: 20 % of it are 12 µm; 12/6 = 2, (6 - 1)/3.
+        found = single.type_one(0.001 * values + 25.001, 25.0, 0.060, resolution=0.0001)
+        assert (found.cg, found.cgk) == pytest.approx((2.0, 5 / 3))
+        assert found.resolved
+        assert found.capable()
+        assert not found.capable(1.67)
+        assert found.bias.significant
+        assert not found.few
+
+    def test_a_coarse_gauge_is_told(self) -> None:
+        found = single.type_one([1.0, 1.01] * 6, 1.0, 0.1, resolution=0.01)
+        assert found.resolved is False
+        assert found.few
+
+    def test_refusals(self) -> None:
+        wrongs: list[Callable[[], object]] = [
+            lambda: single.type_one([1.0] * 9, 1.0, 0.1),
+            lambda: single.type_one([1.0] * 30, 1.0, 0.1),
+            lambda: single.type_one([1.0, 1.1] * 15, 1.0, 0.0),
+        ]
+        for wrong in wrongs:
+            with pytest.raises(Refused):
+                wrong()
+
+
+class TestLinearity:
+    def test_a_line_that_was_put_in_comes_out(self) -> None:
+        rng = np.random.default_rng(41)
+        taken = {size: size + 0.01 - 0.002 * size + rng.normal(0, 0.001, 50) for size in (1.0, 5.0, 9.0)}
+        found = linearity.linearity(taken)
+        assert found.slope.value == pytest.approx(-0.002, abs=2e-4)
+        assert found.intercept.value == pytest.approx(0.01, abs=1e-3)
+        value, low, high = found.line_at(5.0)
+        assert low < 0.0 + value < high
+        assert high - low < found.line_at(20.0)[2] - found.line_at(20.0)[1]
+
+    def test_refusals(self) -> None:
+        for wrong in ({1.0: [1.0, 1.1]}, {1.0: [1.0], 2.0: [2.1]}, {1.0: [1.0, 1.0], 2.0: [2.0, 2.0]}):
+            with pytest.raises(Refused):
+                linearity.linearity(wrong)
+
+
+class TestZeroRange:
+    def test_it_reaches_as_far_as_chance(self) -> None:
+        assert zero_range.suggest(0.001).zero_range == 0.003
+        assert zero_range.suggest(0.001, repeats=4).zero_range == 0.0015
+
+    def test_never_below_what_the_signal_path_does(self) -> None:
+        floor = zero_range_floor(SignalPath.PLC, feed=600, delay=0.25)
+        found = zero_range.suggest(0.00001, floor=floor)
+        assert found.zero_range >= floor
+        assert found.governs is zero_range.Governs.SIGNAL_PATH
+
+    def test_parts_that_scatter_more_than_the_gauge_govern(self) -> None:
+        found = zero_range.suggest(0.0003, process=0.002, averaging_limit=0.005)
+        assert (found.zero_range, found.governs, found.fits) == (0.006, zero_range.Governs.PROCESS, False)
+        assert zero_range.suggest(0.0003, process=0.0001).governs is zero_range.Governs.REPEATABILITY
+
+    def test_it_is_rounded_up_to_what_the_control_takes(self) -> None:
+        assert zero_range.suggest(0.00034, resolution=0.001).zero_range == 0.002
+        assert zero_range.suggest(0.001, resolution=0.001).zero_range == 0.003
+
+    def test_nothing_comes_of_nothing(self) -> None:
+        with pytest.raises(Refused):
+            zero_range.suggest(0.0)
