@@ -120,3 +120,6 @@ class Correction(Base):
     applied_at: Mapped[datetime | None]
     applied_by: Mapped[str | None]
     offset_after: Mapped[float | None]
+    fetched_at: Mapped[datetime | None]  # as program text, which may be run at any time from then on
+    fetched_by: Mapped[str | None]
+    fetched_as: Mapped[str | None]  # the form of the text and its check sum

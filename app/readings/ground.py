@@ -49,6 +49,7 @@ class IssuedCorrection:
     size_error: float = 0.0
     applied_at: datetime | None = None
     decided_at: datetime | None = None  # a person approved or released it
+    fetched_at: datetime | None = None  # as program text: the control applies it behind those fetched before
     applied_by: str | None = None
     offset_after: float | None = None
     superseded_by: int | None = None
@@ -114,6 +115,7 @@ class Named:
 
     applied_at: datetime | None
     decided_at: datetime | None
+    fetched_at: datetime | None = None
 
 
 class Known(NamedTuple):

@@ -203,16 +203,18 @@ def _confirm(ground: Ground, stream: StreamState, tool: ToolState, in_effect: in
 def _had(correction: IssuedCorrection, in_effect: int, last: Named | None) -> bool:
     """Whether a machine whose last applied correction was `in_effect` had applied this one too.
 
-    Corrections take effect in the order of their numbers, but one that waited for a person may have been overtaken.
+    Corrections take effect in the order of their numbers, but one that waited for a person may have been overtaken: by
+    those that were applied, or fetched as program text, before it was let go.
     """
     if correction.number == in_effect:
         return True
     if correction.number < in_effect:
-        since = last.applied_at if last is not None else None
+        since = (last.fetched_at or last.applied_at) if last is not None else None
         return correction.decided_at is None or since is None or correction.decided_at <= since
-    if last is None or last.decided_at is None or correction.applied_at is None:
+    since = correction.fetched_at or correction.applied_at
+    if last is None or last.decided_at is None or since is None:
         return False
-    return correction.applied_at < last.decided_at
+    return since < last.decided_at
 
 
 def _cut_before_reset(tool: ToolState, reading: ReadingIn, last: Named | None) -> bool:

@@ -31,7 +31,7 @@ SELECT 1 / (count(*) = json_array_length($1))::int FROM moved
 LOAD = """
 WITH doc AS MATERIALIZED (SELECT $1::json AS d),
 named AS MATERIALIZED (
-    SELECT c.machine_id, c.number, c.applied_at, c.decided_at
+    SELECT c.machine_id, c.number, c.applied_at, c.decided_at, c.fetched_at
     FROM json_to_recordset((SELECT d -> 'named' FROM doc)) AS w(machine_id int, number int)
     JOIN correction c ON c.machine_id = w.machine_id AND c.number = w.number
 )
@@ -40,16 +40,17 @@ SELECT json_build_object(
         SELECT json_agg(json_build_array(s.machine_id, s.characteristic_id, s.sequence, s.parameters_version, s.paused_by,
             s.last_measured_at, a.location, a.average, a.empirical_value, t.number, t."offset", t.total, t.reset_at,
             CASE WHEN t.number IS NOT NULL THEN (
-                SELECT json_agg(json_build_array(c.number, c.amount, c.status, c.applied_at, c.decided_at) ORDER BY c.number) FROM (
-                    SELECT number, amount, status, applied_at, decided_at FROM correction
+                SELECT json_agg(json_build_array(
+                    c.number, c.amount, c.status, c.applied_at, c.decided_at, c.fetched_at) ORDER BY c.number) FROM (
+                    SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
                     WHERE machine_id = t.machine_id AND tool_memory = t.number
                         AND status IN ('held', 'awaiting_approval', 'pending')
                     UNION ALL
-                    SELECT number, amount, status, applied_at, decided_at FROM correction
+                    SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
                     WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
                         AND number > w.number
                     UNION ALL
-                    SELECT number, amount, status, applied_at, decided_at FROM correction
+                    SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
                     WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
                         AND applied_at > least(
                             w.since, (SELECT min(n.applied_at) FROM named n WHERE n.machine_id = t.machine_id)
@@ -62,7 +63,7 @@ SELECT json_build_object(
         LEFT JOIN average_memory a ON a.machine_id = s.machine_id AND a.location = s.average_memory
         LEFT JOIN tool t ON t.machine_id = s.machine_id AND t.number = s.tool_memory
     ),
-    'named', (SELECT json_agg(json_build_array(machine_id, number, applied_at, decided_at)) FROM named),
+    'named', (SELECT json_agg(json_build_array(machine_id, number, applied_at, decided_at, fetched_at)) FROM named),
     'known', (
         SELECT json_agg(json_build_array(r.characteristic_id, r.key, r.sequence, r.measured, r.parameters_version))
         FROM json_to_recordset((SELECT d -> 'keys' FROM doc)) AS w(machine_id int, characteristic_id int, key text)

@@ -63,6 +63,7 @@ class _Issued(msgspec.Struct, array_like=True):
     status: str
     applied_at: datetime | None
     decided_at: datetime | None
+    fetched_at: datetime | None
 
 
 class _Stream(msgspec.Struct, array_like=True):
@@ -84,7 +85,7 @@ class _Stream(msgspec.Struct, array_like=True):
 
 class _Loaded(msgspec.Struct):
     streams: list[_Stream]
-    named: list[tuple[int, int, datetime | None, datetime | None]] | None
+    named: list[tuple[int, int, datetime | None, datetime | None, datetime | None]] | None
     known: list[tuple[int, str, int, float, int]] | None
 
 
@@ -126,8 +127,8 @@ async def load(
         ground.clear()
     for machine_id, last, version in states:
         ground.last_correction[machine_id], ground.versions[machine_id] = last, version
-    for machine_id, number, applied_at, decided_at in loaded.named or ():
-        ground.named[machine_id, number] = Named(applied_at, decided_at)
+    for machine_id, number, applied_at, decided_at, fetched_at in loaded.named or ():
+        ground.named[machine_id, number] = Named(applied_at, decided_at, fetched_at)
         if applied_at is not None:
             since = machines[machine_id]["since"]
             machines[machine_id]["since"] = applied_at if since is None else min(since, applied_at)
@@ -195,6 +196,7 @@ def _add_stream(
                 c.status,
                 applied_at=c.applied_at,
                 decided_at=c.decided_at,
+                fetched_at=c.fetched_at,
             )
             for c in row.corrections or ()
         ]

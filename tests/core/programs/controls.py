@@ -72,7 +72,7 @@ class Sinumerik(Control):
     def _value(self, expression: str) -> Any:
         expression = re.sub(r"\$TC_DP\d+\[\d+,\d+\]", lambda found: f"W('{found[0][1:]}')", expression)
         expression = re.sub(r"\bR(\d+)", r"V(\1)", expression).replace("<>", "!=").replace(" AND ", " and ")
-        names = {
+        names: dict[str, Callable[..., float]] = {
             "W": lambda name: self.wear.get(f"${name}", 0.0),
             "V": lambda n: self.variables.get(n, 0.0),
             "ABS": abs,
