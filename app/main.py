@@ -26,6 +26,7 @@ from app.people import pages as sign_in_pages
 from app.people.keys import KeyRing
 from app.plant import pages as plant_pages
 from app.readings import api as readings
+from app.readings.by_hand import api as by_hand
 from app.readings.door import Directory, ReadingsDoor
 from app.readings.importing import pages as import_pages
 from app.readings.writer import Writer
@@ -49,6 +50,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     statistics.router,
     readings.push,
     readings.router,
+    by_hand.router,
     offsets.router,
     edges_api.router,
     alarms.router,

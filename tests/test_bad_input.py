@@ -49,6 +49,11 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/readings": FULL_READING,
     "POST /api/v1/readings/batch": FULL_READING | {"key": "bad-input-2"},  # sent as a list of one
     "POST /api/v1/readings/{characteristic}/{sequence}/exclude": WHY,
+    "POST /api/v1/readings/{characteristic}/{sequence}/by-hand": {
+        "measured": 40.001,
+        "verdict": "good",
+        "comment": "Micrometer",
+    },
     "PUT /api/v1/machines/{machine}/tools/{tool}": {"offset": 0.01} | WHY,
     "POST /api/v1/machines/{machine}/tools/{tool}/change": {"offset": 0.01} | WHY,
     "PATCH /api/v1/machines/{machine}/tools/{tool}": {

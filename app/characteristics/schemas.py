@@ -10,7 +10,6 @@ from app.characteristics.tables import ParametersVersion
 from app.core.parameters import FIELDS, Kind, ParameterError, Parameters, Problem, read
 from app.core.zones import nanometres
 from app.errors import FieldError
-from app.machines.tables import Machine
 from app.web.fields import Body, Reason, Slug, Text200
 
 PARAMETERS: dict[str, JsonValue] = {
@@ -177,14 +176,14 @@ class VersionOut(BaseModel):
     parameters: Annotated[dict[str, Any], Field(json_schema_extra=parameters_schema())]
 
 
-def warnings_of(parameters: Parameters, machine: Machine) -> list[FieldError]:
-    """What of a set is outside the ranges printed for the control, or finer than the machine's probe tells."""
+def warnings_of(parameters: Parameters, zero_range_floor: float) -> list[FieldError]:
+    """What of a set is outside the ranges printed for the control, or finer than the machine's probe tells (mm)."""
     try:
         unusual = read(parameters.as_dict())[1]
     except ParameterError:  # made when rules were others
         unusual = []
-    if nanometres(parameters.zero_range) < nanometres(machine.zero_range_floor):
-        values = {"value": parameters.zero_range, "floor": machine.zero_range_floor}
+    if nanometres(parameters.zero_range) < nanometres(zero_range_floor):
+        values = {"value": parameters.zero_range, "floor": zero_range_floor}
         unusual.append(Problem("zero_range", "signal_path", values, warning=True))
     return wording.field_errors(unusual)
 
@@ -200,7 +199,10 @@ def characteristic_out(standing: queries.Standing) -> CharacteristicOut:
         parameters=wording.in_order(version.parameters),
         parameters_version=version.version,
         created_at=characteristic.created_at,
-        warnings=[Warned(field=field, message=message) for field, message in warnings_of(standing.parameters, machine)],
+        warnings=[
+            Warned(field=field, message=message)
+            for field, message in warnings_of(standing.parameters, machine.zero_range_floor)
+        ],
     )
 
 

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue
 from app.core.compensation import Action, needs_approval
 from app.core.parameters import Parameters
 from app.core.variants import Results
+from app.readings.by_hand.schemas import BY_HAND, HandMeasurementOut
 from app.readings.records import Record
 from app.readings.wording import reason
 
@@ -89,7 +90,7 @@ ANSWER: dict[str, JsonValue] = {
     "parameters_version": 4,
 }
 ROW = ANSWER | {"excluded": None}
-DETAIL = ROW | {"touches": None, "machined_at": None, "correction_in_effect": 17}
+DETAIL = ROW | {"by_hand": [BY_HAND], "touches": None, "machined_at": None, "correction_in_effect": 17}
 
 
 class IssuedCorrection(BaseModel):
@@ -192,6 +193,7 @@ class ReadingDetail(ReadingRow):
 
     model_config = ConfigDict(json_schema_extra={"example": DETAIL})
 
+    by_hand: Annotated[list[HandMeasurementOut], Field(description="What people measured on this part.")]
     touches: Annotated[list[list[float]] | None, Field(description="One list per point, each with its repeats.")]
     machined_at: datetime | None
     correction_in_effect: int | None

@@ -9,9 +9,12 @@ import msgspec
 from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
+from app.core.variants import Results
 from app.formats.delimited import defused
+from app.readings.by_hand import queries as by_hand
+from app.readings.by_hand.wording import verdict_of
 from app.readings.records import Entry
-from app.readings.tables import Exclusion, Reading, ReadingTouches
+from app.readings.tables import Exclusion, Reading, ReadingResults, ReadingTouches
 
 COLUMNS = (
     "sequence",
@@ -33,7 +36,11 @@ COLUMNS = (
     "parameters_version",
     "late",
     "excluded",
+    *Results._fields,
+    "hand_measured",
+    "hand_verdict",
 )
+OF_READING = COLUMNS[: COLUMNS.index("excluded")]
 AT_ONCE = 2_000
 
 
@@ -46,9 +53,10 @@ def rows(
     last: int | None = None,
 ) -> Iterator[dict[str, Any]]:
     """Readings in the order of their arrival: measured from `since` on and before `until`, of the last `last`."""
+    hand = by_hand.latest_of_each()
     here = (Reading.machine_id == entry.machine_id, Reading.characteristic_id == entry.characteristic_id)
     query = (
-        select(Reading, ReadingTouches.touches, Exclusion.reason)
+        select(Reading, ReadingTouches.touches, Exclusion.reason, ReadingResults, hand.measured, hand.good)
         .outerjoin(
             ReadingTouches,
             (ReadingTouches.machine_id == Reading.machine_id)
@@ -60,6 +68,18 @@ def rows(
             (Exclusion.machine_id == Reading.machine_id)
             & (Exclusion.characteristic_id == Reading.characteristic_id)
             & (Exclusion.sequence == Reading.sequence),
+        )
+        .outerjoin(
+            ReadingResults,
+            (ReadingResults.machine_id == Reading.machine_id)
+            & (ReadingResults.characteristic_id == Reading.characteristic_id)
+            & (ReadingResults.sequence == Reading.sequence),
+        )
+        .outerjoin(
+            hand,
+            (hand.machine_id == Reading.machine_id)
+            & (hand.characteristic_id == Reading.characteristic_id)
+            & (hand.sequence == Reading.sequence),
         )
         .where(*here)
         .order_by(Reading.sequence)
@@ -75,10 +95,18 @@ def rows(
             query = query.where(Reading.sequence > before)
     # Whoever reads the file may be slow.
     session.execute(text("SET LOCAL idle_in_transaction_session_timeout = 0"))
-    for reading, touches, excluded in session.execute(query.execution_options(yield_per=AT_ONCE)):
-        row = {name: getattr(reading, name) for name in COLUMNS if name not in {"decided_deviation", "excluded"}}
-        yield row | {"decided_deviation": reading.decided, "excluded": excluded, "touches": touches}
-        session.expunge(reading)
+    found = session.execute(query.execution_options(yield_per=AT_ONCE))
+    for reading, touches, excluded, results, measured, good in found:
+        row = {name: getattr(reading, name) for name in OF_READING if name != "decided_deviation"}
+        row |= {name: getattr(results, name, None) for name in Results._fields}
+        yield row | {
+            "decided_deviation": reading.decided,
+            "excluded": excluded,
+            "hand_measured": measured,
+            "hand_verdict": verdict_of(good),
+            "touches": touches,
+        }
+        session.expunge_all()
 
 
 def write_csv(found: Iterator[dict[str, Any]], file: TextIO) -> int:

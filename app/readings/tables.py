@@ -9,7 +9,18 @@ and is never deleted, so a check per row would only cost time.
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ARRAY, BigInteger, ForeignKeyConstraint, Index, Integer, SmallInteger, func, text
+from sqlalchemy import (
+    ARRAY,
+    BigInteger,
+    CheckConstraint,
+    ForeignKeyConstraint,
+    Identity,
+    Index,
+    Integer,
+    SmallInteger,
+    func,
+    text,
+)
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
@@ -125,6 +136,30 @@ class ReadingResults(Base):
     repeat_deviation: Mapped[float | None]
     sections_outside: Mapped[int | None] = mapped_column(SmallInteger)
     rejected: Mapped[bool | None]
+
+
+class HandMeasurement(Base):
+    """What a person found on the part of a reading: a size, mm, or only whether it is good; `alarm` if entered there.
+
+    Any number of them per reading; none replaces the machine's value.
+    """
+
+    __tablename__ = "hand_measurement"
+    __table_args__ = (
+        ForeignKeyConstraint(["machine_id", "characteristic_id"], ["characteristic.machine_id", "characteristic.id"]),
+        CheckConstraint("measured IS NOT NULL OR good IS NOT NULL", name="something"),
+    )
+
+    machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    characteristic_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    sequence: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True)
+    at: Mapped[datetime] = mapped_column(server_default=func.now())
+    actor: Mapped[str]
+    measured: Mapped[float | None]
+    good: Mapped[bool | None]
+    comment: Mapped[str | None]
+    alarm: Mapped[int | None] = mapped_column(BigInteger)
 
 
 class Exclusion(Base):

@@ -160,7 +160,7 @@ def _characteristic(
         machine=standing.machine,
         version=standing.version,
         problem=problem,
-        warnings=actions.warnings_of(standing.parameters, standing.machine),
+        warnings=actions.warnings_of(standing.parameters, standing.machine.zero_range_floor),
         history=history(queries.versions(session, characteristic)),
         **_form(typed, errors or {}),
     )

@@ -81,7 +81,7 @@ def test_a_reading_without_results_has_none_and_no_row(shop: Shop, server: Serve
 def test_sent_again_the_first_results_come_again(shop: Shop) -> None:
     name = f"{shop.characteristic}-v"
     shop.add(name, variant="round", points=2, average_memory=0)
-    body = {"characteristic": name, "touches": [[40.0], [40.002]], "key": "k"}
+    body: dict[str, Any] = {"characteristic": name, "touches": [[40.0], [40.002]], "key": "k"}
     first = shop.call("POST", "/readings", 201, **body)
     assert first["results"]["out_of_roundness"] == 0.002
     assert shop.call("POST", "/readings", 200, **body) == first
