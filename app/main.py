@@ -11,6 +11,8 @@ from starlette.types import ASGIApp
 from app.alarms import api as alarms
 from app.alarms import pages as alarm_pages
 from app.audit import api as audit
+from app.calibration import api as calibration
+from app.calibration.overdue import raise_overdue
 from app.characteristics import api as characteristics
 from app.characteristics import figures_api
 from app.characteristics import pages as characteristic_pages
@@ -18,7 +20,7 @@ from app.db.engine import Database
 from app.machines import api as machines
 from app.offsets import api as offsets
 from app.offsets import chores as offset_chores
-from app.offsets import edges_api
+from app.offsets import edge_pages, edges_api, queue_pages
 from app.offsets import pages as offset_pages
 from app.people import api as people
 from app.people import keys_api
@@ -52,6 +54,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     readings.router,
     by_hand.router,
     offsets.router,
+    calibration.router,
     edges_api.router,
     alarms.router,
     events_api.router,
@@ -63,6 +66,8 @@ ROUTERS: tuple[APIRouter, ...] = (
     plant_pages.router,
     characteristic_pages.router,
     alarm_pages.router,
+    queue_pages.router,
+    edge_pages.router,
     offset_pages.router,
     sign_in_pages.router,
     setup_pages.router,
@@ -73,6 +78,7 @@ ROUTERS: tuple[APIRouter, ...] = (
 CHORES: tuple[Chore, ...] = (
     Chore("corrections expire", offset_chores.expire_corrections),
     Chore("tool lives are told", offset_chores.tell_tool_lives),
+    Chore("calibrations are overdue", raise_overdue),
 )
 
 

@@ -9,28 +9,27 @@ from app.errors import NotFound
 from app.offsets import wording
 from app.offsets.actions import Verb
 from app.offsets.queries import AverageRow, CorrectionRow, ToolRow
+from app.offsets.tables import Tool
 from app.web.i18n import _, ngettext
 from app.web.numbers import mm, um
 
 
 @dataclass(frozen=True)
 class Question:
-    """The second touch, in words. ``number`` is the field for a length (mm), if there is one; ``send_to`` lies below the
-    machine's address.
-    """
+    """The second touch, in words. ``number`` is the field for a length (mm), if there is one; ``hidden`` goes along unseen."""
 
     title: str
     button: str
     send_to: str
     follows: list[str]
     reasons: list[str] = field(default_factory=list)
-    do: str | None = None
     number: str | None = None
     number_label: str = ""
     number_r: str | None = None
     number_value: str = ""
     number_hint: str = ""
     number_needed: bool = False
+    hidden: dict[str, str] = field(default_factory=dict)
 
 
 def plain(length: float) -> str:
@@ -64,12 +63,13 @@ def verb_word(verb: str) -> str:
     }.get(verb, verb)
 
 
-def about_correction(row: CorrectionRow, verb: str, counting_on: list[int]) -> Question:
+def about_correction(row: CorrectionRow, verb: str, counting_on: list[int], came_from: str | None = None) -> Question:
     """Asks before a correction is approved, released, rejected or marked applied. counting_on: see the query of that name."""
     c = row.correction
+    hidden = {"do": verb} | ({"from": came_from} if came_from else {})
     values = {"number": c.number, "amount": um(c.amount), "tool": c.tool_memory, "machine": row.machine}
     after = "–" if row.expected is None else mm(row.expected)
-    send_to = f"corrections/{c.number}"
+    send_to = f"/machines/{row.machine}/corrections/{c.number}"
     to_machine = _("The machine fetches it and changes the offset of tool {tool} by {amount}.").format(**values)
     match verb:
         case "applied":
@@ -81,7 +81,7 @@ def about_correction(row: CorrectionRow, verb: str, counting_on: list[int]) -> Q
                     _("The offset of tool {tool} changes by {amount}, to {after}.").format(**values, after=after),
                     _("Say what the control shows if it shows another offset."),
                 ],
-                do=verb,
+                hidden=hidden,
                 number="offset_after",
                 number_label=_("Offset the control shows"),
                 number_r=f"R10 = {c.tool_memory}",
@@ -94,16 +94,16 @@ def about_correction(row: CorrectionRow, verb: str, counting_on: list[int]) -> Q
                 send_to,
                 [to_machine],
                 [_("Part measured, agrees"), _("Process is known"), _("As expected")],
-                do=verb,
+                hidden=hidden,
             )
         case "release":
             return Question(
                 _("Release correction {number}?").format(**values),
                 _("Release"),
                 send_to,
-                [to_machine, _("The alarm “tool worn” stays until it is acknowledged.")],
+                [to_machine, _("Its alarm stays until it is acknowledged; better decide there.")],
                 [_("Edge looked at, still good"), _("Until the end of the batch"), _("Replaced at next stop")],
-                do=verb,
+                hidden=hidden,
             )
         case _:
             return Question(
@@ -117,11 +117,32 @@ def about_correction(row: CorrectionRow, verb: str, counting_on: list[int]) -> Q
                     *filter(None, [wording.counted_on(counting_on)]),
                 ],
                 [_("False reading"), _("Not applied at the machine"), _("Set by hand instead")],
-                do=verb,
+                hidden=hidden,
             )
 
 
-def about_tool(row: ToolRow, what: str) -> Question:
+def about_all(machine: str, tool: Tool, numbers: list[int], total: float, after: float) -> Question:
+    """Asks before all that awaits approval for one tool is approved together."""
+    return Question(
+        ngettext(
+            "Approve {n} correction of tool {tool}?", "Approve {n} corrections of tool {tool}?", len(numbers)
+        ).format(n=len(numbers), tool=tool.number),
+        _("Approve all"),
+        f"/corrections/{machine}/tools/{tool.number}",
+        [
+            ngettext("Correction {numbers}: {total}.", "Corrections {numbers}: {total} in all.", len(numbers)).format(
+                numbers=", ".join(map(str, numbers)), total=um(total)
+            ),
+            _("The machine fetches them; the offset of tool {tool} goes from {offset} to {after}.").format(
+                tool=tool.number, offset=mm(tool.offset), after=mm(after)
+            ),
+        ],
+        [_("Part measured, agrees"), _("Process is known"), _("As expected")],
+        hidden={"numbers": " ".join(map(str, numbers))},
+    )
+
+
+def about_tool(row: ToolRow, machine: str, what: str) -> Question:
     """Asks before an offset is set by hand or a tool changed. Raises `NotFound` for anything else."""
     number = row.tool.number
     values = {"tool": number, "offset": mm(row.tool.offset), "parts": row.parts}
@@ -133,7 +154,7 @@ def about_tool(row: ToolRow, what: str) -> Question:
             return Question(
                 _("Set the offset of tool {tool} by hand").format(**values),
                 _("Set the offset"),
-                f"tools/{number}/edit",
+                f"/machines/{machine}/tools/{number}/edit",
                 [_("Known until now: {offset}.").format(**values), *follows],
                 [_("Set at the control"), _("Part measured by hand"), _("Typing error corrected")],
                 number="offset",
@@ -146,7 +167,7 @@ def about_tool(row: ToolRow, what: str) -> Question:
             return Question(
                 _("Tool {tool} was changed?").format(**values),
                 _("Tool changed"),
-                f"tools/{number}/change",
+                f"/machines/{machine}/tools/{number}/change",
                 [
                     ngettext(
                         "The old tool cut {parts} part. Parts and sum of corrections begin at 0.",
@@ -161,17 +182,33 @@ def about_tool(row: ToolRow, what: str) -> Question:
                 number_r=f"R10 = {number}",
                 number_hint="0.0000",
             )
+        case "sister" if row.tool.sister is not None and row.characteristics:
+            values["sister"] = row.tool.sister
+            follows = [
+                _(
+                    "{characteristics} correct tool {sister} from now on: a new version of the parameters of each."
+                ).format(characteristics=", ".join(row.characteristics), **values),
+                *follows,
+                _("Select tool {sister} at the machine before the next part.").format(**values),
+            ]
+            return Question(
+                _("Switch from tool {tool} to its sister {sister}?").format(**values),
+                _("Switch"),
+                f"/machines/{machine}/tools/{number}/sister",
+                follows,
+                [_("Edge worn"), _("Insert chipped"), _("Planned life reached")],
+            )
         case _:
             raise NotFound(_("There is nothing at this address."), _("Go back to the tool memory."))
 
 
-def about_average(row: AverageRow) -> Question:
+def about_average(row: AverageRow, machine: str) -> Question:
     """Asks before an empirical value is set."""
     memory = row.memory
     return Question(
         _("Set the empirical value of R11 = {location}").format(location=memory.location),
         _("Set the empirical value"),
-        f"averages/{memory.location}/edit",
+        f"/machines/{machine}/averages/{memory.location}/edit",
         [
             _("It is taken off every measurement: machine reading minus true value."),
             _("The running average {average} begins at 0.").format(average=um(memory.average)),
@@ -191,9 +228,12 @@ def done(verb: str, number: int) -> str | None:
         "applied": _("Correction {n} is applied."),
         "approve": _("Correction {n} is approved; it waits for the machine."),
         "release": _("Correction {n} is released; it waits for the machine."),
+        "approve-all": _("All that awaited approval for tool {n} is approved; it waits for the machine."),
         "rejected": _("Correction {n} is rejected."),
         "edit": _("The offset of tool {n} is set."),
         "change": _("Tool {n} begins anew."),
+        "sister": _("Tool {n} goes on as the sister tool. Select it at the machine."),
+        "described": _("What tool {n} is has been noted."),
         "average": _("The empirical value of R11 = {n} is set."),
     }.get(verb)
     return None if sentence is None else sentence.format(n=number)

@@ -25,7 +25,7 @@ def expire_corrections(session: Session) -> None:
     The time runs from when a correction was issued, or let go by a person. Held ones wait for their alarm, however long.
     """
     due = _overdue()
-    machines = set(session.scalars(due.with_only_columns(Correction.machine_id).distinct()))
+    machines = set(session.scalars(due.with_only_columns(Correction.machine_id).order_by(None)))
     if not machines:
         return
     lock_machines(session, machines)

@@ -11,18 +11,21 @@ from starlette.responses import RedirectResponse
 from app.errors import Conflict, Invalid
 from app.machines import queries as machines
 from app.machines.queries import machine_named
-from app.offsets import actions, asking, confirming, queries, wording
+from app.offsets import actions, asking, confirming, queries, sisters, wording
 from app.offsets.asking import Question
+from app.offsets.edge_schemas import SisterIn
 from app.offsets.schemas import AppliedIn, DecisionIn, EmpiricalValueIn, ToolChange, ToolEdit
 from app.offsets.tables import OPEN
 from app.web.deps import Caller, FormDep, Operator, SessionDep, Viewer, require
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, length, parsed, words
+from app.web.i18n import _
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 MOST_IN_QUEUE = 50
 STEPS_ON_PAGE = 25
+QUEUE, FROM_QUEUE = "/corrections", "queue"  # where a decision may have been begun
 Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
 Word = Annotated[str | None, Query(max_length=40)]
 
@@ -95,10 +98,16 @@ def _too_late(session: Session, machine: str, verb: str, number: int) -> list[st
 
 @router.get("/machines/{machine}/corrections/{number}")
 def correction_page(
-    request: Request, session: SessionDep, caller: Viewer, machine: str, number: int, do: Word = None
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    machine: str,
+    number: int,
+    do: Word = None,
+    came_from: Annotated[str | None, Query(alias="from", max_length=40)] = None,
 ) -> Response:
-    """One correction; with ``do`` it asks for the second touch."""
-    return _correction(request, session, caller, machine, number, do)
+    """One correction; with ``do`` it asks for the second touch, and goes back to where one came ``from``."""
+    return _correction(request, session, caller, machine, number, do, came_from)
 
 
 def _correction(
@@ -108,6 +117,7 @@ def _correction(
     machine: str,
     number: int,
     verb: str | None,
+    came_from: str | None,
     form: Mapping[str, str] | None = None,
     error: Invalid | None = None,
 ) -> Response:
@@ -120,7 +130,8 @@ def _correction(
         status=error.status if error else 200,
         machine=shown,
         row=row,
-        question=asking.about_correction(row, asked, queries.counting_on(session, shown, row.correction))
+        back=QUEUE if came_from == FROM_QUEUE else memory_address(machine, tool=row.correction.tool_memory),
+        question=asking.about_correction(row, asked, queries.counting_on(session, shown, row.correction), came_from)
         if asked
         else None,
         form=form or {},
@@ -151,31 +162,38 @@ def decide(
         sent_twice = found.decided_by == caller.name and found.status == actions.INTO.get(verb)
         said = {"done": verb} if sent_twice else {"late": verb}
     except Invalid as error:
-        return _correction(request, session, caller, machine, number, verb, form, error)
+        return _correction(request, session, caller, machine, number, verb, form.get("from"), form, error)
+    if form.get("from") == FROM_QUEUE:
+        return RedirectResponse(f"{QUEUE}?{urlencode({'at': machine, 'n': number, **said})}", 303)
     return RedirectResponse(memory_address(machine, tool=found.tool_memory, n=number, **said), 303)
 
 
 @router.get("/machines/{machine}/tools/{number}/{what}", dependencies=[require("operator")])
 def ask_tool(request: Request, session: SessionDep, machine: str, number: int, what: str) -> Response:
-    """The forms of a manual edit (`edit`) and of a tool change (`change`)."""
+    """The forms of a manual edit (`edit`), of a tool change (`change`) and of going on with the sister tool (`sister`)."""
     shown = machine_named(session, machine)
     queries.tool(session, shown, number)
-    return _ask(request, session, machine, asking.about_tool(queries.tools(session, shown, only=number)[0], what))
+    return _ask(
+        request, session, machine, asking.about_tool(queries.tools(session, shown, only=number)[0], shown.key, what)
+    )
 
 
 @router.post("/machines/{machine}/tools/{number}/{what}")
 def set_tool(
     request: Request, session: SessionDep, caller: Operator, machine: str, number: int, what: str, form: FormDep
 ) -> Response:
-    """The offset was set by hand, or the tool was changed."""
+    """The offset was set by hand, the tool was changed, or its sister goes on."""
     shown = machine_named(session, machine)
     queries.tool(session, shown, number)
-    question = asking.about_tool(queries.tools(session, shown, only=number)[0], what)
+    question = asking.about_tool(queries.tools(session, shown, only=number)[0], shown.key, what)
     given = {"offset": length(form.get("offset")), "reason": words(form, "reason")}
     try:
         if what == "edit":
             edit = parsed(ToolEdit, given)
             actions.edit_tool(session, shown, number, edit.offset, edit.reason, caller)
+        elif what == "sister":
+            why = parsed(SisterIn, {"reason": given["reason"]})
+            number = sisters.switch_to_sister(session, shown, number, why.reason, caller).sister
         else:
             change = parsed(ToolChange, given)
             actions.change_tool(session, shown, number, change.offset, change.reason, caller)
@@ -190,7 +208,7 @@ def ask_empirical_value(request: Request, session: SessionDep, machine: str, loc
     shown = machine_named(session, machine)
     queries.average(session, shown, location)
     row = queries.averages(session, shown, only=location)[0]
-    return _ask(request, session, machine, asking.about_average(row))
+    return _ask(request, session, machine, asking.about_average(row, shown.key))
 
 
 @router.post("/machines/{machine}/averages/{location}/edit")
@@ -200,7 +218,7 @@ def set_empirical_value(
     """What is taken off every measurement from now on."""
     shown = machine_named(session, machine)
     queries.average(session, shown, location)
-    question = asking.about_average(queries.averages(session, shown, only=location)[0])
+    question = asking.about_average(queries.averages(session, shown, only=location)[0], shown.key)
     given = {"empirical_value": length(form.get("empirical_value")), "reason": words(form, "reason")}
     try:
         value = parsed(EmpiricalValueIn, given)
@@ -218,13 +236,15 @@ def _ask(
     form: Mapping[str, str] | None = None,
     error: Invalid | None = None,
 ) -> Response:
+    shown = machine_named(session, machine)
     return page(
         request,
         "offsets/ask.html",
         status=error.status if error else 200,
-        machine=machine_named(session, machine),
+        machine=shown,
         question=question,
         form=form or {},
         errors=by_field(error) if error else {},
-        address=memory_address,
+        trail=[(_("Tool memory"), "/tools"), (shown.name, memory_address(machine))],
+        back=memory_address(machine),
     )

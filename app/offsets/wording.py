@@ -1,11 +1,12 @@
 """The sentences about corrections and tool offsets: what each status means, and why something cannot be done now."""
 
-from datetime import datetime
+from datetime import UTC, datetime
 
+from app.offsets.lives import Life
 from app.offsets.queries import Step
 from app.offsets.tables import Correction
 from app.web.i18n import _, ngettext
-from app.web.numbers import mm, um
+from app.web.numbers import NOTHING, age, mm, um
 
 # Why the system itself dropped a correction, as it is stored: the word, and what goes with it.
 EXPIRED = "expired after hours:"
@@ -176,6 +177,12 @@ def offset_differs(alarm: int, expected: float, reported: float, fallen: list[in
         "said at alarm {alarm} which of them is true."
     ).format(reported=mm(reported), expected=mm(expected), alarm=alarm)
     return " ".join(filter(None, (said, edit_note(fallen))))
+
+
+def lasted(life: Life) -> str:
+    """How long an edge was in, or has been so far."""
+    duration = life.lasted(datetime.now(UTC))
+    return NOTHING if duration is None else age(duration.total_seconds())
 
 
 def event_word(kind: str) -> str:

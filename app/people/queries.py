@@ -8,16 +8,27 @@ from sqlalchemy import and_, func, or_, select
 from sqlalchemy.orm import Session
 
 from app.alarms.tables import Alarm
+from app.offsets.tables import Correction
 from app.people.callers import Caller, Role
 from app.people.keys import digest
 from app.people.tables import ApiKey, BrowserSession, Invitation, LoginFailure, Person
 
 
-def signed_in(session: Session, token: str) -> tuple[Caller, int] | None:
-    """Whose browser session this token is, and how many alarms are active; None if it has ended."""
+def signed_in(session: Session, token: str) -> tuple[Caller, dict[str, int]] | None:
+    """Whose browser session this token is, and what waits for people: the numbers of the navigation; None if it has ended."""
     active_alarms = select(func.count()).select_from(Alarm).where(Alarm.acknowledged_at.is_(None)).scalar_subquery()
+    waiting = (
+        select(func.count()).select_from(Correction).where(Correction.status.in_(("held", "awaiting_approval")))
+    ).scalar_subquery()
     row = session.execute(
-        select(Person.id, Person.name, Person.role, BrowserSession.csrf, active_alarms.label("active_alarms"))
+        select(
+            Person.id,
+            Person.name,
+            Person.role,
+            BrowserSession.csrf,
+            active_alarms.label("active_alarms"),
+            waiting.label("waiting_corrections"),
+        )
         .join(BrowserSession, BrowserSession.person_id == Person.id)
         .where(
             BrowserSession.token_hash == digest(token),
@@ -28,7 +39,7 @@ def signed_in(session: Session, token: str) -> tuple[Caller, int] | None:
     if row is None:
         return None
     caller = Caller("person", row.name, role=cast("Role", row.role), person_id=row.id, csrf=row.csrf)
-    return caller, row.active_alarms
+    return caller, {"active_alarms": row.active_alarms, "waiting_corrections": row.waiting_corrections}
 
 
 def person_named(session: Session, name: str) -> Person | None:

@@ -77,7 +77,7 @@ async def api_documentation(request: Request, session: SessionDep, settings: Set
     """Every operation with its parameters, fields, examples, a line for curl and its errors."""
     token = request.cookies.get(SESSION_COOKIE)
     if token and (found := await run_in_threadpool(signed_in, session, token)):
-        caller, request.state.active_alarms = found
+        caller, request.state.waiting = found
         request.state.person, request.state.csrf = caller, caller.csrf
     made = request.app.openapi()
     return page(

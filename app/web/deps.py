@@ -108,10 +108,10 @@ async def get_caller(request: Request, session: SessionDep) -> Caller:
         raise NotSignedIn(
             _("Nobody is signed in."), _("Sign in in the browser, or send a key: Authorization: Bearer YOUR-KEY")
         )
-    caller, active_alarms = found
+    caller, waiting = found
     request.state.person = caller
     request.state.csrf = caller.csrf
-    request.state.active_alarms = active_alarms
+    request.state.waiting = waiting
     if request.method not in SAFE_METHODS:
         await _check_token(request, caller.csrf)
     return caller
@@ -123,7 +123,7 @@ async def recognise(request: Request) -> None:
     if token is None or getattr(request.state, "person", None) is not None:
         return
 
-    def look() -> tuple[Caller, int] | None:
+    def look() -> tuple[Caller, dict[str, int]] | None:
         database: Database = request.app.state.database
         with database.begin() as session:
             return signed_in(session, token)
@@ -131,7 +131,7 @@ async def recognise(request: Request) -> None:
     with suppress(SQLAlchemyError):
         found = await run_in_threadpool(look)
         if found is not None:
-            request.state.person, request.state.active_alarms = found
+            request.state.person, request.state.waiting = found
             request.state.csrf = found[0].csrf
 
 

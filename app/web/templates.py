@@ -2,7 +2,7 @@
 
 A page is answered with `page(request, "plant.html", machines=…)`. The templates find in every context what the layers
 around the route have put into `request.state`: `person` (name, role; None if nobody is signed in), `csrf` (the token
-for forms) and `active_alarms` (number, or None if not known).
+for forms), `active_alarms` and `waiting_corrections` (numbers, or None if not known).
 """
 
 from __future__ import annotations
@@ -76,8 +76,10 @@ def render(request: Request, template: str | Template, **context: Any) -> str:
                     "chosen_theme": chosen_theme(request),
                     "person": getattr(state, "person", None),
                     "csrf": getattr(state, "csrf", ""),
-                    "active_alarms": getattr(state, "active_alarms", None),
+                    "active_alarms": None,
+                    "waiting_corrections": None,
                 }
+                | getattr(state, "waiting", {})
                 | context
             )
         )

@@ -1,0 +1,101 @@
+"""Pages: one tool of a machine – its edge, its life against the plan and against the edges before, and how its offset came about."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.errors import Invalid
+from app.machines.queries import machine_named
+from app.offsets import asking, queries, wording
+from app.offsets.edge_schemas import ToolSettings
+from app.offsets.edges import describe_tool
+from app.offsets.lives import lives
+from app.web.deps import FormDep, Operator, SessionDep, require
+from app.web.forms import by_field, length, parsed
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+LIVES_SHOWN = 20
+STEPS_SHOWN = 15
+FIELDS = tuple(ToolSettings.model_fields)
+
+
+@router.get("/machines/{machine}/tools/{number}", dependencies=[require("viewer")])
+def tool_page(
+    request: Request,
+    session: SessionDep,
+    machine: str,
+    number: int,
+    done: Annotated[str | None, Query(max_length=40)] = None,
+) -> Response:
+    """One location of the tool memory with everything about it."""
+    return _tool(request, session, machine, number, done=asking.done(done, number) if done else None)
+
+
+@router.post("/machines/{machine}/tools/{number}")
+def describe(
+    request: Request, session: SessionDep, caller: Operator, machine: str, number: int, form: FormDep
+) -> Response:
+    """What is in the location, how long it is to last, and who goes on."""
+    shown = machine_named(session, machine)
+    try:
+        describe_tool(session, shown, number, parsed_settings(form), caller)
+    except Invalid as error:
+        return _tool(request, session, machine, number, form=form, error=error)
+    return RedirectResponse(f"/machines/{machine}/tools/{number}?done=described", 303)
+
+
+def parsed_settings(form: Mapping[str, str]) -> ToolSettings:
+    """The form as the API takes it: every field is said, an empty one is taken away. Wear life is typed in µm."""
+    given: dict[str, Any] = {name: form.get(name, "").strip() or None for name in FIELDS}
+    for name in ("planned_parts", "sister"):
+        if given[name] is not None and given[name].isdecimal() and len(given[name]) < 12:
+            given[name] = int(given[name])
+    total = length(given["planned_total"])
+    given["planned_total"] = round(total / 1000, 9) if isinstance(total, float) else total
+    parsed(ToolSettings, given)
+    return ToolSettings.model_validate(given)
+
+
+def _tool(
+    request: Request,
+    session: Session,
+    machine: str,
+    number: int,
+    *,
+    done: str | None = None,
+    form: Mapping[str, str] | None = None,
+    error: Invalid | None = None,
+) -> Response:
+    shown = machine_named(session, machine)
+    tool = queries.tool(session, shown, number)
+    row = queries.tools(session, shown, only=number)[0]
+    steps = queries.steps(session, shown, number, limit=STEPS_SHOWN + 1)
+    known = lives(session, shown, number, limit=LIVES_SHOWN)
+    return page(
+        request,
+        "offsets/tool.html",
+        status=error.status if error else 200,
+        machine=shown,
+        row=row,
+        known=known,
+        sister=queries.tools(session, shown, only=tool.sister)[0] if tool.sister else None,
+        waiting=queries.rows_of(session, shown, row.open),
+        steps=steps[:STEPS_SHOWN],
+        more_steps=len(steps) > STEPS_SHOWN,
+        typed=form or _typed(row),
+        errors=by_field(error) if error else {},
+        done=done,
+        wording=wording,
+        offered=asking.offered,
+    )
+
+
+def _typed(row: queries.ToolRow) -> dict[str, str]:
+    """The form as it would have been typed."""
+    typed = {name: "" if getattr(row.tool, name) is None else str(getattr(row.tool, name)) for name in FIELDS}
+    total = row.tool.planned_total
+    return typed | {"planned_total": "" if total is None else f"{total * 1000:.6f}".rstrip("0").rstrip(".")}

@@ -1,0 +1,133 @@
+"""Pages: everything that waits for a person's decision about a correction, and approving all of one tool together."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.characteristics.figures import band_picture
+from app.errors import Conflict, Invalid, NotFound
+from app.machines import queries as machines
+from app.machines.queries import machine_named
+from app.machines.tables import Machine
+from app.offsets import actions, asking, queries, queue, wording
+from app.offsets.schemas import DecisionsIn
+from app.web.deps import FormDep, Operator, SessionDep, require
+from app.web.fields import LARGEST_ID
+from app.web.forms import by_field, parsed, words
+from app.web.i18n import _
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+Slug = Annotated[str | None, Query(max_length=64)]
+Word = Annotated[str | None, Query(max_length=40)]
+Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
+
+
+def queue_address(machine: str | None = None, **query: Any) -> str:
+    """The queue, of one machine or of all."""
+    given = {name: value for name, value in {"machine": machine, **query}.items() if value is not None}
+    return "/corrections" + (f"?{urlencode(given)}" if given else "")
+
+
+@router.get("/corrections", dependencies=[require("viewer")])
+def queue_page(
+    request: Request,
+    session: SessionDep,
+    machine: Slug = None,
+    at: Slug = None,
+    done: Word = None,
+    late: Word = None,
+    n: Number = None,
+) -> Response:
+    """What waits, grouped by machine and tool; ``at`` is where something was done (``done``) or was not (``late``)."""
+    shown = machine_named(session, machine) if machine else None
+    by_machine = queue.count_by_machine(session)
+    return page(
+        request,
+        "offsets/queue.html",
+        groups=queue.groups(session, shown),
+        machine=shown,
+        machines=[(each, by_machine.get(each.id, 0)) for each in machines.machines(session)],
+        done=asking.done(done, n) if done and n else None,
+        late=_too_late(session, at, late, n) if at and late and n else None,
+        wording=wording,
+        picture=lambda each: band_picture(each.deviation, each.parameters, each.zone),
+        address=queue_address,
+        offered=asking.offered,
+    )
+
+
+def _too_late(session: Session, machine: str, verb: str, number: int) -> list[str]:
+    return list(wording.refused(queries.correction(session, machine_named(session, machine), number), machine, verb))
+
+
+@router.get("/corrections/count", dependencies=[require("viewer")])
+def count(request: Request, session: SessionDep) -> Response:
+    """The number beside *Approvals* in the navigation."""
+    return page(request, "waiting_count.html", waiting_corrections=queue.count(session))
+
+
+@router.get("/corrections/{machine}/tools/{tool}", dependencies=[require("operator")])
+def ask_all(request: Request, session: SessionDep, machine: str, tool: int) -> Response:
+    """Asks before all that awaits approval for one tool is approved."""
+    shown = machine_named(session, machine)
+    return _ask(request, shown, _group(session, shown, tool))
+
+
+def _group(session: Session, machine: Machine, tool: int) -> queue.Group:
+    queries.tool(session, machine, tool)
+    group = queue.group_of(session, machine, tool)
+    if group is None or not group.approvable:
+        raise NotFound(
+            _("Nothing of tool {tool} awaits approval any more.").format(tool=tool),
+            _("Somebody else has decided meanwhile. Go back to the list of what waits."),
+        )
+    return group
+
+
+@router.post("/corrections/{machine}/tools/{tool}")
+def approve_all(
+    request: Request, session: SessionDep, caller: Operator, machine: str, tool: int, form: FormDep
+) -> Response:
+    """Approves exactly those that were shown; if one of them was decided about meanwhile, none."""
+    shown = machine_named(session, machine)
+    queries.tool(session, shown, tool)
+    numbers = [int(number) for number in form.get("numbers", "").split() if number.isdecimal() and len(number) < 11]
+    try:
+        decision = parsed(DecisionsIn, {"numbers": numbers, "reason": words(form, "reason")})
+        actions.approve_all(session, shown, decision.numbers, decision.reason, caller)
+    except Conflict:
+        first = next(
+            c
+            for c in (queries.correction(session, shown, number) for number in numbers)
+            if c.status != "awaiting_approval"
+        )
+        if first.decided_by != caller.name or first.status != "pending":
+            return RedirectResponse(queue_address(late="approve", at=machine, n=first.number), 303)
+    except Invalid as error:
+        return _ask(request, shown, _group(session, shown, tool), form, error)
+    return RedirectResponse(queue_address(done="approve-all", n=tool), 303)
+
+
+def _ask(
+    request: Request,
+    machine: Machine,
+    group: queue.Group,
+    form: Mapping[str, str] | None = None,
+    error: Invalid | None = None,
+) -> Response:
+    return page(
+        request,
+        "offsets/ask.html",
+        status=error.status if error else 200,
+        machine=machine,
+        question=asking.about_all(machine.key, group.tool, group.approvable, group.total, group.after),
+        form=form or {},
+        errors=by_field(error) if error else {},
+        trail=[(_("Approvals"), "/corrections")],
+        back="/corrections",
+    )
