@@ -22,12 +22,15 @@ part, so its lower end is when single parts begin to lie beyond. Lengths are mm.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
+
+from app.core.parameters import Parameters
 
 Values = NDArray[np.float64]
 
@@ -237,6 +240,36 @@ def forecast(fit: Fit, limit: float) -> Forecast | None:
         return Forecast(max(0.0, parts), 0.0, inf)
     low, high = (-half - root) / square + fit.centre, (-half + root) / square + fit.centre
     return Forecast(max(0.0, parts), max(0.0, low), max(0.0, high))
+
+
+class Towards(StrEnum):
+    """What an edge comes to: R37 worn off, the end of the tolerance, or the tool's offset limit."""
+
+    WEAR = "wear"
+    TOLERANCE = "tolerance"
+    OFFSET = "offset"
+
+
+def limits_of(parameters: Parameters, way: float, total: float, lifted: float = 0.0) -> dict[Towards, float]:
+    """Where on the wear curve each limit lies, mm, the way that it wears (sign of `way`).
+
+    wear: nothing corrected, a part would deviate by R37. tolerance: were nothing corrected from now on, a part would
+    deviate by R35/2; `total` is the sum of the corrections issued since the tool change. offset: following the wear, the
+    corrections come to `max_total`. lifted: by how much `joined` lifted the end of the curve.
+
+    >>> p = Parameters(target=10, tolerance_width=0.016, zero_range=0.001, averaging_limit=0.005, wear_limit=0.3,
+    ...                confidence_limit=1.0, tool_memory=3, max_total=0.1)
+    >>> {name.value: limit for name, limit in limits_of(p, way=1.0, total=-0.02).items()}
+    {'wear': 0.3, 'tolerance': 0.028, 'offset': 0.1}
+    """
+    sign = 1.0 if way >= 0 else -1.0
+    found = {
+        Towards.WEAR: sign * parameters.wear_limit,
+        Towards.TOLERANCE: total / parameters.factor + lifted + sign * parameters.tolerance_width / 2,
+    }
+    if parameters.max_total is not None and not parameters.measures_only:
+        found[Towards.OFFSET] = sign * parameters.max_total / abs(parameters.factor) + lifted
+    return found
 
 
 def _correlation(residual: Values) -> float:
