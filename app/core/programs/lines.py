@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 from app.core.parameters import BY_NAME, FIELDS, Field, Kind, Parameters
 
-MOST_CHARACTERS = 400_000
-MOST_LINES = 10_000
+MOST_CHARACTERS = 65_536
+MOST_LINES = 4_000
 LONGEST_LINE = 1_000  # no control takes half of it
 NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)"
 PLAIN = re.compile(r"[ -$&'*-:<-z|~]")  # ASCII that no control takes for the end of a comment; others travel as {D8}

@@ -197,5 +197,5 @@ def test_nothing_breaks_the_reader_and_nothing_is_dropped(text: str) -> None:
 
 def test_much_of_anything_is_answered_quickly() -> None:
     for piece in ("#505=#", "X[", "[[[[", "IF", "G65P1A1.", "#[1]=", "(", "#5 = ", "N1 "):
-        text = "\n".join(piece * (900 // len(piece)) for _ in range(200))
-        assert len(fanuc.read(text).lines) == 200
+        text = "\n".join(piece * (900 // len(piece)) for _ in range(60))
+        assert len(fanuc.read(text).lines) == 60

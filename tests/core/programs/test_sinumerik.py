@@ -241,7 +241,7 @@ def test_line_ends_and_marks_of_all_systems() -> None:
         (" \n\t\r\n", "empty"),
         ("R33=1\0", "binary"),
         ("\x01\x02\x03\x04\x05\x06\x07\x08\x0e\x0f", "binary"),
-        ("R33=1\n" * 70_000, "too_long"),
+        ("R33=1\n" * 20_000, "too_long"),
         ("\n" * 20_000 + "R", "too_many_lines"),
     ],
 )
@@ -361,7 +361,7 @@ def test_nothing_breaks_the_reader_and_nothing_is_dropped(text: str) -> None:
         }
 
 
-def test_a_megabyte_of_anything_is_answered_quickly() -> None:
+def test_much_of_anything_is_answered_quickly() -> None:
     for piece in ("R33=R", "(", "R33=1 ", "R24 ", "[[[[", "_A=", "N" * 50, "=" * 30, "IF "):
-        text = "\n".join(piece * (900 // len(piece)) for _ in range(200))
-        assert len(sinumerik.read(text).lines) == 200
+        text = "\n".join(piece * (900 // len(piece)) for _ in range(60))
+        assert len(sinumerik.read(text).lines) == 60

@@ -1,0 +1,1 @@
+"""Program text: what stands in the machines' programs made into characteristics, and characteristics and corrections written for them."""
