@@ -66,7 +66,8 @@ class CalibrationPlan(Base):
     """How often a place is to be calibrated, and what has passed since it was.
 
     since: the last calibration that was not refused, or when the plan was made. counts: how far the characteristics of
-    the machine had counted then, by their id. `due_parts` and `due_days` are None where nothing is planned.
+    the machine had counted then, by their id. `due_parts` and `due_days` are None where nothing is planned. told: the
+    alarm *calibration overdue* was raised since then.
     """
 
     __tablename__ = "calibration_plan"
@@ -83,6 +84,7 @@ class CalibrationPlan(Base):
     acceptance: Mapped[str] = mapped_column(server_default="accept")
     since: Mapped[datetime] = mapped_column(server_default=func.now())
     counts: Mapped[dict[str, Any]] = mapped_column(server_default="{}")
+    told: Mapped[bool] = mapped_column(server_default="false")
 
 
 class PairedReading(Base):

@@ -64,6 +64,7 @@ CREATE TABLE calibration_plan (
     acceptance TEXT DEFAULT 'accept' NOT NULL,
     since timestamptz DEFAULT now() NOT NULL,
     counts JSONB DEFAULT '{}' NOT NULL,
+    told BOOLEAN DEFAULT 'false' NOT NULL,
     CONSTRAINT calibration_plan_pkey PRIMARY KEY (machine_id, memory, location),
     CONSTRAINT calibration_plan_memory_check CHECK (memory IN ('average', 'tool')),
     CONSTRAINT calibration_plan_acceptance_check CHECK (acceptance IN ('accept', 'automatic')),

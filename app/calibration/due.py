@@ -1,0 +1,146 @@
+"""Every place that is calibrated: when it was, what has passed since, and what is due. Never writes."""
+
+from collections import defaultdict
+from datetime import UTC, datetime, timedelta
+from typing import Any, NamedTuple
+
+from sqlalchemy import select, text
+from sqlalchemy.orm import Session
+
+from app.calibration.queries import CalibrationRow, Place, calibrations
+from app.calibration.tables import CalibrationPlan, CalibrationRecord, PairedReading
+from app.characteristics.tables import Characteristic
+from app.machines.tables import Machine
+from app.offsets.tables import AverageMemory, Tool
+from app.readings.tables import Stream
+
+SOON = 0.9  # of what is planned
+
+
+class PlaceRow(NamedTuple):
+    """A place with all that its line in the overview says.
+
+    value: empirical value or offset in effect. parts: measured since `since`, by the characteristic that counted most.
+    last: the last calibration, whatever came of it.
+    """
+
+    machine: Machine
+    place: Place
+    characteristics: list[str]
+    value: float
+    plan: CalibrationPlan | None
+    parts: int
+    last: CalibrationRow | None
+
+    def used(self, now: datetime | None = None) -> float | None:
+        """How much of what is planned has passed, 1 = due; None without a plan."""
+        plan = self.plan
+        if plan is None or (plan.due_parts is None and plan.due_days is None):
+            return None
+        passed = ((now or datetime.now(UTC)) - plan.since).total_seconds() / 86400
+        return max(
+            0.0 if plan.due_parts is None else self.parts / plan.due_parts,
+            0.0 if plan.due_days is None else passed / plan.due_days,
+        )
+
+    @property
+    def due_at(self) -> datetime | None:
+        """When it is due by days."""
+        plan = self.plan
+        if plan is None or plan.due_days is None:
+            return None
+        return plan.since + timedelta(days=plan.due_days)
+
+    @property
+    def parts_left(self) -> int | None:
+        """How many parts until it is due by parts."""
+        if self.plan is None or self.plan.due_parts is None:
+            return None
+        return max(0, self.plan.due_parts - self.parts)
+
+    @property
+    def state(self) -> str:
+        """`overdue`, `refused`, `proposed`, `due_soon`, `calibrated`, `never` (none yet), in this order of urgency."""
+        used = self.used()
+        if used is not None and used >= 1:
+            return "overdue"
+        if self.last is not None and self.last.status in {"refused", "proposed"}:
+            return self.last.status
+        if used is not None and used >= SOON:
+            return "due_soon"
+        return "never" if self.last is None else "calibrated"
+
+
+_PARTS = text("""
+SELECT p.machine_id, p.memory, p.location,
+       greatest(max(s.sequence - coalesce((p.counts ->> s.characteristic_id::text)::bigint, 0)), 0) AS parts
+FROM calibration_plan p
+JOIN stream s ON s.machine_id = p.machine_id AND (p.memory = 'tool' OR s.average_memory = p.location)
+GROUP BY 1, 2, 3
+""")
+
+
+def places(session: Session, machine: Machine | None = None) -> list[PlaceRow]:
+    """All places that are measured with, planned for or have been calibrated, by machine and number."""
+    machines = {row.id: row for row in session.scalars(select(Machine))} if machine is None else {machine.id: machine}
+    plans = {
+        (plan.machine_id, Place(plan.memory, plan.location)): plan
+        for plan in session.scalars(select(CalibrationPlan).execution_options(populate_existing=True))
+    }
+    used_by: dict[Any, list[str]] = defaultdict(list)
+    for machine_id, location, key in session.execute(
+        select(Stream.machine_id, Stream.average_memory, Characteristic.key)
+        .join(
+            Characteristic,
+            (Characteristic.machine_id == Stream.machine_id) & (Characteristic.id == Stream.characteristic_id),
+        )
+        .where(Stream.average_memory > 0)
+        .order_by(Characteristic.key)
+    ):
+        used_by[machine_id, Place("average", location)].append(key)
+    known = {
+        (row.machine_id, Place(row.memory, row.location))
+        for row in session.execute(
+            select(CalibrationRecord.machine_id, CalibrationRecord.memory, CalibrationRecord.location).distinct()
+        )
+    }
+    paired = {
+        (row.machine_id, Place("average", row.location))
+        for row in session.execute(select(PairedReading.machine_id, PairedReading.location).distinct())
+    }
+    parts = {(row.machine_id, Place(row.memory, row.location)): row.parts for row in session.execute(_PARTS)}
+    wanted = {(i, p) for i, p in {*plans, *used_by, *known, *paired} if i in machines}
+    values = _values(session)
+    return [
+        PlaceRow(
+            machines[machine_id],
+            place,
+            used_by.get((machine_id, place), []),
+            values[machine_id, place],
+            plans.get((machine_id, place)),
+            parts.get((machine_id, place), 0),
+            _last(session, machines[machine_id], place) if (machine_id, place) in known else None,
+        )
+        for machine_id, place in sorted(wanted, key=lambda each: (machines[each[0]].key, each[1]))
+    ]
+
+
+def place_row(session: Session, machine: Machine, place: Place, value: float) -> PlaceRow:
+    """One place; also one about which nothing is known yet."""
+    found = next((row for row in places(session, machine) if row.place == place), None)
+    return found or PlaceRow(machine, place, [], value, None, 0, None)
+
+
+def _last(session: Session, machine: Machine, place: Place) -> CalibrationRow | None:
+    found = calibrations(session, machine, place, newest_first=True, limit=1)
+    return found[0] if found else None
+
+
+def _values(session: Session) -> dict[Any, float]:
+    averages = select(AverageMemory.machine_id, AverageMemory.location, AverageMemory.empirical_value)
+    tools = select(Tool.machine_id, Tool.number, Tool.offset)
+    return {
+        (machine_id, Place(memory, location)): value
+        for memory, wanted in (("average", averages), ("tool", tools))
+        for machine_id, location, value in session.execute(wanted)
+    }

@@ -1,0 +1,330 @@
+"""Calibrations, pairs, and what is due. Never writes. Lengths in mm."""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import NamedTuple
+
+from sqlalchemy import Select, and_, func, select
+from sqlalchemy.orm import Session
+
+from app.audit.tables import AuditEntry
+from app.calibration.tables import CalibrationAcceptance, CalibrationRecord, PairedReading
+from app.characteristics.tables import Characteristic
+from app.core.pairs import Comparison, compare
+from app.core.zones import nanometres
+from app.errors import NotFound
+from app.machines.tables import Machine
+from app.offsets import queries as offsets
+from app.web.fields import LARGEST_SERIAL
+from app.web.i18n import _
+
+CONFIDENCE = 0.95
+MOST_PAIRS = 200
+
+
+class Place(NamedTuple):
+    """What is calibrated: a location of the average memory (R11) or, for the offset of a probe, of the tool memory (R10)."""
+
+    memory: str
+    location: int
+
+
+class CalibrationRow(NamedTuple):
+    """A calibration with what became of it.
+
+    status: `refused`; `unchanged` (nothing was to be changed); `proposed` (somebody may accept it); `accepted`;
+    `overtaken` (by a newer calibration, or because the value was changed otherwise).
+    """
+
+    record: CalibrationRecord
+    acceptance: CalibrationAcceptance | None
+    status: str
+
+
+class Origin(NamedTuple):
+    """Where an empirical value came from: who set it, when, why, and by which calibration, if by one."""
+
+    value: float
+    at: datetime
+    actor: str
+    reason: str | None
+    calibration: int | None
+
+
+class Pair(NamedTuple):
+    """A paired reading. counts: it belongs to the series of now and is not excluded."""
+
+    row: PairedReading
+    characteristic: str | None
+    difference: float
+    counts: bool
+
+
+class Suggestion(NamedTuple):
+    """What the pairs of a location say. since: when the value in effect was set; the series of now began then."""
+
+    comparison: Comparison
+    empirical_value: float
+    since: datetime | None
+    pairs: list[Pair]
+
+    @property
+    def outlier(self) -> int | None:
+        """The id of the pair that stands out."""
+        at = self.comparison.outlier
+        return None if at is None else [pair.row.id for pair in self.pairs if pair.counts][at]
+
+
+def value_of(session: Session, machine: Machine, place: Place) -> float:
+    """The empirical value or the offset in effect. Raises `NotFound` for a location that the machine has not."""
+    if place.memory == "average":
+        return offsets.average(session, machine, place.location).empirical_value
+    return offsets.tool(session, machine, place.location).offset
+
+
+def _rows(machine: Machine) -> Select[CalibrationRecord, CalibrationAcceptance]:
+    return (
+        select(CalibrationRecord, CalibrationAcceptance)
+        .outerjoin(
+            CalibrationAcceptance,
+            and_(
+                CalibrationAcceptance.machine_id == CalibrationRecord.machine_id,
+                CalibrationAcceptance.number == CalibrationRecord.number,
+            ),
+        )
+        .where(CalibrationRecord.machine_id == machine.id)
+    )
+
+
+def calibration(session: Session, machine: Machine, number: int) -> CalibrationRow:
+    """One calibration. Raises `NotFound`."""
+    row = (
+        session.execute(_rows(machine).where(CalibrationRecord.number == number)).one_or_none()
+        if 1 <= number <= LARGEST_SERIAL
+        else None
+    )
+    if row is None:
+        raise NotFound(
+            _("Machine {machine} has no calibration {number}.").format(machine=machine.key, number=number),
+            _(
+                "Calibrations are numbered 1, 2, 3 … per machine; GET /api/v1/machines/{machine}/calibrations lists them."
+            ).format(machine=machine.key),
+        )
+    return _with_status(session, machine, [(row[0], row[1])])[0]
+
+
+def by_key(session: Session, machine: Machine, key: str) -> CalibrationRow | None:
+    """The calibration that was sent with this key, if there is one."""
+    row = session.execute(_rows(machine).where(CalibrationRecord.key == key)).one_or_none()
+    return None if row is None else _with_status(session, machine, [(row[0], row[1])])[0]
+
+
+def calibrations(
+    session: Session,
+    machine: Machine,
+    place: Place | None = None,
+    *,
+    after: int = 0,
+    before: int | None = None,
+    newest_first: bool = False,
+    limit: int = 100,
+) -> list[CalibrationRow]:
+    """Calibrations of a machine, or of one place, oldest first."""
+    wanted = _rows(machine).where(CalibrationRecord.number > after).limit(limit)
+    if place is not None:
+        wanted = wanted.where(CalibrationRecord.memory == place.memory, CalibrationRecord.location == place.location)
+    if before is not None:
+        wanted = wanted.where(CalibrationRecord.number < before)
+    order = CalibrationRecord.number.desc() if newest_first else CalibrationRecord.number
+    rows = session.execute(wanted.order_by(order)).all()
+    return _with_status(session, machine, [(row[0], row[1]) for row in rows])
+
+
+def _with_status(
+    session: Session, machine: Machine, found: Sequence[tuple[CalibrationRecord, CalibrationAcceptance | None]]
+) -> list[CalibrationRow]:
+    values: dict[Place, float] = {}
+    newest: dict[Place, int | None] = {}
+    rows = []
+    for record, acceptance in found:
+        place = Place(record.memory, record.location)
+        if record.refused:
+            status = "refused"
+        elif acceptance is not None:
+            status = "accepted"
+        elif record.proposed is None:
+            status = "unchanged"
+        else:
+            if place not in values:
+                values[place] = value_of(session, machine, place)
+                newest[place] = last_good(session, machine, place)
+            holds = newest[place] == record.number and nanometres(values[place] - record.value_before) == 0
+            status = "proposed" if holds else "overtaken"
+        rows.append(CalibrationRow(record, acceptance, status))
+    return rows
+
+
+def last_good(session: Session, machine: Machine, place: Place) -> int | None:
+    """The number of the last calibration of this place that was not refused."""
+    return session.scalar(
+        select(func.max(CalibrationRecord.number)).where(
+            CalibrationRecord.machine_id == machine.id,
+            CalibrationRecord.memory == place.memory,
+            CalibrationRecord.location == place.location,
+            CalibrationRecord.refused.is_(False),
+        )
+    )
+
+
+def running_average(session: Session, machine: Machine, place: Place, value: float) -> float:
+    """A of the last gauge calibration, as long as the empirical value by which it was judged is in effect; else 0."""
+    last = session.scalars(
+        select(CalibrationRecord)
+        .where(
+            CalibrationRecord.machine_id == machine.id,
+            CalibrationRecord.memory == place.memory,
+            CalibrationRecord.location == place.location,
+            CalibrationRecord.refused.is_(False),
+            CalibrationRecord.kind == "gauge",
+        )
+        .order_by(CalibrationRecord.number.desc())
+        .limit(1)
+    ).one_or_none()
+    if last is None or last.average is None or nanometres(last.value_before - value) != 0:
+        return 0.0
+    return last.average
+
+
+def next_number(session: Session, machine: Machine) -> int:
+    """The number of the next calibration; the machine is locked."""
+    last = session.scalar(select(func.max(CalibrationRecord.number)).where(CalibrationRecord.machine_id == machine.id))
+    return (last or 0) + 1
+
+
+# --- where the empirical value came from
+
+
+def value_changes(session: Session, machine: Machine, location: int, limit: int = 1000) -> list[Origin]:
+    """How the empirical value of a location came about, newest first, as the record of changes has it."""
+    entries = session.scalars(_changes(machine, location).limit(limit)).all()
+    return _origins(session, machine, location, entries)
+
+
+def origin(session: Session, machine: Machine, location: int, at: datetime | None = None) -> Origin | None:
+    """Where the value that was in effect at this moment (or is now) came from; None if nobody ever set one."""
+    wanted = _changes(machine, location).limit(1)
+    entry = session.scalars(wanted if at is None else wanted.where(AuditEntry.at <= at)).one_or_none()
+    return None if entry is None else _origins(session, machine, location, [entry])[0]
+
+
+def _changes(machine: Machine, location: int) -> Select[AuditEntry]:
+    return (
+        select(AuditEntry)
+        .where(
+            AuditEntry.subject == f"average/{machine.key}/{location}", AuditEntry.action == "empirical value changed"
+        )
+        .order_by(AuditEntry.id.desc())
+    )
+
+
+def _origins(session: Session, machine: Machine, location: int, entries: Sequence[AuditEntry]) -> list[Origin]:
+    """An acceptance and the change that it made were written in one transaction, so they bear the same time."""
+    accepted = {
+        row.at: row.number
+        for row in session.execute(
+            select(CalibrationAcceptance.at, CalibrationAcceptance.number)
+            .join(
+                CalibrationRecord,
+                and_(
+                    CalibrationRecord.machine_id == CalibrationAcceptance.machine_id,
+                    CalibrationRecord.number == CalibrationAcceptance.number,
+                ),
+            )
+            .where(
+                CalibrationAcceptance.machine_id == machine.id,
+                CalibrationRecord.memory == "average",
+                CalibrationRecord.location == location,
+                CalibrationAcceptance.at.in_([entry.at for entry in entries]),
+            )
+        )
+    }
+    return [
+        Origin(
+            (entry.after or {}).get("empirical_value", 0.0), entry.at, entry.actor, entry.why, accepted.get(entry.at)
+        )
+        for entry in entries
+    ]
+
+
+# --- pairs
+
+
+def pairs(
+    session: Session,
+    machine: Machine,
+    location: int,
+    *,
+    after: int = 0,
+    limit: int = 1000,
+    only: int | None = None,
+    newest: bool = False,
+) -> list[Pair]:
+    """Paired readings of a location, oldest first; with ``newest`` the last so many."""
+    found = origin(session, machine, location)
+    wanted = (
+        select(PairedReading, Characteristic.key)
+        .outerjoin(
+            Characteristic,
+            and_(
+                Characteristic.machine_id == PairedReading.machine_id,
+                Characteristic.id == PairedReading.characteristic_id,
+            ),
+        )
+        .where(PairedReading.machine_id == machine.id, PairedReading.location == location, PairedReading.id > after)
+        .order_by(PairedReading.id.desc() if newest else PairedReading.id)
+        .limit(limit)
+    )
+    if only is not None:
+        wanted = wanted.where(PairedReading.id == only)
+    made = [
+        Pair(
+            row,
+            key,
+            round(row.machine_value - row.true_value, 9) + 0.0,
+            row.excluded_at is None and (found is None or row.at > found.at),
+        )
+        for row, key in session.execute(wanted)
+    ]
+    return made[::-1] if newest else made
+
+
+def suggestion(session: Session, machine: Machine, location: int, confidence: float = CONFIDENCE) -> Suggestion:
+    """What the last pairs of this location say, and those pairs, oldest first.
+
+    A series begins when the empirical value is set: pairs from before tell of a probe that may be another by now.
+    """
+    value = offsets.average(session, machine, location).empirical_value
+    found = origin(session, machine, location)
+    rows = pairs(session, machine, location, limit=MOST_PAIRS, newest=True)
+    differences = [each.difference for each in rows if each.counts]
+    compared = compare(differences, empirical_value=value, confidence=confidence)
+    return Suggestion(compared, value, None if found is None else found.at, rows)
+
+
+def pair(session: Session, machine: Machine, location: int, number: int) -> PairedReading:
+    """One paired reading. Raises `NotFound`."""
+    found = session.get(PairedReading, (machine.id, number), populate_existing=True) if 0 < number < 2**63 else None
+    if found is None or found.location != location:
+        raise NotFound(
+            _("R11 = {location} of {machine} has no paired reading {number}.").format(
+                location=location, machine=machine.key, number=number
+            ),
+            _("GET …/averages/{location}/pairs lists them.").format(location=location),
+        )
+    return found
+
+
+def pair_by_key(session: Session, machine: Machine, key: str) -> PairedReading | None:
+    return session.scalars(
+        select(PairedReading).where(PairedReading.machine_id == machine.id, PairedReading.key == key)
+    ).one_or_none()
