@@ -36,8 +36,14 @@ def _notes(record: Record, parameters: Parameters, amount: float | None) -> tupl
             and not within_tolerance(record.deviation, parameters.limits),
         ),
         ("clamped", amount is not None and nanometres(abs(amount)) < nanometres(abs(parameters.factor * size_error))),
+        ("empirical_value", nanometres(empirical_value(record, parameters)) != 0),
         ("late", record.late),
     )
+
+
+def empirical_value(record: Record, parameters: Parameters) -> float:
+    """What was taken off the measurement, mm; it can be told from what is stored: D = measured - target - EV."""
+    return record.measured - parameters.target - record.deviation
 
 
 def _averaged(record: Record, parameters: Parameters) -> float:
@@ -163,6 +169,11 @@ def _note(code: str, record: Record, parameters: Parameters) -> str:
         case "clamped":
             return _("The correction is limited to the largest step %(step)s.") % {
                 "step": um(parameters.max_step or 0.0)
+            }
+        case "empirical_value":
+            return _("The empirical value %(value)s (R11 = %(location)s) is taken off.") % {
+                "value": um(empirical_value(record, parameters)),
+                "location": parameters.average_memory,
             }
         case _:
             return _("It came late: a later measurement had arrived before it.")
