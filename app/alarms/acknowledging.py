@@ -18,7 +18,8 @@ from typing import Any, Literal, get_args
 from sqlalchemy import select, update
 from sqlalchemy.orm import Session
 
-from app.alarms import queries, wording
+from app.alarms import by_hand, queries, wording
+from app.alarms.by_hand import ByHand
 from app.alarms.queries import AlarmRow
 from app.audit.actions import record
 from app.characteristics.tables import Characteristic
@@ -40,6 +41,7 @@ Action = Literal["tool_replaced", "keep_cutting", "false_reading", "sister_tool"
 ACTIONS: tuple[Action, ...] = get_args(Action)
 Outcome = list[dict[str, Any]]
 NO_OFFSET = 0.0
+NOT_MEASURED = ByHand()
 
 
 def acknowledge(
@@ -51,11 +53,12 @@ def acknowledge(
     *,
     offset: float | None = None,
     changed_by: str | None = None,
+    hand: ByHand = NOT_MEASURED,
 ) -> AlarmRow:
     """Say what an active alarm was.
 
     ``offset`` (mm) is what the new tool starts with (`tool_replaced`), or the one that is true (`offset_set`, where
-    ``changed_by`` says who has changed it at the control).
+    ``changed_by`` says who has changed it at the control). ``hand``: what was found by hand, kept beside the reading.
     Raises `NotFound`; `Conflict` when somebody was first, saying who; `Invalid` when the action cannot be meant.
     """
     lock_machines(session, [queries.alarm(session, number).alarm.machine_id])
@@ -78,7 +81,8 @@ def acknowledge(
         "offset_set": lambda: _offset_set(session, row, comment, caller, offset, changed_by),
         "noted": lambda: _noted(session, row, comment, caller),
     }
-    outcome = [*follows[action](), *_resume(session, row)]
+    measured = by_hand.keep(session, row, hand, comment, caller) if hand.is_said else []
+    outcome = [*measured, *follows[action](), *_resume(session, row)]
     alarm.acknowledged_at, alarm.acknowledged_by = datetime.now(UTC), caller.name
     alarm.action, alarm.comment, alarm.outcome = action, comment, outcome
     record(

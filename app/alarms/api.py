@@ -5,6 +5,7 @@ from typing import Annotated
 from fastapi import Path, Query
 
 from app.alarms import acknowledging, queries
+from app.alarms.by_hand import ByHand
 from app.alarms.queries import State
 from app.alarms.schemas import AcknowledgeIn, AlarmOut, alarm_out
 from app.characteristics.queries import characteristic_named
@@ -68,11 +69,21 @@ def acknowledge_alarm(session: SessionDep, caller: Operator, alarm: Number, give
     - `offset_set`: *offset differs* only: `offset` is true, `changed_by` has changed it; handled as a manual edit
     - `noted`: nothing else; at *offset differs* the reported offset is true
 
+    What was measured by hand (`hand_measured`, `hand_verdict`) is kept beside the machine's value of the last reading behind
+    the alarm, or of `hand_sequence`; that reading is neither excluded nor decided anew.
+
     After a probe fault the paused characteristic goes on, after *offset differs* the paused tool, whichever it was. Acknowledging twice is 409 and says who was
     first.
     """
     return alarm_out(
         acknowledging.acknowledge(
-            session, alarm, given.action, given.comment, caller, offset=given.offset, changed_by=given.changed_by
+            session,
+            alarm,
+            given.action,
+            given.comment,
+            caller,
+            offset=given.offset,
+            changed_by=given.changed_by,
+            hand=ByHand(given.hand_measured, given.hand_verdict, given.hand_sequence),
         )
     )

@@ -25,6 +25,12 @@ def outcomes(outcome: Sequence[dict[str, Any]] | None) -> list[dict[str, Any]]:
     return [{**item, "text": _followed(item)} for item in outcome]
 
 
+def found_by_hand(measured: float | None, good: bool | None) -> str:
+    """What somebody found by hand: `40.0010 mm, part is good`."""
+    verdict = [] if good is None else [_("the part is good")] if good else [_("the part is scrap")]
+    return ", ".join([*([mm(measured)] if measured is not None else []), *verdict])
+
+
 def _followed(item: dict[str, Any]) -> str:
     values = {
         **item,
@@ -55,6 +61,9 @@ def _followed(item: dict[str, Any]) -> str:
             )
         case "correction_released":
             text = _("Correction {number} of {amount} was released to the machine.")
+        case "measured_by_hand":
+            text = _("Reading {sequence} was measured by hand: {found}.")
+            values["found"] = found_by_hand(item.get("measured"), item.get("good"))
         case "nothing_held":
             text = _("No correction was held any more.")
         case "still_held":

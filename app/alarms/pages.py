@@ -8,8 +8,9 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.responses import RedirectResponse
 
 from app.alarms import acknowledging, queries, wording
+from app.alarms.by_hand import ByHand
 from app.alarms.outcomes import outcomes
-from app.alarms.queries import AlarmRow
+from app.alarms.queries import MEASURED_BY_HAND, AlarmRow
 from app.alarms.schemas import AcknowledgeIn
 from app.errors import Conflict, Invalid
 from app.machines import queries as machines
@@ -121,6 +122,7 @@ def _alarm(
         machine=machine,
         form=form or {},
         errors=by_field(error) if error else {},
+        measured_by_hand=MEASURED_BY_HAND,
         wording=wording,
         outcomes=outcomes,
         address=address,
@@ -142,10 +144,19 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
                 "comment": words(form, "comment"),
                 "offset": offset,
                 "changed_by": form.get("changed_by"),
+                "hand_measured": length(form.get("hand_measured")),
+                "hand_verdict": form.get("hand_verdict"),
             },
         )
         acknowledging.acknowledge(
-            session, number, given.action, given.comment, caller, offset=given.offset, changed_by=given.changed_by
+            session,
+            number,
+            given.action,
+            given.comment,
+            caller,
+            offset=given.offset,
+            changed_by=given.changed_by,
+            hand=ByHand(given.hand_measured, given.hand_verdict),
         )
     except Conflict:
         alarm = queries.alarm(session, number).alarm

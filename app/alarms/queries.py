@@ -33,6 +33,9 @@ KINDS = (
 HOLDING = ("tool_worn", "implausible")  # kinds that a correction is held for
 
 
+MEASURED_BY_HAND = frozenset({"acceptance", "oversize", "undersize"})  # where one is asked what the hand has measured
+
+
 class AlarmRow(NamedTuple):
     """An alarm with the names of what it is about, the correction that is held because of it, and the sister of its tool."""
 

@@ -9,7 +9,7 @@ from app.alarms import outcomes, wording
 from app.alarms.acknowledging import Action
 from app.alarms.queries import AlarmRow
 from app.core.parameters import LARGEST_LENGTH
-from app.web.fields import Body, Reason, Text200
+from app.web.fields import LARGEST_ID, Body, Reason, Text200
 
 ALARM: dict[str, JsonValue] = {
     "id": 41,
@@ -75,6 +75,27 @@ class AcknowledgeIn(Body):
     ] = None
     changed_by: Annotated[
         Text200 | None, Field(description="With `offset_set`: who has changed the offset at the control.")
+    ] = None
+    hand_measured: Annotated[
+        float | None,
+        Field(
+            strict=True,
+            ge=-LARGEST_LENGTH,
+            le=LARGEST_LENGTH,
+            description="What was measured by hand, mm; kept beside the machine's value, the reading is not excluded.",
+        ),
+    ] = None
+    hand_verdict: Annotated[
+        Literal["good", "bad"] | None, Field(description="Whether the part is good, by the person's own judgement.")
+    ] = None
+    hand_sequence: Annotated[
+        int | None,
+        Field(
+            strict=True,
+            ge=1,
+            le=LARGEST_ID,
+            description="Of which reading; of the last one behind the alarm if left out.",
+        ),
     ] = None
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from app.alarms.queries import AlarmRow
+from app.alarms.queries import MEASURED_BY_HAND, AlarmRow
 from app.alarms.tables import Alarm
 from app.calibration.wording import refusal
 from app.web.i18n import _, ngettext
@@ -39,6 +39,8 @@ def sentence(row: AlarmRow) -> str:
         "expected": mm(data.get("expected")),
         "reported": mm(data.get("reported")),
         "correction": data.get("correction"),
+        "least": data.get("least"),
+        "m": data.get("m"),
         "parts": data.get("parts"),
         "planned_parts": data.get("planned_parts"),
         "total": um(data.get("total")),
@@ -62,7 +64,9 @@ def sentence(row: AlarmRow) -> str:
                 "is wrong; compensation is paused."
             )
         case "acceptance":
-            text = _("Too many sections of the part are out of tolerance: it is not accepted.")
+            text = _("At least {least} of {m} sections lie outside the tolerance: the part is not accepted.")
+            if "m" not in data:  # raised before sections were told
+                text = _("Too many sections of the part are out of tolerance: it is not accepted.")
         case "offset_limit":
             text = _(
                 "The corrections of tool {tool} have come to their limit {limit} in all: nothing more is corrected that would "
@@ -129,7 +133,7 @@ def what_to_do(kind: str) -> str:
         "undersize": _("Set the part aside and look at tool and clamping."),
         "tool_worn": _("Look at the cutting edge."),
         "probe_fault": _("Clean the stylus, look at chips, coolant and the program. Then say what it was."),
-        "acceptance": _("Measure the part by hand and confirm."),
+        "acceptance": _("Measure it by hand and confirm."),
         "offset_limit": _(
             "Change the tool, or look for what drifts. If the limit is too narrow, an engineer raises the largest sum in Set-up."
         ),
@@ -143,8 +147,10 @@ def what_to_do(kind: str) -> str:
     }.get(kind, _("Look at it and say what it was."))
 
 
-def action_word(action: str) -> str:
-    """An action as it stands on its button."""
+def action_word(action: str, kind: str = "") -> str:
+    """An action as it stands on its button; at a rejected part the hand decides."""
+    if (action, kind) == ("noted", "acceptance"):
+        return _("Measured by hand")
     return {
         "tool_replaced": _("Tool replaced"),
         "keep_cutting": _("Keep cutting"),
@@ -225,7 +231,11 @@ def consequences(row: AlarmRow, action: str) -> list[str]:
             )
             said.append(_("What it asked for is withdrawn, unless the machine has applied it already."))
         case "noted":
-            said.append(_("Nothing else changes."))
+            said.append(
+                _("What you have measured stands beside the machine's value; the reading is not excluded.")
+                if alarm.kind in MEASURED_BY_HAND
+                else _("Nothing else changes.")
+            )
             if held is not None:
                 said.append(
                     _("Correction {number} stays held; it can be released or rejected in the tool memory.").format(
@@ -270,6 +280,7 @@ def comments(kind: str, action: str) -> list[str]:
         ("calibration_overdue", "noted"): [_("At the end of the batch"), _("At the change of shift"), _("Seen")],
         ("calibration_refused", "noted"): [_("Stylus cleaned"), _("Gauge cleaned"), _("Wrong gauge"), _("Seen")],
         ("offset_limit", "noted"): [_("Seen"), _("Limit is looked at")],
+        ("acceptance", "noted"): [_("Measured by hand"), _("Plug gauge"), _("Part set aside"), _("Seen")],
     }
     return special.get((kind, action), common.get(action, [_("Seen")]))
 

@@ -10,9 +10,13 @@ from app.audit import actions as audit
 from app.db.events import publish
 from app.errors import Conflict
 from app.readings import queries
+from app.readings.by_hand.actions import Found as FoundByHand
+from app.readings.by_hand.actions import measure as measure_by_hand
 from app.readings.records import Entry
 from app.readings.tables import Exclusion
 from app.web.i18n import _
+
+__all__ = ["FoundByHand", "exclude", "exclude_all", "measure_by_hand"]
 
 
 def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: str) -> Exclusion:

@@ -20,7 +20,7 @@ from app.core.compensation import (
 )
 from app.core.parameters import Parameters
 from app.core.probing import TouchError, measured_value
-from app.core.variants import results_of
+from app.core.variants import Results, results_of
 from app.errors import Conflict, FieldError, Invalid
 from app.offsets.tables import OUTSTANDING
 from app.readings.ground import (
@@ -88,7 +88,7 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
         accepted=results is None or not results.rejected,
     )
     paused_by = stream.paused_by
-    alarms = [_signal(ground, stream, signal, sequence, decision) for signal in decision.signals]
+    alarms = [_signal(ground, stream, signal, sequence, decision, results) for signal in decision.signals]
     correction = None
     if decision.amount is not None and tool is not None:
         correction = _issue(ground, stream, tool, sequence, decision)
@@ -304,7 +304,9 @@ def _issue(ground: Ground, stream: StreamState, tool: ToolState, sequence: int, 
 LIMIT_OF = {Signal.TOOL_WORN: "wear_limit", Signal.PROBE_FAULT: "confidence_limit"}
 
 
-def _signal(ground: Ground, stream: StreamState, signal: Signal, sequence: int, decision: Decision) -> OpenAlarm:
+def _signal(
+    ground: Ground, stream: StreamState, signal: Signal, sequence: int, decision: Decision, results: Results | None
+) -> OpenAlarm:
     """Raise the alarm, or add to the one that is active for the same trouble."""
     entry, parameters = stream.entry, stream.parameters
     of_tool = signal is Signal.OFFSET_LIMIT and stream.tool is not None
@@ -332,6 +334,12 @@ def _signal(ground: Ground, stream: StreamState, signal: Signal, sequence: int, 
         "decided": decision.decided,
         "limit": parameters.tolerance_width / 2 if limit is None else limit,
     }
+    if signal is Signal.ACCEPTANCE and results is not None:
+        active.data |= {
+            "m": parameters.accept_m,
+            "least": parameters.accept_m - parameters.accept_n + 1,  # so many outside, and it is rejected
+            "outside": results.sections_outside,
+        }
     active.count += 1
     active.last_sequence = sequence
     return active
