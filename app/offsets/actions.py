@@ -23,6 +23,7 @@ from app.offsets.news import average_changed, correction_changed, tool_changed
 from app.offsets.tables import OPEN, AverageMemory, Correction, Tool, ToolEvent
 from app.people.callers import Caller
 from app.readings.tables import Stream
+from app.web.i18n import _
 
 Verb = Literal["rejected", "approve", "release"]
 FROM: dict[str, tuple[str, ...]] = {"rejected": OPEN, "approve": ("awaiting_approval",), "release": ("held",)}
@@ -46,13 +47,30 @@ class Restarted(NamedTuple):
     parts: int
 
 
-def decide(session: Session, machine: Machine, number: int, verb: Verb, reason: str, caller: Caller) -> Decided:
+def decide(
+    session: Session,
+    machine: Machine,
+    number: int,
+    verb: Verb,
+    reason: str,
+    caller: Caller,
+    *,
+    although_fetched: bool = False,
+) -> Decided:
     """Reject a correction that is not applied yet, approve one that awaits it, or release a held one.
 
-    Raises `NotFound`; `Conflict` when the correction's status does not permit it.
+    Raises `NotFound`; `Conflict` when the correction's status does not permit it, or when a program text with it is out in
+    the world and nobody has said that it is to be rejected nevertheless.
     """
     correction = locked(session, machine, number)
     must_be(correction, machine, verb, FROM[verb])
+    if verb == "rejected" and correction.fetched_at is not None and not although_fetched:
+        raise Conflict(
+            wording.is_out(correction),
+            _("Take the text back and make sure that it was not run; then reject it with although_fetched = true."),
+            correction_status=correction.status,
+            fetched_at=correction.fetched_at.isoformat(),
+        )
     before = correction.status
     correction.status, correction.reason = INTO[verb], reason
     correction.decided_at, correction.decided_by = datetime.now(UTC), caller.name
@@ -62,7 +80,8 @@ def decide(session: Session, machine: Machine, number: int, verb: Verb, reason: 
         alarm = _wear_alarm(session, correction)
         return Decided(correction, None if alarm is None else wording.still_active(alarm))
     counting = queries.counting_on(session, machine, correction) if verb == "rejected" else []
-    return Decided(correction, wording.counted_on(counting))
+    notes = [wording.counted_on(counting), wording.is_out(correction) if correction.fetched_at else None]
+    return Decided(correction, " ".join(filter(None, notes)) or None)
 
 
 def approve_all(

@@ -14,6 +14,7 @@ from app.offsets.schemas import (
     DecisionIn,
     DecisionsIn,
     EmpiricalValueIn,
+    RejectionIn,
     Status,
     ToolChange,
     ToolEdit,
@@ -200,12 +201,14 @@ def mark_applied(
 
 @router.post("/corrections/{machine}/{number}/rejected", responses=problems(404, 409))
 def reject_correction(
-    session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number, decision: DecisionIn
+    session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number, decision: RejectionIn
 ) -> CorrectionOut:
     """It will not be applied: the machine refuses the offset, or a person decides against it."""
     found = machine_named(session, machine)
     caller.must_at(found.id, "operator")
-    done = actions.decide(session, found, number, "rejected", decision.reason, caller)
+    done = actions.decide(
+        session, found, number, "rejected", decision.reason, caller, although_fetched=decision.although_fetched
+    )
     return correction_out(queries.row_of(session, found, done.correction), done.note)
 
 

@@ -115,9 +115,10 @@ def about_correction(row: CorrectionRow, verb: str, counting_on: list[int], came
                         **values
                     ),
                     *filter(None, [wording.counted_on(counting_on)]),
+                    *([wording.is_out(c), _("Take the text back first.")] if c.fetched_at else []),
                 ],
                 [_("False reading"), _("Not applied at the machine"), _("Set by hand instead")],
-                hidden=hidden,
+                hidden=hidden | ({"although_fetched": "true"} if c.fetched_at else {}),
             )
 
 

@@ -156,9 +156,14 @@ def decide(
             confirming.mark_applied(session, shown, number, caller, offset_after=applied.offset_after)
         else:
             decision = parsed(DecisionIn, {"reason": words(form, "reason")})
-            actions.decide(session, shown, number, asking.verb(verb), decision.reason, caller)
-    except Conflict:
+            warned = form.get("although_fetched") == "true"
+            actions.decide(
+                session, shown, number, asking.verb(verb), decision.reason, caller, although_fetched=warned
+            )
+    except Conflict as error:
         session.refresh(found)
+        if "fetched_at" in error.more:  # fetched while this was being asked: ask again, with the warning
+            return _correction(request, session, caller, machine, number, verb, form.get("from"), form)
         sent_twice = found.decided_by == caller.name and found.status == actions.INTO.get(verb)
         said = {"done": verb} if sent_twice else {"late": verb}
     except Invalid as error:

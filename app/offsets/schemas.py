@@ -34,6 +34,8 @@ CORRECTION: dict[str, JsonValue] = {
     "decided_by": None,
     "status_reason": None,
     "superseded_by": None,
+    "fetched_at": None,
+    "fetched_by": None,
     "reason": {
         "code": "full_deviation",
         "text": "Deviation 6.1 µm is beyond the averaging limit 5.3 µm: corrected in full.",
@@ -96,6 +98,22 @@ class DecisionsIn(Body):
         Field(min_length=1, max_length=1000, description="Which ones; all of them, or none if one cannot be approved."),
     ]
     reason: Reason
+
+
+class RejectionIn(DecisionIn):
+    """Why a correction is rejected."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"example": {"reason": "part was dirty, measured again", "although_fetched": False}}
+    )
+
+    although_fetched: Annotated[
+        bool,
+        Field(
+            strict=True,
+            description="Needed for one that was fetched as program text: its text was taken back, and was not run.",
+        ),
+    ] = False
 
 
 class ToolEdit(Body):
@@ -162,6 +180,8 @@ class CorrectionOut(BaseModel):
     decided_by: str | None
     status_reason: Annotated[str | None, Field(description="What was said when that was decided.")]
     superseded_by: int | None
+    fetched_at: Annotated[datetime | None, Field(description="When it was first fetched as program text.")]
+    fetched_by: str | None
     reason: Annotated[Why | None, Field(description="Why it was asked for.")]
     note: Annotated[str | None, Field(description="What else is to be said about what was just done.")] = None
 
@@ -270,6 +290,8 @@ def correction_out(row: CorrectionRow, note: str | None = None) -> CorrectionOut
         decided_by=c.decided_by,
         status_reason=wording.why(c),
         superseded_by=c.superseded_by,
+        fetched_at=c.fetched_at,
+        fetched_by=c.fetched_by,
         reason=None if row.reason is None else Why(**row.reason),
         note=note,
     )

@@ -162,6 +162,13 @@ def counted_on(numbers: list[int]) -> str | None:
     ).format(numbers=", ".join(map(str, numbers)))
 
 
+def is_out(correction: Correction) -> str:
+    """Said of a correction that was fetched as program text, before it falls and when it fell."""
+    return _(
+        "Correction {number} was fetched as program text by {who} on {at}: it may be in the control already, or come there."
+    ).format(number=correction.number, who=correction.fetched_by, at=moment(correction.fetched_at))
+
+
 def still_active(alarm: int) -> str:
     """Said when a held correction is released past its alarm."""
     return _(

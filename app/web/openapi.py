@@ -38,6 +38,8 @@ until it is null."""
 TAGS = {
     "readings": "What the probe measured. The answer says what was decided, why, and what to correct.",
     "offsets": "Tool memory (R10), average memory (R11), and the corrections on their way into the offsets.",
+    "calibration": "Gauge, ring and external gauge: what the machine reads too much, and when to look again.",
+    "programs": "Program text of the controls: read, written, and fetched where a machine has no network.",
     "alarms": "What needs a person, and what that person did about it.",
     "machines": "The machines that push readings.",
     "characteristics": "What is measured, by which R parameters it is judged, and its charts.",
