@@ -27,6 +27,8 @@ from app.people import keys_api
 from app.people import pages as sign_in_pages
 from app.people.keys import KeyRing
 from app.plant import pages as plant_pages
+from app.programs import api as programs
+from app.programs import pages as program_pages
 from app.readings import api as readings
 from app.readings.by_hand import api as by_hand
 from app.readings.door import Directory, ReadingsDoor
@@ -56,6 +58,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     offsets.router,
     calibration.router,
     edges_api.router,
+    programs.router,
     alarms.router,
     events_api.router,
     people.router,
@@ -67,6 +70,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     characteristic_pages.router,
     alarm_pages.router,
     queue_pages.router,
+    program_pages.router,
     edge_pages.router,
     offset_pages.router,
     sign_in_pages.router,
