@@ -2,18 +2,19 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import select
+from sqlalchemy import select, update
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.orm import Session
 
 from app.audit import actions as audit
 from app.db.events import publish
 from app.errors import Conflict
+from app.machines.queries import lock_machines
 from app.readings import queries
 from app.readings.by_hand.actions import Found as FoundByHand
 from app.readings.by_hand.actions import measure as measure_by_hand
 from app.readings.records import Entry
-from app.readings.tables import Exclusion
+from app.readings.tables import Exclusion, Reading, Stream
 from app.web.i18n import _
 
 __all__ = ["FoundByHand", "exclude", "exclude_all", "measure_by_hand"]
@@ -56,6 +57,7 @@ def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: s
             },
             _("There is nothing left to do."),
         )
+    _forget_level(session, entry, [sequence])
     audit.record(
         session,
         actor,
@@ -95,6 +97,7 @@ def exclude_all(session: Session, entry: Entry, sequences: Sequence[int], actor:
         else ()
     )
     if made:
+        _forget_level(session, entry, made)
         audit.record(
             session,
             actor,
@@ -115,3 +118,35 @@ def exclude_all(session: Session, entry: Entry, sequences: Sequence[int], actor:
             },
         )
     return made
+
+
+REMEMBERED = 8  # readings after which what one of them was makes no difference to the level (1/2 to the 8th of it)
+NOT_OF_LEVEL = ("implausible", "tool_worn_held", "probe_fault", "before_tool_change")
+
+
+def _forget_level(session: Session, entry: Entry, sequences: Sequence[int]) -> None:
+    """A level that readings taken out have made is not believed any more: the next reading begins it anew."""
+    at = (Stream.machine_id == entry.machine_id, Stream.characteristic_id == entry.characteristic_id)
+    newest = session.scalar(select(Stream.level_sequence).where(*at))
+    if newest is None or not any(newest - REMEMBERED < sequence <= newest for sequence in sequences):
+        return
+    made_it = session.scalar(
+        select(Reading.sequence)
+        .where(
+            Reading.machine_id == entry.machine_id,
+            Reading.characteristic_id == entry.characteristic_id,
+            Reading.sequence.in_(sequences),
+            Reading.sequence > newest - REMEMBERED,
+            Reading.sequence <= newest,
+            Reading.code.not_in(NOT_OF_LEVEL),
+        )
+        .limit(1)
+    )
+    if made_it is not None:
+        lock_machines(session, [entry.machine_id])
+        session.execute(
+            update(Stream)
+            .where(*at)
+            .values(level=None, level_sequence=None)
+            .execution_options(synchronize_session=False)
+        )

@@ -66,6 +66,7 @@ class ToolState:
     offset: float
     total: float
     reset_at: datetime | None
+    paused_by: int | None = None  # the alarm that asks which offset is true
     corrections: list[IssuedCorrection] = field(default_factory=list)
     changed: bool = False
     # Of the applied corrections there are those with a higher number than `since_number`, and those applied after `since`.
@@ -104,6 +105,9 @@ class StreamState:
     tool: ToolState | None
     paused_by: int | OpenAlarm | None
     last_measured_at: datetime | None
+    level: float | None = None  # the deviation expected without corrections, mm; kept where jumps are looked for
+    level_sequence: int | None = None
+    level_moved: bool = False
     alarms: dict[str, OpenAlarm] = field(default_factory=dict)
     before: int = 0  # sequence when it was loaded
     last: "Verdict | None" = None
@@ -189,6 +193,7 @@ class Ground:
             if stream.last is None:
                 continue
             stream.before, stream.last = stream.sequence, None
+            stream.level_moved = False
             stream.alarms.clear()
             if isinstance(stream.paused_by, OpenAlarm):
                 stream.paused_by = stream.paused_by.id

@@ -19,6 +19,7 @@ from app.core.compensation import (
     outstanding_effect,
 )
 from app.core.parameters import Parameters
+from app.core.plausibility import is_jump, moved, uncorrected
 from app.core.probing import TouchError, measured_value
 from app.core.variants import Results, results_of
 from app.errors import Conflict, FieldError, Invalid
@@ -75,19 +76,25 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
     average = stream.average
     empirical_value = average.empirical_value if average else 0.0
     results = results_of(parameters, reading.touches or (), points, empirical_value) if points else None
+    deviation = deviation_of(measured, parameters.target, empirical_value)
+    course = None
+    if parameters.plausible_jump is not None and compensated is not None:
+        course = uncorrected(deviation, compensated, parameters.factor)
+    jump = course is not None and is_jump(course, stream.level, parameters.plausible_jump or 0.0)
+    paused_by = stream.paused_by if tool is None or stream.paused_by is not None else tool.paused_by
     decision = decide(
         parameters,
         State(
             average.average if average else 0.0,
             _issued_total(tool) if parameters.max_total is not None else 0.0,
-            stream.paused_by is not None,
+            paused_by is not None,
         ),
-        deviation_of(measured, parameters.target, empirical_value),
+        deviation,
         outstanding=outstanding_effect((c.amount for c in outstanding), parameters.factor) if outstanding else 0.0,
         previous_tool=previous_tool,
         accepted=results is None or not results.rejected,
+        jump=jump,
     )
-    paused_by = stream.paused_by
     alarms = [_signal(ground, stream, signal, sequence, decision, results) for signal in decision.signals]
     correction = None
     if decision.amount is not None and tool is not None:
@@ -97,12 +104,14 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
     if average is not None and average.average != decision.average_after:
         average.average = decision.average_after
         average.changed = True
-    if decision.action is Action.STOP and paused_by is None:
+    if decision.action is Action.STOP and stream.paused_by is None:
         stream.paused_by = next(alarm for alarm in alarms if alarm.kind == Signal.PROBE_FAULT.value)
     last = stream.last_measured_at
     late = last is not None and measured_at < last
     if not late:
         stream.last_measured_at = measured_at
+        if course is not None and not jump and decision.action is not Action.STOP:
+            stream.level, stream.level_sequence, stream.level_moved = moved(stream.level, course), sequence, True
     verdict = Verdict(
         stream,
         reading,
@@ -301,7 +310,11 @@ def _issue(ground: Ground, stream: StreamState, tool: ToolState, sequence: int, 
     return correction
 
 
-LIMIT_OF = {Signal.TOOL_WORN: "wear_limit", Signal.PROBE_FAULT: "confidence_limit"}
+LIMIT_OF = {
+    Signal.TOOL_WORN: "wear_limit",
+    Signal.PROBE_FAULT: "confidence_limit",
+    Signal.IMPLAUSIBLE: "plausible_jump",
+}
 
 
 def _signal(

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
 from typing import Any
 
+from app.core.compensation import Code
 from app.core.parameters import Parameters
 from app.errors import InbandError
 from app.readings.answers import answer
@@ -51,6 +52,8 @@ def replay(
         )
         if tool is not None and made is not None and made.status != "held":
             tool.total += made.amount
+        if verdict.decision.code is Code.IMPLAUSIBLE:
+            stream.level = None  # somebody has looked, and the next reading begins anew
         _as_if_done(ground, stream)
 
 

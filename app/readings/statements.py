@@ -39,6 +39,7 @@ SELECT json_build_object(
     'streams', (
         SELECT json_agg(json_build_array(s.machine_id, s.characteristic_id, s.sequence, s.parameters_version, s.paused_by,
             s.last_measured_at, a.location, a.average, a.empirical_value, t.number, t."offset", t.total, t.reset_at,
+            t.paused_by, s.level, s.level_sequence,
             CASE WHEN t.number IS NOT NULL THEN (
                 SELECT json_agg(json_build_array(
                     c.number, c.amount, c.status, c.applied_at, c.decided_at, c.fetched_at) ORDER BY c.number) FROM (
@@ -151,6 +152,11 @@ MOVE_TOOLS = """
 UPDATE tool t SET "offset" = n."offset", total = n.total
 FROM json_to_recordset($1) AS n(machine_id int, number int, "offset" float8, total float8)
 WHERE t.machine_id = n.machine_id AND t.number = n.number
+"""
+MOVE_LEVELS = """
+UPDATE stream s SET level = n.level, level_sequence = n.level_sequence
+FROM json_to_recordset($1) AS n(machine_id int, characteristic_id int, level float8, level_sequence bigint)
+WHERE s.machine_id = n.machine_id AND s.characteristic_id = n.characteristic_id
 """
 STEPS = """
 INSERT INTO tool_event (machine_id, number, at, kind, offset_before, offset_after, correction, actor)

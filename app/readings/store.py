@@ -31,6 +31,7 @@ from app.readings.statements import (
     ISSUE,
     LOAD,
     LOCK,
+    MOVE_LEVELS,
     MOVE_TOOLS,
     PARAMETERS,
     RAISE,
@@ -80,6 +81,9 @@ class _Stream(msgspec.Struct, array_like=True):
     offset: float | None
     total: float | None
     reset_at: datetime | None
+    tool_paused_by: int | None
+    level: float | None
+    level_sequence: int | None
     corrections: list[_Issued] | None
 
 
@@ -184,7 +188,7 @@ def _add_stream(
         tool = ground.tools.get((row.machine_id, row.tool))
         if tool is None:
             tool = ground.tools[row.machine_id, row.tool] = ToolState(
-                row.machine_id, row.tool, row.offset or 0.0, row.total or 0.0, row.reset_at
+                row.machine_id, row.tool, row.offset or 0.0, row.total or 0.0, row.reset_at, row.tool_paused_by
             )
         tool.since_number, tool.since = number, since
         tool.corrections = [
@@ -209,6 +213,8 @@ def _add_stream(
         tool,
         row.paused_by,
         row.last_measured_at,
+        level=row.level,
+        level_sequence=row.level_sequence,
         before=row.sequence,
     )
 
@@ -339,6 +345,18 @@ def _rarer(ground: Ground) -> Iterable[tuple[str, list[Any]]]:
             }
             for v in ground.verdicts
             if v.results is not None
+        ],
+    )
+    yield (
+        MOVE_LEVELS,
+        [
+            {
+                "machine_id": stream.entry.machine_id,
+                "characteristic_id": stream.entry.characteristic_id,
+                "level": stream.level,
+                "level_sequence": stream.level_sequence,
+            }
+            for stream in {id(v.stream): v.stream for v in ground.verdicts if v.stream.level_moved}.values()
         ],
     )
     if ground.touched_machines:
