@@ -38,6 +38,8 @@ from app.rounds import Chore, Rounds
 from app.settings import Settings
 from app.setup import pages as setup_pages
 from app.statistics import api as statistics
+from app.wear import actions as wear_chores
+from app.wear import api as wear
 from app.web import api_docs, events_api, health
 from app.web.limits import BodyLimit
 from app.web.live import Live
@@ -52,6 +54,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     characteristics.router,
     figures_api.router,
     statistics.router,
+    wear.router,
     readings.push,
     readings.router,
     by_hand.router,
@@ -82,6 +85,7 @@ ROUTERS: tuple[APIRouter, ...] = (
 CHORES: tuple[Chore, ...] = (
     Chore("corrections expire", offset_chores.expire_corrections),
     Chore("tool lives are told", offset_chores.tell_tool_lives),
+    Chore("wear is foretold, and hunting told", wear_chores.look_ahead),
     Chore("calibrations are overdue", raise_overdue),
 )
 

@@ -36,6 +36,42 @@ def raise_for_tool(session: Session, machine_id: int, tool_memory: int, kind: st
     return active
 
 
+def raise_for_characteristic(
+    session: Session,
+    machine_id: int,
+    characteristic_id: int,
+    tool_memory: int | None,
+    kind: str,
+    data: dict[str, Any],
+) -> Alarm:
+    """Raise an alarm about a characteristic that no reading raises, or count one more if it is active already."""
+    active = session.scalars(
+        select(Alarm)
+        .where(
+            Alarm.machine_id == machine_id,
+            Alarm.characteristic_id == characteristic_id,
+            Alarm.kind == kind,
+            Alarm.acknowledged_at.is_(None),
+        )
+        .execution_options(populate_existing=True)
+    ).one_or_none()
+    if active is None:
+        active = Alarm(
+            machine_id=machine_id,
+            characteristic_id=characteristic_id,
+            tool_memory=tool_memory or None,
+            kind=kind,
+            data=data,
+        )
+        session.add(active)
+    else:
+        active.count += 1
+        active.last_at = func.clock_timestamp()
+        active.data = data
+    session.flush()
+    return active
+
+
 def raise_for_place(session: Session, machine_id: int, kind: str, data: dict[str, Any]) -> Alarm:
     """Raise an alarm about a location of a memory (`memory` and `location` in its data); the machine is locked.
 

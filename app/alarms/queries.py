@@ -29,6 +29,7 @@ KINDS = (
     "signal",
     "implausible",
     "tool_life",
+    "hunting",
 )
 HOLDING = ("tool_worn", "implausible")  # kinds that a correction is held for
 

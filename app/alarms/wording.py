@@ -6,6 +6,7 @@ from typing import Any
 from app.alarms.queries import MEASURED_BY_HAND, AlarmRow
 from app.alarms.tables import Alarm
 from app.calibration.wording import refusal
+from app.wear.wording import hunting_sentence, remedy_sentence
 from app.web.i18n import _, ngettext
 from app.web.numbers import mm, um, um_limit
 
@@ -24,6 +25,7 @@ def kind_word(kind: str) -> str:
         "calibration_refused": _("Calibration refused"),
         "implausible": _("Implausible jump"),
         "tool_life": _("Tool life reached"),
+        "hunting": _("Hunting"),
         "signal": _("Signal"),
     }.get(kind, kind)
 
@@ -90,6 +92,8 @@ def sentence(row: AlarmRow) -> str:
             text = _("The probe has not been calibrated for {passed}: {place}.")
         case "calibration_refused":
             text = _("A calibration was refused and changes nothing: {place}. {why}")
+        case "hunting":
+            text = f"{hunting_sentence(data)} {remedy_sentence(data, data['settings'])}"
         case _:
             text = str(data.get("text") or kind_word(alarm.kind))
     return text.format(**values) if alarm.kind in _KNOWN else text
@@ -142,6 +146,7 @@ def what_to_do(kind: str) -> str:
             "Look at the part and the stylus, and whether the right tool has cut it. Then say what it was."
         ),
         "tool_life": _("Change the tool, or go on with its sister."),
+        "hunting": _("An engineer sets the parameters in Set-up; the page of the characteristic says to what."),
         "calibration_overdue": _("Calibrate it; that ends this alarm."),
         "calibration_refused": _("Clean stylus and gauge and look at the program, then calibrate again."),
     }.get(kind, _("Look at it and say what it was."))
@@ -171,6 +176,7 @@ def offered(row: AlarmRow) -> list[str]:
         "offset_differs": ["offset_set", "tool_replaced"],
         "implausible": ["false_reading", "keep_cutting", "tool_replaced", "sister_tool", "noted"],
         "tool_life": ["tool_replaced", "sister_tool", "noted"],
+        "hunting": ["noted"],
         "calibration_overdue": ["noted"],
         "calibration_refused": ["noted"],
     }.get(alarm.kind, ["noted", "tool_replaced", "false_reading"])

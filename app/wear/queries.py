@@ -26,10 +26,12 @@ from app.core.zones import nanometres
 from app.offsets.queries import OFFSET_TOLERANCE
 from app.offsets.tables import OUTSTANDING, Correction, Tool, ToolEvent
 from app.readings.tables import Stream
+from app.statistics import queries as statistics
 from app.statistics.queries import Window
 
 MOST_READINGS = 2_500  # read one by one
 MOST_GROUPS, GROUP = 400, 16  # what is older: so many groups of so many readings
+FEW = 100  # of a tool that has cut fewer parts the chart shows the one before too
 MOST_EVENTS = 5_000  # steps of the tool's offset that are looked through
 SETTINGS = ("zero_range", "averaging_limit", "weighting_factor", "factor", "tool_memory", "average_memory", "mode")
 
@@ -142,6 +144,14 @@ def life_of(session: Session, standing: Standing) -> Window:
     """The readings since the tool was changed."""
     stream = _stream(session, standing)
     return Window(stream.sequence_at_tool_change + 1, stream.sequence, stream.sequence)
+
+
+def shown(session: Session, standing: Standing, last: str | None) -> Window:
+    """The readings that a chart is asked for: `tool` (of few, those before too), `all`, or the last so many."""
+    if last in (None, "tool"):
+        life = life_of(session, standing)
+        return life if life.count >= FEW else statistics.window_of(session, standing.characteristic, last=FEW)
+    return statistics.window_of(session, standing.characteristic, last=None if last == "all" else int(last or FEW))
 
 
 def wear_of(session: Session, standing: Standing, window: Window) -> Wear:

@@ -1,0 +1,114 @@
+"""What is worked out on the rounds: the outlook of each characteristic, and an alarm where a loop begins to hunt.
+
+None of it is what readings are decided by, so no machine is locked for it, and what the writer has in memory stays true.
+"""
+
+from sqlalchemy import Select, func, or_, select
+from sqlalchemy.dialects.postgresql import insert
+from sqlalchemy.orm import Session
+
+from app.alarms import actions as alarms
+from app.characteristics import queries as characteristics
+from app.characteristics.queries import Standing
+from app.characteristics.tables import Characteristic
+from app.core.hunting import State
+from app.core.wear import LONGEST
+from app.db.events import publish
+from app.readings.tables import Stream
+from app.statistics.queries import Window
+from app.wear import queries, wording
+from app.wear.queries import Wear
+from app.wear.tables import Outlook
+
+MOST = 200  # characteristics on one round; those whose outlook is oldest come first
+OVERCORRECTS = (State.HUNTING.value, State.SWINGING.value)
+
+
+def look_ahead(session: Session) -> None:
+    """Work out the outlook of what was measured since, and raise *hunting* once where a loop has begun to hunt."""
+    changes = []
+    for key in session.scalars(_moved()):
+        standing = characteristics.characteristic_named(session, key)
+        before = session.get(Outlook, (standing.machine.id, standing.characteristic.id))
+        hunted = before is not None and before.hunting in OVERCORRECTS
+        wear = queries.wear_of(session, standing, _newest(session, standing))
+        _note(session, wear)
+        found = wear.hunting
+        if found is not None and found.state in OVERCORRECTS and not hunted:
+            alarm = alarms.raise_for_characteristic(
+                session,
+                standing.machine.id,
+                standing.characteristic.id,
+                standing.parameters.tool_memory,
+                "hunting",
+                wording.hunting_data(found) | {"settings": {name: standing.version.parameters[name] for name in SAID}},
+            )
+            changes.append(
+                {
+                    "kind": "alarm",
+                    "machine": standing.machine.key,
+                    "characteristic": standing.characteristic.key,
+                    "tool": alarm.tool_memory,
+                    "id": alarm.id,
+                    "alarm": alarm.kind,
+                    "state": "active",
+                }
+            )
+    if changes:
+        publish(session, *changes)
+
+
+SAID = ("zero_range", "averaging_limit", "weighting_factor", "tolerance_width")  # settings that the sentences name
+
+
+def _moved() -> Select[str]:
+    """Keys of the characteristics that have been measured, or set otherwise, since their outlook was made."""
+    return (
+        select(Characteristic.key)
+        .join(
+            Stream,
+            (Stream.machine_id == Characteristic.machine_id) & (Stream.characteristic_id == Characteristic.id),
+        )
+        .outerjoin(
+            Outlook,
+            (Outlook.machine_id == Stream.machine_id) & (Outlook.characteristic_id == Stream.characteristic_id),
+        )
+        .where(
+            Stream.sequence > 0,
+            or_(
+                Outlook.sequence.is_(None),
+                Outlook.sequence != Stream.sequence,
+                Outlook.parameters_version != Stream.parameters_version,
+            ),
+        )
+        .order_by(Outlook.at.nulls_first())
+        .limit(MOST)
+    )
+
+
+def _newest(session: Session, standing: Standing) -> Window:
+    """What the outlook is made of: the line needs no more."""
+    life = queries.life_of(session, standing)
+    return Window(max(1, life.last - LONGEST + 1), life.last, life.newest)
+
+
+def _note(session: Session, wear: Wear) -> None:
+    towards, forecast = wear.first or (None, None)
+    finite = forecast is not None and forecast.high != float("inf")
+    values = {
+        "sequence": wear.window.last,
+        "parameters_version": wear.standing.version.version,
+        "at": func.now(),
+        "towards": towards.value if towards else None,
+        "parts": forecast.parts if forecast else None,
+        "parts_low": forecast.low if forecast else None,
+        "parts_high": forecast.high if forecast and finite else None,
+        "hunting": (wear.hunting.state if wear.hunting else State.QUIET).value,
+    }
+    where = {"machine_id": wear.standing.machine.id, "characteristic_id": wear.standing.characteristic.id}
+    session.execute(
+        insert(Outlook)
+        .values(**where, **values)
+        .on_conflict_do_update(index_elements=["machine_id", "characteristic_id"], set_=values)
+        .execution_options(synchronize_session=False)
+    )

@@ -1,0 +1,66 @@
+"""JSON routes: the wear of a characteristic in numbers, and its curve."""
+
+from typing import Annotated
+
+import msgspec
+from fastapi import Query, Response
+
+from app.characteristics import queries as characteristics
+from app.characteristics.figures_api import FIGURE, CharacteristicKey, Theme, Width
+from app.statistics import queries as statistics
+from app.wear import queries
+from app.wear.chart import chart_of
+from app.wear.figures import wear_figure
+from app.wear.schemas import WearOut
+from app.web.api import api_router, problems
+from app.web.deps import AnyCaller, SessionDep
+from app.web.fields import LARGEST_ID
+
+router = api_router("wear")
+
+
+@router.get("/characteristics/{characteristic}/wear", responses=problems(404))
+def get_wear(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    last: Annotated[
+        int | None, Query(ge=1, le=LARGEST_ID, description="Of the tool's readings only those among the last so many.")
+    ] = None,
+) -> WearOut:
+    """Wear per part with its interval, parts left as a forecast, and whether the loop hunts.
+
+    Without `last` of the present tool life. Excluded readings, probe faults and parts cut before the tool change are left out.
+    """
+    standing = characteristics.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    window = queries.life_of(session, standing)
+    if last is not None:
+        window = statistics.window_of(session, standing.characteristic, last=last, first=window.first)
+    return WearOut.of(queries.wear_of(session, standing, window))
+
+
+@router.get("/characteristics/{characteristic}/figures/wear", responses=problems(404) | FIGURE, response_model=None)
+def get_wear_figure(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    last: Annotated[
+        str | None,
+        Query(
+            pattern=r"^([1-9][0-9]{0,17}|all|tool)$",
+            description="The last so many readings, `all`, or `tool`: since the tool was changed.",
+        ),
+    ] = None,
+    theme: Theme = "light",
+    width: Width = 1240,
+) -> Response:
+    """The wear curve with its line, what the corrections took out of it, and the forecast to the limits that are near."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    wear = queries.wear_of(session, standing, queries.shown(session, standing, last))
+    return Response(
+        msgspec.json.encode(wear_figure(chart_of(wear), theme=theme, width=width)),
+        media_type="application/json",
+        headers={"Cache-Control": "no-store"},
+    )

@@ -1,0 +1,220 @@
+"""The sentences about wear, forecasts and hunting. Lengths in mm."""
+
+from collections.abc import Mapping
+from math import floor, inf, log10
+from typing import Any
+
+from app.core.hunting import GOAL, Hunting, Remedy, State
+from app.core.wear import FEWEST, Fit, Forecast, Towards
+from app.web.i18n import _, ngettext
+from app.web.numbers import NO_BREAK_SPACE, signed
+
+FAR = 10_000  # parts: further ahead nobody plans, and nothing goes on as it is
+
+
+def per_part(slope: float, decimals: int = 3) -> str:
+    r"""Wear in µm per part.
+
+    >>> per_part(0.000061)
+    '+0.061\xa0µm'
+    """
+    return f"{signed(slope * 1000, decimals)}{NO_BREAK_SPACE}µm"
+
+
+def rounded(parts: float) -> int:
+    """Two digits: more nobody knows.
+
+    >>> rounded(143.2), rounded(7.6), rounded(0)
+    (140, 8, 0)
+    """
+    if parts < 10:
+        return round(parts)
+    step = 10 ** (floor(log10(parts)) - 1)
+    return int(round(parts / step) * step)
+
+
+def interval(forecast: Forecast) -> str:
+    """The interval of a forecast, in parts: `90–260`."""
+    high = _("more") if forecast.high == inf or forecast.high > FAR else str(rounded(forecast.high))
+    return f"{rounded(forecast.low)}–{high}"
+
+
+def parts_left(forecast: Forecast) -> str:
+    """How many parts, with the interval: `≈ 140 (90–260)`."""
+    if forecast.parts <= 0:
+        return _("reached")
+    if forecast.parts > FAR:
+        return _("more than {n}").format(n=f"{FAR:,}".replace(",", NO_BREAK_SPACE))
+    return f"≈{NO_BREAK_SPACE}{rounded(forecast.parts)} ({interval(forecast)})"
+
+
+def towards_word(towards: Towards | str) -> str:
+    """What comes, as it stands after a number of parts."""
+    return {
+        Towards.WEAR: _("to R37"),
+        Towards.TOLERANCE: _("to the end of the tolerance"),
+        Towards.OFFSET: _("to the offset limit"),
+    }[Towards(towards)]
+
+
+def towards_name(towards: Towards) -> str:
+    """What comes, as a heading."""
+    return {
+        Towards.WEAR: _("Worn by R37"),
+        Towards.TOLERANCE: _("End of the tolerance"),
+        Towards.OFFSET: _("Offset limit"),
+    }[towards]
+
+
+def definition(towards: Towards, *, corrects: bool) -> str:
+    """What is meant by it."""
+    if towards is Towards.WEAR:
+        return _("a part would deviate by R37, had nothing been corrected since the tool was changed")
+    if towards is Towards.OFFSET:
+        return _("the corrections of this tool come to their largest sum, if they follow the wear")
+    if corrects:
+        return _("a part would be out of tolerance, if nothing were corrected from now on")
+    return _("a part is out of tolerance; nothing is corrected here")
+
+
+def wear_sentence(fit: Fit | None) -> str:
+    """What can be said of the wear per part."""
+    if fit is None:
+        return _("Too few readings of this tool yet: a line needs {n}.").format(n=FEWEST)
+    low, high = fit.slope_interval
+    if not fit.is_wear:
+        return _("No wear to be seen: between {low} and {high} per part over the last {n} readings.").format(
+            low=per_part(low), high=per_part(high), n=fit.count
+        )
+    return _("{slope} per part, between {low} and {high}, over the last {n} readings.").format(
+        slope=per_part(fit.slope), low=per_part(low), high=per_part(high), n=fit.count
+    )
+
+
+def fit_note(fit: Fit) -> str:
+    """What the numbers assume."""
+    said = [_("Scatter about the line {scatter} (one standard deviation).").format(scatter=_um(fit.scatter, 2))]
+    if fit.correlation >= 0.05:
+        said.append(
+            _("Neighbours scatter alike ({rho}): the {n} readings count as {effective}.").format(
+                rho=f"{fit.correlation:.2f}", n=fit.count, effective=round(fit.effective)
+            )
+        )
+    if fit.left_out:
+        said.append(
+            ngettext("{n} outlier is left out.", "{n} outliers are left out.", fit.left_out).format(n=fit.left_out)
+        )
+    return " ".join(said)
+
+
+def hunting_word(state: State | str) -> str:
+    """The verdict in a word or two."""
+    return {
+        State.UNKNOWN: _("Too few readings"),
+        State.QUIET: _("Quiet"),
+        State.HUNTING: _("Hunting"),
+        State.SWINGING: _("Swinging"),
+    }[State(state)]
+
+
+def hunting_data(found: Hunting) -> dict[str, Any]:
+    """What the sentences are worded from; an alarm keeps it."""
+    remedy = found.remedy
+    return {
+        "state": found.state.value,
+        "readings": found.readings,
+        "corrections": found.corrections,
+        "reversals": found.reversals,
+        "mean_size": found.mean_size,
+        "scatter": found.scatter,
+        "expected_corrections": found.expected.corrections if found.expected else None,
+        "expected_reversals": found.expected.reversals if found.expected else None,
+        "expected_size": found.expected.size if found.expected else None,
+        "excess": found.expected.excess if found.expected else None,
+        "remedy": None if remedy is None else remedy._asdict(),
+    }
+
+
+def hunting_sentence(data: Mapping[str, Any]) -> str:
+    """What was seen, and what scatter alone would do."""
+    values = {
+        "n": data["readings"],
+        "corrections": data["corrections"],
+        "reversals": data["reversals"],
+        "size": _um(data["mean_size"], 1),
+        "scatter": _um(data["scatter"], 2),
+        "alone": _share(data["expected_corrections"]),
+        "back": _share(data["expected_reversals"]),
+        "excess": _share(data["excess"]),
+    }
+    match State(data["state"]):
+        case State.UNKNOWN:
+            return _("Too few readings with these settings yet to tell.")
+        case State.QUIET:
+            return _(
+                "{corrections} corrections in {n} readings, {reversals} took the one before back. Scatter of {scatter} alone "
+                "would correct {alone} of the readings."
+            ).format(**values)
+        case State.HUNTING:
+            return _(
+                "The loop runs after its own scatter: {corrections} corrections in {n} readings, and {reversals} took the one "
+                "before back, {size} on average. Scatter of {scatter} alone does that with these settings; the parts scatter "
+                "{excess} more for it."
+            ).format(**values)
+        case State.SWINGING:
+            return _(
+                "The offset swings: {corrections} corrections in {n} readings, {reversals} took the one before back, {size} on "
+                "average. Scatter of {scatter} alone would take back only {back} of the readings."
+            ).format(**values)
+
+
+def remedy_sentence(data: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
+    """What to set, and by how much. settings: the parameters in force, by name."""
+    if data["state"] == State.SWINGING:
+        return _(
+            "Look at the factor of this characteristic, at whether the machine says what was in effect (correction_in_effect or "
+            "machined_at), and whether something else moves this offset."
+        )
+    if data["state"] != State.HUNTING or data["remedy"] is None:
+        return ""
+    remedy = Remedy(**data["remedy"])
+    values = {
+        "r33": _um(settings["zero_range"], 1),
+        "new_r33": _um(remedy.zero_range, 1),
+        "k": f"{settings['weighting_factor']:g}",
+        "new_k": f"{remedy.weighting_factor or 0:g}",
+        "r34": _um(settings["averaging_limit"], 1),
+        "new_r34": _um(remedy.averaging_limit, 1),
+        "goal": _share(GOAL),
+    }
+    if remedy.averaging_limit is not None:
+        if remedy.averaging_limit > settings["tolerance_width"] / 2:
+            return _(
+                "No setting helps: the process scatters too much for this tolerance. Average more touches (R27), or find what "
+                "makes it scatter."
+            )
+        text = _("Raise R34 from {r34} to {new_r34} and R33 from {r33} to {new_r33}")
+    elif remedy.zero_range is not None and remedy.weighting_factor is not None:
+        text = _("Raise R33 from {r33} to {new_r33}, or k from {k} to {new_k}")
+    elif remedy.zero_range is not None:
+        text = _("Raise R33 from {r33} to {new_r33}; k alone does not help")
+    elif remedy.weighting_factor is not None:
+        text = _("Raise k from {k} to {new_k}; R33 alone does not help")
+    else:
+        return _("No setting helps: the process scatters too much for these limits.")
+    text = (text + _(": then scatter alone corrects no more than {goal} of the readings.")).format(**values)
+    if remedy.floor and remedy.zero_range == remedy.floor:
+        text += " " + _("R33 is not below {floor}, the uncertainty of the probe's signal path.").format(
+            floor=_um(remedy.floor, 1)
+        )
+    return text
+
+
+def _um(length: float | None, decimals: int) -> str:
+    return "–" if length is None else f"{length * 1000:.{decimals}f}{NO_BREAK_SPACE}µm"
+
+
+def _share(share: float | None) -> str:
+    if share is None:
+        return "–"
+    return f"{share * 100:.1f}{NO_BREAK_SPACE}%" if share < 0.095 else f"{share * 100:.0f}{NO_BREAK_SPACE}%"
