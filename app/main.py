@@ -12,6 +12,7 @@ from app.alarms import api as alarms
 from app.alarms import pages as alarm_pages
 from app.audit import api as audit
 from app.calibration import api as calibration
+from app.calibration import pages as calibration_pages
 from app.calibration.overdue import raise_overdue
 from app.characteristics import api as characteristics
 from app.characteristics import figures_api
@@ -29,6 +30,9 @@ from app.people.keys import KeyRing
 from app.plant import pages as plant_pages
 from app.programs import api as programs
 from app.programs import pages as program_pages
+from app.proof import api as proof
+from app.proof import pages as proof_pages
+from app.proof import queries as proofs
 from app.readings import api as readings
 from app.readings.by_hand import api as by_hand
 from app.readings.door import Directory, ReadingsDoor
@@ -54,6 +58,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     characteristics.router,
     figures_api.router,
     statistics.router,
+    proof.router,
     wear.router,
     readings.push,
     readings.router,
@@ -76,9 +81,11 @@ ROUTERS: tuple[APIRouter, ...] = (
     program_pages.router,
     edge_pages.router,
     offset_pages.router,
+    calibration_pages.router,
     sign_in_pages.router,
     setup_pages.router,
     import_pages.router,
+    proof_pages.router,
 )
 
 # What is looked after once a minute; see app.rounds.
@@ -104,10 +111,12 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
         writer.start()
         live.start()
         rounds.start()
+        proving = proofs.begin_later()
         # What has been made so far stays for good: the collector need not walk it again, which halves the p99.
         gc.collect()
         gc.freeze()
         yield
+        proving.cancel()
         await live.stop()
         await rounds.stop()
         await writer.stop()

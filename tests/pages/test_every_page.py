@@ -51,6 +51,7 @@ PAGES = {
     "/account": ["/account"],
     "/import": ["/import"],
     "/api/docs": ["/api/docs"],
+    "/proof": ["/proof"],
 }
 SIGNED_OUT = {"/sign-in", "/invitation/{token}"}
 OPENED_ELSEWHERE = {"/import/{token}"}  # needs a file that was sent; tests/imports

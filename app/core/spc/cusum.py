@@ -97,7 +97,7 @@ def _one_sided(k: float, h: float, shift: float, start: float) -> tuple[float, f
 
     L(u) = 1 + L(0) Phi(k - u - shift) + integral over 0..h of L(x) phi(x + k - u - shift).
     """
-    nodes = int(64 + 12 * h)
+    nodes = int(32 + 8 * h)
     x, weights = np.polynomial.legendre.leggauss(nodes)
     x, weights = h * (x + 1) / 2, h / 2 * weights
     at = np.concatenate(([0.0, start], x))

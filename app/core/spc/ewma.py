@@ -93,7 +93,7 @@ def average_run_length(weight: float, width: float, shift: float = 0.0) -> float
     if weight == 1:
         return 1 / (ndtr(-width - shift) + ndtr(-width + shift))
     limit = width * sqrt(weight / (2 - weight))
-    nodes = int(min(2000, 64 + 24 * limit / weight))
+    nodes = int(min(2000, 32 + 12 * limit / weight))
     if limit / weight > 1e3:
         raise Refused(Reason.BEYOND_RANGE)
     x, weights = np.polynomial.legendre.leggauss(nodes)

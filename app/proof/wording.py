@@ -1,0 +1,54 @@
+"""What the examples are about, and how their numbers are written."""
+
+from app.proof.cases import Value
+from app.proof.queries import Check
+from app.web.i18n import _, ngettext
+
+
+def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
+    """What examples are sorted by on the page: a heading and the kinds below it."""
+    return {
+        "decision": (_("Decision and measuring"), ("decision", "mean_nominal", "running_average", "signal_path")),
+        "summary": (_("Mean, spread, autocorrelation"), ("summary",)),
+        "charts": (
+            _("Control charts"),
+            ("constants", "d2_star", "individuals", "subgroups", "ewma", "moving_average", "cusum"),
+        ),
+        "chance": (
+            _("How often charts signal"),
+            ("rule_probability", "rule_run_length", "ewma_run_length", "cusum_run_length"),
+        ),
+        "capability": (_("Capability and normality"), ("capability", "percentile", "anderson_darling", "shapiro_wilk")),
+        "gauge": (_("Gauge studies"), ("gauge_ranges", "gauge_anova", "linearity", "bias", "type_one")),
+    }
+
+
+def number(value: float | bool | None) -> str:
+    """A number with the digits that can be told apart at the tolerances in use."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return _("yes") if value else _("no")
+    return f"{value:.12g}"
+
+
+def written(value: Value | None) -> str:
+    """A number, or a list of them."""
+    return ", ".join(map(number, value)) if isinstance(value, list) else number(value)
+
+
+def size(check: Check) -> int:
+    return len(check.expected) if isinstance(check.expected, list) else 1
+
+
+def numbers(count: int) -> str:
+    return ngettext("%(num)d number", "%(num)d numbers", count) % {"num": count}
+
+
+def warning(failing: int) -> str:
+    """For the top of pages with statistics."""
+    return ngettext(
+        "%(num)d published example does not come out as published. Do not rely on the statistics of this program until that is settled.",
+        "%(num)d published examples do not come out as published. Do not rely on the statistics of this program until that is settled.",
+        failing,
+    ) % {"num": failing}

@@ -1,0 +1,42 @@
+"""Published numbers, each with its source: what app/proof/cases holds comes out of the engine."""
+
+import json
+from collections import Counter
+
+import pytest
+
+from app.proof.cases import FOLDER, Case, cases
+from app.proof.engine import ENGINE
+from app.proof.queries import run
+from app.proof.wording import topics
+
+
+@pytest.mark.parametrize("case", cases(), ids=lambda case: f"{case.kind}: {case.name}")
+def test_it_comes_out_as_published(case: Case) -> None:
+    (result,) = run([case]).results
+    assert result.error is None
+    assert [(check.name, check.expected, check.got) for check in result.checks if not check.passed] == []
+    assert [check.name for check in result.checks] == list(case.expected)
+
+
+def test_every_kind_has_an_example_and_a_place_on_the_page() -> None:
+    assert {case.kind for case in cases()} == set(ENGINE)
+    placed = Counter(kind for _heading, kinds in topics().values() for kind in kinds)
+    assert placed == Counter(dict.fromkeys(ENGINE, 1))
+
+
+def test_every_example_names_its_source_and_what_it_may_be_off_by() -> None:
+    for case in cases():
+        assert len(case.source) > 20
+        assert set(case.tolerance) == set(case.expected)
+        for name, expected in case.expected.items():
+            tolerance = case.tolerance[name]
+            if isinstance(tolerance, list):
+                assert isinstance(expected, list)
+                assert len(tolerance) == len(expected)
+
+
+def test_no_example_is_there_twice() -> None:
+    assert max(Counter((case.kind, case.name) for case in cases()).values()) == 1
+    described = [each for path in FOLDER.glob("*.json") for each in json.loads(path.read_text(encoding="utf-8"))]
+    assert len(described) == len(cases()) >= 45
