@@ -219,3 +219,13 @@ def place_words(place: Place) -> str:
 def missing_touch(expected: float, got: float | None) -> str:
     """The count of touches is not the one that was announced."""
     return _("{got} touches came, R27 says {expected}").format(got=got, expected=expected)
+
+
+def no_such_page() -> str:
+    """There is nothing at this address."""
+    return _("There is nothing at this address.")
+
+
+def go_to_overview() -> str:
+    """Where to look instead."""
+    return _("Go back to the calibrations.")

@@ -1,0 +1,226 @@
+"""Pages: every place that is calibrated, one place with its history and forms, and the second touch before a value is set."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.calibration import actions, asking, comparing, due, forms, queries, wording
+from app.calibration.queries import Place
+from app.calibration.schemas import GaugeIn, PairIn, PlanIn, RingIn
+from app.characteristics import queries as characteristics
+from app.errors import Conflict, Invalid, NotFound
+from app.machines import queries as machines
+from app.machines.queries import machine_named
+from app.web.deps import Caller, FormDep, Operator, SessionDep, Viewer, require
+from app.web.fields import LARGEST_ID
+from app.web.forms import by_field, parsed, words
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+ON_PAGE = 25
+MEMORIES = {"averages": "average", "probes": "tool"}
+Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
+Word = Annotated[str | None, Query(max_length=40)]
+
+
+def address(machine: str, place: Place, **query: Any) -> str:
+    """The page of a place."""
+    folder = "averages" if place.memory == "average" else "probes"
+    given = {name: value for name, value in query.items() if value is not None}
+    return f"/calibration/{machine}/{folder}/{place.location}" + (f"?{urlencode(given)}" if given else "")
+
+
+@router.get("/calibration", dependencies=[require("viewer")])
+def overview(request: Request, session: SessionDep) -> Response:
+    """All machines and places: what was found last, and when the next calibration is due."""
+    rows = due.places(session)
+    groups = [
+        (machine, [row for row in rows if row.machine.id == machine.id]) for machine in machines.machines(session)
+    ]
+    return page(request, "calibration/overview.html", groups=groups, wording=wording, address=address)
+
+
+@router.get("/calibration/{machine}/probes", dependencies=[require("viewer")])
+def choose_probe(session: SessionDep, machine: str, tool: Annotated[int, Query(ge=1, le=32)]) -> Response:
+    """The page of the probe in this location of the tool memory."""
+    return RedirectResponse(address(machine_named(session, machine).key, Place("tool", tool)), 303)
+
+
+@router.get("/calibration/{machine}/{memory}/{location}")
+def place_page(
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    machine: str,
+    memory: str,
+    location: int,
+    before: Number = None,
+    done: Word = None,
+    n: Number = None,
+) -> Response:
+    """One place: how it stands, its history, the pairs, and the forms."""
+    said = asking.done(done, n) if done else None
+    return _place(request, session, caller, machine, _of(memory, location), before=before, said=said)
+
+
+def _of(memory: str, location: int) -> Place:
+    if memory not in MEMORIES:
+        raise NotFound(wording.no_such_page(), wording.go_to_overview())
+    return Place(MEMORIES[memory], location)
+
+
+def _place(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    machine: str,
+    place: Place,
+    *,
+    before: int | None = None,
+    said: str | None = None,
+    late: bool = False,
+    form: Mapping[str, str] | None = None,
+    error: Invalid | None = None,
+) -> Response:
+    shown = machine_named(session, machine)
+    value = queries.value_of(session, shown, place)
+    row = due.place_row(session, shown, place, value)
+    average = place.memory == "average"
+    history = queries.calibrations(session, shown, place, before=before, newest_first=True, limit=ON_PAGE + 1)
+    older = address(machine, place, before=history[ON_PAGE - 1].record.number) if len(history) > ON_PAGE else None
+    return page(
+        request,
+        "calibration/place.html" if average else "calibration/probe.html",
+        status=error.status if error else 409 if late else 200,
+        machine=shown,
+        place=place,
+        row=row,
+        history=history[:ON_PAGE],
+        older=older,
+        newest=address(machine, place) if before else None,
+        origin=queries.origin(session, shown, place.location) if average else None,
+        suggestion=queries.suggestion(session, shown, place.location) if average else None,
+        form=forms.filled_in(row, _limits(session, row)) | dict(form or {}),
+        errors=by_field(error) if error else {},
+        said=said,
+        late=late,
+        wording=wording,
+        address=address,
+        may_plan=caller.may("engineer"),
+    )
+
+
+def _limits(session: Session, row: due.PlaceRow) -> dict[str, float]:
+    """R33, R34, R36 and R28 of a characteristic that uses the location."""
+    if not row.characteristics:
+        return {}
+    parameters = characteristics.characteristic_named(session, row.characteristics[0]).parameters
+    return {name: getattr(parameters, name) for name in forms.LENGTHS}
+
+
+@router.post("/calibration/{machine}/{memory}/{location}")
+def enter(
+    request: Request,
+    session: SessionDep,
+    caller: Operator,
+    machine: str,
+    memory: str,
+    location: int,
+    form: FormDep,
+) -> Response:
+    """A calibration typed in, pairs pasted, or a plan: `do` says which. All of it is taken, or nothing."""
+    shown, place = machine_named(session, machine), _of(memory, location)
+    queries.value_of(session, shown, place)
+    verb, number = form.get("do", ""), None
+    try:
+        with session.begin_nested():
+            if verb == "plan":
+                caller.must("engineer")
+                actions.set_plan(session, shown, place, parsed(PlanIn, forms.plan(form)), caller)
+            elif verb == "pairs" and place.memory == "average":
+                given = [parsed(PairIn, pair) for pair in forms.pairs(form)]
+                for pair in given:
+                    comparing.add_pair(session, shown, location, pair, caller)
+                number = len(given)
+            elif place.memory == "average":
+                number = actions.calibrate_gauge(
+                    session, shown, parsed(GaugeIn, forms.gauge(form, location)), caller
+                ).row.record.number
+            else:
+                ringed = parsed(RingIn, forms.ring(form, location))
+                number = actions.calibrate_ring(session, shown, ringed, caller).row.record.number
+    except Invalid as error:
+        return _place(request, session, caller, machine, place, form=form, error=error)
+    return RedirectResponse(address(machine, place, done=verb or "calibrated", n=number), 303)
+
+
+@router.get("/calibration/{machine}/{memory}/{location}/{what}/{number}", dependencies=[require("operator")])
+def ask(
+    request: Request, session: SessionDep, machine: str, memory: str, location: int, what: str, number: int
+) -> Response:
+    """The second touch: `accept` a calibration, accept the `suggestion` of the pairs, `exclude` a pair."""
+    return _ask(request, session, machine, _of(memory, location), what, number)
+
+
+def _ask(
+    request: Request,
+    session: Session,
+    machine: str,
+    place: Place,
+    what: str,
+    number: int,
+    form: Mapping[str, str] | None = None,
+    error: Invalid | None = None,
+) -> Response:
+    shown = machine_named(session, machine)
+    return page(
+        request,
+        "calibration/ask.html",
+        status=error.status if error else 200,
+        machine=shown,
+        place=place,
+        question=asking.question(session, shown, place, what, number),
+        form=form or {},
+        errors=by_field(error) if error else {},
+        wording=wording,
+        address=address,
+        here=f"{address(machine, place)}/{what}/{number}",
+    )
+
+
+@router.post("/calibration/{machine}/{memory}/{location}/{what}/{number}")
+def confirm(
+    request: Request,
+    session: SessionDep,
+    caller: Operator,
+    machine: str,
+    memory: str,
+    location: int,
+    what: str,
+    number: int,
+    form: FormDep,
+) -> Response:
+    """It is done, or who comes too late is told how it stands."""
+    shown, place = machine_named(session, machine), _of(memory, location)
+    try:
+        reason = asking.reason(words(form, "reason"))
+        if what == "accept":
+            actions.accept(session, shown, number, reason, caller)
+        elif what == "suggestion" and place.memory == "average":
+            seen = asking.seen(form.get("seen"))
+            number = comparing.accept_suggestion(session, shown, location, reason, caller, seen=seen).record.number
+        elif what == "exclude" and place.memory == "average":
+            comparing.exclude_pair(session, shown, location, number, reason, caller)
+        else:
+            raise NotFound(wording.no_such_page(), wording.go_to_overview())
+    except Conflict as late:
+        return _place(
+            request, session, caller, machine, place, said=f"{late.detail} {late.what_to_do or ''}", late=True
+        )
+    except Invalid as error:
+        return _ask(request, session, machine, place, what, number, form, error)
+    return RedirectResponse(address(machine, place, done=what, n=number), 303)
