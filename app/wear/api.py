@@ -1,12 +1,11 @@
 """JSON routes: the wear of a characteristic in numbers, and its curve."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
-from fastapi import Query, Response
+from fastapi import Path, Query, Response
 
 from app.characteristics import queries as characteristics
-from app.characteristics.figures_api import FIGURE, CharacteristicKey, Theme, Width
 from app.statistics import queries as statistics
 from app.wear import queries
 from app.wear.chart import chart_of
@@ -15,8 +14,17 @@ from app.wear.schemas import WearOut
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, SessionDep
 from app.web.fields import LARGEST_ID
+from app.web.theme import ThemeName
 
 router = api_router("wear")
+
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+FIGURE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "A Plotly figure: `data` and `layout`",
+        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
+    }
+}
 
 
 @router.get("/characteristics/{characteristic}/wear", responses=problems(404))
@@ -52,8 +60,8 @@ def get_wear_figure(
             description="The last so many readings, `all`, or `tool`: since the tool was changed.",
         ),
     ] = None,
-    theme: Theme = "light",
-    width: Width = 1240,
+    theme: Annotated[ThemeName, Query(description="For a light or a dark page.")] = "light",
+    width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")] = 1240,
 ) -> Response:
     """The wear curve with its line, what the corrections took out of it, and the forecast to the limits that are near."""
     standing = characteristics.characteristic_named(session, characteristic)
