@@ -10,6 +10,7 @@ The map of the house. Whoever knows the shop floor knows where to look:
     alarms           what needs a person, and what follows when one acknowledges it
     plant            the first page: every machine and characteristic at a glance
     statistics       what the readings say together: counts, spread, charts of ten million points
+    wear             true wear behind the corrections, how long an edge will do, and loops that hunt
     proof            published examples run through the live engine: what it says, what was published
     setup            the pages where all of that is set up
     people           who may do what: sign-in, sessions, roles, personal keys
