@@ -107,7 +107,7 @@ def _reported(
     """
     said, last = confirmed[0], confirmed[-1]
     tool.offset = round(reported, DECIMALS) + 0.0
-    for each in {said, last}:  # what was reported, so that saying it again is recognised
+    for each in confirmed:  # what was reported, so that saying it again is recognised
         each.offset_after, each.applied_by = tool.offset, caller.name
     _step(session, machine, tool, last.number, before, tool.offset, at, caller)
     changes = [*(correction_changed(session, machine, each) for each in confirmed), tool_changed(machine, tool.number)]

@@ -29,8 +29,11 @@ class TestWithoutScripts:
         text = operator.open(page_of(shop))
         assert f'id="correction-{number}"' in text
         assert f"/machines/{shop.machine}/corrections/{number}?do=applied" in text
-        assert "31 unused locations" in text
-        assert "19 unused locations" in text
+        for table, locations in (("all-tools", 32), ("all-averages", 20)):
+            shown = text.partition(f'id="{table}"')[2].partition("</ol>")[0]
+            assert [int(number) for number in re.findall(r'class="place">(\d+)<', shown)] == list(
+                range(1, locations + 1)
+            )
 
     @pytest.mark.parametrize(
         ("verb", "fields", "status"),
@@ -172,7 +175,7 @@ class TestInABrowser:
         page.set_viewport_size({"width": 800, "height": 1280})
         page.goto(page_of(shop))
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-        for target in page.locator(".waiting-verbs a, .tool-card .button, .tabs a, .unused summary").all():
+        for target in page.locator(".waiting-verbs a, .tool-card .button, .tabs a, .cells a").all():
             box = target.bounding_box()
             assert box is not None
             assert box["height"] >= 48
