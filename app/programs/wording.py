@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from app.characteristics.wording import label
+from app.characteristics.wording import choice, label
 from app.core.parameters import BY_NAME, Kind
 from app.core.programs.corrections import Form
 from app.core.programs.lines import (
@@ -55,7 +55,7 @@ def note(said: Note) -> str:
             **values | {"before": _value(None, said.data["before"])}
         )
     return {
-        "call": _("calls {word}"),
+        "call": _call(str(values.get("word", ""))),
         "r44_for_r34": _("R44 is taken for R34, as the manual misprints it; check that it is the averaging limit"),
         "skip_block": _("The block begins with /: on the control it is left out while block skip is on"),
         "not_used": _("{r} is not used here"),
@@ -77,12 +77,23 @@ def note(said: Note) -> str:
     }[said.code].format(**values)
 
 
+def _call(word: str) -> str:
+    words = {
+        "L05": _("calibration subprogram"),
+        "L15": _("measuring subprogram"),
+        "L75": _("target and tolerance from the drawing"),
+        "L92": _("calibration cycle"),
+        "L93": _("measuring cycle"),
+    }
+    return f"{word}: {words[word]}" if word in words else _("calls {word}").format(word=word)
+
+
 def _taken(said: Note) -> str:
     data = said.data
     name = data.get("name")
     value = _value(name, data["value"])
     if said.code == "result":
-        return _("result {r} = {value}").format(r=data["r"], value=value)
+        return _("result {r} = {value} {name}").format(r=data["r"], value=value, name=variable(data["r"]))
     if said.code == "assumed":
         field = BY_NAME[data["name"]]
         return _("{r} {name} is not in the text: {value} is taken, the least of the cycles' range").format(
@@ -90,12 +101,36 @@ def _taken(said: Note) -> str:
         )
     if said.code == "setting":
         return _("{name}: {value}").format(name=_named(data["name"]), value=value)
-    words = {"r": data["r"], "value": value, "name": _named(name) if name and name != data["r"] else ""}
+    words = {"r": data["r"], "value": value, "name": variable(data["r"]) or (_named(name) if name else "")}
     if data["how"] == "run_together":
-        return _("{r} = {value} {name} (two digits are the number, the rest is the value)").format(**words)
+        return _("{r} = {value} {name}, written without =").format(**words)
     if data["how"] == "name":
         return _("{text} is {r} = {value} {name}").format(**words, text=data["text"])
     return _("{r} = {value} {name}").format(**words).rstrip()
+
+
+def variable(r: str) -> str:
+    """What a number means that is no parameter here: of the calibration, of the macros, of what a cycle has found."""
+    return {
+        "R21": _("surface"),
+        "R22": _("probe"),
+        "R24": _("two points"),
+        "R42": _("nominal"),
+        "R43": _("measured"),
+        "R44": _("difference"),
+        "R46": _("memory location"),
+        "R47": _("tool offset number"),
+        "R49": _("average"),
+        "#500": _("start X"),
+        "#501": _("start Z"),
+        "#502": _("probe radius term"),
+        "#503": _("radius"),
+        "#504": _("probing feed"),
+        "#510": _("section 1"),
+        "#511": _("section 2"),
+        "#512": _("section 3"),
+        "#513": _("rejects"),
+    }.get(r, "")
 
 
 def _named(name: str) -> str:
@@ -111,7 +146,7 @@ def _value(name: str | None, value: Any) -> str:
     if isinstance(value, int | float):
         field = BY_NAME.get(name or "")
         return written(value) + (" mm" if field is not None and field.kind is Kind.LENGTH else "")
-    return str(value)
+    return choice(name or "", str(value)).lower()
 
 
 def _set(parameters: dict[str, Any]) -> str:

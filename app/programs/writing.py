@@ -1,7 +1,7 @@
 """A characteristic as program text of a control."""
 
 import re
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from app.characteristics.queries import Standing
 from app.core.programs import fanuc
@@ -57,6 +57,23 @@ def program_of(
     head, rest = text.split("\n", 1)
     where = "#505" if control == "fanuc" else "R32"
     return f"{head}\n({where} IS THE TARGET: WRITE THE SIZE OF YOUR GAUGE THERE)\n{rest}"
+
+
+class Shown(NamedTuple):
+    """A program text as pages show it."""
+
+    text: str
+    download: str
+    file: str
+
+
+def shown(standing: Standing) -> Shown | None:
+    """The measuring program for the machine's own control; None where nothing is written for it."""
+    control = standing.machine.control
+    if control not in WRITTEN:
+        return None
+    download = f"/api/v1/characteristics/{standing.characteristic.key}/program"
+    return Shown(program_of(standing, control), download, file_name(standing, control, "measuring"))
 
 
 def file_name(standing: Standing, control: str, kind: Kind) -> str:

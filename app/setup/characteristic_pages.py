@@ -13,6 +13,7 @@ from app.characteristics.actions import CharacteristicChange, CharacteristicIn
 from app.characteristics.wording import history
 from app.errors import Conflict, InbandError, Invalid
 from app.machines import queries as machines
+from app.programs import writing
 from app.setup import parameter_form
 from app.setup.frame import setup_page
 from app.web.deps import Caller, Engineer, FormDep, SessionDep, Viewer
@@ -88,6 +89,11 @@ def _new(
     )
 
 
+def prefilled_new(request: Request, session: Session, caller: Caller, typed: Mapping[str, str]) -> Response:
+    """The form of a new characteristic with what is known of it already, as if it had been typed."""
+    return _new(request, session, caller, typed, {})
+
+
 @router.get("/setup/characteristics/{characteristic}")
 def characteristic_page(request: Request, session: SessionDep, caller: Viewer, characteristic: str) -> Response:
     return _characteristic(request, session, caller, queries.characteristic_named(session, characteristic))
@@ -133,6 +139,14 @@ def send_characteristic(
     return RedirectResponse(f"/setup/characteristics/{quote(characteristic)}?done={done}", 303)
 
 
+def prefilled_change(
+    request: Request, session: Session, caller: Caller, standing: queries.Standing, typed: Mapping[str, str]
+) -> Response:
+    """The form of a characteristic with other parameters typed into it; nothing is changed until it is sent."""
+    names = {"name": standing.characteristic.name, "part": standing.characteristic.part or ""}
+    return _characteristic(request, session, caller, standing, typed=names | dict(typed))
+
+
 def _characteristic(
     request: Request,
     session: Session,
@@ -162,6 +176,7 @@ def _characteristic(
         problem=problem,
         warnings=actions.warnings_of(standing.parameters, standing.machine.zero_range_floor),
         history=history(queries.versions(session, characteristic)),
+        program=writing.shown(standing),
         **_form(typed, errors or {}),
     )
 

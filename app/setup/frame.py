@@ -16,6 +16,7 @@ def setup_page(
     tabs = [
         ("characteristics", _("Characteristics"), "/setup/characteristics"),
         ("machines", _("Machines and keys"), "/setup/machines"),
+        ("programs", _("Program text"), "/setup/programs"),
     ]
     if caller.may("admin"):
         tabs.append(("people", _("People"), "/setup/people"))

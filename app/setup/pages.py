@@ -3,7 +3,7 @@
 from fastapi import APIRouter, Response
 from starlette.responses import RedirectResponse
 
-from app.setup import audit_pages, characteristic_pages, machine_pages, people_pages
+from app.setup import audit_pages, characteristic_pages, machine_pages, people_pages, program_pages
 from app.web.deps import require
 
 router = APIRouter(include_in_schema=False)
@@ -14,5 +14,5 @@ def setup() -> Response:
     return RedirectResponse("/setup/characteristics", 303)
 
 
-for part in (machine_pages, characteristic_pages, people_pages, audit_pages):
+for part in (machine_pages, characteristic_pages, program_pages, people_pages, audit_pages):
     router.include_router(part.router)

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 
 from app.characteristics.wording import choice, explanation, label, order_sentence
 from app.core.parameters import BY_NAME, FIELDS, Field, Kind, mean_nominal
+from app.core.programs.lines import written
 from app.web.i18n import _
 
-__all__ = ["choice", "diagram", "parameters_from", "sentences", "typed_defaults", "typed_from"]
+__all__ = ["choice", "diagram", "parameters_from", "sentences", "typed_defaults", "typed_from", "typed_partly"]
 
 FACTORS = ("-1", "-0.5", "0.5")
 OTHER = "other"
@@ -100,6 +101,22 @@ def typed_from(parameters: Mapping[str, Any]) -> dict[str, str]:
         "accept_n": _text(parameters["accept"]["n"]),
         "accept_m": _text(parameters["accept"]["m"]),
     }
+
+
+def typed_partly(given: Mapping[str, Any]) -> dict[str, str]:
+    """The form as it would have been typed for some parameters, every digit of them; the others are at their defaults."""
+    typed = typed_defaults() | {name: _exactly(given[name]) for name in BY_NAME if given.get(name) is not None}
+    if typed["nominal"]:  # target and width follow from the drawing
+        typed["target"] = typed["tolerance_width"] = ""
+    if typed["factor"]:
+        known = next((factor for factor in FACTORS if float(factor) == given["factor"]), OTHER)
+        typed |= {"factor": known, "factor_other": typed["factor"] if known == OTHER else ""}
+    accept = given.get("accept") or {"n": 1, "m": 1}
+    return typed | {"accept_n": str(accept["n"]), "accept_m": str(accept["m"])}
+
+
+def _exactly(value: Any) -> str:
+    return written(value) if isinstance(value, float) else _text(value)
 
 
 def parameters_from(form: Mapping[str, str]) -> dict[str, Any]:
