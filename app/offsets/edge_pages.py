@@ -19,7 +19,7 @@ from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 LIVES_SHOWN = 20
-STEPS_SHOWN = 15
+STEPS_SHOWN = 6
 FIELDS = tuple(ToolSettings.model_fields)
 
 

@@ -11,6 +11,7 @@ from app.plant import queries
 from app.plant.queries import Group, Row
 from app.plant.state import State
 from app.plant.wording import state_word
+from app.wear.queries import foretold
 from app.web.deps import SessionDep, require
 from app.web.templates import page
 
@@ -48,6 +49,7 @@ def _page(request: Request, session: Session, show: str, machine: str | None) ->
         state_word=state_word,
         band=lambda row: band_picture(row.stream.last_deviation, row.parameters, None, row.average),
         spark=lambda row: sparkline(row.trend, row.parameters),
+        foretold=lambda row: foretold(row.outlook),
         now=now,
         **_summary(groups),
     )

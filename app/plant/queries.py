@@ -16,8 +16,12 @@ from app.machines.tables import Machine
 from app.offsets.tables import OPEN, AverageMemory, Correction, Tool
 from app.plant.state import CALM, NEED_SOMEONE, Known, State, state_of
 from app.readings.tables import Stream
+from app.statistics import queries as statistics
+from app.statistics.queries import Rejects
+from app.wear.tables import Outlook
 
 TREND = 50  # readings of the small picture
+NO_REJECTS = Rejects(0, 0)
 
 _TREND = """
 SELECT s.characteristic_id, array_agg(r.deviation ORDER BY r.sequence), min(r.received_at)
@@ -45,6 +49,9 @@ class Row:
     corrections: list[tuple[int, str, float]]
     known: Known
     state: State
+    rejects: Rejects | None = None  # since the tool was changed; None without acceptance n of m
+    outlook: Outlook | None = None  # what the rounds last made of it
+    tool_paused_by: int | None = None  # the alarm that asks which offset of the tool is true
 
     @property
     def trend(self) -> list[float]:
@@ -85,8 +92,9 @@ def plant(session: Session, *, machine: str | None = None, trends: bool = True) 
     alarms, tool_alarms = _alarms(session, only)
     corrections = _corrections(session, only)
     courses = _trends(session, only) if trends else {}
+    rejects = statistics.rejects_by_characteristic(session, only)
     rows: dict[int, list[Row]] = defaultdict(list)
-    for characteristic, stored, stream, average, offset in session.execute(_standing(only)):
+    for characteristic, stored, stream, average, offset, tool_paused_by, outlook in session.execute(_standing(only)):
         number = characteristic.id
         parameters = Parameters.from_dict(stored)
         trend, since = courses.get(number, ([], None))
@@ -101,6 +109,7 @@ def plant(session: Session, *, machine: str | None = None, trends: bool = True) 
             trend=trend,
             since=since,
             last_at=stream.last_received_at,
+            tool_paused=tool_paused_by is not None,
         )
         rows[characteristic.machine_id].append(
             Row(
@@ -113,6 +122,9 @@ def plant(session: Session, *, machine: str | None = None, trends: bool = True) 
                 corrections[number],
                 known,
                 state_of(known),
+                rejects.get(number, NO_REJECTS) if parameters.accept_m > 1 else None,
+                outlook=outlook,
+                tool_paused_by=tool_paused_by,
             )
         )
     return [Group(each, rows[each.id], tool_alarms[each.id]) for each in machines]
@@ -126,7 +138,15 @@ def row_of(session: Session, machine: str, characteristic: str) -> Row:
 
 def _standing(machine_id: int | None) -> Any:
     query = (
-        select(Characteristic, ParametersVersion.parameters, Stream, AverageMemory.average, Tool.offset)
+        select(
+            Characteristic,
+            ParametersVersion.parameters,
+            Stream,
+            AverageMemory.average,
+            Tool.offset,
+            Tool.paused_by,
+            Outlook,
+        )
         .join(
             Stream,
             (Stream.machine_id == Characteristic.machine_id) & (Stream.characteristic_id == Characteristic.id),
@@ -142,6 +162,10 @@ def _standing(machine_id: int | None) -> Any:
             (AverageMemory.machine_id == Stream.machine_id) & (AverageMemory.location == Stream.average_memory),
         )
         .outerjoin(Tool, (Tool.machine_id == Stream.machine_id) & (Tool.number == Stream.tool_memory))
+        .outerjoin(
+            Outlook,
+            (Outlook.machine_id == Stream.machine_id) & (Outlook.characteristic_id == Stream.characteristic_id),
+        )
         .order_by(Characteristic.key)
     )
     return query if machine_id is None else query.where(Characteristic.machine_id == machine_id)

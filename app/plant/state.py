@@ -17,6 +17,7 @@ class State(StrEnum):
     """From the most urgent to the calmest; the first that applies is shown."""
 
     PROBE_FAULT = "probe_fault"
+    PAUSED = "paused"
     TOOL_WORN = "tool_worn"
     HELD = "held"
     OVERSIZE = "oversize"
@@ -33,6 +34,7 @@ class State(StrEnum):
 NEED_SOMEONE = frozenset(
     {
         State.PROBE_FAULT,
+        State.PAUSED,
         State.TOOL_WORN,
         State.HELD,
         State.OVERSIZE,
@@ -48,6 +50,7 @@ CALM = frozenset({State.CORRECTING, State.DRIFTING_UP, State.DRIFTING_DOWN, Stat
 class Known:
     """What the state is told by.
 
+    paused: by a probe fault; tool_paused: nobody knows which offset its tool has.
     alarms: kinds of the active ones. corrections: statuses of the open ones. trend: the last deviations, oldest first, mm;
     since: when the first of them arrived.
     """
@@ -62,6 +65,7 @@ class Known:
     trend: Sequence[float]
     since: datetime | None
     last_at: datetime | None
+    tool_paused: bool = False
 
     @property
     def old_from(self) -> datetime | None:
@@ -78,6 +82,8 @@ def state_of(known: Known) -> State:
     """The most urgent thing that can be said."""
     if known.paused or "probe_fault" in known.alarms:
         return State.PROBE_FAULT
+    if known.tool_paused:
+        return State.PAUSED
     if "tool_worn" in known.alarms:
         return State.TOOL_WORN
     if "held" in known.corrections:

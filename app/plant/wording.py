@@ -8,6 +8,7 @@ def state_word(state: State) -> str:
     """The state in one or two words."""
     return {
         State.PROBE_FAULT: _("Probe fault"),
+        State.PAUSED: _("Paused"),
         State.TOOL_WORN: _("Tool worn"),
         State.HELD: _("Held"),
         State.OVERSIZE: _("Oversize"),

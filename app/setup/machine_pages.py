@@ -20,7 +20,7 @@ from app.web.forms import by_field, length, parsed
 from app.web.i18n import _
 
 router = APIRouter()
-NUMBERS = ("signal_delay", "signal_jitter", "probing_feed")
+NUMBERS = ("signal_delay", "signal_jitter", "probing_feed", "corrections_expire_after")
 SHOWN = ("name", "control", "signal_path", *NUMBERS)
 
 

@@ -31,18 +31,31 @@ PAGES = {
     "/alarms": ["/alarms", "/alarms?machine={machine}"],
     "/alarms/history": ["/alarms/history"],
     "/alarms/{number}": ["/alarms/{alarm}", "/alarms/{alarm}?action=keep_cutting"],
+    "/corrections": ["/corrections", "/corrections?machine={machine}"],
+    "/corrections/{machine}/tools/{tool}": ["/corrections/{machine}/tools/5"],
     "/tools": ["/tools"],
+    "/machines/{machine}/tools/{number}": ["/machines/{machine}/tools/3", "/machines/{machine}/tools/32"],
     "/machines/{machine}/tools": ["/machines/{machine}/tools?tool=3"],
+    "/machines/{machine}/corrections/program": [
+        "/machines/{machine}/corrections/program",
+        "/machines/{machine}/corrections/program?form=list",
+    ],
     "/machines/{machine}/corrections/{number}": ["/machines/{machine}/corrections/1"],
     "/machines/{machine}/tools/{number}/{what}": [
         "/machines/{machine}/tools/3/edit",
         "/machines/{machine}/tools/3/change",
+        "/machines/{machine}/tools/3/sister",
     ],
     "/machines/{machine}/averages/{location}/edit": ["/machines/{machine}/averages/5/edit"],
     "/setup": ["/setup"],
     "/setup/characteristics": ["/setup/characteristics"],
     "/setup/characteristics/new": ["/setup/characteristics/new"],
     "/setup/characteristics/{characteristic}": ["/setup/characteristics/{characteristic}"],
+    "/setup/programs": ["/setup/programs"],
+    "/setup/characteristics/{characteristic}/program": [
+        "/setup/characteristics/{characteristic}/program",
+        "/setup/characteristics/{characteristic}/program?kind=calibration&gauge=199.852&control=fanuc",
+    ],
     "/setup/machines": ["/setup/machines"],
     "/setup/machines/new": ["/setup/machines/new"],
     "/setup/machines/{machine}": ["/setup/machines/{machine}"],
@@ -55,7 +68,7 @@ PAGES = {
 }
 SIGNED_OUT = {"/sign-in", "/invitation/{token}"}
 OPENED_ELSEWHERE = {"/import/{token}"}  # needs a file that was sent; tests/imports
-PARTS = {"/plant-summary", "/alarms/count"}  # only ever fetched into a page
+PARTS = {"/plant-summary", "/alarms/count", "/corrections/count"}  # only ever fetched into a page
 
 
 def routes_of(router: Any) -> Iterator[APIRoute]:
@@ -86,6 +99,15 @@ def shop(server: Server) -> Shop:
     made.add(f"{made.characteristic}-empty", tool_memory=4)
     made.add(f"{made.characteristic}-approval", tool_memory=5, average_memory=6, mode="approval")
     made.read(6.0, f"{made.characteristic}-approval")
+    made.read(-12.0, f"{made.characteristic}-approval")
+    made.call(
+        "PATCH",
+        f"/machines/{made.machine}/tools/3",
+        name="Finishing tool with a name as long as tool lists have them",
+        edge="D1",
+        planned_parts=400,
+        sister=13,
+    )
     made.call(
         "PATCH",
         f"/characteristics/{made.characteristic}-empty",
