@@ -25,8 +25,8 @@ CALIBRATION: dict[str, JsonValue] = {
     "action": "accept",
     "reason": {
         "code": "averaged_difference",
-        "text": "The machine reads +3.0 µm, +3.0 µm beside the empirical value +0.0 µm; the average +1.5 µm is beyond the "
-        "zero range ±1 µm: the empirical value becomes +1.5 µm.",
+        "text": "The machine reads +3.0 µm too much. Less the empirical value +0.0 µm that is +3.0 µm; the average +1.5 µm "
+        "is beyond the zero range ±1 µm: the empirical value becomes +1.5 µm.",
     },
     "gauge_size": 199.852,
     "measured": 199.855,

@@ -243,7 +243,7 @@ def calibration_figure(
     changes = queries.value_changes(session, found, location, limit)
     return figures.gauge_figure(
         [mark_of(row) for row in reversed(rows)],
-        [(change.at, change.value) for change in reversed(changes)],
+        sorted((change.since, change.value) for change in changes),
         value,
         theme=theme_from(theme),
     )

@@ -15,6 +15,7 @@ from app.characteristics import queries as characteristics
 from app.errors import Conflict, Invalid, NotFound
 from app.machines import queries as machines
 from app.machines.queries import machine_named
+from app.offsets.queries import TOOL_LOCATIONS
 from app.web.deps import Caller, FormDep, Operator, SessionDep, Viewer, require
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed, words
@@ -44,8 +45,12 @@ def overview(request: Request, session: SessionDep) -> Response:
     return page(request, "calibration/overview.html", groups=groups, wording=wording, address=address)
 
 
-@router.get("/calibration/{machine}/probes", dependencies=[require("viewer")])
-def choose_probe(session: SessionDep, machine: str, tool: Annotated[int, Query(ge=1, le=32)]) -> Response:
+@router.get("/calibration/probes", dependencies=[require("viewer")])
+def choose_probe(
+    session: SessionDep,
+    machine: Annotated[str, Query(max_length=64)],
+    tool: Annotated[int, Query(ge=1, le=TOOL_LOCATIONS)],
+) -> Response:
     """The page of the probe in this location of the tool memory."""
     return RedirectResponse(address(machine_named(session, machine).key, Place("tool", tool)), 303)
 

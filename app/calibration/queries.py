@@ -42,13 +42,17 @@ class CalibrationRow(NamedTuple):
 
 
 class Origin(NamedTuple):
-    """Where an empirical value came from: who set it, when, why, and by which calibration, if by one."""
+    """Where an empirical value came from: who set it, when, why, and by which calibration, if by one.
+
+    since: from when on it was in effect on the machine; one that takes effect by itself does so when it is made.
+    """
 
     value: float
     at: datetime
     actor: str
     reason: str | None
     calibration: int | None
+    since: datetime
 
 
 class Pair(NamedTuple):
@@ -230,9 +234,14 @@ def _changes(machine: Machine, location: int) -> Select[AuditEntry]:
 def _origins(session: Session, machine: Machine, location: int, entries: Sequence[AuditEntry]) -> list[Origin]:
     """An acceptance and the change that it made were written in one transaction, so they bear the same time."""
     accepted = {
-        row.at: row.number
+        row.at: row
         for row in session.execute(
-            select(CalibrationAcceptance.at, CalibrationAcceptance.number)
+            select(
+                CalibrationAcceptance.at,
+                CalibrationAcceptance.number,
+                CalibrationAcceptance.automatic,
+                CalibrationRecord.calibrated_at,
+            )
             .join(
                 CalibrationRecord,
                 and_(
@@ -248,12 +257,13 @@ def _origins(session: Session, machine: Machine, location: int, entries: Sequenc
             )
         )
     }
-    return [
-        Origin(
-            (entry.after or {}).get("empirical_value", 0.0), entry.at, entry.actor, entry.why, accepted.get(entry.at)
-        )
-        for entry in entries
-    ]
+    found = []
+    for entry in entries:
+        value, by = (entry.after or {}).get("empirical_value", 0.0), accepted.get(entry.at)
+        since = by.calibrated_at if by is not None and by.automatic else entry.at
+        number = None if by is None else by.number
+        found.append(Origin(value, entry.at, entry.actor, entry.why, number, since))
+    return found
 
 
 # --- pairs

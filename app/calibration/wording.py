@@ -32,23 +32,23 @@ def sentence(record: CalibrationRecord) -> str:
     match record.outcome:
         case Outcome.WITHIN_ZERO_RANGE:
             text = _(
-                "The machine reads {difference}; the empirical value {before} explains it but for {left}, which is within "
-                "the zero range {zero}: nothing is to be changed."
+                "The machine reads {difference} too much. Less the empirical value {before} that is {left}, within the zero "
+                "range {zero}: nothing is to be changed."
             )
         case Outcome.AVERAGE_KEPT:
             text = _(
-                "The machine reads {difference}, {left} beside the empirical value {before}; the average {average} is within "
-                "the zero range {zero}: nothing is to be changed yet."
+                "The machine reads {difference} too much. Less the empirical value {before} that is {left}; the average "
+                "{average} is within the zero range {zero}: nothing is to be changed yet."
             )
         case Outcome.AVERAGED_DIFFERENCE:
             text = _(
-                "The machine reads {difference}, {left} beside the empirical value {before}; the average {average} is beyond "
-                "the zero range {zero}: the empirical value becomes {proposed}."
+                "The machine reads {difference} too much. Less the empirical value {before} that is {left}; the average "
+                "{average} is beyond the zero range {zero}: the empirical value becomes {proposed}."
             )
         case Outcome.FULL_DIFFERENCE:
             text = _(
-                "The machine reads {difference}, {left} beside the empirical value {before}, beyond the averaging limit "
-                "{limit}: the empirical value becomes {proposed}."
+                "The machine reads {difference} too much. Less the empirical value {before} that is {left}, beyond the "
+                "averaging limit {limit}: the empirical value becomes {proposed}."
             )
         case Outcome.CENTRED if record.proposed is None:
             text = _("The probe stands in the middle of the spindle: its offset stays.")
@@ -204,6 +204,8 @@ def what_pairs_say(found: Comparison, empirical_value: float) -> str:
     said = _("The machine reads {mean} too much, with {confidence} certainty between {low} and {high}.").format(
         **values
     )
+    if found.outlier is not None:
+        said += " " + _("One pair stands out: look at it first.")
     if found.suggested is None:
         return said + " " + _("The empirical value {value} lies inside: the pairs agree with it.").format(**values)
     return said + " " + _("The empirical value {value} lies outside: {mean} is suggested.").format(**values)
