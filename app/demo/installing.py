@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from random import Random
 
-from app.demo import plant
+from app.demo import calibrating, plant
 from app.demo.client import Client, Refused
 from app.demo.running import Line, Pace
 from app.demo.simulation import Machine
@@ -16,9 +16,13 @@ PAST = 300  # parts of each machine
 
 def set_up(admin: Client, machine: plant.Machine) -> None:
     """The machine and its characteristics, as far as they are not there."""
-    _unless_there(
-        admin, "/machines", {"key": machine.key, "name": machine.name, "control": machine.control}, machine.key
-    )
+    made: dict[str, object] = {
+        "key": machine.key,
+        "name": machine.name,
+        "control": machine.control,
+        "signal_path": machine.signal_path,
+    }
+    _unless_there(admin, "/machines", made, machine.key)
     for feature in machine.features:
         body = {"key": feature.key, "name": feature.name, "machine": machine.key, "part": machine.part}
         _unless_there(admin, "/characteristics", body | {"parameters": feature.parameters}, feature.key)
@@ -52,6 +56,7 @@ def lines(
     made: list[Line] = []
     for spec in machines:
         set_up(admin, spec)
+        calibrating.behind(admin, spec.key, seed)
         gateway = Client(url, new_key(admin, f"/machines/{spec.key}/keys", {"name": KEY_NAME}), ending)
         rng = Random(f"{seed}:{spec.key}:operator")
         made.append(Line(Machine(spec, seed), gateway, operator, run, rng, ending))
