@@ -3,12 +3,13 @@
 from collections.abc import Iterable
 from typing import Any
 
-from sqlalchemy import select, tuple_
+from sqlalchemy import func, select, tuple_
 from sqlalchemy.orm import Session
 
 from app.alarms.tables import Alarm
 from app.characteristics import queries as characteristics
 from app.characteristics.tables import Characteristic
+from app.core.compensation import Code
 from app.core.plausibility import uncorrected
 from app.core.variants import Results
 from app.errors import NotFound
@@ -18,7 +19,7 @@ from app.readings.answers import answer
 from app.readings.by_hand import queries as by_hand
 from app.readings.by_hand.wording import as_json as in_json
 from app.readings.records import Entry, Record
-from app.readings.tables import Exclusion, Reading, ReadingResults, ReadingTouches
+from app.readings.tables import Exclusion, HandMeasurement, Reading, ReadingResults, ReadingTouches, Stream
 from app.readings.wording import reason
 from app.web.fields import is_slug
 from app.web.i18n import _
@@ -131,6 +132,33 @@ def uncorrected_of(session: Session, machine_id: int, characteristic_id: int, se
     return uncorrected(row.deviation, row.compensated, parameters.factor)
 
 
+def course_of(session: Session, machine_id: int, characteristic_id: int, factor: float, limit: int) -> list[float]:
+    """The last deviations on this tool as they would be without corrections, oldest first, mm; excluded ones left out."""
+    rows = session.execute(
+        select(Reading.deviation, Reading.compensated)
+        .join(
+            Stream,
+            (Stream.machine_id == Reading.machine_id) & (Stream.characteristic_id == Reading.characteristic_id),
+        )
+        .outerjoin(
+            Exclusion,
+            (Exclusion.machine_id == Reading.machine_id)
+            & (Exclusion.characteristic_id == Reading.characteristic_id)
+            & (Exclusion.sequence == Reading.sequence),
+        )
+        .where(
+            Reading.machine_id == machine_id,
+            Reading.characteristic_id == characteristic_id,
+            Reading.sequence > func.greatest(Stream.sequence_at_tool_change, Stream.sequence - limit),
+            Reading.compensated.is_not(None),
+            Reading.code != Code.IMPLAUSIBLE,
+            Exclusion.sequence.is_(None),
+        )
+        .order_by(Reading.sequence)
+    )
+    return [uncorrected(deviation, compensated or 0.0, factor) for deviation, compensated in rows]
+
+
 def first_answers(session: Session, entry: Entry, sequences: Iterable[int]) -> dict[int, dict[str, Any]]:
     """The answers that these readings were given when they came, by sequence."""
     rows = session.execute(
@@ -163,6 +191,13 @@ def detail(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
         "machined_at": record.machined_at,
         "correction_in_effect": record.correction_in_effect,
     }
+
+
+def hand_measurements(
+    session: Session, machine_id: int, characteristic_id: int, first: int, last: int, limit: int
+) -> list[HandMeasurement]:
+    """What was measured by hand on the parts of these readings; of more than `limit` the newest."""
+    return by_hand.between(session, machine_id, characteristic_id, first, last, limit)
 
 
 def page(session: Session, entry: Entry, after: int, limit: int) -> list[Record]:

@@ -11,15 +11,18 @@ from starlette.responses import RedirectResponse
 from app.characteristics import actions, queries
 from app.characteristics.actions import CharacteristicChange, CharacteristicIn
 from app.characteristics.wording import history
+from app.core.plausibility import suggested_jump
 from app.errors import Conflict, InbandError, Invalid
 from app.machines import queries as machines
 from app.programs import writing
+from app.readings import queries as readings
 from app.setup import parameter_form
 from app.setup.frame import setup_page
 from app.web.deps import Caller, Engineer, FormDep, SessionDep, Viewer
 from app.web.forms import by_field, parsed
 
 router = APIRouter()
+LOOKED_BACK = 100  # readings from which a plausible jump is suggested
 
 
 @router.get("/setup/characteristics")
@@ -177,7 +180,17 @@ def _characteristic(
         warnings=actions.warnings_of(standing.parameters, standing.machine.zero_range_floor),
         history=history(queries.versions(session, characteristic)),
         program=writing.shown(standing),
+        suggested_jump=_suggested_jump(session, standing),
         **_form(typed, errors or {}),
+    )
+
+
+def _suggested_jump(session: Session, standing: queries.Standing) -> float | None:
+    """What the last readings suggest for the largest plausible jump, mm."""
+    factor = standing.parameters.factor
+    characteristic = standing.characteristic
+    return suggested_jump(
+        readings.course_of(session, characteristic.machine_id, characteristic.id, factor, LOOKED_BACK)
     )
 
 
