@@ -27,6 +27,11 @@ def set_up(admin: Client, machine: plant.Machine) -> None:
         body = {"key": feature.key, "name": feature.name, "machine": machine.key, "part": machine.part}
         _unless_there(admin, "/characteristics", body | {"parameters": feature.parameters}, feature.key)
 
+    for tool in machine.tools:
+        path = f"/machines/{machine.key}/tools/{tool.number}"
+        if admin.get(path)["name"] is None:
+            admin.call("PATCH", path, json={"name": tool.name, "edge": "D1", "planned_parts": tool.life})
+
 
 def _unless_there(admin: Client, path: str, body: dict[str, object], key: str) -> None:
     try:
