@@ -29,6 +29,9 @@ from app.readings import actions as readings
 from app.readings import queries as reading_queries
 from app.statistics import queries as statistics
 from app.statistics.queries import MOST_IN_HISTOGRAM, Numbers, Window
+from app.wear import queries as wear
+from app.wear.queries import Wear
+from app.wear.wording import WearWords
 from app.web.deps import Caller, FormDep, Operator, SessionDep, Viewer
 from app.web.fields import LARGEST_ID, Reason
 from app.web.forms import by_field
@@ -47,8 +50,10 @@ Sequence_ = Annotated[int, Path(ge=1, le=LARGEST_ID, alias="sequence")]
 class Shown:
     """What the page of a characteristic shows, each part looked up when the template comes to it."""
 
-    def __init__(self, session: Session, standing: Standing, choice: Choice, before: int | None) -> None:
-        self._session, self._choice, self._before = session, choice, before
+    def __init__(
+        self, session: Session, standing: Standing, choice: Choice, before: int | None, edge: str = "tool"
+    ) -> None:
+        self._session, self._choice, self._before, self._edge = session, choice, before, edge
         self.standing = standing
         self.now = datetime.now(UTC)
 
@@ -75,6 +80,11 @@ class Shown:
         return statistics.numbers_of(self._session, self.standing.characteristic, self.counted)
 
     @cached_property
+    def wear(self) -> Wear:
+        """Of the tool in the machine."""
+        return wear.wear_of(self._session, self.standing, wear.shown(self._session, self.standing, self._edge))
+
+    @cached_property
     def decisions(self) -> list[Decision]:
         return decisions(self._session, self.standing, before=self._before, limit=SHOWN + 1)
 
@@ -93,6 +103,7 @@ def characteristic_page(
     choice: Chosen,
     scale: Annotated[Literal["zones", "true", "time"], Query()] = "zones",
     before: Annotated[int | None, Query(ge=1, le=LARGEST_ID)] = None,
+    edge: Annotated[Literal["tool", "1000", "all"], Query()] = "tool",
     x_live_part: Annotated[str | None, Header()] = None,
 ) -> Response:
     """The zone chart, the numbers, the decisions and the parameters of one characteristic."""
@@ -102,16 +113,20 @@ def characteristic_page(
 
     def link(**changes: Any) -> str:
         """This page with something else chosen."""
-        kept = (chosen if not changes.keys() & {"last", "first"} else {}) | {"scale": scale}
+        kept = (chosen if not changes.keys() & {"last", "first"} else {}) | {"scale": scale, "edge": edge}
         values = {name: value for name, value in {**kept, **changes}.items() if value is not None}
-        return f"{path}?{urlencode({name: v for name, v in values.items() if (name, v) != ('scale', 'zones')})}"
+        usual = {("scale", "zones"), ("edge", "tool")}
+        return f"{path}?{urlencode({name: v for name, v in values.items() if (name, v) not in usual})}"
 
     figure = "run" if scale == "time" else "zones"
     shown = chosen if scale == "time" else chosen | {"scale": scale}
     return page(
         request,
         "characteristics/characteristic.html",
-        shown=Shown(session, standing, choice, before),
+        shown=Shown(session, standing, choice, before, edge),
+        edge=edge,
+        wear_url=f"/api/v1{path}/figures/wear?{urlencode({'last': edge})}",
+        wear_words=WearWords,
         wanted=lambda part: x_live_part is None or x_live_part == part,
         characteristic=standing.characteristic,
         machine=standing.machine,

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
 from itertools import pairwise
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,10 +29,13 @@ from app.offsets.tables import OUTSTANDING, Correction, Tool, ToolEvent
 from app.readings.tables import Stream
 from app.statistics import queries as statistics
 from app.statistics.queries import Window
+from app.wear import wording
+from app.wear.tables import Outlook
 
 MOST_READINGS = 2_500  # read one by one
 MOST_GROUPS, GROUP = 400, 16  # what is older: so many groups of so many readings
 FEW = 100  # of a tool that has cut fewer parts the chart shows the one before too
+PLANNED, NEAR = 2_000, 100  # parts: what lies further ahead is not told on the plant's page; what is nearer stands out
 MOST_EVENTS = 5_000  # steps of the tool's offset that are looked through
 SETTINGS = ("zero_range", "averaging_limit", "weighting_factor", "factor", "tool_memory", "average_memory", "mode")
 
@@ -329,3 +333,24 @@ def _since(versions: dict[int, dict[str, Any]]) -> int:
             break
         since = number
     return since
+
+
+class Coming(NamedTuple):
+    """What comes to a characteristic, in words, for a line of the plant's page."""
+
+    parts: str
+    towards: str
+    near: bool
+
+
+def foretold(outlook: Outlook | None) -> Coming | None:
+    """What the rounds have foretold, if it is not too far off to plan for; near when it may come within `NEAR` parts."""
+    if outlook is None or outlook.towards is None or outlook.parts is None or outlook.parts > PLANNED:
+        return None
+    high = inf if outlook.parts_high is None else outlook.parts_high
+    forecast = Forecast(outlook.parts, outlook.parts_low or 0.0, high)
+    return Coming(
+        wording.parts_left(forecast),
+        wording.towards_parts(Towards(outlook.towards), reached=outlook.parts <= 0),
+        outlook.parts <= NEAR,
+    )

@@ -5,6 +5,7 @@ from math import floor, inf, log10
 from typing import Any
 
 from app.core.hunting import GOAL, Hunting, Remedy, State
+from app.core.parameters import Parameters
 from app.core.wear import FEWEST, Fit, Forecast, Towards
 from app.web.i18n import _, ngettext
 from app.web.numbers import NO_BREAK_SPACE, signed
@@ -48,13 +49,19 @@ def parts_left(forecast: Forecast) -> str:
     return f"≈{NO_BREAK_SPACE}{rounded(forecast.parts)} ({interval(forecast)})"
 
 
-def towards_word(towards: Towards | str) -> str:
+def towards_parts(towards: Towards, *, reached: bool = False) -> str:
     """What comes, as it stands after a number of parts."""
+    if reached:
+        return {
+            Towards.WEAR: _("R37 by wear"),
+            Towards.TOLERANCE: _("end of the tolerance"),
+            Towards.OFFSET: _("offset limit"),
+        }[towards]
     return {
-        Towards.WEAR: _("to R37"),
-        Towards.TOLERANCE: _("to the end of the tolerance"),
-        Towards.OFFSET: _("to the offset limit"),
-    }[Towards(towards)]
+        Towards.WEAR: _("parts to R37"),
+        Towards.TOLERANCE: _("parts to the tolerance limit"),
+        Towards.OFFSET: _("parts to the offset limit"),
+    }[towards]
 
 
 def towards_name(towards: Towards) -> str:
@@ -218,3 +225,35 @@ def _share(share: float | None) -> str:
     if share is None:
         return "–"
     return f"{share * 100:.1f}{NO_BREAK_SPACE}%" if share < 0.095 else f"{share * 100:.0f}{NO_BREAK_SPACE}%"
+
+
+class WearWords:
+    """What the page of a characteristic says beside the wear curve."""
+
+    def __init__(
+        self,
+        fit: Fit | None,
+        forecasts: Mapping[Towards, Forecast],
+        first: tuple[Towards, Forecast] | None,
+        hunting: Hunting | None,
+        parameters: Parameters,
+    ) -> None:
+        self.slope = per_part(fit.slope) if fit is not None and fit.is_wear else None
+        self.wear = wear_sentence(fit)
+        self.note = fit_note(fit) if fit is not None else None
+        self.forecasts = [
+            (
+                towards_name(name),
+                parts_left(forecast),
+                definition(name, corrects=not parameters.measures_only),
+                first is not None and first[0] is name,
+            )
+            for name, forecast in sorted(forecasts.items(), key=lambda item: item[1].parts)
+        ]
+        data = hunting_data(hunting) if hunting is not None else None
+        self.hunting = hunting_sentence(data) if data else None
+        self.hunting_state = hunting.state.value if hunting else None
+        self.hunting_word = hunting_word(hunting.state) if hunting else None
+        overcorrects = hunting is not None and hunting.state in (State.HUNTING, State.SWINGING)
+        self.hunting_tone = "attention" if overcorrects else "steady"
+        self.remedy = remedy_sentence(data, parameters.as_dict()) if data else ""
