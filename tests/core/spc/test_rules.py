@@ -1,5 +1,6 @@
 """Run rules: against their definitions spelled out, in pieces as in one, mirrored, and against what others published."""
 
+import re
 from itertools import pairwise
 from math import cos, e, tan
 
@@ -14,6 +15,7 @@ from app.core.spc.chance import average_run_length, chance, per_window
 from app.core.spc.refusal import Reason, Refused
 from app.core.spc.rules import FITTING, NELSON, RULES, WESTERN_ELECTRIC, Kind, Rule, RuleName, Scan, members, signals
 from app.core.spc.shewhart import Chart
+from app.settings import HOUSE
 
 # Quarters reach every limit exactly, and equal neighbours come up often.
 POINTS = st.lists(st.integers(-14, 14).map(lambda quarter: quarter / 4), min_size=1, max_size=80)
@@ -197,6 +199,16 @@ class TestChance:
                 firsts.append(start + rule.n)
         length = chance(rule).average_run_length
         assert np.mean(firsts) == pytest.approx(length, abs=5 * length / len(firsts) ** 0.5)
+
+    def test_the_reference_prints_what_is_computed(self) -> None:
+        text = (HOUSE / "docs" / "reference" / "statistics.md").read_text(encoding="utf-8")
+        printed = re.findall(r"^\| (Nelson|Western Electric) (\d).*\| ([\d.]+) % \| ([\d ]+)", text, re.MULTILINE)
+        assert len(printed) == len(RULES)
+        for family, number, share, length in printed:
+            found = chance(RULES[RuleName(f"{family.split()[0].lower()}_{number}")])
+            assert share == f"{100 * found.per_window:.2f}"
+            assert int(length.replace(" ", "")) == round(found.average_run_length)
+        assert f"every {average_run_length(WESTERN_ELECTRIC):.0f} points" in text
 
     def test_steps_with_others_and_too_many_rules_are_refused(self) -> None:
         with pytest.raises(Refused):
