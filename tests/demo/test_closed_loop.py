@@ -78,7 +78,8 @@ def test_the_past_is_in_the_past_in_order_and_leaves_nothing_to_be_done(server: 
     assert datetime.fromisoformat(times[-1]) <= datetime.now(UTC)
     assert not any(reading["late"] for reading in found)
     assert [reading["sequence"] for reading in found] == list(range(1, len(found) + 1))
-    assert list(filled[0]._operator.items("/alarms", state="active")) == []
+    left = [alarm["kind"] for alarm in filled[0]._operator.items("/alarms", state="active")]
+    assert set(left) <= {"hunting"}, "which the rounds may raise at any minute"
 
 
 @pytest.mark.slow
