@@ -188,13 +188,19 @@ def lives_figure(
             ),
         )
     ]
+    way = -1 if sum(life.total or 0.0 for life in lives) < 0 else 1
+    near = (
+        usual is not None
+        and planned_parts is not None
+        and abs(usual - planned_parts) < 0.15 * max(usual, planned_parts)
+    )
+    apart = (9 if (usual or 0) >= (planned_parts or 0) else -9) if near else 0  # so that their words do not meet
     lines = [
-        (value, axis, dash, text)
-        for value, axis, dash, text in (
-            (usual, "y", "dot", _("median {n}").format(n=f"{usual or 0:g}")),
-            (planned_parts, "y", "dash", _("planned {n}").format(n=planned_parts)),
-            (None if planned_total is None else planned_total * 1000, "y2", "dash", _("planned")),
-            (None if planned_total is None else -planned_total * 1000, "y2", "dash", ""),
+        (value, axis, dash, text, shift)
+        for value, axis, dash, text, shift in (
+            (usual, "y", "dot", _("median {n}").format(n=f"{usual or 0:g}"), apart),
+            (planned_parts, "y", "dash", _("planned {n}").format(n=planned_parts), -apart),
+            (None if planned_total is None else way * planned_total * 1000, "y2", "dash", _("planned"), 0),
         )
         if value is not None
     ]
@@ -242,7 +248,7 @@ def lives_figure(
                     "y1": value,
                     "line": {"color": colours.faint if dash == "dot" else colours.ink, "width": 1.5, "dash": dash},
                 }
-                for value, axis, dash, _text in lines
+                for value, axis, dash, _text, _shift in lines
             ],
             annotations=[
                 {
@@ -252,11 +258,11 @@ def lives_figure(
                     "yref": axis,
                     "y": value,
                     "text": text,
+                    "yshift": shift,
                     "showarrow": False,
                     "font": {"size": 12, "color": colours.quiet},
                 }
-                for value, axis, _dash, text in lines
-                if text
+                for value, axis, _dash, text, shift in lines
             ],
         ),
     }

@@ -157,9 +157,7 @@ def decide(
         else:
             decision = parsed(DecisionIn, {"reason": words(form, "reason")})
             warned = form.get("although_fetched") == "true"
-            actions.decide(
-                session, shown, number, asking.verb(verb), decision.reason, caller, although_fetched=warned
-            )
+            actions.decide(session, shown, number, asking.verb(verb), decision.reason, caller, although_fetched=warned)
     except Conflict as error:
         session.refresh(found)
         if "fetched_at" in error.more:  # fetched while this was being asked: ask again, with the warning

@@ -201,8 +201,8 @@ class TestSister:
         assert "Tool 13 goes on for tool 3" in done["outcome"][0]["text"]
         assert codes(shop.acknowledge(second["id"], "sister_tool")) == ["switched_already"]
         assert shop.tool(13)["characteristics"] == sorted([shop.characteristic, other])
-        versions = shop.call("GET", f"/characteristics/{other}/versions")["items"]
-        assert "edge broken" in {version["reason"] for version in versions}
+        entries = shop.call("GET", f"/audit?subject=characteristic/{other}")["items"]
+        assert [entry["why"] for entry in entries if entry["action"] == "parameters changed"] == ["edge broken"]
 
     def test_an_alarm_of_a_tool_without_one(self, shop: Shop) -> None:
         shop.read(350.0)
