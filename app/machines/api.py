@@ -46,5 +46,5 @@ def get_machine(session: SessionDep, caller: AnyCaller, machine: MachineKey) -> 
 
 @router.patch("/machines/{machine}", responses=problems(404))
 def change_machine(session: SessionDep, caller: Engineer, machine: MachineKey, change: MachineChange) -> MachineOut:
-    """Give it another name or control."""
+    """Give it another name or control, another path of the probe's signal, or another expiry of corrections."""
     return MachineOut.model_validate(actions.change_machine(session, machine, change, caller.name))
