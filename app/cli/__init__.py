@@ -22,6 +22,7 @@ PARTS = (
     "app.cli.people",
     "app.cli.data",
     "app.cli.replay",
+    "app.cli.programs",
     "app.cli.proof",
     "app.demo.cli",
 )

@@ -25,9 +25,10 @@ from app.cli.data import (
     report,
     wishes_of,
 )
-from app.core.parameters import BY_R, ParameterError, Parameters, read
+from app.core.parameters import ParameterError, Parameters, read
 from app.errors import Invalid
-from app.formats import r_numbers
+from app.programs.reading import look as look_at_program
+from app.programs.schemas import looked_out
 from app.readings.importing.history import Flawed
 from app.readings.importing.layout import look
 from app.readings.importing.lines import Flaw, lines
@@ -137,10 +138,15 @@ def _parameters(path: Path, factor: float | None) -> Parameters:
     return rules
 
 
-def _of_program(text: str) -> dict[str, float]:
-    """R parameters of program text; those of calibration and of the touch itself are not asked for here."""
-    found = r_numbers.read(text)
-    other = [name for name in found if name not in BY_R and name != "R24"]
-    if other:
-        say(_("Not used: {names}").format(names=", ".join(other)))
-    return {name: value for name, value in found.items() if name not in other}
+def _of_program(text: str) -> dict[str, Any]:
+    """The parameters of program text. Raises `ValueError` where a line holds something that was not understood."""
+    looked = looked_out(look_at_program(text))
+    for line in looked.lines:
+        said = "; ".join(note.text for note in line.notes)
+        if line.verdict == "not_understood":
+            raise ValueError(_("line {line}: {said}").format(line=line.line, said=said))
+        if any(note.warning for note in line.notes):
+            say(_("line {line}: {said}").format(line=line.line, said=said), style="yellow")
+    if looked.program is None or not looked.program.parameters:
+        raise ValueError(_("There are no R parameters such as R33=0.001 in it."))
+    return looked.program.parameters

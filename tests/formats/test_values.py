@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.formats import r_numbers
 from app.formats.values import Unreadable, folded, moment, number, unit_in, zone_named
 
 BELGRADE = ZoneInfo("Europe/Belgrade")
@@ -117,12 +116,3 @@ def test_names_are_compared_without_accents_case_and_unit() -> None:
     assert [unit_in(name) for name in ("Wert [µm]", "Wert_um", "diameter (in)", "Ø [mm]", "minimum")] == [
         "um", "um", "inch", "mm", None,
     ]  # fmt: skip
-
-
-def test_r_numbers_out_of_program_text() -> None:
-    text = "N10 R33=0.001 R34=0,0053 (R36=9)\nR4=2 ; R37=5\nL93\nM17\n"
-    assert r_numbers.read(text) == {"R33": 0.001, "R34": 0.0053, "R04": 2.0}
-    with pytest.raises(Unreadable, match="line 2: R34=x is not a number"):
-        r_numbers.read("R33=1\nR34=x")
-    with pytest.raises(Unreadable, match="no R parameters"):
-        r_numbers.read("L93")
