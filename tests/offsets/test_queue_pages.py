@@ -46,12 +46,12 @@ class TestQueue:
         first, second = awaiting(shop, 20.0, 50.0)
         path = f"/machines/{shop.machine}/corrections/"
         assert 'name="from" value="queue"' in operator.open(f"{path}{first}?do=approve&from=queue")
-        text = operator.send(f"{path}{first}", **{"do": "approve", "reason": "agrees", "from": "queue"})
+        text = operator.send(f"{path}{first}", 200, **{"do": "approve", "reason": "agrees", "from": "queue"})
         assert f"Correction {first} is approved" in text
         assert "Corrections that wait for a decision" in text
-        operator.send(f"{path}{second}", **{"do": "rejected", "reason": "false", "from": "queue"})
+        operator.send(f"{path}{second}", 200, **{"do": "rejected", "reason": "false", "from": "queue"})
         assert [shop.correction(n)["status"] for n in (first, second)] == ["pending", "rejected"]
-        late = operator.send(f"{path}{second}", **{"do": "approve", "reason": "agrees", "from": "queue"})
+        late = operator.send(f"{path}{second}", 200, **{"do": "approve", "reason": "agrees", "from": "queue"})
         assert "Nothing was done" in late
         assert f"rejected by {operator.name}" in late
 

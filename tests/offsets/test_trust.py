@@ -239,6 +239,41 @@ def _last(shop: Shop) -> int | None:
     return applied[-1]["number"] if applied else None
 
 
+class TestLimits:
+    def test_the_largest_step_cuts_and_says_so(self, shop: Shop) -> None:
+        key = f"{shop.characteristic}-s"
+        shop.add(key, max_step=0.004, tool_memory=4, average_memory=6)
+        answer = shop.read(20.0, key)
+        assert answer["correction"]["amount"] == -0.004
+        assert answer["reason"]["notes"] == ["clamped"]
+        assert "limited to the largest step 4.0 µm" in answer["reason"]["text"]
+        correction = shop.correction(answer["correction"]["number"])
+        assert (correction["size_error"], correction["reason"]["notes"]) == (0.02, ["clamped"])
+
+    def test_at_the_largest_sum_a_new_tool_or_a_wider_limit_goes_on(self, shop: Shop) -> None:
+        key = f"{shop.characteristic}-s"
+        shop.add(key, max_total=0.01, tool_memory=4, average_memory=6)
+        first = shop.read(6.0, key)["correction"]["number"]
+        shop.correction(first, "applied")
+        stopped = shop.read(6.0, key, correction_in_effect=first)
+        assert (stopped["correction"], stopped["reason"]["code"]) == (None, "offset_limit")
+        assert "or the largest sum is raised" in stopped["reason"]["text"]
+        (alarm,) = shop.alarms()
+        assert (alarm["kind"], alarm["tool_memory"]) == ("offset_limit", 4)
+        assert "raises the largest sum" in alarm["what_to_do"]
+        assert shop.read(-6.0, key, correction_in_effect=first)["action"] == "correct"  # it leads back
+        shop.correction(first + 1, "rejected", reason="not now")
+        shop.acknowledge(alarm["id"], "noted", comment="limit is looked at")
+        shop.call("PATCH", f"/characteristics/{key}", parameters={"max_total": 0.05}, reason="hard material")
+        assert shop.read(6.0, key, correction_in_effect=first)["correction"]["amount"] == -0.006
+        shop.call("PATCH", f"/characteristics/{key}", parameters={"max_total": 0.01}, reason="soft again")
+        shop.read(7.0, key, correction_in_effect=first)
+        again = next(alarm for alarm in shop.alarms() if alarm["kind"] == "offset_limit")
+        done = shop.acknowledge(again["id"], "tool_replaced")
+        assert codes(done)[0] == "tool_restarted"
+        assert shop.read(6.0, key)["action"] == "correct"
+
+
 class TestExpiry:
     @pytest.fixture
     def hasty(self, shop: Shop) -> Shop:
