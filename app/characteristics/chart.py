@@ -14,11 +14,12 @@ from sqlalchemy.orm import Session
 
 from app.alarms.tables import Alarm
 from app.alarms.wording import kind_word
-from app.characteristics.figures import Block, Mark, Point, RunPoint, Step
+from app.characteristics.figures import Block, HandPoint, Mark, Point, RunPoint, Step
 from app.characteristics.figures.lanes import COUNTED, MANUAL_EDIT, TOOL_CHANGE
 from app.characteristics.queries import Standing
 from app.core.zones import classify
 from app.offsets.tables import OPEN, AverageMemory, Correction, ToolEvent
+from app.readings import queries as readings
 from app.statistics import queries as statistics
 from app.statistics.queries import Course, Window
 from app.web.i18n import _
@@ -31,6 +32,7 @@ MOST_MARKS = 24  # side by side, without covering each other
 MOST_CHANGES = 100
 MOST_MOMENTS = 200
 MOST_RUN = 2_000
+MOST_BY_HAND = 200
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Chart:
     points: list[Point]
     steps: list[Step]
     marks: list[Mark]
+    hands: list[HandPoint]
     total_before: float
     centre: float
 
@@ -101,9 +104,23 @@ def chart_of(session: Session, standing: Standing, window: Window) -> Chart:
         ],
         steps=steps,
         marks=shown,
+        hands=_hands(session, standing, window),
         total_before=before,
         centre=parameters.target + empirical_value_of(session, standing),
     )
+
+
+def _hands(session: Session, standing: Standing, window: Window) -> list[HandPoint]:
+    """What people measured by hand, against the target: a hand needs no empirical value."""
+    found = readings.hand_measurements(
+        session, standing.machine.id, standing.characteristic.id, window.first, window.last, MOST_BY_HAND
+    )
+    target, key = standing.parameters.target, standing.characteristic.key
+    return [
+        HandPoint(each.sequence, each.measured - target, each.good, each.actor, reading_link(key, each.sequence))
+        for each in found
+        if each.measured is not None
+    ]
 
 
 def run_of(session: Session, standing: Standing, window: Window) -> list[RunPoint]:

@@ -7,9 +7,12 @@ import msgspec
 from fastapi import Depends, Path, Query, Response
 
 from app.characteristics import queries
+from app.characteristics.beside import results_of
 from app.characteristics.chart import chart_of, run_of
-from app.characteristics.figures import histogram_edges, histogram_figure, run_figure, zone_chart
+from app.characteristics.figures import histogram_edges, histogram_figure, result_figure, run_figure, zone_chart
 from app.characteristics.queries import Standing
+from app.characteristics.wording import result_label
+from app.core.variants import yielded_by
 from app.errors import FieldError, Invalid
 from app.statistics import queries as statistics
 from app.statistics.queries import Window
@@ -27,6 +30,7 @@ FIGURE: dict[int | str, dict[str, Any]] = {
         "content": {"application/json": {"example": {"data": [], "layout": {}}}},
     }
 }
+ResultName = Literal["run_out", "out_of_roundness", "taper", "repeat_range", "repeat_deviation"]
 CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 Theme = Annotated[ThemeName, Query(description="For a light or a dark page.")]
 Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
@@ -105,6 +109,7 @@ def get_zone_chart(
             blocks=chart.blocks,
             steps=chart.steps,
             marks=chart.marks,
+            hands=chart.hands,
             scale=scale,
             theme=theme,
             centre=chart.centre,
@@ -128,6 +133,28 @@ def get_run_chart(
     standing, window = _found(session, caller, characteristic, choice)
     parameters = standing.parameters
     return _answer(run_figure(run_of(session, standing, window), parameters, target=parameters.target, theme=theme))
+
+
+@router.get("/characteristics/{characteristic}/figures/results", responses=problems(404) | FIGURE, response_model=None)
+def get_result_chart(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: Chosen,
+    result: Annotated[
+        ResultName | None, Query(description="Which one; what the variant of the characteristic yields if left out.")
+    ] = None,
+    theme: Theme = "light",
+    width: Width = 1240,  # noqa: ARG001 - every chart is asked with its width
+) -> Response:
+    """What the measuring variant yields beside the value: run-out, out-of-roundness, taper, repeatability.
+
+    Of more readings than can be drawn, blocks with their extremes; of more than 500 000 the last ones.
+    """
+    standing, window = _found(session, caller, characteristic, choice)
+    name: str = result or next(iter(yielded_by(standing.parameters)), "repeat_range")
+    points, ranges = results_of(session, standing, window, name)
+    return _answer(result_figure(name, result_label(name), points, ranges, theme=theme))
 
 
 @router.get(

@@ -14,21 +14,23 @@ from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.alarms.wording import action_word
+from app.calibration import queries as calibrations
 from app.characteristics import chart, queries
 from app.characteristics.decisions import Decision, decision, decisions, version_of
-from app.characteristics.figures import band_picture
-from app.characteristics.figures_api import Choice, Chosen
+from app.characteristics.figures import angle_of, band_picture, residuals_of, touches_picture
+from app.characteristics.figures_api import Choice, Chosen, ResultName
 from app.characteristics.queries import Standing
-from app.characteristics.wording import history, in_order, label, worded
+from app.characteristics.wording import history, in_order, label, result_label, worded
 from app.core.parameters import BY_NAME
 from app.core.probing import start_and_end
+from app.core.variants import yielded_by
 from app.errors import InbandError
 from app.plant import queries as plant
 from app.plant.wording import state_word
 from app.readings import actions as readings
 from app.readings import queries as reading_queries
 from app.statistics import queries as statistics
-from app.statistics.queries import MOST_IN_HISTOGRAM, Numbers, Window
+from app.statistics.queries import MOST_IN_HISTOGRAM, Numbers, Rejects, Window
 from app.wear import queries as wear
 from app.wear.queries import Wear
 from app.wear.wording import WearWords
@@ -80,6 +82,18 @@ class Shown:
         return statistics.numbers_of(self._session, self.standing.characteristic, self.counted)
 
     @cached_property
+    def rejects(self) -> tuple[Rejects, Rejects] | None:
+        """With acceptance n of m: parts and sections outside among the shown readings, and since the tool change."""
+        if self.standing.parameters.accept_m == 1:
+            return None
+        session, characteristic = self._session, self.standing.characteristic
+        of_tool = statistics.since_tool_change(session, characteristic)
+        return (
+            statistics.rejects_of(session, characteristic, self.counted),
+            statistics.rejects_of(session, characteristic, of_tool),
+        )
+
+    @cached_property
     def wear(self) -> Wear:
         """Of the tool in the machine."""
         return wear.wear_of(self._session, self.standing, wear.shown(self._session, self.standing, self._edge))
@@ -104,6 +118,7 @@ def characteristic_page(
     scale: Annotated[Literal["zones", "true", "time"], Query()] = "zones",
     before: Annotated[int | None, Query(ge=1, le=LARGEST_ID)] = None,
     edge: Annotated[Literal["tool", "1000", "all"], Query()] = "tool",
+    result: Annotated[ResultName | None, Query()] = None,
     x_live_part: Annotated[str | None, Header()] = None,
 ) -> Response:
     """The zone chart, the numbers, the decisions and the parameters of one characteristic."""
@@ -113,11 +128,13 @@ def characteristic_page(
 
     def link(**changes: Any) -> str:
         """This page with something else chosen."""
-        kept = (chosen if not changes.keys() & {"last", "first"} else {}) | {"scale": scale, "edge": edge}
+        kept = (chosen if not changes.keys() & {"last", "first"} else {}) | {"scale": scale, "edge": edge, "result": result}
         values = {name: value for name, value in {**kept, **changes}.items() if value is not None}
         usual = {("scale", "zones"), ("edge", "tool")}
         return f"{path}?{urlencode({name: v for name, v in values.items() if (name, v) not in usual})}"
 
+    yielded = yielded_by(standing.parameters)
+    drawn = result if result in yielded else next(iter(yielded), None)
     figure = "run" if scale == "time" else "zones"
     shown = chosen if scale == "time" else chosen | {"scale": scale}
     return page(
@@ -141,6 +158,8 @@ def characteristic_page(
         most=MOST_IN_HISTOGRAM,
         link=link,
         chart_url=f"/api/v1{path}/figures/{figure}?{urlencode(shown)}",
+        results=[(result_label(name), link(result=name), name == drawn) for name in yielded],
+        result_url=f"/api/v1{path}/figures/results?{urlencode(chosen | {'result': drawn})}",
         histogram_url=f"/api/v1{path}/figures/histogram?{urlencode(chosen)}",
         may_edit=caller.may("engineer"),
         state_word=state_word,
@@ -178,6 +197,24 @@ def reading_page(
 ) -> Response:
     """One reading: what was measured, what was decided, why, by which parameters, and what followed."""
     return _reading(request, session, caller, queries.characteristic_named(session, characteristic), sequence)
+
+
+@router.post("/characteristics/{characteristic}/readings/{sequence}/by-hand")
+def send_measured_by_hand(
+    request: Request, session: SessionDep, caller: Operator, characteristic: str, sequence: Sequence_, form: FormDep
+) -> Response:
+    """Enter what was measured by hand on this part."""
+    standing = queries.characteristic_named(session, characteristic)
+    entry = reading_queries.entry_of(session, characteristic)
+    assert entry is not None
+    try:
+        readings.measure_typed_by_hand(session, entry, sequence, form, caller.name)
+    except InbandError as error:
+        if error.status == 404:
+            raise
+        session.expire_all()
+        return _reading(request, session, caller, standing, sequence, status=error.status, typed=form, problem=error)
+    return RedirectResponse(chart.reading_link(characteristic, sequence), 303)
 
 
 @router.post("/characteristics/{characteristic}/readings/{sequence}/exclude")
@@ -227,6 +264,9 @@ def _reading(
         characteristic=standing.characteristic,
         machine=standing.machine,
         judged_by=version,
+        origin=calibrations.origin(session, standing.machine, limits.average_memory, found.reading["received_at"])
+        if "empirical_value" in found.reading["reason"]["notes"]
+        else None,
         limits=limits,
         table=parameter_table(version.parameters),
         band=band_picture(
@@ -243,6 +283,10 @@ def _reading(
         typed=typed or {},
         problem=problem,
         errors=by_field(problem) if problem else {},
+        picture=touches_picture(limits, found.point_means) if found.touches else None,
+        residuals=residuals_of(limits, found.point_means) if found.touches else [],
+        angle_of=angle_of,
+        result_label=result_label,
         code_word=code_word,
         action_word=action_word,
     )

@@ -77,6 +77,20 @@ def explanation(name: str) -> str | None:
     }.get(name)
 
 
+def result_label(name: str) -> str:
+    """What a variant's result is called."""
+    return {
+        "run_out": _("Run-out"),
+        "out_of_roundness": _("Out-of-roundness"),
+        "taper": _("Taper over the length"),
+        "slope": _("Taper per mm"),
+        "repeat_range": _("Range of the repeats"),
+        "repeat_deviation": _("Standard deviation of the repeats"),
+        "sections_outside": _("Sections outside"),
+        "rejected": _("Rejected"),
+    }.get(name, name)
+
+
 def choice(name: str, value: str) -> str:
     """One of the choices of a parameter."""
     return {

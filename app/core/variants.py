@@ -20,7 +20,7 @@ from typing import NamedTuple
 from app.core.acceptance import sections_outside
 from app.core.compensation import DECIMALS
 from app.core.parameters import Parameters, Variant
-from app.core.probing import Touches, sections_of
+from app.core.probing import Touches, points_expected, sections_of
 
 POINTS_FOR_A_SHAPE = 2
 
@@ -41,6 +41,20 @@ class Results(NamedTuple):
     repeat_deviation: float | None = None
     sections_outside: int | None = None
     rejected: bool | None = None
+
+
+def yielded_by(parameters: Parameters) -> tuple[str, ...]:
+    """Which lengths of `Results` a characteristic with these parameters yields, the variant's own first.
+
+    >>> from app.core.parameters import read
+    >>> yielded_by(read({"R32": 62.0, "R35": 0.03, "R33": 0, "R37": 0.3, "R36": 1.0, "R25": 1, "R27": 2})[0])
+    ('run_out', 'repeat_range', 'repeat_deviation')
+    """
+    own = {Variant.INDEXED: "run_out", Variant.ROUND: "out_of_roundness", Variant.ALONG: "taper"}.get(
+        parameters.variant
+    )
+    found = (own,) if own and points_expected(parameters) >= POINTS_FOR_A_SHAPE else ()
+    return (*found, *(("repeat_range", "repeat_deviation") if parameters.repeats > 1 else ()))
 
 
 def results_of(

@@ -233,13 +233,21 @@ class Line:
         return list(self._operator.items("/alarms", state="active", machine=self.key))
 
     def _acknowledge(self, alarm: dict[str, Any], action: str, comment: str) -> None:
+        body = {"action": action, "comment": f"{comment} (simulated operator)"}
         try:
-            self._operator.post(
-                f"/alarms/{alarm['id']}/acknowledge", {"action": action, "comment": f"{comment} (simulated operator)"}
-            )
+            self._operator.post(f"/alarms/{alarm['id']}/acknowledge", body | self._measured_by_hand(alarm))
         except Refused as refusal:
             if refusal.status != 409:  # somebody was first
                 raise
+
+    def _measured_by_hand(self, alarm: dict[str, Any]) -> dict[str, Any]:
+        """A rejected part is measured with a bore gauge, which has a scatter of its own."""
+        if alarm["kind"] != "acceptance":
+            return {}
+        target = next(f.target for f in self.machine.spec.features if f.key == alarm["characteristic"])
+        deviation = alarm["data"]["deviation"] + self._rng.gauss(0.0, 0.001)
+        verdict = "good" if abs(deviation) <= alarm["data"]["limit"] else "bad"
+        return {"hand_measured": round(target + deviation, 4), "hand_verdict": verdict}
 
     def _change_worn_tools(self) -> None:
         for number, edge in self.machine.edges.items():
@@ -261,7 +269,10 @@ NOTED = ("noted", "Looked at.")
 REMEDIES = {
     "tool_worn": ("tool_replaced", "Edge was chipped; fresh insert."),
     "offset_limit": ("tool_replaced", "Fresh insert."),
+    "tool_life": ("tool_replaced", "Fresh insert."),
+    "implausible": ("false_reading", "Chip on the stylus; wiped."),
     "probe_fault": ("false_reading", "Stylus was dirty; wiped."),
+    "acceptance": ("noted", "Bore gauge"),
     "oversize": ("noted", "Part sorted out."),
     "undersize": ("noted", "Part sorted out."),
 }

@@ -197,7 +197,7 @@ class Machine:
         if feature.touches:
             points, repeats = feature.touches
             touches = [
-                [round(size + self._probing.gauss(0.0, feature.scatter / 2), 5) for _repeat in range(repeats)]
-                for _point in range(points)
+                [round(size + off + self._probing.gauss(0.0, feature.scatter / 2), 5) for _repeat in range(repeats)]
+                for off in (feature.shape or (0.0,) * points)
             ]
         return Probe(feature, part, self.at + 4.0 * at, round(size, 5), touches)

@@ -13,11 +13,12 @@ from app.machines.queries import lock_machines
 from app.readings import queries
 from app.readings.by_hand.actions import Found as FoundByHand
 from app.readings.by_hand.actions import measure as measure_by_hand
+from app.readings.by_hand.actions import measure_typed as measure_typed_by_hand
 from app.readings.records import Entry
 from app.readings.tables import Exclusion, Reading, Stream
 from app.web.i18n import _
 
-__all__ = ["FoundByHand", "exclude", "exclude_all", "measure_by_hand"]
+__all__ = ["FoundByHand", "exclude", "exclude_all", "measure_by_hand", "measure_typed_by_hand"]
 
 
 def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: str) -> Exclusion:

@@ -35,6 +35,10 @@ class StatisticsOut(BaseModel):
                 "in_tolerance": 198,
                 "share_in_tolerance": 0.99497,
                 "corrections": 17,
+                "rejected": None,
+                "sections_outside": None,
+                "rejected_since_tool_change": None,
+                "sections_outside_since_tool_change": None,
                 "zones": {
                     "zero": 71,
                     "average": 109,
@@ -60,6 +64,12 @@ class StatisticsOut(BaseModel):
     in_tolerance: int = Field(description="Parts whose raw deviation was within the tolerance in force.")
     share_in_tolerance: float | None
     corrections: int = Field(description="Readings that led to a correction.")
+    rejected: int | None = Field(description="With acceptance n of m: parts that were not accepted; else null.")
+    sections_outside: int | None = Field(
+        description="With acceptance n of m: sections out of tolerance, the lathe line's #513; else null."
+    )
+    rejected_since_tool_change: int | None = Field(description="The same of all parts since the tool was changed.")
+    sections_outside_since_tool_change: int | None
     zones: dict[str, int] = Field(description="How many were decided in each zone.")
 
 
@@ -85,6 +95,11 @@ def get_statistics(
     caller.must_at(standing.machine.id, "viewer")
     window = queries.window_of(session, standing.characteristic, last=last)
     numbers = queries.numbers_of(session, standing.characteristic, window, start=start, end=end)
+    rejects = of_tool = None
+    if standing.parameters.accept_m > 1:
+        rejects = queries.rejects_of(session, standing.characteristic, window, start=start, end=end)
+        since_change = queries.since_tool_change(session, standing.characteristic)
+        of_tool = queries.rejects_of(session, standing.characteristic, since_change)
     return StatisticsOut(
         characteristic=standing.characteristic.key,
         first_sequence=window.first if window.count else None,
@@ -98,6 +113,10 @@ def get_statistics(
         in_tolerance=numbers.in_tolerance,
         share_in_tolerance=numbers.share_in_tolerance,
         corrections=numbers.corrections,
+        rejected=rejects.parts if rejects else None,
+        sections_outside=rejects.sections if rejects else None,
+        rejected_since_tool_change=of_tool.parts if of_tool else None,
+        sections_outside_since_tool_change=of_tool.sections if of_tool else None,
         zones=numbers.zones,
     )
 

@@ -46,7 +46,7 @@ def envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits, colours: Pale
         )
         for block in blocks
     ]
-    edge = {"width": 1, "color": _see_through(colours.steady, 0.5), "shape": "hvh"}
+    edge = {"width": 1, "color": see_through(colours.steady, 0.5), "shape": "hvh"}
     common = {"type": "scatter", "mode": "lines", "x": x, "customdata": [block.link for block in blocks], "text": text}
     common |= {"hovertemplate": "%{text}<extra></extra>"}
     lower = common | {
@@ -59,7 +59,7 @@ def envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits, colours: Pale
         "y": [ruler.position(b.maximum) for b in blocks],
         "line": edge,
         "fill": "tonexty",
-        "fillcolor": _see_through(colours.steady),
+        "fillcolor": see_through(colours.steady),
         "name": _("Smallest to largest"),
         "meta": "maximum",
     }
@@ -95,6 +95,6 @@ def envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits, colours: Pale
     return [lower, upper, mean, *([marks] if extremes else [])]
 
 
-def _see_through(colour: str, share: float = 0.28) -> str:
+def see_through(colour: str, share: float = 0.28) -> str:
     red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     return f"rgba({red},{green},{blue},{share})"

@@ -15,6 +15,7 @@ from datetime import datetime
 from typing import Any, Literal
 
 from app.characteristics.figures.blocks import Block, envelope
+from app.characteristics.figures.by_hand import HandPoint, hand_marks
 from app.characteristics.figures.labels import band_shapes, limit_labels, limit_lines, size_ticks
 from app.characteristics.figures.lanes import Mark, Step, event_lane, offset_lane
 from app.characteristics.figures.scale import Scale, ScaleName, TrueScale, ZoneScale
@@ -50,6 +51,7 @@ def zone_chart(
     blocks: Sequence[Block] = (),
     steps: Sequence[Step] = (),
     marks: Sequence[Mark] = (),
+    hands: Sequence[HandPoint] = (),
     scale: ScaleName = "zones",
     theme: ThemeName = "light",
     centre: float | None = None,
@@ -61,7 +63,7 @@ def zone_chart(
 
     points: readings by ascending sequence. blocks: older ones, thinned; every block's extremes are drawn.
     steps: corrections by ascending sequence of the reading that caused them; total_before: their sum before the first (mm).
-    marks: alarms and tool changes. centre: the size (mm) at deviation 0, target + empirical value, for the sizes at the left.
+    marks: alarms and tool changes. hands: what was measured by hand. centre: the size (mm) at deviation 0, target + empirical value, for the sizes at the left.
     width: of the chart in pixels, about: decides which words have room.
     ringed: the number of the reading with a ring about it; `newest` is the last one.
     """
@@ -84,6 +86,7 @@ def zone_chart(
         *_average(blocks, points, ruler, colours),
         *_readings(points, ruler, colours),
         *_ring(points, ringed, ruler, colours),
+        *hand_marks(hands, ruler, colours),
     ]
     pixels = max(width - left - right, 200)
     events, event_notes, event_lines = event_lane(marks, span, pixels, colours)

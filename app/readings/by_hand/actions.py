@@ -1,5 +1,6 @@
 """Entering what was measured by hand. It is kept beside the reading and changes nothing else."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sqlalchemy.orm import Session
@@ -9,8 +10,10 @@ from app.characteristics import queries as characteristics
 from app.db.events import publish
 from app.errors import FieldError, Invalid
 from app.readings import queries as readings
+from app.readings.by_hand.schemas import HandMeasurementIn
 from app.readings.records import Entry
 from app.readings.tables import HandMeasurement
+from app.web.forms import length, parsed
 from app.web.i18n import _
 
 FURTHEST = 10.0  # mm from the target; what lies further away was typed in another unit
@@ -90,3 +93,13 @@ def measure(
         },
     )
     return made
+
+
+def measure_typed(
+    session: Session, entry: Entry, sequence: int, form: Mapping[str, str], actor: str
+) -> HandMeasurement:
+    """The same from a form: a size with a decimal point or comma, a verdict, a comment; as the API takes them."""
+    typed = {name: form.get(name, "").strip() for name in ("verdict", "comment")}
+    given = parsed(HandMeasurementIn, {"measured": length(form.get("measured")), **typed})
+    good = None if given.verdict is None else given.verdict == "good"
+    return measure(session, entry, sequence, Found(given.measured, good, given.comment), actor)
