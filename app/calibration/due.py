@@ -2,13 +2,13 @@
 
 from collections import defaultdict
 from datetime import UTC, datetime, timedelta
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from sqlalchemy import select, text
+from sqlalchemy import func, select, text, tuple_
 from sqlalchemy.orm import Session
 
-from app.calibration.queries import CalibrationRow, Place, calibrations
-from app.calibration.tables import CalibrationPlan, CalibrationRecord, PairedReading
+from app.calibration.queries import CalibrationRow, Place, status_of
+from app.calibration.tables import CalibrationAcceptance, CalibrationPlan, CalibrationRecord, PairedReading
 from app.characteristics.tables import Characteristic
 from app.machines.tables import Machine
 from app.offsets.tables import AverageMemory, Tool
@@ -76,6 +76,7 @@ SELECT p.machine_id, p.memory, p.location,
        greatest(max(s.sequence - coalesce((p.counts ->> s.characteristic_id::text)::bigint, 0)), 0) AS parts
 FROM calibration_plan p
 JOIN stream s ON s.machine_id = p.machine_id AND (p.memory = 'tool' OR s.average_memory = p.location)
+WHERE p.machine_id = ANY(:machines)
 GROUP BY 1, 2, 3
 """)
 
@@ -83,34 +84,25 @@ GROUP BY 1, 2, 3
 def places(session: Session, machine: Machine | None = None) -> list[PlaceRow]:
     """All places that are measured with, planned for or have been calibrated, by machine and number."""
     machines = {row.id: row for row in session.scalars(select(Machine))} if machine is None else {machine.id: machine}
+    ids = list(machines)
     plans = {
         (plan.machine_id, Place(plan.memory, plan.location)): plan
-        for plan in session.scalars(select(CalibrationPlan).execution_options(populate_existing=True))
-    }
-    used_by: dict[Any, list[str]] = defaultdict(list)
-    for machine_id, location, key in session.execute(
-        select(Stream.machine_id, Stream.average_memory, Characteristic.key)
-        .join(
-            Characteristic,
-            (Characteristic.machine_id == Stream.machine_id) & (Characteristic.id == Stream.characteristic_id),
-        )
-        .where(Stream.average_memory > 0)
-        .order_by(Characteristic.key)
-    ):
-        used_by[machine_id, Place("average", location)].append(key)
-    known = {
-        (row.machine_id, Place(row.memory, row.location))
-        for row in session.execute(
-            select(CalibrationRecord.machine_id, CalibrationRecord.memory, CalibrationRecord.location).distinct()
+        for plan in session.scalars(
+            select(CalibrationPlan).where(CalibrationPlan.machine_id.in_(ids)).execution_options(populate_existing=True)
         )
     }
+    used_by, values = _used_by(session, ids), _values(session, ids)
+    last = _last(session, ids, values)
     paired = {
         (row.machine_id, Place("average", row.location))
-        for row in session.execute(select(PairedReading.machine_id, PairedReading.location).distinct())
+        for row in session.execute(
+            select(PairedReading.machine_id, PairedReading.location).where(PairedReading.machine_id.in_(ids)).distinct()
+        )
     }
-    parts = {(row.machine_id, Place(row.memory, row.location)): row.parts for row in session.execute(_PARTS)}
-    wanted = {(i, p) for i, p in {*plans, *used_by, *known, *paired} if i in machines}
-    values = _values(session)
+    parts = {
+        (row.machine_id, Place(row.memory, row.location)): row.parts
+        for row in session.execute(_PARTS, {"machines": ids})
+    }
     return [
         PlaceRow(
             machines[machine_id],
@@ -119,9 +111,11 @@ def places(session: Session, machine: Machine | None = None) -> list[PlaceRow]:
             values[machine_id, place],
             plans.get((machine_id, place)),
             parts.get((machine_id, place), 0),
-            _last(session, machines[machine_id], place) if (machine_id, place) in known else None,
+            last.get((machine_id, place)),
         )
-        for machine_id, place in sorted(wanted, key=lambda each: (machines[each[0]].key, each[1]))
+        for machine_id, place in sorted(
+            {*plans, *used_by, *last, *paired}, key=lambda each: (machines[each[0]].key, each[1])
+        )
     ]
 
 
@@ -131,16 +125,57 @@ def place_row(session: Session, machine: Machine, place: Place, value: float) ->
     return found or PlaceRow(machine, place, [], value, None, 0, None)
 
 
-def _last(session: Session, machine: Machine, place: Place) -> CalibrationRow | None:
-    found = calibrations(session, machine, place, newest_first=True, limit=1)
-    return found[0] if found else None
+At = tuple[int, Place]  # a machine's id and one of its places
 
 
-def _values(session: Session) -> dict[Any, float]:
+def _used_by(session: Session, machines: list[int]) -> dict[At, list[str]]:
+    found: dict[At, list[str]] = defaultdict(list)
+    for machine_id, location, key in session.execute(
+        select(Stream.machine_id, Stream.average_memory, Characteristic.key)
+        .join(
+            Characteristic,
+            (Characteristic.machine_id == Stream.machine_id) & (Characteristic.id == Stream.characteristic_id),
+        )
+        .where(Stream.average_memory > 0, Stream.machine_id.in_(machines))
+        .order_by(Characteristic.key)
+    ):
+        found[machine_id, Place("average", location)].append(key)
+    return found
+
+
+def _last(session: Session, machines: list[int], values: dict[At, float]) -> dict[At, CalibrationRow]:
+    """The last calibration of every place, whatever came of it."""
+    record, accepted = CalibrationRecord, CalibrationAcceptance
+    place = (record.machine_id, record.memory, record.location)
+    good = {
+        (machine_id, Place(memory, location)): number
+        for machine_id, memory, location, number in session.execute(
+            select(*place, func.max(record.number))
+            .where(record.refused.is_(False), record.machine_id.in_(machines))
+            .group_by(*place)
+        )
+    }
+    newest = select(*place, func.max(record.number)).where(record.machine_id.in_(machines)).group_by(*place)
+    found = session.execute(
+        select(record, accepted)
+        .outerjoin(accepted, (accepted.machine_id == record.machine_id) & (accepted.number == record.number))
+        .where(tuple_(*place, record.number).in_(newest))
+    )
+    rows = {}
+    for made, acceptance in found:
+        at = (made.machine_id, Place(made.memory, made.location))
+        rows[at] = CalibrationRow(made, acceptance, status_of(made, acceptance, values[at], good.get(at)))
+    return rows
+
+
+def _values(session: Session, machines: list[int]) -> dict[At, float]:
     averages = select(AverageMemory.machine_id, AverageMemory.location, AverageMemory.empirical_value)
     tools = select(Tool.machine_id, Tool.number, Tool.offset)
     return {
         (machine_id, Place(memory, location)): value
-        for memory, wanted in (("average", averages), ("tool", tools))
+        for memory, wanted in (
+            ("average", averages.where(AverageMemory.machine_id.in_(machines))),
+            ("tool", tools.where(Tool.machine_id.in_(machines))),
+        )
         for machine_id, location, value in session.execute(wanted)
     }

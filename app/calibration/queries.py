@@ -152,20 +152,24 @@ def _with_status(
     rows = []
     for record, acceptance in found:
         place = Place(record.memory, record.location)
-        if record.refused:
-            status = "refused"
-        elif acceptance is not None:
-            status = "accepted"
-        elif record.proposed is None:
-            status = "unchanged"
-        else:
-            if place not in values:
-                values[place] = value_of(session, machine, place)
-                newest[place] = last_good(session, machine, place)
-            holds = newest[place] == record.number and nanometres(values[place] - record.value_before) == 0
-            status = "proposed" if holds else "overtaken"
-        rows.append(CalibrationRow(record, acceptance, status))
+        if place not in values:
+            values[place] = value_of(session, machine, place)
+            newest[place] = last_good(session, machine, place)
+        rows.append(CalibrationRow(record, acceptance, status_of(record, acceptance, values[place], newest[place])))
     return rows
+
+
+def status_of(
+    record: CalibrationRecord, acceptance: CalibrationAcceptance | None, value: float, newest: int | None
+) -> str:
+    """What became of a calibration. value: in effect now; newest: the last of its place that was not refused."""
+    if record.refused:
+        return "refused"
+    if acceptance is not None:
+        return "accepted"
+    if record.proposed is None:
+        return "unchanged"
+    return "proposed" if newest == record.number and nanometres(value - record.value_before) == 0 else "overtaken"
 
 
 def last_good(session: Session, machine: Machine, place: Place) -> int | None:
