@@ -47,6 +47,16 @@ PAGES = {
         "/machines/{machine}/tools/3/sister",
     ],
     "/machines/{machine}/averages/{location}/edit": ["/machines/{machine}/averages/5/edit"],
+    "/calibration": ["/calibration"],
+    "/calibration/{machine}/{memory}/{location}": [
+        "/calibration/{machine}/averages/5",
+        "/calibration/{machine}/averages/6",
+        "/calibration/{machine}/probes/32",
+    ],
+    "/calibration/{machine}/{memory}/{location}/{what}/{number}": [
+        "/calibration/{machine}/averages/5/accept/1",
+        "/calibration/{machine}/averages/6/suggestion/0",
+    ],
     "/setup": ["/setup"],
     "/setup/characteristics": ["/setup/characteristics"],
     "/setup/characteristics/new": ["/setup/characteristics/new"],
@@ -108,6 +118,16 @@ def shop(server: Server) -> Shop:
         planned_parts=400,
         sister=13,
     )
+    calibrations = f"/machines/{made.machine}/calibrations"
+    limits: dict[str, Any] = {"zero_range": 0.001, "averaging_limit": 0.01, "confidence_limit": 1.0}
+    for touches in ([199.8553], [201.9]):
+        made.call("POST", calibrations, 201, average_memory=5, gauge_size=199.852, touches=touches, **limits)
+    ring: dict[str, Any] = {"nominal": 30.0, "upper_deviation": 0.01, "lower_deviation": -0.01, "radius_term": 6.0}
+    sections = [{"plus": 24.012, "minus": -23.988}] * 3
+    made.call("POST", f"{calibrations}/ring", 201, tool_memory=32, sections=sections, **ring)
+    for difference in (0.002, 0.0025, 0.0022, 0.0024, 0.03):
+        pair: dict[str, Any] = {"machine_value": 40.0 + difference, "external_value": 40.0, "instrument": "CMM, hall C"}
+        made.call("POST", f"/machines/{made.machine}/averages/6/pairs", 201, **pair)
     made.call(
         "PATCH",
         f"/characteristics/{made.characteristic}-empty",
