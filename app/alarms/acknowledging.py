@@ -171,10 +171,8 @@ def _keep_cutting(session: Session, row: AlarmRow, comment: str, caller: Caller)
     if row.alarm.kind not in queries.HOLDING:
         return []
     outcome: Outcome = []
-    true = True
-    if row.alarm.kind == "implausible":
-        true = _level_follows(session, row)
-    if row.held is not None and not true:
+    true = _level_follows(session, row)
+    if row.held is not None and not true and row.alarm.kind == "implausible":
         outcome.append(_withdraw(session, row, row.held, comment, caller))
     elif row.held is not None:
         released = offsets.decide(session, row.machine, row.held.number, "release", comment, caller).correction
@@ -191,13 +189,14 @@ def _level_follows(session: Session, row: AlarmRow) -> bool:
     alarm = row.alarm
     stream = session.get(Stream, (alarm.machine_id, alarm.characteristic_id), populate_existing=True)
     last = alarm.last_sequence or alarm.sequence
-    if stream is None or last is None:
+    if stream is None or last is None or stream.level is None:
         return True
     if stream.level_sequence is not None and stream.level_sequence > last:
         return False
     stream.level = reading_queries.uncorrected_of(session, alarm.machine_id, stream.characteristic_id, last)
     stream.level_sequence = last
-    if row.held is not None and stream.average_memory:  # corrected in full: the average begins again, as after any such
+    if row.alarm.kind == "implausible" and row.held is not None and stream.average_memory:
+        # Corrected in full, as in the zones within R37: the average begins again.
         offsets.restart_averages(session, row.machine, [stream.average_memory], datetime.now(UTC))
     session.flush()
     return True

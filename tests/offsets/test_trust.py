@@ -189,6 +189,16 @@ class TestPlausibility:
         assert codes(guarded.acknowledge(alarm["id"], "keep_cutting")) == ["correction_withdrawn", "level_disagrees"]
         assert guarded.correction(held)["status"] == "rejected"
 
+    def test_a_worn_tool_that_goes_on_cutting_is_expected_where_it_is(self, guarded: Shop) -> None:
+        guarded.read(0.5)
+        held = guarded.read(350.0)
+        assert held["reason"]["code"] == "tool_worn_held"  # one question at a time
+        guarded.acknowledge(guarded.alarms()[0]["id"], "keep_cutting")
+        number = held["correction"]["number"]
+        guarded.correction(number, "applied")
+        assert guarded.read(0.5, correction_in_effect=number)["reason"]["code"] == "within_zero_range"
+        assert guarded.alarms() == []
+
     def test_a_false_reading_is_excluded_and_its_correction_withdrawn(self, guarded: Shop) -> None:
         guarded.read(0.5)
         held = guarded.read(40.0)["correction"]["number"]
