@@ -15,6 +15,7 @@ The map of the house. Whoever knows the shop floor knows where to look:
     setup            the pages where all of that is set up
     people           who may do what: sign-in, sessions, roles, personal keys
     audit            who changed what, from what, to what, and why
+    programs         program text of the controls: read, written, corrections fetched as text
     formats          files in and out
     demo             a simulated plant that talks to the public API like real machines do
 

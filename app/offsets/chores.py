@@ -22,7 +22,8 @@ ACTOR = "inband"
 def expire_corrections(session: Session) -> None:
     """Corrections that have waited longer than their machine's setting are superseded: the next reading decides anew.
 
-    The time runs from when a correction was issued, or let go by a person. Held ones wait for their alarm, however long.
+    The time runs from when a correction was issued, or let go by a person. Held ones wait for their alarm, however long;
+    those that were fetched as program text may be in the control by now, and wait for somebody to say so.
     """
     due = _overdue()
     machines = set(session.scalars(due.with_only_columns(Correction.machine_id).order_by(None)))
@@ -57,6 +58,7 @@ def _overdue() -> Select[Correction, Machine]:
         .where(
             Correction.status.in_(OUTSTANDING),
             Machine.corrections_expire_after.is_not(None),
+            Correction.fetched_at.is_(None),
             waiting_since
             < func.clock_timestamp() - Machine.corrections_expire_after * func.make_interval(0, 0, 0, 0, 1),
         )

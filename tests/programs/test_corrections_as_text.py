@@ -6,6 +6,7 @@ from typing import Any
 import httpx
 import pytest
 
+from app.offsets.chores import expire_corrections
 from tests.core.programs.controls import Fanuc, Sinumerik
 from tests.shop import Shop
 
@@ -111,6 +112,17 @@ class TestFetching:
         shop.call("POST", f"/machines/{other.machine}/corrections/applied", 403, shop.machine_client, numbers=[1])
         answer = shop.machine_client.get(f"/api/v1/machines/{other.machine}/corrections/program")
         assert answer.status_code == 403
+
+
+    def test_it_does_not_expire(self, shop: Shop, server: Any) -> None:
+        """Its text may have been run: the machine says so with its next reading, perhaps after the weekend."""
+        shop.read(6.1)
+        shop.read(20.0, correction_in_effect=0)
+        fetched(shop, 1)
+        shop.call("PATCH", f"/machines/{shop.machine}", corrections_expire_after=1e-6)
+        with server.database.begin() as session:
+            expire_corrections(session)
+        assert [shop.correction(n)["status"] for n in (1, 2)] == ["pending", "superseded"]
 
 
 class TestConfirming:
