@@ -1,7 +1,7 @@
 """The core: what a probe reading means and what follows from it.
 
 Pure functions of their arguments: no clock, no input or output, no randomness, no logging.
-Standard library, NumPy and SciPy only, so that every verdict can be had in a REPL::
+Standard library, NumPy, SciPy and Numba only, so that every verdict can be had in a REPL::
 
     >>> from app.core.compensation import State, decide
     >>> from app.core.parameters import Parameters

@@ -14,7 +14,7 @@ from app.core.spc.gauge.linearity import linearity
 from app.core.spc.gauge.single import bias, type_one
 from app.core.spc.normality import anderson_darling, shapiro_wilk
 from app.core.spc.refusal import Floats
-from app.core.spc.rules import RULES, RuleName
+from app.core.spc.rules import RULES, RuleName, signals_of_cusum
 from app.core.spc.spread import Estimator, subgroups, summary
 from app.core.uncertainty import position_uncertainty
 
@@ -131,7 +131,7 @@ def moving(given: Given) -> Got:
 
 def summed(given: Given) -> Got:
     chart = cusum.cusum(shewhart.given(given["centre"], given["sigma"]), given["values"], given["k"], given["h"])
-    first = int(np.argmax(chart.outside))
+    first = next(iter(signals_of_cusum(chart))).start
     return {
         "above": (chart.above.round(9)).tolist(),
         "below": (chart.below.round(9)).tolist(),

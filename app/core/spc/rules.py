@@ -28,6 +28,7 @@ from enum import IntEnum, StrEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from app.core.spc.cusum import Cusum
 from app.core.spc.refusal import Floats, checked
 from app.core.spc.scan import STATE, beyond_runs, equal_runs
 from app.core.spc.shewhart import Chart, ControlChart
@@ -222,3 +223,23 @@ def signals_of(chart: ControlChart, rules: Iterable[Rule] = NELSON) -> Signals:
         if rule.name in FITTING[chart.chart]
     ]
     return signals(chart.z, fitting)
+
+
+def signals_of_cusum(chart: Cusum) -> Signals:
+    """The signals of a CUSUM: runs of points whose upper (side 1) or lower sum (side -1) is above h.
+
+    When the change began is another question: `Cusum.since_above` points back to where the sum left 0.
+
+    >>> from app.core.spc.cusum import cusum
+    >>> from app.core.spc.shewhart import given
+    >>> list(signals_of_cusum(cusum(given(0, 1), [2.0, 2.0, 2.0, 2.0, -9.0])))[0]
+    Run(rule=<RuleName.NELSON_1: 'nelson_1'>, side=1, start=3, end=3, points=1)
+    """
+    none = np.empty((0, 4), np.int64)
+    rows = []
+    for side, sums in ((1, chart.above), (-1, chart.below)):
+        found = beyond_runs(sums, 0, 1, 1, 1, chart.limit, np.zeros(STATE, np.int64), none)
+        found[:, 0] = side
+        rows.append(found)
+    together = np.concatenate(rows)
+    return Signals(len(chart.above), {RuleName.NELSON_1: together[np.argsort(together[:, 1], kind="stable")]})

@@ -144,7 +144,9 @@ def subgroups(values: ArrayLike, sizes: int | ArrayLike) -> Subgroups:
     ([11.0, 13.0], [2.0, 4.0], [1.414, 2.0])
     """
     x = checked(values)
-    each = np.full(len(x) // sizes, sizes) if isinstance(sizes, int) else np.asarray(sizes, dtype=np.int64).reshape(-1)
+    each = np.asarray(sizes, dtype=np.int64)
+    if each.ndim == 0:
+        each = np.full(len(x) // max(int(each), 1), each)
     if len(each) == 0:
         raise Refused(Reason.TOO_FEW_SUBGROUPS, have=0, needed=1)
     if (each < 1).any() or each.sum() > len(x):

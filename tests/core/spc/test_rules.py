@@ -12,9 +12,23 @@ from hypothesis import strategies as st
 from app.core.compiled import plain
 from app.core.spc import scan
 from app.core.spc.chance import average_run_length, chance, per_window
+from app.core.spc.cusum import cusum
 from app.core.spc.refusal import Reason, Refused
-from app.core.spc.rules import FITTING, NELSON, RULES, WESTERN_ELECTRIC, Kind, Rule, RuleName, Scan, members, signals
+from app.core.spc.rules import (
+    FITTING,
+    NELSON,
+    RULES,
+    WESTERN_ELECTRIC,
+    Kind,
+    Rule,
+    RuleName,
+    Scan,
+    members,
+    signals,
+    signals_of_cusum,
+)
 from app.core.spc.shewhart import Chart
+from app.core.spc.shewhart import given as standard
 from app.settings import HOUSE
 
 # Quarters reach every limit exactly, and equal neighbours come up often.
@@ -131,6 +145,16 @@ def test_a_point_on_the_limit_is_not_beyond_it_and_one_on_the_centre_on_no_side(
 def test_every_signal_is_kept_when_several_rules_fire_on_one_point() -> None:
     found = list(signals([2.5, 2.5, 2.5, 3.5]))
     assert {run.rule for run in found} == {RuleName.NELSON_1, RuleName.NELSON_5, RuleName.NELSON_6}
+
+
+@given(z=POINTS)
+@settings(max_examples=60, deadline=None)
+def test_the_signals_of_a_cusum_are_its_points_beyond_the_limit(z: list[float]) -> None:
+    chart = cusum(standard(0, 1), z, h=3.0)
+    found = list(signals_of_cusum(chart))
+    for side, sums in ((1, chart.above), (-1, chart.below)):
+        flagged = {i for run in found if run.side == side for i in range(run.start, run.end + 1)}
+        assert flagged == set(np.flatnonzero(sums > chart.limit).tolist())
 
 
 def test_what_is_flagged_lies_in_the_runs() -> None:
