@@ -36,7 +36,7 @@ TOLERABLE = 0.1  # reversals per reading: more of them is hunting
 DISPERSION = 1.5  # simulated: 0.75 to 1.45, the more the less M is averaged
 ALARM = 0.001  # so rarely TOLERABLE hunting alone looks like more of it
 GOAL = 0.01  # of the readings scatter alone may correct with what is suggested
-LARGEST_K = 20.0
+LARGEST_K = 10.0
 ROUND_K, ROUND_R33 = 0.5, 0.0001  # suggestions are made in such steps
 
 

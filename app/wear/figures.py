@@ -17,6 +17,8 @@ from app.web.theme import Palette, ThemeName, layout, palette
 
 AHEAD, LEAST_AHEAD = 0.6, 20  # how far the forecast is drawn at most, in shares of what is shown; in parts
 STEPS = 24  # points of a curved edge
+SYMBOLS = {-1: "triangle-down", 0: "circle", 1: "triangle-up"}  # beyond the edges of the chart, drawn on them
+FAR = 4  # times the tolerance: what deviates further does not stretch the chart
 ROOM = 0.06  # above and below, in shares of the height
 
 
@@ -59,20 +61,15 @@ def wear_figure(chart: WearChart, *, theme: ThemeName = "light", width: int = 12
         for name, forecast in chart.forecasts.items()
         if forecast.low <= ahead and not (chart.corrects and name is Towards.TOLERANCE)
     }
-    data: list[dict[str, Any]] = []
-    for life in lives:
-        if life.sequence:
-            data += _band(life, chart, colours, ahead if life is chart.now else 0)
-    for life in lives:
-        if life.sequence:
-            data += _life(life, chart, colours, is_now=life is chart.now)
-    if chart.fit is not None:
-        data += _line(chart.fit, colours, ahead)
     heights = [
         value
         for life in lives
         for worn, taken in zip(life.worn, life.taken, strict=True)
-        for value in (worn, taken - chart.half, taken + chart.half)
+        for value in (
+            *([worn] if abs(worn - taken) <= FAR * chart.half else ()),
+            taken - chart.half,
+            taken + chart.half,
+        )
     ]
     heights += [chart.taken - chart.half, chart.taken + chart.half, *near.values()]
     if chart.fit is not None and ahead:
@@ -80,6 +77,15 @@ def wear_figure(chart: WearChart, *, theme: ThemeName = "light", width: int = 12
         heights += [edge - wide, edge + wide]
     low, high = min(heights) * 1000, max(heights) * 1000
     room = (high - low) * ROOM
+    data: list[dict[str, Any]] = []
+    for life in lives:
+        if life.sequence:
+            data += _band(life, chart, colours, ahead if life is chart.now else 0)
+    for life in lives:
+        if life.sequence:
+            data += _life(life, chart, colours, (low, high), is_now=life is chart.now)
+    if chart.fit is not None:
+        data += _line(chart.fit, colours, ahead)
     marks = _changes(chart, colours)
     limits = _limits(near, colours)
     return {
@@ -162,7 +168,9 @@ def _band(life: Life, chart: WearChart, colours: Palette, ahead: float) -> list[
     ]
 
 
-def _life(life: Life, chart: WearChart, colours: Palette, *, is_now: bool) -> list[dict[str, Any]]:
+def _life(
+    life: Life, chart: WearChart, colours: Palette, edges: tuple[float, float], *, is_now: bool
+) -> list[dict[str, Any]]:
     traces: list[dict[str, Any]] = []
     if chart.corrects or any(life.taken):
         traces.append(
@@ -179,6 +187,7 @@ def _life(life: Life, chart: WearChart, colours: Palette, *, is_now: bool) -> li
             }
         )
     few = len(life.sequence) <= 400
+    far = [(_um(value) > edges[1]) - (_um(value) < edges[0]) for value in life.worn]
     traces.append(
         {
             "type": "scatter",
@@ -187,10 +196,16 @@ def _life(life: Life, chart: WearChart, colours: Palette, *, is_now: bool) -> li
             "meta": "wear",
             "showlegend": is_now,
             "x": list(life.sequence),
-            "y": [_um(value) for value in life.worn],
+            "y": [min(max(_um(value), edges[0]), edges[1]) for value in life.worn],
             "marker": {
-                "size": [(5 if few else 3) + (1 if count > 1 else 0) for count in life.counts],
-                "color": colours.steady if is_now else colours.faint,
+                "size": [
+                    10 if beyond else (5 if few else 3) + (count > 1)
+                    for beyond, count in zip(far, life.counts, strict=True)
+                ],
+                "symbol": [SYMBOLS[beyond] for beyond in far],
+                "color": [
+                    colours.attention if beyond else colours.steady if is_now else colours.faint for beyond in far
+                ],
             },
             "customdata": [f"/characteristics/{chart.key}/readings/{number}" for number in life.sequence],
             "text": [

@@ -34,7 +34,7 @@ from app.wear.tables import Outlook
 
 MOST_READINGS = 2_500  # read one by one
 MOST_GROUPS, GROUP = 400, 16  # what is older: so many groups of so many readings
-FEW = 100  # of a tool that has cut fewer parts the chart shows the one before too
+FEW = hunting.LONGEST  # of a tool that has cut fewer parts the chart shows the one before too
 PLANNED, NEAR = 2_000, 100  # parts: what lies further ahead is not told on the plant's page; what is nearer stands out
 MOST_EVENTS = 5_000  # steps of the tool's offset that are looked through
 SETTINGS = ("zero_range", "averaging_limit", "weighting_factor", "factor", "tool_memory", "average_memory", "mode")
@@ -119,9 +119,18 @@ class Wear:
         return wear.fit(self.now.sequence[single], self.now.worn[single])
 
     @cached_property
+    def is_off(self) -> bool:
+        """Whether the two newest readings lie far off the line: what broke or slipped tells nothing of what comes."""
+        if self.fit is None:
+            return False
+        far = wear.OUTLIER * self.fit.scatter + 1e-9
+        line = [self.fit.at(float(at - self.fit.last)) for at in self.now.sequence[-2:]]
+        return all(abs(worn - on) > far for worn, on in zip(self.now.worn[-2:].tolist(), line, strict=True))
+
+    @cached_property
     def forecasts(self) -> dict[Towards, Forecast]:
-        """Parts left to each limit; empty where no wear is to be seen, or the window does not reach the present."""
-        if self.fit is None or not self.fit.is_wear or not self.window.reaches_now:
+        """Parts left to each limit; empty where no wear is to be seen, `is_off`, or the window does not reach the present."""
+        if self.fit is None or not self.fit.is_wear or self.is_off or not self.window.reaches_now:
             return {}
         found = {name: wear.forecast(self.fit, limit) for name, limit in self.limits.items()}
         return {name: forecast for name, forecast in found.items() if forecast is not None}
@@ -172,7 +181,10 @@ def wear_of(session: Session, standing: Standing, window: Window) -> Wear:
         "target": parameters.target,
     }
     newest = max(window.first, window.last - MOST_READINGS + 1)
-    rows = _rows(session, _SINGLE, where | {"first": newest, "last": window.last})
+    earliest = max(1, min(newest, window.last - hunting.LONGEST + 1))
+    read = _rows(session, _SINGLE, where | {"first": earliest, "last": window.last})
+    judged = _hunting(session, standing, versions, read)
+    rows = [row for row in read if row.sequence >= newest]
     if newest > window.first:
         stride = max(GROUP, -(-(newest - window.first) // MOST_GROUPS))
         older = where | {
@@ -210,7 +222,7 @@ def wear_of(session: Session, standing: Standing, window: Window) -> Wear:
         [piece(low, high) for low, high in pairwise(cuts) if high > low],
         _total(session, standing),
         changes[-1] if changes else None,
-        _hunting(session, standing, versions, rows, worn),
+        judged,
     )
 
 
@@ -289,14 +301,13 @@ def _hunting(
     standing: Standing,
     versions: dict[int, dict[str, Any]],
     rows: Sequence[_Row],
-    worn: Values,
 ) -> Hunting | None:
     """Of the newest readings judged with the settings of now; None where nothing is corrected."""
     parameters = standing.parameters
     if parameters.measures_only:
         return None
     since = _since(versions)
-    mine = [at for at, row in enumerate(rows) if row.version >= since and row.judged][-hunting.LONGEST :]
+    mine = [row for row in rows if row.version >= since and row.judged][-hunting.LONGEST :]
     sizes: Sequence[float] = ()
     if mine:
         sizes = session.scalars(
@@ -304,7 +315,7 @@ def _hunting(
             .where(
                 Correction.machine_id == standing.machine.id,
                 Correction.characteristic_id == standing.characteristic.id,
-                Correction.sequence.between(rows[mine[0]].sequence, rows[mine[-1]].sequence),
+                Correction.sequence.between(mine[0].sequence, mine[-1].sequence),
                 Correction.status.in_(("applied", *OUTSTANDING)),
             )
             .order_by(Correction.sequence)
@@ -312,7 +323,7 @@ def _hunting(
     return hunting.judge(
         sizes,
         len(mine),
-        wear.scatter_of(worn[mine]),
+        wear.scatter_of(np.array([row.deviation + row.compensated / parameters.factor for row in mine])),
         Settings(
             parameters.zero_range,
             parameters.averaging_limit,

@@ -59,8 +59,8 @@ def towards_parts(towards: Towards, *, reached: bool = False) -> str:
         }[towards]
     return {
         Towards.WEAR: _("parts to R37"),
-        Towards.TOLERANCE: _("parts to the tolerance limit"),
-        Towards.OFFSET: _("parts to the offset limit"),
+        Towards.TOLERANCE: _("parts to tolerance"),
+        Towards.OFFSET: _("parts to limit"),
     }[towards]
 
 
@@ -237,9 +237,13 @@ class WearWords:
         first: tuple[Towards, Forecast] | None,
         hunting: Hunting | None,
         parameters: Parameters,
+        *,
+        is_off: bool = False,
     ) -> None:
         self.slope = per_part(fit.slope) if fit is not None and fit.is_wear else None
         self.wear = wear_sentence(fit)
+        if is_off:
+            self.wear += " " + _("The newest readings lie far off the line: nothing is foretold.")
         self.note = fit_note(fit) if fit is not None else None
         self.forecasts = [
             (
