@@ -241,12 +241,13 @@ class Line:
                 raise
 
     def _measured_by_hand(self, alarm: dict[str, Any]) -> dict[str, Any]:
-        """A rejected part is measured with a bore gauge, which has a scatter of its own."""
+        """A rejected part is measured with a bore gauge: what lies far out was a chip under the stylus, not the part."""
         if alarm["kind"] != "acceptance":
             return {}
         target = next(f.target for f in self.machine.spec.features if f.key == alarm["characteristic"])
-        deviation = alarm["data"]["deviation"] + self._rng.gauss(0.0, 0.001)
-        verdict = "good" if abs(deviation) <= alarm["data"]["limit"] else "bad"
+        found, limit = alarm["data"]["deviation"], alarm["data"]["limit"]
+        deviation = self._rng.gauss(found if abs(found) < 1.5 * limit else 0.0, 0.001)
+        verdict = "good" if abs(deviation) <= limit else "bad"
         return {"hand_measured": round(target + deviation, 4), "hand_verdict": verdict}
 
     def _change_worn_tools(self) -> None:
