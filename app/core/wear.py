@@ -39,6 +39,7 @@ SHORTER = 0.7  # what is kept of a run that does not follow one line
 LEVEL = 0.95  # of confidence, two-sided
 BREAK = 0.001  # so rarely scatter alone makes one line look like two
 OUTLIER = 5.0  # standard deviations from its neighbours
+STEP = 8.0  # standard deviations from one reading to the next
 NEAR = 5  # readings on either side of a step of the reference that say whether the parts moved
 
 
@@ -57,7 +58,8 @@ class Step(NamedTuple):
 class Fit:
     """The line through the newest readings: w = level + slope x (sequence - last). mm, and mm per part.
 
-    first, last: sequences it was fitted from and to; count: readings it was fitted to; left_out: outliers between them.
+    first, last: sequences it was fitted from, and of the newest reading; count: readings it was fitted to; left_out: outliers
+    between them; off: newest readings that a step divides from the line, as when an edge breaks: they are left out too.
     slope_error, level_error: standard errors. scatter: standard deviation about the line. correlation: rho. effective: how
     many independent readings it is worth. centre, spread: mean of sequence - last, and sum of squares about it.
     """
@@ -66,6 +68,7 @@ class Fit:
     last: int
     count: int
     left_out: int
+    off: int
     level: float
     level_error: float
     slope: float
@@ -183,6 +186,8 @@ def fit(sequence: NDArray[np.int64], curve: Values) -> Fit | None:
     """
     sequence, curve = sequence[-LONGEST:], curve[-LONGEST:]
     good = ~outliers(curve)
+    off = _off(curve[good])
+    good[np.flatnonzero(good)[len(curve[good]) - off :]] = False
     x, y = sequence[good].astype(np.float64), curve[good]
     while len(x) * SHORTER >= SHORTEST and _breaks(x, y):
         keep = int(len(x) * SHORTER)
@@ -203,7 +208,8 @@ def fit(sequence: NDArray[np.int64], curve: Values) -> Fit | None:
         first=int(x[0]) + last,
         last=last,
         count=count,
-        left_out=int((sequence >= x[0] + last).sum()) - count,
+        left_out=int((sequence >= x[0] + last).sum()) - count - off,
+        off=off,
         level=float(y.mean()) - slope * centre,
         level_error=scatter * sqrt(inflation * (1 / count + centre**2 / spread)),
         slope=slope,
@@ -219,14 +225,14 @@ def fit(sequence: NDArray[np.int64], curve: Values) -> Fit | None:
 def forecast(fit: Fit, limit: float) -> Forecast | None:
     """Parts until w reaches `limit` (mm), one that lies the way that it wears; None where no wear is to be seen.
 
-    A limit that the line has passed already is reached: 0 parts.
+    A limit that the line has passed already is reached: 0 parts. What broke tells nothing of what comes: None as well.
 
     >>> w = np.arange(40) * 0.0001 + np.array([0.001, -0.001] * 20)
     >>> f = forecast(fit(np.arange(1, 41), w), 0.0139)
     >>> round(f.parts), round(f.low), round(f.high)
     (105, 70, 163)
     """
-    if not fit.is_wear:
+    if not fit.is_wear or fit.off:
         return None
     # (c + b u - L)^2 = T^2 (1 + v/n + v u^2 / Sxx) about the centre of the readings, u = parts - centre.
     inflation, reach = fit.count / fit.effective, fit.quantile * fit.scatter
@@ -270,6 +276,13 @@ def limits_of(parameters: Parameters, way: float, total: float, lifted: float = 
     if parameters.max_total is not None and not parameters.measures_only:
         found[Towards.OFFSET] = sign * parameters.max_total / abs(parameters.factor) + lifted
     return found
+
+
+def _off(curve: Values) -> int:
+    """How many of the newest readings lie beyond a step, `STEP` standard deviations high; so many as make a line do not."""
+    newest = np.abs(np.diff(curve[-FEWEST:]))
+    steps = np.flatnonzero(newest > max(STEP * scatter_of(curve), 1e-9))
+    return len(newest) - int(steps[0]) if len(curve) > FEWEST and len(steps) else 0
 
 
 def _correlation(residual: Values) -> float:

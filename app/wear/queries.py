@@ -35,7 +35,7 @@ from app.wear.tables import Outlook
 MOST_READINGS = 2_500  # read one by one
 MOST_GROUPS, GROUP = 400, 16  # what is older: so many groups of so many readings
 FEW = hunting.LONGEST  # of a tool that has cut fewer parts the chart shows the one before too
-PLANNED, NEAR = 2_000, 100  # parts: what lies further ahead is not told on the plant's page; what is nearer stands out
+PLANNED, NEAR = 500, 100  # parts: what lies further ahead is not told on the plant's page; what is nearer stands out
 MOST_EVENTS = 5_000  # steps of the tool's offset that are looked through
 SETTINGS = ("zero_range", "averaging_limit", "weighting_factor", "factor", "tool_memory", "average_memory", "mode")
 
@@ -119,18 +119,9 @@ class Wear:
         return wear.fit(self.now.sequence[single], self.now.worn[single])
 
     @cached_property
-    def is_off(self) -> bool:
-        """Whether the two newest readings lie far off the line: what broke or slipped tells nothing of what comes."""
-        if self.fit is None:
-            return False
-        far = wear.OUTLIER * self.fit.scatter + 1e-9
-        line = [self.fit.at(float(at - self.fit.last)) for at in self.now.sequence[-2:]]
-        return all(abs(worn - on) > far for worn, on in zip(self.now.worn[-2:].tolist(), line, strict=True))
-
-    @cached_property
     def forecasts(self) -> dict[Towards, Forecast]:
-        """Parts left to each limit; empty where no wear is to be seen, `is_off`, or the window does not reach the present."""
-        if self.fit is None or not self.fit.is_wear or self.is_off or not self.window.reaches_now:
+        """Parts left to each limit; empty where no wear is to be seen, or the window does not reach the present."""
+        if self.fit is None or not self.fit.is_wear or not self.window.reaches_now:
             return {}
         found = {name: wear.forecast(self.fit, limit) for name, limit in self.limits.items()}
         return {name: forecast for name, forecast in found.items() if forecast is not None}

@@ -24,6 +24,7 @@ class PerPartOut(BaseModel):
     last_sequence: int
     readings: int
     left_out: int = Field(description="Outliers among them.")
+    off: int = Field(description="Newest readings beyond a step, as when an edge breaks; nothing is foretold then.")
     level: float = Field(description="Of the line at the last reading.")
     scatter: float = Field(description="Standard deviation about the line.")
     correlation: float = Field(description="Of neighbours (lag 1); it widens the interval.")
@@ -90,6 +91,7 @@ EXAMPLE: dict[str, Any] = {
         "last_sequence": 812,
         "readings": 199,
         "left_out": 1,
+        "off": 0,
         "level": 0.0128,
         "scatter": 0.00094,
         "correlation": 0.03,
@@ -168,6 +170,7 @@ def _per_part(fit: Fit | None) -> PerPartOut | None:
         last_sequence=fit.last,
         readings=fit.count,
         left_out=fit.left_out,
+        off=fit.off,
         level=fit.level,
         scatter=fit.scatter,
         correlation=fit.correlation,

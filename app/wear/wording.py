@@ -237,12 +237,10 @@ class WearWords:
         first: tuple[Towards, Forecast] | None,
         hunting: Hunting | None,
         parameters: Parameters,
-        *,
-        is_off: bool = False,
     ) -> None:
         self.slope = per_part(fit.slope) if fit is not None and fit.is_wear else None
         self.wear = wear_sentence(fit)
-        if is_off:
+        if fit is not None and fit.off:
             self.wear += " " + _("The newest readings lie far off the line: nothing is foretold.")
         self.note = fit_note(fit) if fit is not None else None
         self.forecasts = [

@@ -150,6 +150,18 @@ def test_run_in_and_chips_end_the_past() -> None:
     assert abs(found.slope - 0.00005) < 4 * found.slope_error
 
 
+def test_an_edge_that_breaks_bends_no_line_and_foretells_nothing() -> None:
+    curve = line(100, 0.0001, 0.0005, seed=1)
+    curve[-3:] += 0.4
+    found = fitted(curve)
+    assert (found.off, found.last, found.count) == (3, 100, 97)
+    assert found.slope == pytest.approx(0.0001, rel=0.05)
+    assert forecast(found, 0.3) is None
+    curve[-20:-3] += 0.4  # twenty readings beyond it are the new line
+    found = fitted(curve)
+    assert found.off == 0
+
+
 def test_one_line_is_rarely_taken_for_two() -> None:
     whole = [fitted(line(200, 0.00005, 0.001, seed)) for seed in range(300)]
     assert sum(found.first > 1 for found in whole) <= 3
