@@ -509,6 +509,8 @@ def test_bad_queries(operation: Operation, place: Place) -> None:
                 bad += ["1763709302", "2026-11-21T08:15:02", "2026-13-01T00:00:00Z"]
             if name == "limit":
                 bad += ["0", "1001"]
+            if kind.get("type") == "number":
+                bad.remove("1.5")
             query = "&".join(f"{key}={value}" for key, value in needed.items() if key != name)
             for value in bad:
                 if operation.path == "/api/v1/events" and not strict:
