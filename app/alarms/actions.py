@@ -102,6 +102,14 @@ def settle_for_place(
     return active
 
 
+def news(machine: str, alarm: Alarm) -> dict[str, Any]:
+    """What live pages and event listeners are told of an alarm that does not come from a reading."""
+    told = {"kind": "alarm", "machine": machine, "characteristic": None, "tool": alarm.tool_memory, "id": alarm.id}
+    if alarm.acknowledged_at is None:
+        return told | {"alarm": alarm.kind, "state": "active"}
+    return told | {"alarm": alarm.kind, "state": "acknowledged", "action": alarm.action}
+
+
 def _of_place(session: Session, machine_id: int, kind: str, data: dict[str, Any]) -> Alarm | None:
     return session.scalars(
         select(Alarm)

@@ -26,7 +26,6 @@ from app.errors import Conflict, FieldError, Invalid
 from app.machines.queries import lock_machines
 from app.machines.tables import Machine
 from app.offsets import actions as offsets
-from app.offsets.news import alarm_raised
 from app.people.callers import Caller
 from app.readings.tables import Stream
 from app.web.i18n import _
@@ -177,7 +176,7 @@ def _keep(
     if made.refused:
         if caller.kind != "person":  # a person sees the refusal; a machine may have nobody beside it
             alarm = alarms.raise_for_place(session, machine.id, REFUSED, about | wording.values_of(made))
-            changes.append(alarm_raised(machine, alarm))
+            changes.append(alarms.news(machine.key, alarm))
     else:
         changes += end_alarms(session, machine, made)
         count_anew(session, machine, place, made.calibrated_at)
@@ -200,11 +199,7 @@ def end_alarms(session: Session, machine: Machine, made: CalibrationRecord) -> l
         alarms.settle_for_place(session, machine.id, kind, about, made.actor, comment, outcome)
         for kind in (OVERDUE, REFUSED)
     ]
-    return [
-        alarm_raised(machine, alarm) | {"state": "acknowledged", "action": "noted"}
-        for alarm in ended
-        if alarm is not None
-    ]
+    return [alarms.news(machine.key, alarm) for alarm in ended if alarm is not None]
 
 
 def count_anew(session: Session, machine: Machine, place: Place, since: datetime) -> None:

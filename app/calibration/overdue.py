@@ -11,7 +11,6 @@ from app.calibration.tables import CalibrationPlan
 from app.db.events import publish
 from app.machines.queries import lock_machines
 from app.machines.tables import Machine
-from app.offsets.news import alarm_raised
 
 _OVERDUE = text("""
 SELECT * FROM (
@@ -51,4 +50,4 @@ def _raise(session: Session, row: RowMapping) -> dict[str, Any]:
         "due_days": row["due_days"],
     }
     alarm = alarms.raise_for_place(session, row["machine_id"], OVERDUE, data)
-    return alarm_raised(session.get_one(Machine, row["machine_id"]), alarm)
+    return alarms.news(session.get_one(Machine, row["machine_id"]).key, alarm)
