@@ -48,6 +48,7 @@ PAGES = {
     ],
     "/machines/{machine}/averages/{location}/edit": ["/machines/{machine}/averages/5/edit"],
     "/calibration": ["/calibration"],
+    "/calibration/probes": ["/calibration/probes?machine={machine}&tool=32"],
     "/calibration/{machine}/{memory}/{location}": [
         "/calibration/{machine}/averages/5",
         "/calibration/{machine}/averages/6",
@@ -125,7 +126,7 @@ def shop(server: Server) -> Shop:
     ring: dict[str, Any] = {"nominal": 30.0, "upper_deviation": 0.01, "lower_deviation": -0.01, "radius_term": 6.0}
     sections = [{"plus": 24.012, "minus": -23.988}] * 3
     made.call("POST", f"{calibrations}/ring", 201, tool_memory=32, sections=sections, **ring)
-    for difference in (0.002, 0.0025, 0.0022, 0.0024, 0.03):
+    for difference in (0.002, 0.0025, 0.0022, 0.0024, 0.0045):
         pair: dict[str, Any] = {"machine_value": 40.0 + difference, "external_value": 40.0, "instrument": "CMM, hall C"}
         made.call("POST", f"/machines/{made.machine}/averages/6/pairs", 201, **pair)
     made.call(
