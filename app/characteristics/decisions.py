@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -10,11 +10,23 @@ from sqlalchemy.orm import Session
 from app.alarms.tables import Alarm
 from app.characteristics.queries import Standing
 from app.characteristics.tables import ParametersVersion
+from app.core.compensation import deviation_of
+from app.core.parameters import Parameters
+from app.core.probing import sections_of
+from app.core.zones import within_tolerance
 from app.errors import NotFound
 from app.offsets.tables import Correction
 from app.readings import queries as readings
 from app.readings.tables import ReadingTouches
 from app.web.i18n import _
+
+
+class Section(NamedTuple):
+    """One section of a part, mm; `inside` is on the limit too."""
+
+    value: float
+    deviation: float
+    inside: bool
 
 
 @dataclass(frozen=True)
@@ -32,6 +44,17 @@ class Decision:
     @property
     def sequence(self) -> int:
         return int(self.reading["sequence"])
+
+    def sections(self, limits: Parameters) -> list[Section]:
+        """The sections of a part accepted by n of m, judged as the reading was: with the empirical value of then."""
+        if not self.touches or limits.accept_m == 1:
+            return []
+        empirical_value = self.reading["measured"] - limits.target - self.reading["deviation"]
+        deviations = [
+            (value, deviation_of(value, limits.target, empirical_value))
+            for value in sections_of(limits, self.point_means)
+        ]
+        return [Section(value, found, within_tolerance(found, limits.limits)) for value, found in deviations]
 
     @property
     def point_means(self) -> list[float]:

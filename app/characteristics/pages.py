@@ -128,7 +128,11 @@ def characteristic_page(
 
     def link(**changes: Any) -> str:
         """This page with something else chosen."""
-        kept = (chosen if not changes.keys() & {"last", "first"} else {}) | {"scale": scale, "edge": edge, "result": result}
+        kept = (chosen if not changes.keys() & {"last", "first"} else {}) | {
+            "scale": scale,
+            "edge": edge,
+            "result": result,
+        }
         values = {name: value for name, value in {**kept, **changes}.items() if value is not None}
         usual = {("scale", "zones"), ("edge", "tool")}
         return f"{path}?{urlencode({name: v for name, v in values.items() if (name, v) not in usual})}"
@@ -285,6 +289,7 @@ def _reading(
         errors=by_field(problem) if problem else {},
         picture=touches_picture(limits, found.point_means) if found.touches else None,
         residuals=residuals_of(limits, found.point_means) if found.touches else [],
+        sections=found.sections(limits),
         angle_of=angle_of,
         result_label=result_label,
         code_word=code_word,

@@ -352,6 +352,7 @@ def _signal(
             "m": parameters.accept_m,
             "least": parameters.accept_m - parameters.accept_n + 1,  # so many outside, and it is rejected
             "outside": results.sections_outside,
+            "target": parameters.target,
         }
     active.count += 1
     active.last_sequence = sequence

@@ -15,8 +15,9 @@ from app.core.variants import fitted_points
 from app.web.i18n import _
 from app.web.numbers import mm, um
 
-WIDTH, HEIGHT = 260.0, 200.0
+WIDTH, HEIGHT = 300.0, 236.0
 RADIUS, REACH = 58.0, 20.0  # of the drawn part, and how far the largest residual stands off it
+WORD_AWAY = 26.0
 HALF_TURN = 180.0
 
 
@@ -72,7 +73,7 @@ def _round(parameters: Parameters, points: Sequence[float]) -> list[str]:
         turn = -angle_of(parameters, at, len(points)) * pi / HALF_TURN
         ray = (cos(turn), sin(turn))
         foot, tip, word = (
-            (x0 + r * ray[0], y0 + r * ray[1]) for r in (RADIUS, RADIUS + residual * scale, RADIUS + REACH + 14)
+            (x0 + r * ray[0], y0 + r * ray[1]) for r in (RADIUS, RADIUS + residual * scale, RADIUS + REACH + WORD_AWAY)
         )
         drawn += _point(at, foot, tip, word, residual)
     return drawn
@@ -93,7 +94,7 @@ def _along(parameters: Parameters, points: Sequence[float]) -> list[str]:
         )
     for at, (x, height) in enumerate(zip(at_x, heights, strict=True)):
         tip = (x, middle - height * scale)
-        drawn += _point(at, (x, middle), tip, (x, middle + 76.0), height)
+        drawn += _point(at, (x, middle), tip, (x, middle + 84.0), height)
     return drawn
 
 
@@ -121,6 +122,6 @@ def _point(
     return [
         f'<path class="residual" d="M{foot[0]:.1f} {foot[1]:.1f}L{tip[0]:.1f} {tip[1]:.1f}"/>',
         f'<circle class="touch" cx="{tip[0]:.1f}" cy="{tip[1]:.1f}" r="5"/>',
-        f'<text class="name" x="{word[0]:.1f}" y="{word[1]:.1f}">{at + 1}</text>',
-        f'<text class="value" x="{word[0]:.1f}" y="{word[1] + 14:.1f}">{um(residual)}</text>',
+        f'<text class="name" x="{word[0]:.1f}" y="{word[1] - 2:.1f}">{at + 1}</text>',
+        f'<text class="value" x="{word[0]:.1f}" y="{word[1] + 12:.1f}">{um(residual)}</text>',
     ]
