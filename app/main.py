@@ -1,5 +1,6 @@
 """The wiring and nothing else: `create_app` puts the house together."""
 
+import asyncio
 import gc
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -37,6 +38,7 @@ from app.readings import api as readings
 from app.readings.by_hand import api as by_hand
 from app.readings.door import Directory, ReadingsDoor
 from app.readings.importing import pages as import_pages
+from app.readings.quiet import compile_now
 from app.readings.writer import Writer
 from app.rounds import Chore, Rounds
 from app.settings import Settings
@@ -111,12 +113,14 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
         writer.start()
         live.start()
         rounds.start()
+        compiling = asyncio.get_running_loop().run_in_executor(None, compile_now)
         proving = proofs.begin_later()
         # What has been made so far stays for good: the collector need not walk it again, which halves the p99.
         gc.collect()
         gc.freeze()
         yield
         proving.cancel()
+        await compiling
         await live.stop()
         await rounds.stop()
         await writer.stop()

@@ -118,7 +118,9 @@ class WhySo(BaseModel):
     text: Annotated[str, Field(description="For people.")]
     notes: Annotated[
         list[str],
-        Field(description="What else was considered: outstanding, part_out_of_tolerance, clamped, empirical_value, late."),
+        Field(
+            description="What else was considered: outstanding, part_out_of_tolerance, clamped, empirical_value, late."
+        ),
     ]
 
 

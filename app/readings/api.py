@@ -16,6 +16,7 @@ from app.readings import actions, queries
 from app.readings.answers import ReadingAnswer, ReadingDetail, ReadingRow
 from app.readings.door import Directory, answer_of, take
 from app.readings.ground import Stored, Verdict
+from app.readings.quiet import QuietReadings
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn, decode_many, decode_one
 from app.readings.writer import Outcome, Writer, store_batch
@@ -131,7 +132,7 @@ async def push_batch(
         wanted = _looked_up(directory, decode_many(body, datetime.now(UTC), lines=lines))
         for entry in {entry.machine_id: entry for entry, _reading in wanted}.values():
             caller.must_at(entry.machine_id, "operator")
-        outcomes = store_batch(database.dsn, writer.book, wanted) if wanted else []
+        outcomes = store_batch(database.dsn, writer.book, wanted, writer.spare) if wanted else []
         return outcomes, msgspec.json.encode(_counts(outcomes))
 
     outcomes, counts = await run_in_threadpool(stored)
@@ -166,11 +167,17 @@ def _looked_up(directory: Directory, readings: list[ReadingIn]) -> list[tuple[En
 
 
 def _counts(outcomes: list[Outcome]) -> dict[str, Any]:
-    new = [outcome for outcome in {id(o): o for o in outcomes}.values() if isinstance(outcome, Verdict)]
+    once = {id(o): o for o in outcomes}.values()
+    new = [outcome for outcome in once if isinstance(outcome, Verdict)]
+    zones = Counter(verdict.decision.zone.value for verdict in new)
+    for outcome in once:
+        if isinstance(outcome, QuietReadings):
+            zones.update(outcome.zones())
+    stored = zones.total()
     return {
-        "stored": len(new),
-        "repeated": len(outcomes) - len(new),
-        "zones": Counter(verdict.decision.zone.value for verdict in new),
+        "stored": stored,
+        "repeated": len(outcomes) - stored,
+        "zones": zones,
         "corrections": sum(verdict.correction is not None for verdict in new),
         "alarms": len({id(alarm) for verdict in new for alarm in verdict.alarms if alarm.new}),
     }
@@ -188,7 +195,10 @@ def _with_decisions(outcomes: list[Outcome], database: Database) -> bytes:
                 found = queries.first_answers(session, entry, sequences)
                 first |= {Stored(entry, sequence): each for sequence, each in found.items()}
     items = [
-        first[outcome] if isinstance(outcome, Stored) else answer_of(cast("Verdict", outcome)) for outcome in outcomes
+        first[outcome]
+        if isinstance(outcome, Stored)
+        else answer_of(outcome.verdict(at) if isinstance(outcome, QuietReadings) else cast("Verdict", outcome))
+        for at, outcome in enumerate(outcomes)
     ]
     return msgspec.json.encode(_counts(outcomes) | {"items": items})
 

@@ -129,6 +129,7 @@ async def said(outcome: Outcome, database: Database) -> tuple[int, dict[str, Any
         raise outcome
     if isinstance(outcome, Stored):
         return 200, await run_in_threadpool(_stored, database, outcome)
+    assert isinstance(outcome, Verdict)  # columns are made of batches only
     return 201, answer_of(outcome)
 
 

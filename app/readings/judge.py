@@ -63,16 +63,9 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
 
     sequence = stream.sequence + 1
     measured_at = now if reading.measured_at is None else reading.measured_at.astimezone(UTC)
-    previous_tool = False
-    outstanding: list[IssuedCorrection] = []
-    if tool is not None:
-        if tool.corrections and in_effect is not None:
-            _confirm(ground, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
-        last_applied = None if in_effect is None else ground.named.get((tool.machine_id, in_effect))
-        previous_tool = _cut_before_reset(tool, reading, last_applied)
-        outstanding = [c for c in tool.corrections if _not_in_effect(c, tool, reading, last_applied)]
-
-    compensated = None if previous_tool else _compensated(tool, outstanding)
+    if tool is not None and tool.corrections and in_effect is not None:
+        _confirm(ground, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
+    previous_tool, outstanding, compensated = cut_with(ground, tool, reading)
     average = stream.average
     empirical_value = average.empirical_value if average else 0.0
     results = results_of(parameters, reading.touches or (), points, empirical_value) if points else None
@@ -209,6 +202,31 @@ def _confirm(ground: Ground, stream: StreamState, tool: ToolState, in_effect: in
         ground.touched_machines.add(tool.machine_id)
 
 
+def confirms(ground: Ground, tool: ToolState | None, in_effect: int | None) -> bool:
+    """Whether a reading that names this correction confirms one that is pending."""
+    if tool is None or in_effect is None:
+        return False
+    last = ground.named.get((tool.machine_id, in_effect))
+    return any(c.status == "pending" and _had(c, in_effect, last) for c in tool.corrections)
+
+
+def cut_with(
+    ground: Ground, tool: ToolState | None, reading: ReadingIn
+) -> tuple[bool, list[IssuedCorrection], float | None]:
+    """What the part of a reading was cut with.
+
+    Whether with an offset from before a tool change or an edit by hand; the corrections it was cut without; and the sum
+    (mm) of those of this tool's life that it was cut with, None in the first case.
+    """
+    if tool is None:
+        return False, [], 0.0
+    in_effect = reading.correction_in_effect
+    last = None if in_effect is None else ground.named.get((tool.machine_id, in_effect))
+    previous_tool = _cut_before_reset(tool, reading, last)
+    outstanding = [c for c in tool.corrections if _not_in_effect(c, tool, reading, last)]
+    return previous_tool, outstanding, None if previous_tool else _compensated(tool, outstanding)
+
+
 def _had(correction: IssuedCorrection, in_effect: int, last: Named | None) -> bool:
     """Whether a machine whose last applied correction was `in_effect` had applied this one too.
 
@@ -262,10 +280,8 @@ def _not_in_effect(correction: IssuedCorrection, tool: ToolState, reading: Readi
     return applied_at is None
 
 
-def _compensated(tool: ToolState | None, outstanding: list[IssuedCorrection]) -> float:
+def _compensated(tool: ToolState, outstanding: list[IssuedCorrection]) -> float:
     """The corrections of this tool's life that were in effect when the part was cut, summed, mm; what it wore lies behind them."""
-    if tool is None:
-        return 0.0
     total = tool.total
     for correction in outstanding:
         if correction.status == "applied":

@@ -108,6 +108,8 @@ def decode_many(body: bytes, now: datetime, *, lines: bool) -> list[ReadingIn]:
         if body.count(b'"') != sum(map(_quotes, readings)):
             _load_many(body, lines=lines)
     latest = now + AHEAD
+    if _all_plain(readings, latest):
+        return readings
     errors = [
         error
         for at, reading in enumerate(readings)
@@ -230,6 +232,18 @@ def _plain(reading: ReadingIn, latest: datetime) -> bool:
         and reading.characteristic.isprintable()
         and (key is None or key.isprintable())
         and (part is None or part.isprintable())
+    )
+
+
+def _all_plain(readings: list[ReadingIn], latest: datetime) -> bool:
+    """Whether `_plain` holds for all of them, in a third of the time."""
+    texts = [text for r in readings for text in (r.key, r.part) if text is not None]
+    times = [reading.measured_at.timestamp() for reading in readings if reading.measured_at is not None]
+    return (
+        "".join(texts).isprintable()
+        and "".join({reading.characteristic for reading in readings}).isprintable()
+        and (not times or (min(times) > EARLIEST.timestamp() and max(times) < latest.timestamp()))
+        and all(r.measured is not None and r.touches is None and r.machined_at is None for r in readings)
     )
 
 

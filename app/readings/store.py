@@ -16,6 +16,7 @@ import msgspec
 from app.core.parameters import Parameters
 from app.db.pipeline import Pipeline, Step
 from app.readings.ground import AverageState, Ground, IssuedCorrection, Known, Named, OpenAlarm, StreamState, ToolState
+from app.readings.quiet import QuietReadings
 from app.readings.records import Entry, Record
 from app.readings.schemas import ReadingIn
 from app.readings.statements import (
@@ -219,13 +220,15 @@ def _add_stream(
     )
 
 
-async def save(pipeline: Pipeline, ground: Ground, *, begun: bool) -> None:
+async def save(pipeline: Pipeline, ground: Ground, quiet: QuietReadings | None = None, *, begun: bool) -> None:
     """Write everything that was decided on this ground and commit it.
 
     begun: the machines are locked already; otherwise all of it happens in one round trip. Raises `Moved` when somebody
     has changed a machine since the ground was loaded, and psycopg's errors.
     """
     touched = list({id(verdict.stream): verdict.stream for verdict in ground.verdicts}.values())
+    if quiet is not None:
+        touched = quiet.streams()  # of all readings of the batch
     opening = [*_opening(ground, {stream.entry.machine_id for stream in touched}, begun=begun)]
     if ground.raised:
         await _number_alarms(pipeline, ground, opening)
@@ -243,9 +246,13 @@ async def save(pipeline: Pipeline, ground: Ground, *, begun: bool) -> None:
         "readings": [] if copying else [record._asdict() for record in records],
         "changes": _changes(ground, touched),
     }
-    if copying:
+    if copying or quiet is not None:
         await pipeline.run(opening)
         opening = []
+    if quiet is not None:
+        async with pipeline.connection.cursor() as cursor, cursor.copy(COPY) as copy:
+            await copy.write(quiet.rows())
+    if copying:
         await _copy(pipeline, records)
     await pipeline.run(
         (

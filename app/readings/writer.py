@@ -26,6 +26,7 @@ from app.db.pipeline import Pipeline
 from app.errors import DatabaseAway, InbandError, Invalid, OutcomeUnknown
 from app.readings.ground import Ground, Stored, Verdict
 from app.readings.judge import judge
+from app.readings.quiet import FEWEST, QuietReadings
 from app.readings.records import Entry
 from app.readings.schemas import MOST_ERRORS, ReadingIn
 from app.readings.store import Book, load, save
@@ -34,9 +35,11 @@ from app.web.i18n import _
 log = logging.getLogger(__name__)
 
 ROLLBACK = (("ROLLBACK", None),)
-Outcome = Verdict | Stored | InbandError
+Outcome = Verdict | QuietReadings | Stored | InbandError
+"""What became of a reading; `QuietReadings` hold it by its place in the batch."""
 MOST_AT_ONCE = 256
 MOST_WAITING = 20_000
+MOST_SPARE = 2  # connections kept for batches
 PATIENCE = 5.0  # s that a reading waits for a database that is away, before it is answered 503
 
 
@@ -90,28 +93,63 @@ async def transact(
     if begun:
         await load(pipeline, book, ground, wanted, trusting=trusting)
     now = datetime.now(UTC)
-    outcomes: list[Outcome] = []
-    for entry, reading in wanted:
-        try:
-            outcomes.append(judge(ground, entry, reading, now))
-        except InbandError as refusal:
-            outcomes.append(refusal)
+    quiet = None
+    if all_or_nothing and trusting and len(wanted) >= FEWEST and _keys_differ(wanted):
+        quiet = QuietReadings(ground, wanted, now)
+    outcomes = _decide(ground, wanted, now, quiet)
     if trusting and any(isinstance(outcome, InbandError) for outcome in outcomes):
         raise Doubtful
     if all_or_nothing:
         refuse_all(outcomes)
-    if not ground.verdicts:
+    if not ground.verdicts and quiet is None:
         await pipeline.run(ROLLBACK)
         ground.settle()
         return outcomes
     try:
-        await save(pipeline, ground, begun=begun)
+        await save(pipeline, ground, quiet, begun=begun)
     except psycopg.Error as error:
         if pipeline.closed:
             raise CommitLost(outcomes) from error
         raise
     ground.settle()
+    if quiet is not None:
+        ground.clear()  # it knows nothing of what the columns hold
     return outcomes
+
+
+def _keys_differ(wanted: Sequence[tuple[Entry, ReadingIn]]) -> bool:
+    keys = [(entry.characteristic_id, reading.key) for entry, reading in wanted if reading.key is not None]
+    return len(set(keys)) == len(keys)
+
+
+def _decide(
+    ground: Ground, wanted: Sequence[tuple[Entry, ReadingIn]], now: datetime, quiet: QuietReadings | None
+) -> list[Outcome]:
+    """Decide the readings in their order: those that ask for nothing as columns, if there are any, the others one by one."""
+    outcomes: list[Outcome] = []
+    while True:
+        if quiet is not None:
+            outcomes += [quiet] * (quiet.run(len(outcomes)) - len(outcomes))
+        at = len(outcomes)
+        if at == len(wanted):
+            break
+        if quiet is not None:
+            quiet.hand_over(at)
+        try:
+            outcomes.append(judge(ground, *wanted[at], now))
+        except InbandError as refusal:
+            outcomes.append(refusal)
+        if quiet is not None:
+            quiet.take_back(at)
+    if quiet is not None:
+        quiet.close()
+    return outcomes
+
+
+def new_ones(outcomes: Sequence[Outcome]) -> list[Verdict]:
+    """The readings that were stored now, each once, in their order."""
+    verdicts = [o.verdict(at) if isinstance(o, QuietReadings) else o for at, o in enumerate(outcomes)]
+    return list({id(verdict): verdict for verdict in verdicts if isinstance(verdict, Verdict)}.values())
 
 
 def refuse_all(outcomes: Sequence[Outcome]) -> None:
@@ -220,7 +258,7 @@ class Keeper:
             except psycopg.OperationalError as error:
                 log.warning("how a commit ended cannot be asked yet: %s", error)
             if monotonic() + pause > deadline:
-                return [OutcomeUnknown() if isinstance(o, Verdict) else o for o in lost.outcomes]
+                return [OutcomeUnknown() if isinstance(o, Verdict | QuietReadings) else o for o in lost.outcomes]
             await asyncio.sleep(pause)
             pause = min(2 * pause, 0.5)
 
@@ -230,7 +268,7 @@ async def committed(pipeline: Pipeline, lost: CommitLost) -> bool:
 
     Under the lock of a machine it has either ended or not begun, and moving the version keeps it from beginning.
     """
-    first = next(outcome for outcome in lost.outcomes if isinstance(outcome, Verdict))
+    first = new_ones(lost.outcomes)[0]
     entry = first.stream.entry
     async with pipeline.connection.transaction():
         await pipeline.connection.execute(
@@ -243,15 +281,26 @@ async def committed(pipeline: Pipeline, lost: CommitLost) -> bool:
         return await cursor.fetchone() is not None
 
 
-def store_batch(dsn: str, book: Book, wanted: Sequence[tuple[Entry, ReadingIn]]) -> list[Outcome]:
-    """Store a batch, all or nothing, from a thread of its own: it would keep the loop of the single readings waiting."""
+def store_batch(
+    dsn: str, book: Book, wanted: Sequence[tuple[Entry, ReadingIn]], spare: list[Keeper] | None = None
+) -> list[Outcome]:
+    """Store a batch, all or nothing, from a thread of its own: it would keep the loop of the single readings waiting.
+
+    spare: where keepers, and with them connections, are taken from and left for the next batch.
+    """
 
     async def stored() -> list[Outcome]:
-        keeper = Keeper(dsn, book)
+        keeper = spare.pop() if spare else Keeper(dsn, book)
         try:
-            return await keeper.store(wanted, all_or_nothing=True)
-        finally:
+            outcomes = await keeper.store(wanted, all_or_nothing=True)
+        except BaseException:
             await keeper.close()
+            raise
+        if spare is None or len(spare) >= MOST_SPARE:
+            await keeper.close()
+        else:
+            spare.append(keeper)
+        return outcomes
 
     # All of a batch lives until it is stored: looking through it for garbage every few hundred objects doubles its time.
     gc.disable()
@@ -268,6 +317,7 @@ class Writer:
 
     def __init__(self, dsn: str) -> None:
         self.book: Book = {}
+        self.spare: list[Keeper] = []
         self._keeper = Keeper(dsn, self.book)
         self._waiting: list[tuple[Entry, ReadingIn, asyncio.Future[Outcome]]] = []
         self._wake = asyncio.Event()
@@ -284,7 +334,8 @@ class Writer:
         self._wake.set()
         if self._task:
             await self._task
-        await self._keeper.close()
+        for keeper in (self._keeper, *self.spare):
+            await keeper.close()
 
     def submit(self, entry: Entry, reading: ReadingIn) -> asyncio.Future[Outcome]:
         """Hand a reading over; the future holds its outcome after the commit."""

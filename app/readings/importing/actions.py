@@ -7,13 +7,12 @@ from pathlib import Path
 from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from app.readings import queries
-from app.readings.ground import Verdict
 from app.readings.importing.history import MOST_FLAWS, Flawed, Progress, Summary, store_history
 from app.readings.importing.layout import Layout
 from app.readings.importing.lines import Flaw, Line, lines
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn
-from app.readings.writer import store_batch
+from app.readings.writer import new_ones, store_batch
 from app.web.i18n import _
 
 MOST_LIVE = 10_000
@@ -71,7 +70,7 @@ def _store_live(
         raise Flawed(
             [_named(error.field, error.message, numbers) for error in refusal.errors], len(refusal.errors)
         ) from None
-    new = [outcome for outcome in {id(o): o for o in outcomes}.values() if isinstance(outcome, Verdict)]
+    new = new_ones(outcomes)
     summary.stored, summary.repeated = len(new), len(outcomes) - len(new)
     for verdict in new:
         zone = verdict.decision.zone.value
