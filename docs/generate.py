@@ -179,7 +179,7 @@ def vocabulary() -> dict[str, tuple[str, ...]]:
         "zones": tuple(Zone),
         "actions": tuple(Action),
         "codes": tuple(Code),
-        "alarm kinds": (*Signal, "offset_differs", "tool_life"),
+        "alarm kinds": (*Signal, "offset_differs", "tool_life", "calibration_overdue", "calibration_refused"),
         "acknowledgements": ACTIONS,
         "statuses": get_args(Status),
         "roles": get_args(Role),
