@@ -21,7 +21,6 @@ from app.wear.queries import Wear
 from app.wear.tables import Outlook
 
 MOST = 200  # characteristics on one round; those whose outlook is oldest come first
-OVERCORRECTS = (State.HUNTING.value, State.SWINGING.value)
 
 
 def look_ahead(session: Session) -> None:
@@ -30,11 +29,11 @@ def look_ahead(session: Session) -> None:
     for key in session.scalars(_moved()):
         standing = characteristics.characteristic_named(session, key)
         before = session.get(Outlook, (standing.machine.id, standing.characteristic.id))
-        hunted = before is not None and before.hunting in OVERCORRECTS
+        hunted = before is not None and before.hunting in queries.OVERCORRECTS
         wear = queries.wear_of(session, standing, _newest(session, standing))
         _note(session, wear)
         found = wear.hunting
-        if found is not None and found.state in OVERCORRECTS and not hunted:
+        if found is not None and found.state.value in queries.OVERCORRECTS and not hunted:
             alarm = alarms.raise_for_characteristic(
                 session,
                 standing.machine.id,

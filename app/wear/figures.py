@@ -199,7 +199,7 @@ def _life(
             "y": [min(max(_um(value), edges[0]), edges[1]) for value in life.worn],
             "marker": {
                 "size": [
-                    10 if beyond else (5 if few else 3) + (count > 1)
+                    10 if beyond else (5 if few else 4) + (count > 1)
                     for beyond, count in zip(far, life.counts, strict=True)
                 ],
                 "symbol": [SYMBOLS[beyond] for beyond in far],

@@ -37,6 +37,7 @@ MOST_GROUPS, GROUP = 400, 16  # what is older: so many groups of so many reading
 FEW = hunting.LONGEST  # of a tool that has cut fewer parts the chart shows the one before too
 PLANNED, NEAR = 500, 100  # parts: what lies further ahead is not told on the plant's page; what is nearer stands out
 MOST_EVENTS = 5_000  # steps of the tool's offset that are looked through
+OVERCORRECTS = (hunting.State.HUNTING.value, hunting.State.SWINGING.value)
 SETTINGS = ("zero_range", "averaging_limit", "weighting_factor", "factor", "tool_memory", "average_memory", "mode")
 
 # Every deviation from the target of now, by the empirical value of then: that belongs to the probe.
