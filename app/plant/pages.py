@@ -12,6 +12,7 @@ from app.plant.queries import Group, Row
 from app.plant.state import State
 from app.plant.wording import state_word
 from app.wear.queries import foretold
+from app.wear.wording import hunting_word
 from app.web.deps import SessionDep, require
 from app.web.templates import page
 
@@ -50,6 +51,7 @@ def _page(request: Request, session: Session, show: str, machine: str | None) ->
         band=lambda row: band_picture(row.stream.last_deviation, row.parameters, None, row.average),
         spark=lambda row: sparkline(row.trend, row.parameters),
         foretold=lambda row: foretold(row.outlook),
+        hunting_word=hunting_word,
         now=now,
         **_summary(groups),
     )

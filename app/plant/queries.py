@@ -18,6 +18,7 @@ from app.plant.state import CALM, NEED_SOMEONE, Known, State, state_of
 from app.readings.tables import Stream
 from app.statistics import queries as statistics
 from app.statistics.queries import Rejects
+from app.wear.queries import OVERCORRECTS
 from app.wear.tables import Outlook
 
 TREND = 50  # readings of the small picture
@@ -60,6 +61,11 @@ class Row:
     @property
     def old_from(self) -> datetime | None:
         return self.known.old_from
+
+    @property
+    def overcorrects(self) -> bool:
+        """Whether its loop runs after its own scatter, whoever has noted that."""
+        return self.outlook is not None and self.outlook.hunting in OVERCORRECTS
 
     @property
     def is_calm(self) -> bool:
