@@ -28,9 +28,7 @@ from app.errors import Conflict, FieldError, Invalid
 from app.machines.queries import lock_machines
 from app.offsets import actions as offsets
 from app.offsets import queries as offset_queries
-from app.offsets import sisters
-from app.offsets.news import tool_changed
-from app.offsets.tables import Correction, Tool
+from app.offsets.tables import Correction
 from app.people.callers import Caller
 from app.readings import actions as readings
 from app.readings import queries as reading_queries
@@ -207,9 +205,9 @@ def _sister_tool(session: Session, row: AlarmRow, comment: str, caller: Caller) 
     number = row.alarm.tool_memory
     assert number is not None
     tool = offset_queries.tool(session, row.machine, number)
-    if tool.sister is not None and not sisters.on_tool(session, row.machine, number):
+    if tool.sister is not None and not offsets.on_tool(session, row.machine, number):
         return [{"code": "switched_already", "tool": number, "sister": tool.sister}]
-    done = sisters.switch_to_sister(session, row.machine, number, comment, caller)
+    done = offsets.switch_to_sister(session, row.machine, number, comment, caller)
     outcome: Outcome = [
         {"code": "switched", "tool": number, "sister": done.sister, "characteristics": done.characteristics}
     ]
@@ -284,19 +282,11 @@ def _resume(session: Session, row: AlarmRow) -> Outcome:
         .returning(Stream.characteristic_id)
         .execution_options(synchronize_session=False)
     ).all()
-    tools = session.scalars(
-        update(Tool)
-        .filter_by(**at)
-        .values(paused_by=None)
-        .returning(Tool.number)
-        .execution_options(synchronize_session=False)
-    ).all()
+    tools = offsets.resume_tools(session, row.machine, row.alarm.id)
     keys = session.scalars(
         select(Characteristic.key)
         .where(Characteristic.machine_id == row.alarm.machine_id, Characteristic.id.in_(paused))
         .order_by(Characteristic.key)
     )
-    if tools:
-        publish(session, *(tool_changed(row.machine, number) for number in tools))
     resumed: Outcome = [{"code": "resumed", "characteristic": key} for key in keys]
-    return resumed + [{"code": "tool_resumed", "tool": number} for number in sorted(tools)]
+    return resumed + [{"code": "tool_resumed", "tool": number} for number in tools]

@@ -19,12 +19,15 @@ from app.errors import Conflict
 from app.machines.queries import lock_machines
 from app.machines.tables import Machine
 from app.offsets import queries, wording
+from app.offsets.dropping import supersede
 from app.offsets.news import average_changed, correction_changed, tool_changed
+from app.offsets.sisters import on_tool, switch_to_sister
 from app.offsets.tables import OPEN, AverageMemory, Correction, Tool, ToolEvent
 from app.people.callers import Caller
 from app.readings.tables import Stream
 from app.web.i18n import _
 
+__all__ = ["on_tool", "switch_to_sister"]  # so that the others find them with what else is done to tools
 Verb = Literal["rejected", "approve", "release"]
 FROM: dict[str, tuple[str, ...]] = {"rejected": OPEN, "approve": ("awaiting_approval",), "release": ("held",)}
 INTO = {"rejected": "rejected", "approve": "pending", "release": "pending"}
@@ -205,6 +208,22 @@ def set_empirical_value(
     return memory
 
 
+def resume_tools(session: Session, machine: Machine, alarm: int) -> list[int]:
+    """Correcting goes on through the tools that this alarm has paused; their locations. The machine is locked."""
+    resumed = sorted(
+        session.scalars(
+            update(Tool)
+            .where(Tool.machine_id == machine.id, Tool.paused_by == alarm)
+            .values(paused_by=None)
+            .returning(Tool.number)
+            .execution_options(synchronize_session=False)
+        )
+    )
+    if resumed:
+        publish(session, *(tool_changed(machine, number) for number in resumed))
+    return resumed
+
+
 def locked(session: Session, machine: Machine, number: int) -> Correction:
     lock_machines(session, [machine.id])
     return queries.correction(session, machine, number)
@@ -214,18 +233,6 @@ def must_be(correction: Correction, machine: Machine, verb: str, statuses: tuple
     if correction.status not in statuses:
         detail, instead = wording.refused(correction, machine.key, verb)
         raise Conflict(detail, instead, correction_status=correction.status)
-
-
-def supersede(
-    session: Session, machine: Machine, number: int, now: datetime, who: str | None, reason: str
-) -> Sequence[Correction]:
-    """All that is open for this tool falls. who: None for the system itself, whose reason is then a code of `wording`."""
-    fallen = queries.open_corrections(session, machine, number)
-    for correction in fallen:
-        correction.status, correction.reason = "superseded", reason
-        correction.decided_at, correction.decided_by = now, who
-    session.flush()
-    return fallen
 
 
 def restart_averages(session: Session, machine: Machine, locations: Sequence[int], now: datetime) -> list[int]:

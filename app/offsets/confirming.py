@@ -17,7 +17,8 @@ from app.db.events import publish
 from app.errors import Conflict
 from app.machines.tables import Machine
 from app.offsets import queries, wording
-from app.offsets.actions import Decided, locked, must_be, record_status, supersede
+from app.offsets.actions import Decided, locked, must_be, record_status
+from app.offsets.dropping import supersede
 from app.offsets.news import alarm_raised, correction_changed, tool_changed
 from app.offsets.queries import OFFSET_TOLERANCE
 from app.offsets.tables import Correction, Tool, ToolEvent

@@ -12,14 +12,14 @@ from sqlalchemy.orm import Session
 
 from app.audit.actions import record
 from app.characteristics import actions as characteristics
-from app.characteristics.schemas import CharacteristicChange
+from app.characteristics.actions import CharacteristicChange
 from app.characteristics.tables import Characteristic
 from app.db.events import publish
 from app.errors import Conflict
 from app.machines.queries import lock_machines
 from app.machines.tables import Machine
 from app.offsets import queries
-from app.offsets.actions import supersede
+from app.offsets.dropping import supersede
 from app.offsets.news import correction_changed, tool_changed
 from app.people.callers import Caller
 from app.readings.tables import Stream
