@@ -139,7 +139,7 @@ def add_pair(session: SessionDep, caller: AnyCaller, machine: MachineKey, locati
     """Keep a reading of the machine beside what an external gauge (micrometer, CMM) says of the same part."""
     found = machine_named(session, machine)
     caller.must_at(found.id, "operator")
-    made = comparing.add_pair(session, found, location, given, caller)
+    (made,) = comparing.add_pairs(session, found, location, [given], caller)
     return pair_out(queries.pairs(session, found, location, only=made.id)[0])
 
 

@@ -1,5 +1,6 @@
 """Paired readings against an external gauge, and accepting the empirical value that they suggest. Lengths in mm."""
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
@@ -21,13 +22,21 @@ from app.readings import queries as readings
 from app.web.i18n import _
 
 
-def add_pair(session: Session, machine: Machine, location: int, given: PairIn, caller: Caller) -> PairedReading:
-    """Keep a reading of the machine beside what an external gauge says. With a key that was sent before: the pair of then.
+def add_pairs(
+    session: Session, machine: Machine, location: int, given: Sequence[PairIn], caller: Caller
+) -> list[PairedReading]:
+    """Keep readings of the machine beside what an external gauge says. With a key that was sent before: the pair of then.
 
     Raises `NotFound`; `Invalid` when the machine's reading is not named or typed rightly; `Conflict` for a used key.
     """
     lock_machines(session, [machine.id])
     queries.value_of(session, machine, Place("average", location))
+    made = [_add(session, machine, location, pair, caller) for pair in given]
+    _publish_pairs(session, machine, location)
+    return made
+
+
+def _add(session: Session, machine: Machine, location: int, given: PairIn, caller: Caller) -> PairedReading:
     machine_value, characteristic_id = _machine_value(session, machine, given)
     before = None if given.key is None else queries.pair_by_key(session, machine, given.key)
     said = (location, machine_value, given.external_value, given.instrument)
@@ -51,8 +60,6 @@ def add_pair(session: Session, machine: Machine, location: int, given: PairIn, c
     )
     session.add(made)
     session.flush()
-    session.refresh(made)
-    _publish_pairs(session, machine, location)
     return made
 
 

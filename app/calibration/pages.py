@@ -12,7 +12,7 @@ from app.calibration import actions, asking, comparing, due, forms, queries, wor
 from app.calibration.queries import Place
 from app.calibration.schemas import GaugeIn, PairIn, PlanIn, RingIn
 from app.characteristics import queries as characteristics
-from app.errors import Conflict, Invalid, NotFound
+from app.errors import Conflict, FieldError, Invalid, NotFound
 from app.machines import queries as machines
 from app.machines.queries import machine_named
 from app.offsets.queries import TOOL_LOCATIONS
@@ -148,9 +148,7 @@ def enter(
                 actions.set_plan(session, shown, place, parsed(PlanIn, forms.plan(form)), caller)
             elif verb == "pairs" and place.memory == "average":
                 given = [parsed(PairIn, pair) for pair in forms.pairs(form)]
-                for pair in given:
-                    comparing.add_pair(session, shown, location, pair, caller)
-                number = len(given)
+                number = _add_pairs(session, shown, location, given, caller)
             elif place.memory == "average":
                 number = actions.calibrate_gauge(
                     session, shown, parsed(GaugeIn, forms.gauge(form, location)), caller
@@ -161,6 +159,13 @@ def enter(
     except Invalid as error:
         return _place(request, session, caller, machine, place, form=form, error=error)
     return RedirectResponse(address(machine, place, done=verb or "calibrated", n=number), 303)
+
+
+def _add_pairs(session: Session, machine: Any, location: int, given: list[PairIn], caller: Caller) -> int:
+    try:
+        return len(comparing.add_pairs(session, machine, location, given, caller))
+    except NotFound as missing:  # a reading that is not there is a slip in a line, not a page that is not there
+        raise Invalid(missing.detail, errors=[FieldError("lines", missing.detail)]) from None
 
 
 @router.get("/calibration/{machine}/{memory}/{location}/{what}/{number}", dependencies=[require("operator")])

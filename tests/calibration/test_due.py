@@ -6,6 +6,7 @@ import psycopg
 import pytest
 
 from app.calibration.overdue import raise_overdue
+from app.main import CHORES
 from tests.calibration.test_calibrations import calibrate, ring
 from tests.shop import Shop
 
@@ -43,6 +44,10 @@ def test_a_location_that_is_measured_with_is_listed_without_a_plan(shop: Shop) -
     assert (found["state"], found["due_parts"], found["last"]) == ("never", None, None)
     assert found["characteristics"] == [shop.characteristic]
     assert go_round(shop) == 0
+
+
+def test_the_rounds_look_after_it() -> None:
+    assert raise_overdue in [chore.do for chore in CHORES]
 
 
 def test_by_parts(shop: Shop) -> None:

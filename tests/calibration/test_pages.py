@@ -135,6 +135,9 @@ class TestWithoutScripts:
         assert "40.0020" in operator.open(f"{place(shop)}/exclude/{pair['id']}")
         assert "Another part" in operator.send(f"{place(shop)}/exclude/{pair['id']}", reason="Another part")
         operator.send(place(shop), 422, **(fields | {"characteristic": "nowhere"}), lines="1 40.0")
+        text = operator.send(place(shop), 422, **fields, lines="1 40.0\n99 40.0")
+        assert "has no reading 99" in text
+        assert len(shop.call("GET", f"/machines/{shop.machine}/averages/5/pairs")["items"]) == 1
 
     def test_engineers_plan(self, shop: Shop, operator: Person) -> None:
         engineer = Person(shop.server, "engineer")
