@@ -22,7 +22,7 @@ from app.db.engine import Database
 from app.machines import api as machines
 from app.offsets import api as offsets
 from app.offsets import chores as offset_chores
-from app.offsets import edge_pages, edges_api, queue_pages
+from app.offsets import edge_pages, edges_api, queue_pages, text_api, text_pages
 from app.offsets import pages as offset_pages
 from app.people import api as people
 from app.people import keys_api
@@ -30,7 +30,6 @@ from app.people import pages as sign_in_pages
 from app.people.keys import KeyRing
 from app.plant import pages as plant_pages
 from app.programs import api as programs
-from app.programs import pages as program_pages
 from app.proof import api as proof
 from app.proof import pages as proof_pages
 from app.proof import queries as proofs
@@ -69,6 +68,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     calibration.router,
     edges_api.router,
     programs.router,
+    text_api.router,
     alarms.router,
     events_api.router,
     people.router,
@@ -80,7 +80,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     characteristic_pages.router,
     alarm_pages.router,
     queue_pages.router,
-    program_pages.router,
+    text_pages.router,
     edge_pages.router,
     offset_pages.router,
     calibration_pages.router,

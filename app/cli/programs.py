@@ -16,7 +16,8 @@ from app.core.programs.lines import MOST_CHARACTERS, Verdict
 from app.machines.queries import machine_named
 from app.offsets import fetching
 from app.people.callers import Caller
-from app.programs import reading, wording, writing
+from app.programs import queries as programs
+from app.programs import wording
 from app.programs.schemas import looked_out
 
 program = typer.Typer(help="Program text of the controls.", no_args_is_help=True)
@@ -48,8 +49,8 @@ def read_program(
 ) -> None:
     """Read a program text: what was not understood to standard error, the parameters as JSON to standard output."""
     with file.open("rb") as opened:
-        text = reading.decoded(opened.read(4 * MOST_CHARACTERS + 4))
-    looked = reading.look(text, control.value if control else None)
+        text = programs.decoded(opened.read(4 * MOST_CHARACTERS + 4))
+    looked = programs.look(text, control.value if control else None)
     answer = looked_out(looked)
     for line in answer.lines:
         worth_saying = [note.text for note in line.notes if note.warning or line.verdict == NOT_UNDERSTOOD]
@@ -89,8 +90,8 @@ def write_program(
     settings = settings_from(data_dir=data_dir, database_url=database_url)
     with migrated(settings) as database, database.begin() as session:
         standing = queries.characteristic_named(session, characteristic)
-        chosen = writing.control_of(standing, control.value if control else None)
-        sys.stdout.write(writing.program_of(standing, chosen, kind.value, gauge=gauge))
+        chosen = programs.control_of(standing, control.value if control else None)
+        sys.stdout.write(programs.program_of(standing, chosen, kind.value, gauge=gauge))
 
 
 @program.command("corrections")

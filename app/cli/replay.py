@@ -27,7 +27,7 @@ from app.cli.data import (
 )
 from app.core.parameters import ParameterError, Parameters, read
 from app.errors import Invalid
-from app.programs.reading import look as look_at_program
+from app.programs.queries import look as look_at_program
 from app.programs.schemas import looked_out
 from app.readings.importing.history import Flawed
 from app.readings.importing.layout import look

@@ -14,7 +14,7 @@ from app.characteristics.wording import history
 from app.core.plausibility import suggested_jump
 from app.errors import Conflict, InbandError, Invalid
 from app.machines import queries as machines
-from app.programs import writing
+from app.programs import queries as programs
 from app.readings import queries as readings
 from app.setup import parameter_form
 from app.setup.frame import setup_page
@@ -179,7 +179,7 @@ def _characteristic(
         problem=problem,
         warnings=actions.warnings_of(standing.parameters, standing.machine.zero_range_floor),
         history=history(queries.versions(session, characteristic)),
-        program=writing.shown(standing),
+        program=programs.shown(standing),
         suggested_jump=_suggested_jump(session, standing),
         **_form(typed, errors or {}),
     )

@@ -12,11 +12,12 @@ from starlette.datastructures import UploadFile
 from app.characteristics import actions, queries
 from app.characteristics.wording import in_order, label, worded
 from app.core.parameters import BY_NAME, LARGEST_LENGTH
-from app.core.programs.lines import MOST_CHARACTERS, Program, Verdict
+from app.core.programs import fanuc
+from app.core.programs.lines import MOST_CHARACTERS, WARNINGS, Program, Verdict
 from app.errors import Invalid
-from app.programs import reading, wording, writing
-from app.programs.reading import READABLE, Looked
-from app.programs.schemas import looked_out
+from app.programs import queries as programs
+from app.programs import wording
+from app.programs.queries import READABLE, Looked
 from app.setup import characteristic_pages, parameter_form
 from app.setup.frame import setup_page
 from app.web.deps import Caller, SessionDep, Viewer, texts
@@ -40,14 +41,14 @@ async def send_program(request: Request, session: SessionDep, caller: Viewer) ->
     typed = dict(texts(form))
     file = form.get("file")
     if isinstance(file, UploadFile) and file.filename:
-        typed["text"] = reading.decoded(await file.read(4 * MOST_CHARACTERS + 4))
+        typed["text"] = programs.decoded(await file.read(4 * MOST_CHARACTERS + 4))
     return await run_in_threadpool(_sent, request, session, caller, typed)
 
 
 def _sent(request: Request, session: Session, caller: Caller, typed: dict[str, str]) -> Response:
     control = typed.get("control")
     try:
-        looked = reading.look(typed.get("text", ""), control if control in READABLE else None)  # type: ignore[arg-type]
+        looked = programs.look(typed.get("text", ""), control if control in READABLE else None)  # type: ignore[arg-type]
     except Invalid as error:
         return _page(request, session, caller, typed, errors=by_field(error), status=error.status)
     do = typed.get("do", "")
@@ -98,7 +99,8 @@ def _page(
         errors=errors or {},
         controls=[("", _("found out")), ("sinumerik", "Sinumerik"), ("fanuc", "Fanuc")],
         looked=looked,
-        read=looked_out(looked) if looked else None,
+        touches=fanuc.touches(program.results) if program else None,
+        warned=WARNINGS,
         program=program,
         judging=judging,
         parameters=_rows(parameters),
@@ -158,13 +160,13 @@ def program_page(
 ) -> Response:
     """The measuring or calibration program of a characteristic, to copy and download."""
     standing = queries.characteristic_named(session, characteristic)
-    chosen = control if control in writing.WRITTEN else standing.machine.control
-    if chosen not in writing.WRITTEN:
-        chosen = writing.WRITTEN[0]
-    kind = kind if kind in get_args(writing.Kind) else "measuring"
+    chosen = control if control in programs.WRITTEN else standing.machine.control
+    if chosen not in programs.WRITTEN:
+        chosen = programs.WRITTEN[0]
+    kind = kind if kind in get_args(programs.Kind) else "measuring"
     options = {"surface": surface if surface == "groove" else "free", "probe": probe if probe == "radial" else "axial"}
     size, wrong = _gauge(gauge)
-    text = writing.program_of(standing, chosen, kind, gauge=size, **options)  # type: ignore[arg-type]
+    text = programs.program_of(standing, chosen, kind, gauge=size, **options)  # type: ignore[arg-type]
     asked = {"control": chosen, "kind": kind}
     if kind == "calibration":
         asked |= options | ({"gauge": gauge} if size is not None else {})
@@ -182,7 +184,7 @@ def program_page(
         errors={"gauge": wrong} if wrong else {},
         controls=[("sinumerik", "Sinumerik"), ("fanuc", "Fanuc")],
         download=f"/api/v1/characteristics/{standing.characteristic.key}/program?{urlencode(asked)}",
-        file=writing.file_name(standing, chosen, kind),  # type: ignore[arg-type]
+        file=programs.file_name(standing, chosen, kind),  # type: ignore[arg-type]
         address=lambda **query: f"/setup/characteristics/{standing.characteristic.key}/program?{urlencode(query)}",
     )
 

@@ -81,6 +81,11 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     return {status: EVERY_ERROR[status] for status in sorted({401, 403, 422, 503, *statuses})}
 
 
+def plain(example: str) -> dict[int | str, dict[str, object]]:
+    """How an answer in plain text is described."""
+    return {200: {"description": "The text", "content": {"text/plain": {"example": example}}}}
+
+
 def _operation_id(route: APIRoute) -> str:
     return route.name
 

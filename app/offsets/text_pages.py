@@ -12,8 +12,8 @@ from app.errors import NotFound
 from app.machines.queries import machine_named
 from app.offsets import fetching
 from app.offsets.asking import Question
+from app.offsets.text_api import corrections_file
 from app.programs import wording
-from app.programs.api import corrections_file
 from app.web.deps import FormDep, Operator, SessionDep, require
 from app.web.fields import LARGEST_SERIAL
 from app.web.i18n import _, ngettext
