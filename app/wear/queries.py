@@ -1,7 +1,7 @@
 """The wear curve of a characteristic, what it foretells, and whether its loop hunts. Never writes.
 
 The newest readings are read one by one. Of a longer run, what is older is read as evenly spread groups of neighbouring
-readings, each drawn as its mean: wear is slow, and a curve of a million readings costs what one of three thousand does.
+readings, each drawn as its mean: wear is slow, and a curve of a million readings costs what one of two thousand does.
 """
 
 from bisect import bisect_right
@@ -32,8 +32,8 @@ from app.statistics.queries import Window
 from app.wear import wording
 from app.wear.tables import Outlook
 
-MOST_READINGS = 2_500  # read one by one
-MOST_GROUPS, GROUP = 400, 16  # what is older: so many groups of so many readings
+MOST_READINGS = 1_200  # read one by one
+MOST_GROUPS, GROUP = 300, 16  # what is older: so many groups of so many readings
 FEW = hunting.LONGEST  # of a tool that has cut fewer parts the chart shows the one before too
 PLANNED, NEAR = 500, 100  # parts: what lies further ahead is not told on the plant's page; what is nearer stands out
 MOST_EVENTS = 5_000  # steps of the tool's offset that are looked through

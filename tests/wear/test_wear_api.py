@@ -269,7 +269,7 @@ def test_of_a_very_long_life_older_readings_are_thinned_into_groups(shop: Shop) 
             {"key": shop.characteristic},
         )
     (drawn,) = [trace for trace in figure(shop)["data"] if trace["meta"] == "wear"]
-    assert 2_500 < len(drawn["x"]) <= 2_500 + 400
+    assert 1_200 < len(drawn["x"]) <= 1_200 + 300
     assert drawn["x"] == sorted(set(drawn["x"]))
     assert drawn["y"][0] == pytest.approx(0.85e-3, abs=1e-3)  # mean of the first sixteen, µm
     assert drawn["x"][-1] == 50_000
