@@ -14,7 +14,7 @@ from app.offsets import fetching
 from app.offsets.asking import Question
 from app.offsets.text_api import corrections_file
 from app.programs import wording
-from app.web.deps import FormDep, Operator, SessionDep, require
+from app.web.deps import FormDep, Operator, SessionDep, Viewer
 from app.web.fields import LARGEST_SERIAL
 from app.web.i18n import _, ngettext
 from app.web.templates import page
@@ -28,10 +28,11 @@ def address(machine: str, **query: str | int) -> str:
     return f"/machines/{machine}/corrections/program" + (f"?{urlencode(query)}" if query else "")
 
 
-@router.get("/machines/{machine}/corrections/program", dependencies=[require("viewer")])
+@router.get("/machines/{machine}/corrections/program")
 def corrections_page(
     request: Request,
     session: SessionDep,
+    caller: Viewer,
     machine: str,
     form: Form | None = None,
     do: Annotated[str, Query(max_length=40)] = "",
@@ -47,7 +48,7 @@ def corrections_page(
     """
     found = machine_named(session, machine)
     handed = fetching.pending_text(session, found, form)
-    asked = request.state.person.may("operator") and do == "applied" and bool(handed.numbers)
+    asked = caller.may("operator") and do == "applied" and bool(handed.numbers)
     return page(
         request,
         "programs/corrections.html",
