@@ -27,18 +27,25 @@ SignalWay = Annotated[
 ]
 Delay = Annotated[
     float,
-    Field(ge=0, le=1000, allow_inf_nan=False, description="Of the way through the PLC, ms; at most 0.25 as a rule."),
+    Field(
+        strict=True,
+        ge=0,
+        le=1000,
+        allow_inf_nan=False,
+        description="Of the way through the PLC, ms; at most 0.25 as a rule.",
+    ),
 ]
 Jitter = Annotated[
     float,
     Field(
+        strict=True,
         ge=0,
         le=1000,
         allow_inf_nan=False,
         description="By how much the delay varies, ms; null if nobody has measured it: then the whole delay counts.",
     ),
 ]
-Feed = Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False, description="Probing feed, mm/min.")]
+Feed = Annotated[float, Field(strict=True, gt=0, le=100_000, allow_inf_nan=False, description="Probing feed, mm/min.")]
 MACHINE: dict[str, JsonValue] = {
     "key": "lathe-1",
     "name": "Lathe 1, hall B",
