@@ -23,6 +23,7 @@ from urllib.parse import urlsplit
 import httpx
 import psycopg
 import pytest
+from hypothesis import settings
 from playwright.sync_api import Browser, Page, Playwright, Request, sync_playwright
 from sqlalchemy.orm import Session
 
@@ -33,6 +34,9 @@ from app.settings import HOUSE
 
 for name in [name for name in os.environ if name.startswith(("INBAND_", "PG"))]:
     del os.environ[name]  # no test may meet a real installation
+
+settings.register_profile("inband", deadline=None)  # a computer that is busy is no fault of what is tested
+settings.load_profile("inband")
 
 TEMPLATE = "template_inband"
 BROWSER_OPTIONS = [
