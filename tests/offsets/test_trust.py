@@ -277,7 +277,7 @@ class TestLimits:
         shop.call("PATCH", f"/characteristics/{key}", parameters={"max_total": 0.05}, reason="hard material")
         assert shop.read(6.0, key, correction_in_effect=first)["correction"]["amount"] == -0.006
         shop.call("PATCH", f"/characteristics/{key}", parameters={"max_total": 0.01}, reason="soft again")
-        shop.read(7.0, key, correction_in_effect=first)
+        shop.read(20.0, key, correction_in_effect=first)
         again = next(alarm for alarm in shop.alarms() if alarm["kind"] == "offset_limit")
         done = shop.acknowledge(again["id"], "tool_replaced")
         assert codes(done)[0] == "tool_restarted"
