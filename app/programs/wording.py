@@ -150,7 +150,7 @@ def _value(name: str | None, value: Any) -> str:
 
 
 def _set(parameters: dict[str, Any]) -> str:
-    return ", ".join(f"{_named(name)} {_value(name, value)}" for name, value in parameters.items())
+    return ", ".join(f"{_named(name)} = {_value(name, value)}" for name, value in parameters.items())
 
 
 def form_word(form: str) -> str:
