@@ -113,7 +113,6 @@ class TestFetching:
         answer = shop.machine_client.get(f"/api/v1/machines/{other.machine}/corrections/program")
         assert answer.status_code == 403
 
-
     def test_it_does_not_expire(self, shop: Shop, server: Any) -> None:
         """Its text may have been run: the machine says so with its next reading, perhaps after the weekend."""
         shop.read(6.1)
