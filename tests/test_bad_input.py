@@ -65,7 +65,7 @@ BODIES: dict[str, dict[str, Any]] = {
         "sister": 13,
     },
     "POST /api/v1/machines/{machine}/tools/{tool}/switch": WHY,
-    "POST /api/v1/corrections/{machine}/approve": {"numbers": [1]} | WHY,
+    "POST /api/v1/corrections/{machine}/approve": {"numbers": [2]} | WHY,  # the one of `Place` that awaits approval
     "PUT /api/v1/machines/{machine}/averages/{location}": {"empirical_value": 0.001} | WHY,
     "POST /api/v1/machines/{machine}/calibrations": {
         "average_memory": 5,

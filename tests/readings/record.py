@@ -20,7 +20,7 @@ def rows(dsn: str, query: str, *values: Any) -> list[tuple[Any, ...]]:
 
 
 def counts(dsn: str) -> dict[str, int]:
-    """How many rows each table has, but for the log of what the tests themselves set up with."""
+    """How many rows each table has, but for what the rounds foretell while nobody asks."""
     with psycopg.connect(dsn, autocommit=True) as connection:
         tables = [
             name
@@ -28,7 +28,7 @@ def counts(dsn: str) -> dict[str, int]:
                 "SELECT relname::text FROM pg_class WHERE relkind = 'r' AND relnamespace = 'public'::regnamespace"
             )
         ]
-        return {name: _count(connection, name) for name in tables}
+        return {name: _count(connection, name) for name in tables if name != "outlook"}
 
 
 def _count(connection: psycopg.Connection[Any], table: str) -> int:

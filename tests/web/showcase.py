@@ -201,6 +201,9 @@ def showcase(stage: Stage | None = None) -> Starlette:
     def count(request: Request) -> Response:
         return page(request, "alarm_count.html", active_alarms=stage.alarms)
 
+    def waiting(request: Request) -> Response:
+        return page(request, "waiting_count.html", waiting_corrections=0)
+
     def problem(request: Request) -> Response:
         request.state.person = person
         return problem_page(
@@ -221,6 +224,7 @@ def showcase(stage: Stage | None = None) -> Starlette:
             Route("/figures/{name}", figure),
             Route("/part", part),
             Route("/alarms/count", count),
+            Route("/corrections/count", waiting),
             Route("/problem", problem),
             Route("/api/v1/events", events),
             Mount("/static", assets()),
