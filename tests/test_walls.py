@@ -10,7 +10,7 @@ OPEN = {
     "figures",
 }  # wording and figures are pure: values in, sentences and pictures out
 WORDS = {"app.people.callers"}  # who calls: a plain value that everybody may speak of
-EDGE = {"api", "pages", "schemas", "figures"}  # these take no tables; what lies behind a door (readings/store.py) may
+EDGE = {"api", "pages", "schemas", "figures"}  # these take no tables; what lies behind a door (readings/saving.py) may
 
 
 def crossings(graph: grimp.ImportGraph) -> list[str]:

@@ -16,10 +16,12 @@ from app.readings import actions, queries
 from app.readings.answers import ReadingAnswer, ReadingDetail, ReadingRow
 from app.readings.door import Directory, answer_of, take
 from app.readings.ground import Stored, Verdict
+from app.readings.keeper import store_batch
 from app.readings.quiet import QuietReadings
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn, decode_many, decode_one
-from app.readings.writer import Outcome, Writer, store_batch
+from app.readings.transaction import Outcome
+from app.readings.writer import Writer
 from app.web.api import BASE, api_router, problems
 from app.web.deps import AnyCaller, Operator, SessionDep
 from app.web.fields import Body, Limit, Page, Reason, page_of

@@ -21,7 +21,8 @@ from app.readings.answers import answer
 from app.readings.ground import Stored, Verdict
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn, decode_one
-from app.readings.writer import Outcome, Writer
+from app.readings.transaction import Outcome
+from app.readings.writer import Writer
 from app.web.i18n import _
 from app.web.problems import unforeseen
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from app.core.compensation import Action, Decision, outstanding_effect
 from app.core.recursion import CODES, ZONES, Lane, Lanes, Quiet, quiet_run
-from app.db.rows import EPOCH, MICROSECOND, array_of_int4, fixed, moment, one_of, table, texts
 from app.readings.ground import AverageState, Ground, StreamState, Verdict
 from app.readings.judge import confirms, cut_with
 from app.readings.records import Entry, Record
+from app.readings.rows import EPOCH, MICROSECOND, array_of_int4, fixed, moment, one_of, table, texts
 from app.readings.schemas import ReadingIn
 
 FEWEST = 64  # readings that are worth making columns of

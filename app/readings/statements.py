@@ -4,10 +4,28 @@ Rows travel as JSON because the server takes it apart with `json_to_recordset`, 
 and for sixty-four.
 """
 
+from collections.abc import Iterable
+from typing import Any
+
+import msgspec
+
 from app.core.variants import Results
 from app.core.zones import Zone
 from app.db.events import PUBLISHED
 from app.readings.records import Record
+
+_json = msgspec.json.Encoder()
+
+
+def as_json(value: Any) -> str:
+    """One statement's rows."""
+    return _json.encode(value).decode()
+
+
+def array(numbers: Iterable[int]) -> str:
+    """An array of numbers."""
+    return "{" + ",".join(map(str, numbers)) + "}"
+
 
 LOCK = """
 SELECT machine_id, last_correction, version FROM machine_state

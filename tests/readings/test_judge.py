@@ -14,10 +14,11 @@ from app.errors import Conflict, InbandError, Invalid
 from app.machines.queries import lock_machines
 from app.readings.ground import AverageState, Ground, Stored, StreamState, ToolState, Verdict
 from app.readings.judge import judge
+from app.readings.keeper import committed, connect
+from app.readings.loading import Book
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn
-from app.readings.store import Book
-from app.readings.writer import CommitLost, committed, connect, transact
+from app.readings.transaction import CommitLost, transact
 from tests.loops import run
 from tests.shop import PARAMETERS
 

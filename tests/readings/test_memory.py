@@ -9,8 +9,9 @@ import pytest
 
 from app.readings.door import Directory
 from app.readings.ground import Ground
+from app.readings.keeper import connect
 from app.readings.schemas import decode_one
-from app.readings.writer import connect, transact
+from app.readings.transaction import transact
 from tests.conftest import Server
 from tests.loops import run
 from tests.readings.record import history, must_hold

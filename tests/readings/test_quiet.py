@@ -8,12 +8,13 @@ from typing import Any
 import pytest
 
 from app.db.engine import Database
-from app.readings import writer
+from app.readings import transaction
 from app.readings.door import Directory
+from app.readings.keeper import store_batch
 from app.readings.quiet import QuietReadings
 from app.readings.records import Record
 from app.readings.schemas import decode_many
-from app.readings.writer import new_ones, store_batch
+from app.readings.transaction import new_ones
 from tests.conftest import Server
 from tests.loops import in_thread
 from tests.readings.record import must_hold, rows
@@ -84,7 +85,7 @@ def test_as_columns_is_as_one_by_one(server: Server, monkeypatch: pytest.MonkeyP
         wanted = readings(chance, size, numbers)
         answers = []
         for shop, keys, fewest in ((one, names, 64), (other, others, 10**9)):
-            monkeypatch.setattr(writer, "FEWEST", fewest)
+            monkeypatch.setattr(transaction, "FEWEST", fewest)
             answers.append(store(server.database, [{"characteristic": keys[n], **reading} for n, reading in wanted]))
             for alarm in shop.alarms():
                 if alarm["kind"] == "probe_fault":

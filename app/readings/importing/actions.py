@@ -10,9 +10,10 @@ from app.readings import queries
 from app.readings.importing.history import MOST_FLAWS, Flawed, Progress, Summary, store_history
 from app.readings.importing.layout import Layout
 from app.readings.importing.lines import Flaw, Line, lines
+from app.readings.keeper import store_batch
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn
-from app.readings.writer import new_ones, store_batch
+from app.readings.transaction import new_ones
 from app.web.i18n import _
 
 MOST_LIVE = 10_000

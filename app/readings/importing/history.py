@@ -28,7 +28,8 @@ from app.machines import queries as machines
 from app.offsets import queries as offsets
 from app.readings.importing.lines import Flaw, Line
 from app.readings.records import Entry
-from app.readings.store import as_json, full_blocks
+from app.readings.saving import full_blocks
+from app.readings.statements import as_json
 from app.readings.wording import touch_problem
 from app.web.i18n import _
 

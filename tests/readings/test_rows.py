@@ -6,7 +6,7 @@ import numpy as np
 import psycopg
 
 from app.db.engine import Database
-from app.db.rows import array_of_int4, fixed, moment, one_of, table, texts
+from app.readings.rows import array_of_int4, fixed, moment, one_of, table, texts
 
 TIME = datetime(2026, 11, 21, 8, 15, 2, 120001, tzinfo=timezone(timedelta(hours=1)))
 

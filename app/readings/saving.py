@@ -1,24 +1,16 @@
-"""Loading the ground under the machines' locks, and writing what was decided: one round trip each.
-
-Rows travel as one JSON document per statement: the server takes it apart with `json_to_recordset`, which measured
-faster than arrays for one row and for sixty-four. Large batches send their readings by binary COPY.
+"""Writing what was decided, and the commit: one round trip. Large batches send their readings by binary COPY.
 
 This is the one place that writes the tables of offsets and alarms from here: a set-based statement for all readings of
 a transaction cannot be had through the actions that serve one person at a time.
 """
 
-from collections.abc import Iterable, Sequence
-from datetime import datetime
+from collections.abc import Iterable
 from typing import Any
 
-import msgspec
-
-from app.core.parameters import Parameters
 from app.db.pipeline import Pipeline, Step
-from app.readings.ground import AverageState, Ground, IssuedCorrection, Known, Named, OpenAlarm, StreamState, ToolState
+from app.readings.ground import Ground, OpenAlarm, StreamState, ToolState
 from app.readings.quiet import QuietReadings
 from app.readings.records import Entry, Record
-from app.readings.schemas import ReadingIn
 from app.readings.statements import (
     ACTIVE_ALARMS,
     ALARM_NUMBERS,
@@ -30,11 +22,9 @@ from app.readings.statements import (
     FAN,
     GUARD,
     ISSUE,
-    LOAD,
     LOCK,
     MOVE_LEVELS,
     MOVE_TOOLS,
-    PARAMETERS,
     RAISE,
     REPEAT,
     RESULTS,
@@ -44,180 +34,11 @@ from app.readings.statements import (
     SUMMARISE_SUMMARIES,
     TOP_LEVEL,
     TOUCHES,
+    array,
+    as_json,
 )
 
-Book = dict[tuple[int, int], Parameters]
-"""Parameters by (characteristic, version). A version never changes, so they are kept for good."""
-
 COPY_FROM = 500  # readings in one transaction from which COPY is faster than one JSON document
-
-_json = msgspec.json.Encoder()
-
-
-def as_json(value: Any) -> str:
-    """One statement's rows."""
-    return _json.encode(value).decode()
-
-
-class _Issued(msgspec.Struct, array_like=True):
-    number: int
-    amount: float
-    status: str
-    applied_at: datetime | None
-    decided_at: datetime | None
-    fetched_at: datetime | None
-
-
-class _Stream(msgspec.Struct, array_like=True):
-    machine_id: int
-    characteristic_id: int
-    sequence: int
-    version: int
-    paused_by: int | None
-    last_measured_at: datetime | None
-    location: int | None
-    average: float | None
-    empirical_value: float | None
-    tool: int | None
-    offset: float | None
-    total: float | None
-    reset_at: datetime | None
-    tool_paused_by: int | None
-    level: float | None
-    level_sequence: int | None
-    corrections: list[_Issued] | None
-
-
-class _Loaded(msgspec.Struct):
-    streams: list[_Stream]
-    named: list[tuple[int, int, datetime | None, datetime | None, datetime | None]] | None
-    known: list[tuple[int, str, int, float, int]] | None
-
-
-_loaded = msgspec.json.Decoder(_Loaded)
-
-
-async def load(
-    pipeline: Pipeline, book: Book, ground: Ground, wanted: Sequence[tuple[Entry, ReadingIn]], *, trusting: bool = False
-) -> None:
-    """Begin a transaction, lock the machines, bring what the readings are judged against into the ground.
-
-    trusting: take the keys for new ones. If one is not, `save` will fail with a `UniqueViolation`.
-    """
-    entries = {entry.characteristic_id: entry for entry, _ in wanted}
-    machines = _machines(wanted)
-    document = {
-        "streams": [
-            {"machine_id": e.machine_id, "characteristic_id": e.characteristic_id, **machines[e.machine_id]}
-            for e in entries.values()
-        ],
-        "named": [
-            {"machine_id": machine_id, "number": number}
-            for machine_id, number in {
-                (e.machine_id, r.correction_in_effect) for e, r in wanted if r.correction_in_effect is not None
-            }
-        ],
-        "keys": [
-            {"machine_id": e.machine_id, "characteristic_id": e.characteristic_id, "key": r.key}
-            for e, r in wanted
-            if r.key is not None and not trusting
-        ],
-    }
-    _begun, locked, ((text,),) = await pipeline.run(
-        (("BEGIN", None), (LOCK, _array(machines)), (LOAD, as_json(document)))
-    )
-    loaded = _loaded.decode(text or b"")
-    states = [(int(machine_id or 0), int(last or 0), int(version or 0)) for machine_id, last, version in locked]
-    if any(ground.versions.get(machine_id, version) != version for machine_id, _last, version in states):
-        ground.clear()
-    for machine_id, last, version in states:
-        ground.last_correction[machine_id], ground.versions[machine_id] = last, version
-    for machine_id, number, applied_at, decided_at, fetched_at in loaded.named or ():
-        ground.named[machine_id, number] = Named(applied_at, decided_at, fetched_at)
-        if applied_at is not None:
-            since = machines[machine_id]["since"]
-            machines[machine_id]["since"] = applied_at if since is None else min(since, applied_at)
-    for row in loaded.streams:
-        parameters = await _parameters(pipeline, book, row.machine_id, row.characteristic_id, row.version)
-        _add_stream(ground, entries[row.characteristic_id], parameters, row, **machines[row.machine_id])
-    for c, key, sequence, measured, version in loaded.known or ():
-        parameters = await _parameters(pipeline, book, entries[c].machine_id, c, version)
-        ground.stored_keys[c, key] = Known(sequence, measured, parameters)
-
-
-def _array(numbers: Iterable[int]) -> str:
-    return "{" + ",".join(map(str, numbers)) + "}"
-
-
-def _machines(wanted: Iterable[tuple[Entry, ReadingIn]]) -> dict[int, dict[str, Any]]:
-    """The machines, each with the oldest correction and the oldest time that one of its readings names."""
-    machines: dict[int, dict[str, Any]] = {}
-    for entry, reading in wanted:
-        row = machines.get(entry.machine_id)
-        if row is None:
-            row = machines[entry.machine_id] = {"number": None, "since": None}
-        if reading.correction_in_effect is not None:
-            known = row["number"]
-            row["number"] = reading.correction_in_effect if known is None else min(known, reading.correction_in_effect)
-        elif reading.machined_at is not None:
-            row["since"] = reading.machined_at if row["since"] is None else min(row["since"], reading.machined_at)
-    return machines
-
-
-async def _parameters(
-    pipeline: Pipeline, book: Book, machine_id: int, characteristic_id: int, version: int
-) -> Parameters:
-    parameters = book.get((characteristic_id, version))
-    if parameters is None:
-        wanted = {"machine_id": machine_id, "characteristic_id": characteristic_id, "version": version}
-        (((text,),),) = await pipeline.run(((PARAMETERS, as_json(wanted)),))  # a version that is named is there
-        parameters = book[characteristic_id, version] = Parameters.from_dict(msgspec.json.decode(text or b""))
-    return parameters
-
-
-def _add_stream(
-    ground: Ground, entry: Entry, parameters: Parameters, row: _Stream, number: int | None, since: datetime | None
-) -> None:
-    memory = tool = None
-    if row.location is not None:
-        memory = ground.averages.get((row.machine_id, row.location))
-        if memory is None:
-            memory = ground.averages[row.machine_id, row.location] = AverageState(
-                row.machine_id, row.location, row.average or 0.0, row.empirical_value or 0.0
-            )
-    if row.tool is not None:
-        tool = ground.tools.get((row.machine_id, row.tool))
-        if tool is None:
-            tool = ground.tools[row.machine_id, row.tool] = ToolState(
-                row.machine_id, row.tool, row.offset or 0.0, row.total or 0.0, row.reset_at, row.tool_paused_by
-            )
-        tool.since_number, tool.since = number, since
-        tool.corrections = [
-            IssuedCorrection(
-                row.machine_id,
-                c.number,
-                row.tool,
-                c.amount,
-                c.status,
-                applied_at=c.applied_at,
-                decided_at=c.decided_at,
-                fetched_at=c.fetched_at,
-            )
-            for c in row.corrections or ()
-        ]
-    ground.streams[row.characteristic_id] = StreamState(
-        entry,
-        row.sequence,
-        row.version,
-        parameters,
-        memory,
-        tool,
-        row.paused_by,
-        row.last_measured_at,
-        level=row.level,
-        level_sequence=row.level_sequence,
-        before=row.sequence,
-    )
 
 
 async def save(pipeline: Pipeline, ground: Ground, quiet: QuietReadings | None = None, *, begun: bool) -> None:
@@ -273,7 +94,7 @@ def _opening(ground: Ground, machines: set[int], *, begun: bool) -> Iterable[Ste
     if not begun:
         yield "BEGIN", None
         if len(machines) > 1:
-            yield LOCK, _array(machines)
+            yield LOCK, array(machines)
     yield (
         GUARD,
         as_json([{"machine_id": machine_id, "version": ground.versions[machine_id]} for machine_id in machines]),
@@ -283,7 +104,7 @@ def _opening(ground: Ground, machines: set[int], *, begun: bool) -> Iterable[Ste
 async def _number_alarms(pipeline: Pipeline, ground: Ground, opening: list[Step]) -> None:
     """Find the alarms that are active for the same trouble already, and draw numbers for the others."""
     machines = {alarm.machine_id for alarm in ground.raised}
-    *_opened, rows = await pipeline.run([*opening, (ACTIVE_ALARMS, _array(machines))])
+    *_opened, rows = await pipeline.run([*opening, (ACTIVE_ALARMS, array(machines))])
     active = {
         (int(machine or 0), _number(characteristic), _number(tool), (kind or b"").decode()): _number(alarm)
         for machine, characteristic, tool, kind, alarm in rows
