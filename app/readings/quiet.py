@@ -16,7 +16,7 @@ from app.core.recursion import CODES, ZONES, Lane, Lanes, Quiet, quiet_run
 from app.readings.ground import AverageState, Ground, StreamState, Verdict
 from app.readings.judge import confirms, cut_with
 from app.readings.records import Entry, Record
-from app.readings.rows import EPOCH, MICROSECOND, array_of_int4, fixed, moment, one_of, table, texts
+from app.readings.rows import EPOCH, MICROSECOND, always, array_of_int4, fixed, moment, moments, one_of, table, texts
 from app.readings.schemas import ReadingIn
 
 FEWEST = 64  # readings that are worth making columns of
@@ -29,7 +29,7 @@ def compile_now() -> None:
     """Have everything compiled that a batch runs through, before the first one comes."""
     lane = np.zeros(0, np.int64)
     quiet_run(0, np.zeros(0), lane, Lanes.of([]), lane, np.zeros(0), Quiet.room(0))
-    table([fixed(lane, ">i8")])
+    table([fixed(lane, ">i8")], 0)
 
 
 class _Kind:
@@ -74,7 +74,7 @@ class QuietReadings:
         never = [reading.measured is None or reading.machined_at is not None for _, reading in wanted]
         self._lane_of = np.where(never, -1, self._kind_of)
         self._measured = np.array([reading.measured or 0.0 for _, reading in wanted])
-        self._times = np.array([moment(reading.measured_at or now) for _, reading in wanted], np.int64)
+        self._times = moments([reading.measured_at or now for _, reading in wanted])
         self._latest = self._latest_before()
         self._circumstances: list[Circumstance] = []
         self._circumstance_of = np.zeros(len(wanted), np.int64)
@@ -86,20 +86,15 @@ class QuietReadings:
 
     def _sort(self, ground: Ground) -> list[int]:
         """The kind of each reading."""
-        numbers: dict[tuple[int, int | None], int] = {}
-        kinds = []
-        for entry, reading in self.wanted:
-            name = (entry.characteristic_id, reading.correction_in_effect)
-            number = numbers.get(name)
-            if number is None:
-                number = numbers[name] = len(numbers)
-                stream = ground.streams[entry.characteristic_id]
-                self._kinds.append(_Kind(ground, stream, reading.correction_in_effect))
-                self._streams.setdefault(entry.characteristic_id, (len(self._streams), stream))
-                if stream.average is not None:
-                    self._memories.setdefault(id(stream.average), (len(self._memories), stream.average))
-            kinds.append(number)
-        return kinds
+        names = [(entry.characteristic_id, reading.correction_in_effect) for entry, reading in self.wanted]
+        numbers = {name: number for number, name in enumerate(dict.fromkeys(names))}
+        for characteristic, in_effect in numbers:
+            stream = ground.streams[characteristic]
+            self._kinds.append(_Kind(ground, stream, in_effect))
+            self._streams.setdefault(characteristic, (len(self._streams), stream))
+            if stream.average is not None:
+                self._memories.setdefault(id(stream.average), (len(self._memories), stream.average))
+        return [numbers[name] for name in names]
 
     def _lane(self, kind: _Kind) -> Lane:
         average = kind.stream.average
@@ -214,7 +209,7 @@ class QuietReadings:
             compensated=compensated,
         )
 
-    def rows(self) -> bytes:
+    def rows(self) -> memoryview:
         """The quiet readings as rows of the table `reading`, for a binary COPY."""
         at = np.flatnonzero(self._quiet)
         made, stream, circumstance = self._made, self._stream_of[at], self._circumstance_of[at]
@@ -222,7 +217,7 @@ class QuietReadings:
         readings = [self.wanted[position][1] for position in at.tolist()]
         in_effect = np.array([kind.in_effect or 0 for kind in self._kinds])[self._kind_of[at]]
         named = np.array([kind.in_effect is None for kind in self._kinds])[self._kind_of[at]]
-        null = one_of([None], np.zeros(len(at), np.int8))
+        null = always(None)
         compensated = np.array([np.nan if each is None else each for _, each in self._circumstances])[circumstance]
         columns = {
             "machine_id": fixed(np.array([s.entry.machine_id for s in streams])[stream], ">i4"),
@@ -242,7 +237,7 @@ class QuietReadings:
             "paused_by": null,
             "late": fixed(self._times[at] < self._latest[at], "?"),
             "zone": one_of([zone.value.encode() for zone in ZONES], made.zone[at]),
-            "action": one_of([Action.NONE.value.encode()], np.zeros(len(at), np.int8)),
+            "action": always(Action.NONE.value.encode()),
             "code": one_of([code.value.encode() for code in CODES], made.code[at]),
             "key": texts([reading.key for reading in readings]),
             "part": texts([reading.part for reading in readings]),
@@ -252,4 +247,4 @@ class QuietReadings:
             "alarms": null,
             "compensated": fixed(compensated, ">f8", np.isnan(compensated)),
         }
-        return table([columns[name] for name in Record._fields])
+        return table([columns[name] for name in Record._fields], len(at))

@@ -238,11 +238,11 @@ def _plain(reading: ReadingIn, latest: datetime) -> bool:
 def _all_plain(readings: list[ReadingIn], latest: datetime) -> bool:
     """Whether `_plain` holds for all of them, in a third of the time."""
     texts = [text for r in readings for text in (r.key, r.part) if text is not None]
-    times = [reading.measured_at.timestamp() for reading in readings if reading.measured_at is not None]
+    times = [reading.measured_at for reading in readings if reading.measured_at is not None]
     return (
         "".join(texts).isprintable()
         and "".join({reading.characteristic for reading in readings}).isprintable()
-        and (not times or (min(times) > EARLIEST.timestamp() and max(times) < latest.timestamp()))
+        and (not times or (min(times) >= EARLIEST and max(times) <= latest))
         and all(r.measured is not None and r.touches is None and r.machined_at is None for r in readings)
     )
 

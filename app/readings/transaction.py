@@ -57,15 +57,15 @@ async def transact(
     Raises `Invalid` naming each refused reading when it is all or nothing, `CommitLost`, and psycopg's errors. The ground
     is of no use then.
     """
-    begun = not trusting or not all(ground.knows(entry, reading) for entry, reading in wanted)
+    columns = all_or_nothing and trusting and len(wanted) >= FEWEST and _keys_differ(wanted)
+    asked = _examples(wanted) if columns else wanted
+    begun = not trusting or not all(ground.knows(entry, reading) for entry, reading in asked)
     if begun:
-        await load(pipeline, book, ground, wanted, trusting=trusting)
+        await load(pipeline, book, ground, asked, trusting=trusting)
     now = datetime.now(UTC)
-    quiet = None
-    if all_or_nothing and trusting and len(wanted) >= FEWEST and _keys_differ(wanted):
-        quiet = QuietReadings(ground, wanted, now)
+    quiet = QuietReadings(ground, wanted, now) if columns else None
     outcomes = _decide(ground, wanted, now, quiet)
-    if trusting and any(isinstance(outcome, InbandError) for outcome in outcomes):
+    if trusting and any(issubclass(kind, InbandError) for kind in set(map(type, outcomes))):
         raise Doubtful
     if all_or_nothing:
         refuse_all(outcomes)
@@ -83,6 +83,11 @@ async def transact(
     if quiet is not None:
         ground.clear()  # it knows nothing of what the columns hold
     return outcomes
+
+
+def _examples(wanted: Sequence[tuple[Entry, ReadingIn]]) -> list[tuple[Entry, ReadingIn]]:
+    """One reading for each ground that readings of the batch ask for; their keys are new."""
+    return list({(e.characteristic_id, r.correction_in_effect, r.machined_at): (e, r) for e, r in wanted}.values())
 
 
 def _keys_differ(wanted: Sequence[tuple[Entry, ReadingIn]]) -> bool:
