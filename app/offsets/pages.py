@@ -24,7 +24,7 @@ from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 MOST_IN_QUEUE = 50
-STEPS_ON_PAGE = 25
+STEPS_ON_PAGE = 10
 QUEUE, FROM_QUEUE = "/corrections", "queue"  # where a decision may have been begun
 Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
 Word = Annotated[str | None, Query(max_length=40)]
@@ -78,6 +78,8 @@ def memories(
         if len(steps) > STEPS_ON_PAGE
         else None,
         newest=memory_address(shown.key, tool=chosen.tool.number) if before else None,
+        # Parts that come again show the tool of the first time: which one most likely matters changes by the second.
+        here=memory_address(shown.key, tool=chosen.tool.number, before=before),
         done=asking.done(done, n) if done and n else None,
         late=_too_late(session, shown.key, late, n) if late and n else None,
         wording=wording,

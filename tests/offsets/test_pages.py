@@ -158,6 +158,22 @@ class TestInABrowser:
         expect(page.locator("#steps")).to_contain_text(operator.name)
         expect(page.locator("plotly-chart .main-svg").first).to_be_visible()
 
+    def test_the_tool_shown_stays_when_another_matters_more(self, shop: Shop, operator: Person, page: Page) -> None:
+        """Its number, its offset and its buttons belong together, whatever is corrected meanwhile."""
+        other = f"{shop.characteristic}-2"
+        shop.add(other, tool_memory=2, average_memory=6)
+        shop.correction(shop.read(20.0, other)["correction"]["number"], "applied")
+        operator.sign_in(page)
+        page.goto(page_of(shop))
+        expect(page.locator("#tool h2")).to_have_text("Tool 2")
+        expect(page.locator("live-status")).to_have_attribute("state", "live")
+        shop.read(20.0)  # a correction of tool 3 waits: without a word about the tool, it would be shown first
+        expect(page.locator("#queue")).to_contain_text("to tool 3")
+        shop.correction(shop.read(-30.0, other)["correction"]["number"], "applied")
+        expect(page.locator("#tool-now")).to_contain_text("+0.0100")
+        expect(page.locator("#tool-now")).to_contain_text("R10 = 2")
+        expect(page.locator("#tool h2")).to_have_text("Tool 2")
+
     def test_a_tool_change_in_the_dialog(self, shop: Shop, operator: Person, page: Page) -> None:
         operator.sign_in(page)
         page.goto(f"{page_of(shop)}?tool=3")
