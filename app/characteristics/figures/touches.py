@@ -15,9 +15,9 @@ from app.core.variants import fitted_points
 from app.web.i18n import _
 from app.web.numbers import mm, um
 
-WIDTH, HEIGHT = 300.0, 236.0
+WIDTH, HEIGHT = 320.0, 252.0
 RADIUS, REACH = 58.0, 20.0  # of the drawn part, and how far the largest residual stands off it
-WORD_AWAY = 26.0
+WORD_AWAY = 30.0
 HALF_TURN = 180.0
 
 
