@@ -228,8 +228,8 @@ def ring_figure(marks: Sequence[Mark], *, theme: ThemeName = "light") -> dict[st
             "type": "scatter",
             "mode": "markers",
             "meta": f"section {number + 1}",
+            "name": _("Section {n}").format(n=number + 1),
             "yaxis": "y2",
-            "showlegend": False,
             "x": [mark.at.isoformat() for mark in marks if len(mark.diameters) > number],
             "y": [
                 min(max(mark.diameters[number], edges[0]), edges[1]) * 1000
