@@ -186,7 +186,7 @@ class TestCorrections:
         before = page.locator("#corrections-text").input_value()
         expect(page.locator("live-status")).to_contain_text("live")
         shop.read(20.0, correction_in_effect=0)
-        expect(page.locator("#newer")).to_contain_text("are others by now")
+        expect(page.locator("#newer")).to_contain_text("have changed since")
         assert page.locator("#corrections-text").input_value() == before
         page.get_by_role("button", name="Mark fetched").click()
         expect(page.locator("#in-text tbody tr")).to_have_count(2)
