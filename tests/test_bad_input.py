@@ -271,6 +271,24 @@ class Place:
         shop.read(6.0)
         awaiting = shop.read(6.0, self.approved)["correction"]["number"]
         held = shop.read(350.0)
+        shop.call("PATCH", f"/machines/{shop.machine}/tools/3", sister=13)
+        shop.call(
+            "POST",
+            f"/machines/{shop.machine}/calibrations",
+            201,
+            **BODIES["POST /api/v1/machines/{machine}/calibrations"] | {"average_memory": 6, "touches": [25.002, 25.0022], "key": None},
+        )
+        pairs = [  # enough of them to suggest 0.001
+            shop.call(
+                "POST",
+                f"/machines/{shop.machine}/averages/5/pairs",
+                201,
+                machine_value=measured,
+                external_value=40.0,
+                instrument="CMM",
+            )
+            for measured in (40.0011, 40.0009, 40.001, 40.0009, 40.0011)
+        ]
         name = f"person-{shop.machine}"
         server.person(name, "viewer")
         person = next(each for each in shop.call("GET", "/people?limit=1000")["items"] if each["name"] == name)
@@ -282,14 +300,7 @@ class Place:
             "location": 5,
             "number": 1,
             "alarm": held["alarms"][0]["id"],
-            "pair": shop.call(
-                "POST",
-                f"/machines/{shop.machine}/averages/5/pairs",
-                201,
-                machine_value=40.0,
-                external_value=40.0,
-                instrument="CMM",
-            )["id"],
+            "pair": pairs[0]["id"],
             "person": next(person[name] for name in ("id", "name", "key") if name in person),
             "key": shop.call("POST", f"/machines/{shop.machine}/keys", 201, name="second")["id"],
         }
@@ -562,6 +573,7 @@ def test_wrong_methods(path: str, place: Place) -> None:
 
 def test_what_all_this_was_tried_on_can_be_done(server: Server) -> None:
     """The bodies above are good ones: what was refused was refused for what was changed in them."""
+    wrong = []
     for operation in WITH_BODY:
         place = Place(server)
         body = place.body(operation)
@@ -570,4 +582,6 @@ def test_what_all_this_was_tried_on_can_be_done(server: Server) -> None:
         if operation.name == "POST /api/v1/characteristics":
             body["key"] = f"bore-{place.shop.machine}"
         answer = place.send(operation, as_text(operation, body))
-        assert answer.status_code in {200, 201, 204}, f"{operation.name}: {answer.text}"
+        if answer.status_code not in {200, 201, 204}:
+            wrong.append(f"{operation.name}: {answer.text}")
+    assert wrong == []
