@@ -7,13 +7,14 @@ from typing import Any
 from app.calibration.due import PlaceRow
 from app.core.calibration import SECTIONS
 from app.errors import FieldError, Invalid
-from app.web.forms import length
+from app.web.forms import by_field, length
 from app.web.i18n import _
 
 NUMBERS = ("gauge_size", "zero_range", "averaging_limit", "confidence_limit", "weighting_factor", "path_factor")
 RING_NUMBERS = ("nominal", "upper_deviation", "lower_deviation", "radius_term")
 KEPT = ("surface", "probe_type", "axis", "direction", "tool_memory")
 LENGTHS = ("zero_range", "averaging_limit", "confidence_limit", "path_factor")
+IN_SECTIONS = tuple(f"sections[{number}].{side}" for number in range(SECTIONS) for side in ("plus", "minus"))
 _BETWEEN = re.compile(r"[\s;]+")
 MOST_LINES = 500
 
@@ -84,6 +85,18 @@ def pairs(form: Mapping[str, str]) -> list[dict[str, Any]]:
             pair["machine_value"] = columns[0]
         made.append(pair)
     return made
+
+
+def at_fields(error: Invalid) -> dict[str, str]:
+    """What is wrong, by the field of the form: the touches stand in one field, so each that is wrong is counted out."""
+    errors = by_field(error)
+    touches = [(name, message) for name, message in errors.items() if name.startswith("touches[")]
+    for name, message in touches:
+        del errors[name]
+        number = int(name.removeprefix("touches[").partition("]")[0]) + 1
+        said = _("Touch {n}: {what}").format(n=number, what=message)
+        errors["touches"] = f"{errors['touches']}. {said}" if "touches" in errors else said
+    return errors
 
 
 def plan(form: Mapping[str, str]) -> dict[str, Any]:

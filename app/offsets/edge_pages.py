@@ -15,6 +15,7 @@ from app.offsets.edges import describe_tool
 from app.offsets.lives import lives
 from app.web.deps import FormDep, Operator, SessionDep, require
 from app.web.forms import by_field, length, parsed
+from app.web.i18n import _
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -87,11 +88,19 @@ def _tool(
         steps=steps[:STEPS_SHOWN],
         more_steps=len(steps) > STEPS_SHOWN,
         typed=form or _typed(row),
-        errors=by_field(error) if error else {},
+        errors=_errors(error) if error else {},
         done=done,
         wording=wording,
         offered=asking.offered,
     )
+
+
+def _errors(error: Invalid) -> dict[str, str]:
+    """What is wrong at each field. Wear life is typed in µm, so its limits are not told in mm."""
+    errors = by_field(error)
+    if "planned_total" in errors:
+        errors["planned_total"] = _("Must be a number of µm larger than 0")
+    return errors
 
 
 def _typed(row: queries.ToolRow) -> dict[str, str]:

@@ -82,7 +82,12 @@ def _with_values(kind: str, context: Mapping[str, Any]) -> str | None:
         "too_short": _("must have at least {min_length} items"),
     }
     sentence = sentences.get(kind)
-    return None if sentence is None else sentence.format(**context)
+    return None if sentence is None else sentence.format(**{name: _plain(value) for name, value in context.items()})
+
+
+def _plain(value: Any) -> Any:
+    """A limit as people write it: 0 and 0.000001, neither 0.0 nor 1e-06."""
+    return f"{value:.9f}".rstrip("0").rstrip(".") if isinstance(value, float) else value
 
 
 def checked(kind: Any, value: Any, field: str) -> Any:

@@ -5,6 +5,7 @@
 //   <dialog data-open>  is open from the start (a form that came back with errors)
 //
 // A click on the backdrop and Escape close a dialog too. A form is sent once: its buttons rest until the answer is there.
+// A form that came back with errors is shown at the first field that is wrong, however far down it stands.
 
 import "./live-status.js";
 import "./live-part.js";
@@ -32,3 +33,4 @@ document.addEventListener("submit", (event) => {
 window.addEventListener("pageshow", () => document.querySelectorAll("form[data-sent]").forEach((form) => delete form.dataset.sent));
 
 for (const dialog of document.querySelectorAll("dialog[data-open]")) dialog.showModal();
+document.querySelector("dialog[open] [aria-invalid], main [aria-invalid]")?.focus();
