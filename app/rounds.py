@@ -26,7 +26,8 @@ _OURS = "SELECT pg_try_advisory_lock(7291, 2)"
 class Chore(NamedTuple):
     """Something to be done on every round, in a transaction of its own.
 
-    ``do`` looks first whether there is anything to do, without a lock: on most rounds there is nothing. What it changes
+    ``do`` that answers True has done a part and is done again at once, in another transaction: a machine that is locked
+    keeps its readings waiting until the commit, so it does one machine at a time. ``do`` looks first whether there is anything to do, without a lock: on most rounds there is nothing. What it changes
     it locks with one call of `lock_machines`, like everybody. It says nothing when it finds nothing, and doing it again
     changes nothing.
     """
@@ -43,8 +44,10 @@ def go_round(database: Database, chores: Sequence[Chore]) -> None:
 
 def _do(database: Database, chore: Chore) -> None:
     try:
-        with database.begin() as session:
-            chore.do(session)
+        more = True
+        while more:
+            with database.begin() as session:
+                more = chore.do(session) is True
     except Exception:
         log.exception("on the rounds, this failed and is tried again in a minute: %s", chore.name)
 

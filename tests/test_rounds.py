@@ -36,6 +36,23 @@ def test_a_chore_that_fails_is_rolled_back_logged_by_name_and_takes_no_other_wit
     assert "broken tap" in caplog.text
 
 
+def test_a_chore_that_has_done_a_part_is_done_again_in_a_transaction_of_its_own(database: Database) -> None:
+    waiting = ["one", "two", "three"]
+    done: list[int] = []
+
+    def part(session: Session) -> bool:
+        if not waiting:
+            return False
+        done.append(session.scalars(text("SELECT txid_current()")).one())
+        session.execute(ADD, {"key": waiting.pop()})
+        return True
+
+    go_round(database, [Chore("in parts", part)])
+    assert len(set(done)) == 3
+    with database.begin() as session:
+        assert session.scalars(text("SELECT key FROM machine ORDER BY key")).all() == ["one", "three", "two"]
+
+
 class Count:
     """A chore that counts how often it was done, and by which of two."""
 

@@ -30,9 +30,9 @@ def raise_overdue(session: Session) -> int:
     due = session.execute(_OVERDUE).mappings().all()
     if not due:
         return 0
-    lock_machines(session, [row["machine_id"] for row in due])
+    locked = lock_machines(session, [row["machine_id"] for row in due])
     due = session.execute(_OVERDUE).mappings().all()  # of now that nobody can calibrate in between
-    changes = [_raise(session, row) for row in due]
+    changes = [_raise(session, row) for row in due if row["machine_id"] in locked]
     publish(session, *changes)
     return len(changes)
 

@@ -1,37 +1,42 @@
 """What is done about offsets although nobody asks: corrections that nobody had applied expire, spent edges are told."""
 
 from datetime import UTC, datetime
+from typing import NamedTuple
 
-from sqlalchemy import Select, func, or_, select
+from sqlalchemy import Select, func, or_, select, true
 from sqlalchemy.orm import Session
 
 from app.alarms import actions as alarms
 from app.audit.actions import record
-from app.core.tool_life import use_of
+from app.core.tool_life import Use, use_of
 from app.db.events import publish
 from app.machines.queries import lock_machines
 from app.machines.tables import Machine
-from app.offsets import queries, wording
+from app.offsets import wording
 from app.offsets.lives import plan_of
 from app.offsets.news import alarm_raised, correction_changed
 from app.offsets.tables import OUTSTANDING, Correction, Tool
+from app.readings.tables import Stream
 
 ACTOR = "inband"
+MOST = 50  # corrections that expire in one transaction: readings of the machine wait until then
 
 
-def expire_corrections(session: Session) -> None:
+def expire_corrections(session: Session) -> bool:
     """Corrections that have waited longer than their machine's setting are superseded: the next reading decides anew.
 
     The time runs from when a correction was issued, or let go by a person. Held ones wait for their alarm, however long;
     those that were fetched as program text may be in the control by now, and wait for somebody to say so.
+    One machine at a time, so that its readings wait for no other: True when there may be more.
     """
-    due = _overdue()
-    machines = set(session.scalars(due.with_only_columns(Correction.machine_id).order_by(None)))
-    if not machines:
-        return
-    lock_machines(session, machines)
+    due = _overdue().limit(MOST)
+    found = session.scalar(due.with_only_columns(Correction.machine_id).limit(1))
+    if found is None:
+        return False
+    lock_machines(session, [found])
     changes, now = [], datetime.now(UTC)
-    for correction, machine in session.execute(due.execution_options(populate_existing=True)).all():
+    of_it = due.where(Correction.machine_id == found).execution_options(populate_existing=True)
+    for correction, machine in session.execute(of_it).all():
         hours = f"{machine.corrections_expire_after:g}"
         before = correction.status
         correction.status, correction.decided_at, correction.decided_by = "superseded", now, None
@@ -48,6 +53,7 @@ def expire_corrections(session: Session) -> None:
         changes.append(correction_changed(session, machine, correction))
     if changes:
         publish(session, *changes)
+    return True
 
 
 def _overdue() -> Select[Correction, Machine]:
@@ -66,16 +72,18 @@ def _overdue() -> Select[Correction, Machine]:
     )
 
 
-def tell_tool_lives(session: Session) -> None:
-    """An edge that has reached its planned life raises *tool life*, once in its life."""
+def tell_tool_lives(session: Session) -> bool:
+    """An edge that has reached its planned life raises *tool life*, once in its life.
+
+    One machine at a time: True when there may be more.
+    """
     spent = _spent(session)
     if not spent:
-        return
-    lock_machines(session, {tool.machine_id for tool, _machine in spent})
+        return False
+    found = spent[0].machine.id
+    lock_machines(session, [found])
     changes = []
-    for tool, machine in _spent(session):
-        parts = queries.parts_cut(session, machine.id, tool.number)
-        use = use_of(plan_of(tool), parts, tool.total)
+    for tool, machine, parts, use in _spent(session, found):
         tool.life_told = True
         alarm = alarms.raise_for_tool(
             session,
@@ -94,19 +102,35 @@ def tell_tool_lives(session: Session) -> None:
         changes.append(alarm_raised(machine, alarm))
     if changes:
         publish(session, *changes)
+    return True
 
 
-def _spent(session: Session) -> list[tuple[Tool, Machine]]:
-    """The tools whose planned life is reached and was not told yet."""
+class _Spent(NamedTuple):
+    """A tool whose planned life is reached and was not told yet, with the parts that it has cut."""
+
+    tool: Tool
+    machine: Machine
+    parts: int
+    use: Use
+
+
+def _spent(session: Session, machine_id: int | None = None) -> list[_Spent]:
+    """Such tools of this machine, or of all. One query: thousands of tools may have a plan."""
+    cut = (
+        select(func.max(Stream.sequence - Stream.sequence_at_tool_change))
+        .where(Stream.machine_id == Tool.machine_id, Stream.tool_memory == Tool.number)
+        .correlate(Tool)
+        .scalar_subquery()
+    )
     planned = session.execute(
-        select(Tool, Machine)
+        select(Tool, Machine, Tool.parts_kept + func.coalesce(cut, 0))
         .join(Machine, Machine.id == Tool.machine_id)
         .where(or_(Tool.planned_parts.is_not(None), Tool.planned_total.is_not(None)), ~Tool.life_told)
+        .where(true() if machine_id is None else Tool.machine_id == machine_id)
         .order_by(Tool.machine_id, Tool.number)
         .execution_options(populate_existing=True)
     ).all()
-    return [
-        (tool, machine)
-        for tool, machine in planned
-        if use_of(plan_of(tool), queries.parts_cut(session, machine.id, tool.number), tool.total).spent
+    judged = [
+        _Spent(tool, machine, parts, use_of(plan_of(tool), parts, tool.total)) for tool, machine, parts in planned
     ]
+    return [each for each in judged if each.use.spent]

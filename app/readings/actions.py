@@ -27,6 +27,7 @@ def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: s
     Raises `NotFound`, and `Conflict` when it has been excluded already, saying by whom.
     """
     queries.record_of(session, entry, sequence)
+    lock_machines(session, [entry.machine_id])  # before the first row, as whoever acknowledges an alarm does
     made: Exclusion | None = session.scalar(
         insert(Exclusion)
         .values(
@@ -86,6 +87,7 @@ def exclude_all(session: Session, entry: Entry, sequences: Sequence[int], actor:
 
     Returns the ones that were excluded now.
     """
+    lock_machines(session, [entry.machine_id])
     at = {"machine_id": entry.machine_id, "characteristic_id": entry.characteristic_id}
     made = sorted(
         session.scalars(
@@ -126,7 +128,10 @@ NOT_OF_LEVEL = ("implausible", "tool_worn_held", "probe_fault", "before_tool_cha
 
 
 def _forget_level(session: Session, entry: Entry, sequences: Sequence[int]) -> None:
-    """A level that readings taken out have made is not believed any more: the next reading begins it anew."""
+    """A level that readings taken out have made is not believed any more: the next reading begins it anew.
+
+    The machine is locked.
+    """
     at = (Stream.machine_id == entry.machine_id, Stream.characteristic_id == entry.characteristic_id)
     newest = session.scalar(select(Stream.level_sequence).where(*at))
     if newest is None or not any(newest - REMEMBERED < sequence <= newest for sequence in sequences):
@@ -144,7 +149,6 @@ def _forget_level(session: Session, entry: Entry, sequences: Sequence[int]) -> N
         .limit(1)
     )
     if made_it is not None:
-        lock_machines(session, [entry.machine_id])
         session.execute(
             update(Stream)
             .where(*at)

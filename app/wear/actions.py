@@ -1,7 +1,9 @@
 """What is worked out on the rounds: the outlook of each characteristic, and an alarm where a loop begins to hunt.
 
-None of it is what readings are decided by, so no machine is locked for it, and what the writer has in memory stays true.
+Outlooks are not what readings are decided by: no machine is locked for them, and what the writer has in memory stays true.
 """
+
+from typing import Any
 
 from sqlalchemy import Select, func, or_, select
 from sqlalchemy.dialects.postgresql import insert
@@ -11,9 +13,10 @@ from app.alarms import actions as alarms
 from app.characteristics import queries as characteristics
 from app.characteristics.queries import Standing
 from app.characteristics.tables import Characteristic
-from app.core.hunting import State
+from app.core.hunting import Hunting, State
 from app.core.wear import LONGEST
 from app.db.events import publish
+from app.machines.queries import lock_machines
 from app.readings.tables import Stream
 from app.statistics.queries import Window
 from app.wear import queries, wording
@@ -25,7 +28,7 @@ MOST = 200  # characteristics on one round; those whose outlook is oldest come f
 
 def look_ahead(session: Session) -> None:
     """Work out the outlook of what was measured since, and raise *hunting* once where a loop has begun to hunt."""
-    changes = []
+    begun: list[tuple[Standing, Hunting]] = []
     for key in session.scalars(_moved()):
         standing = characteristics.characteristic_named(session, key)
         before = session.get(Outlook, (standing.machine.id, standing.characteristic.id))
@@ -34,27 +37,31 @@ def look_ahead(session: Session) -> None:
         _note(session, wear)
         found = wear.hunting
         if found is not None and found.state.value in queries.OVERCORRECTS and not hunted:
-            alarm = alarms.raise_for_characteristic(
-                session,
-                standing.machine.id,
-                standing.characteristic.id,
-                standing.parameters.tool_memory,
-                "hunting",
-                wording.hunting_data(found) | {"settings": {name: standing.version.parameters[name] for name in SAID}},
-            )
-            changes.append(
-                {
-                    "kind": "alarm",
-                    "machine": standing.machine.key,
-                    "characteristic": standing.characteristic.key,
-                    "tool": alarm.tool_memory,
-                    "id": alarm.id,
-                    "alarm": alarm.kind,
-                    "state": "active",
-                }
-            )
-    if changes:
-        publish(session, *changes)
+            begun.append((standing, found))
+    if begun:
+        lock_machines(session, {standing.machine.id for standing, _found in begun})
+        publish(session, *(_tell(session, standing, found) for standing, found in begun))
+
+
+def _tell(session: Session, standing: Standing, found: Hunting) -> dict[str, Any]:
+    """Raise the alarm: under the machine's lock, as whoever acknowledges the one before it. What is told to live pages."""
+    alarm = alarms.raise_for_characteristic(
+        session,
+        standing.machine.id,
+        standing.characteristic.id,
+        standing.parameters.tool_memory,
+        "hunting",
+        wording.hunting_data(found) | {"settings": {name: standing.version.parameters[name] for name in SAID}},
+    )
+    return {
+        "kind": "alarm",
+        "machine": standing.machine.key,
+        "characteristic": standing.characteristic.key,
+        "tool": alarm.tool_memory,
+        "id": alarm.id,
+        "alarm": alarm.kind,
+        "state": "active",
+    }
 
 
 SAID = ("zero_range", "averaging_limit", "weighting_factor", "tolerance_width")  # settings that the sentences name

@@ -7,6 +7,7 @@ import pytest
 from app.core.plausibility import uncorrected
 from app.db.engine import Database
 from app.offsets.chores import tell_tool_lives
+from app.rounds import Chore, go_round
 from tests.shop import Shop
 
 SETTINGS: dict[str, Any] = {
@@ -30,8 +31,7 @@ def path(shop: Shop, more: str = "", number: int = 3) -> str:
 
 def rounds(server: Any) -> None:
     database: Database = server.database
-    with database.begin() as session:
-        tell_tool_lives(session)
+    go_round(database, [Chore("tool lives are told", tell_tool_lives)])
 
 
 def codes(alarm: Any) -> list[str]:

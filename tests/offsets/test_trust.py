@@ -1,5 +1,6 @@
 """Offsets one can trust: an offset that differs pauses its tool, jumps are held, nothing is applied twice, old ones expire."""
 
+import time
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -7,9 +8,14 @@ from typing import Any
 import httpx
 import pytest
 from sqlalchemy import text
+from sqlalchemy.orm import Session
 
 from app.db.engine import Database
+from app.machines.queries import lock_machines
 from app.offsets.chores import expire_corrections, tell_tool_lives
+from app.readings.actions import exclude_all
+from app.readings.queries import entry_of
+from app.rounds import Chore, go_round
 from tests.shop import Shop
 
 
@@ -338,6 +344,23 @@ class TestExpiry:
             "held",
         ]
 
+    def test_one_machine_at_a_time_and_only_under_its_lock(self, hasty: Shop, server: Any, database: Database) -> None:
+        """What readings are decided by changes under the lock; the readings of one machine wait for no other."""
+        rounds(database)
+        shops = [hasty, Shop(server)]
+        shops[1].call("PATCH", f"/machines/{shops[1].machine}", corrections_expire_after=8.0)
+        for shop in shops:
+            age(database, shop, pending(shop), hours=9)
+        before = [version(database, shop) for shop in shops]
+        with database.begin() as session:
+            assert expire_corrections(session) is True
+        now = [shop.correction(1)["status"] for shop in shops]
+        assert sorted(now) == ["pending", "superseded"]
+        moved = [version(database, shop) > old for shop, old in zip(shops, before, strict=True)]
+        assert moved == [status == "superseded" for status in now]
+        rounds(database)
+        assert [shop.correction(1)["status"] for shop in shops] == ["superseded", "superseded"]
+
     def test_never_unless_it_is_asked_for(self, shop: Shop, database: Database) -> None:
         number = pending(shop)
         age(database, shop, number, hours=10_000)
@@ -357,9 +380,16 @@ class TestExpiry:
 
 
 def rounds(database: Database) -> None:
-    for chore in (expire_corrections, tell_tool_lives):
-        with database.begin() as session:
-            chore(session)
+    go_round(database, [Chore("corrections expire", expire_corrections), Chore("tool lives are told", tell_tool_lives)])
+
+
+def version(database: Database, shop: Shop) -> int:
+    with database.begin() as session:
+        found: int = session.scalars(
+            text("SELECT version FROM machine_state s JOIN machine m ON m.id = s.machine_id WHERE m.key = :machine"),
+            {"machine": shop.machine},
+        ).one()
+        return found
 
 
 def age(database: Database, shop: Shop, number: int, hours: float) -> None:
@@ -377,6 +407,16 @@ def age(database: Database, shop: Shop, number: int, hours: float) -> None:
 def at_once(*calls: Any) -> list[httpx.Response]:
     with ThreadPoolExecutor(len(calls)) as pool:
         return [future.result() for future in [pool.submit(call) for call in calls]]
+
+
+def _until_somebody_waits(session: Session) -> None:
+    waits = text(
+        "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND wait_event_type = 'Lock'"
+    )
+    deadline = time.monotonic() + 10
+    while not session.scalar(waits):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 class TestAtOnce:
@@ -400,6 +440,22 @@ class TestAtOnce:
                 expiring.result()
             status = self.consistent(shop, number, before)
             assert status == {200: "applied", 409: "superseded"}[answer.status_code]
+
+    def test_excluding_waits_for_the_machine_before_it_takes_a_row(self, shop: Shop, database: Database) -> None:
+        """Whoever acknowledges an alarm as a false reading has the machine, then excludes: the other order would deadlock."""
+        shop.call(
+            "PATCH", f"/characteristics/{shop.characteristic}", parameters={"plausible_jump": 0.01}, reason="chip"
+        )
+        shop.read(0.5)
+        path = f"/api/v1/readings/{shop.characteristic}/1/exclude"
+        with ThreadPoolExecutor(1) as pool:
+            with database.begin() as session:
+                lock_machines(session, [entry_of(session, shop.characteristic).machine_id])  # type: ignore[union-attr]
+                waiting = pool.submit(lambda: shop.admin.post(path, json={"reason": "chip"}))
+                _until_somebody_waits(session)
+                session.execute(text("SET LOCAL lock_timeout = '2s'"))
+                exclude_all(session, entry_of(session, shop.characteristic), [1], "ana", "chip")  # type: ignore[arg-type]
+            assert waiting.result().status_code == 409
 
     def test_a_confirmation_against_a_tool_change(self, shop: Shop, server: Any) -> None:
         other = server.client(server.key())

@@ -7,6 +7,7 @@ import httpx
 import pytest
 
 from app.offsets.chores import expire_corrections
+from app.rounds import Chore, go_round
 from tests.core.programs.controls import Fanuc, Sinumerik
 from tests.shop import Shop
 
@@ -119,8 +120,7 @@ class TestFetching:
         shop.read(20.0, correction_in_effect=0)
         fetched(shop, 1)
         shop.call("PATCH", f"/machines/{shop.machine}", corrections_expire_after=1e-6)
-        with server.database.begin() as session:
-            expire_corrections(session)
+        go_round(server.database, [Chore("corrections expire", expire_corrections)])
         assert [shop.correction(n)["status"] for n in (1, 2)] == ["pending", "superseded"]
 
 
