@@ -8,6 +8,7 @@ import asyncio
 import gc
 import logging
 from collections.abc import Sequence
+from contextlib import suppress
 from time import monotonic
 
 import psycopg
@@ -21,6 +22,7 @@ from app.readings.loading import Book
 from app.readings.quiet import QuietReadings
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn
+from app.readings.statements import TELL
 from app.readings.transaction import MISTRUST, ROLLBACK, CommitLost, Outcome, new_ones, refuse_all, transact
 from app.web.i18n import _
 
@@ -28,6 +30,7 @@ log = logging.getLogger(__name__)
 
 PATIENCE = 5.0  # s that a reading waits for a database that is away, before it is answered 503
 SHY = 16  # transactions that load what they need, after one whose memory was not true any more
+TELL_EVERY = 0.05  # s; waking everybody costs as much as a commit, and pages look ten times a second at most
 MOST_SPARE = 2  # connections kept for batches
 
 # Every statement of the writer finds its rows by an index, however small the tables are when it is first planned; planned
@@ -53,6 +56,8 @@ class Keeper:
         self._shy = 0
         self._pipeline: Pipeline | None = None
         self._away_since: float | None = None
+        self._told_at = 0.0
+        self.untold = False  # readings were stored that nobody has been woken for yet
 
     async def close(self) -> None:
         """Give the connection back."""
@@ -65,13 +70,20 @@ class Keeper:
         deadline = (monotonic() if self._away_since is None else self._away_since) + PATIENCE
         pause = 0.02
         trusting = not self._shy
+        tell = all_or_nothing or monotonic() > self._told_at + TELL_EVERY
         while True:
             try:
                 if self._pipeline is None or self._pipeline.closed:
                     self._pipeline = await connect(self.dsn)
                 self._pipeline.look()
                 outcomes = await transact(
-                    self._pipeline, self.book, self._ground, wanted, all_or_nothing=all_or_nothing, trusting=trusting
+                    self._pipeline,
+                    self.book,
+                    self._ground,
+                    wanted,
+                    all_or_nothing=all_or_nothing,
+                    trusting=trusting,
+                    tell=tell,
                 )
             except CommitLost as lost:
                 self._ground = Ground()
@@ -106,7 +118,17 @@ class Keeper:
             else:
                 self._away_since = None
                 self._shy = max(0, self._shy - 1)
+                self.untold = not tell
+                if tell:
+                    self._told_at = monotonic()
                 return outcomes
+
+    async def tell(self) -> None:
+        """Wake who listens, if there is something that was not told with its transaction."""
+        if self.untold and self._pipeline is not None:
+            self.untold, self._told_at = False, monotonic()
+            with suppress(psycopg.Error):  # nobody listens to a database that is away
+                await self._pipeline.run(((TELL, None),))
 
     async def _roll_back(self) -> None:
         self._ground = Ground()

@@ -41,11 +41,14 @@ from app.readings.statements import (
 COPY_FROM = 500  # readings in one transaction from which COPY is faster than one JSON document
 
 
-async def save(pipeline: Pipeline, ground: Ground, quiet: QuietReadings | None = None, *, begun: bool) -> None:
+async def save(
+    pipeline: Pipeline, ground: Ground, quiet: QuietReadings | None = None, *, begun: bool, tell: bool = True
+) -> None:
     """Write everything that was decided on this ground and commit it.
 
-    begun: the machines are locked already; otherwise all of it happens in one round trip. Raises `Moved` when somebody
-    has changed a machine since the ground was loaded, and psycopg's errors.
+    begun: the machines are locked already; otherwise all of it happens in one round trip. tell: wake who listens to the
+    journal of events. Raises psycopg's errors; `DivisionByZero` when somebody has changed a machine since the ground was
+    loaded.
     """
     touched = list({id(verdict.stream): verdict.stream for verdict in ground.verdicts}.values())
     if quiet is not None:
@@ -66,6 +69,7 @@ async def save(pipeline: Pipeline, ground: Ground, quiet: QuietReadings | None =
         ],
         "readings": [] if copying else [record._asdict() for record in records],
         "changes": _changes(ground, touched),
+        "tell": tell,
     }
     if copying or quiet is not None:
         await pipeline.run(opening)

@@ -11,7 +11,7 @@ import msgspec
 
 from app.core.variants import Results
 from app.core.zones import Zone
-from app.db.events import PUBLISHED
+from app.db.events import CHANNEL, PUBLISHED
 from app.readings.records import Record
 
 _json = msgspec.json.Encoder()
@@ -131,8 +131,10 @@ WITH doc AS MATERIALIZED (SELECT $1::json AS d), moved AS ({MOVE_STREAMS}), aver
 stored AS (
     INSERT INTO reading ({_COLUMNS})
     SELECT {_COLUMNS} FROM json_to_recordset((SELECT d -> 'readings' FROM doc)) AS r({_READING})
-), {PUBLISHED.format(changes="(SELECT d -> 'changes' FROM doc)")}
+), {PUBLISHED.format(changes="(SELECT d -> 'changes' FROM doc)")} WHERE (SELECT (d ->> 'tell')::bool FROM doc)
 """  # noqa: S608 - made of constants
+# What was not told with the transaction; whoever is woken reads on in the journal from where it was.
+TELL = f"NOTIFY {CHANNEL}"
 COPY = f"COPY reading ({_COLUMNS}) FROM STDIN (FORMAT BINARY)"
 # The rarer rows, each statement sent only when there is something for it.
 TOUCHES = """

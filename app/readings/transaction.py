@@ -50,11 +50,12 @@ async def transact(
     *,
     all_or_nothing: bool = False,
     trusting: bool = False,
+    tell: bool = True,
 ) -> list[Outcome]:
     """Decide and store these readings in one transaction, in their order.
 
     trusting: take the ground for true and the keys for new ones; `MISTRUST` is raised when they are not, or may not be.
-    Raises `Invalid` naming each refused reading when it is all or nothing, `CommitLost`, and psycopg's errors. The ground
+    tell: see `save`. Raises `Invalid` naming each refused reading when it is all or nothing, `CommitLost`, and psycopg's errors. The ground
     is of no use then.
     """
     columns = all_or_nothing and trusting and len(wanted) >= FEWEST and _keys_differ(wanted)
@@ -74,7 +75,7 @@ async def transact(
         ground.settle()
         return outcomes
     try:
-        await save(pipeline, ground, quiet, begun=begun)
+        await save(pipeline, ground, quiet, begun=begun, tell=tell)
     except psycopg.Error as error:
         if pipeline.closed:
             raise CommitLost(outcomes) from error

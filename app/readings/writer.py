@@ -8,7 +8,7 @@ import asyncio
 import logging
 
 from app.errors import DatabaseAway, OutcomeUnknown
-from app.readings.keeper import Keeper
+from app.readings.keeper import TELL_EVERY, Keeper
 from app.readings.loading import Book
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn
@@ -32,6 +32,7 @@ class Writer:
         self._wake = asyncio.Event()
         self._ending = False
         self._task: asyncio.Task[None] | None = None
+        self._telling: asyncio.TimerHandle | None = None
 
     def start(self) -> None:
         """Begin to take readings; call it on the loop that serves requests."""
@@ -43,6 +44,7 @@ class Writer:
         self._wake.set()
         if self._task:
             await self._task
+        await self._keeper.tell()
         for keeper in (self._keeper, *self.spare):
             await keeper.close()
 
@@ -62,6 +64,7 @@ class Writer:
             if not self._waiting:
                 self._wake.clear()
             if not batch:
+                await self._keeper.tell()
                 continue
             try:
                 outcomes = await self._keeper.store([item[:2] for item in batch])
@@ -71,3 +74,9 @@ class Writer:
             for (_entry, _reading, future), outcome in zip(batch, outcomes, strict=True):
                 if not future.done():  # the client may be gone; what it sent is stored all the same
                     future.set_result(outcome)
+            if self._keeper.untold and self._telling is None:
+                self._telling = asyncio.get_running_loop().call_later(TELL_EVERY, self._tell)
+
+    def _tell(self) -> None:
+        self._telling = None
+        self._wake.set()

@@ -89,6 +89,11 @@ class Live:
                 await asyncio.sleep(1)
 
     async def _pass_on(self, conn: AsyncConnection[Any]) -> None:
+        if not self._clients:
+            newest = await _newest(conn)
+            if not self._clients:  # still nobody, who would miss what lies between
+                self._last = newest
+                return
         cursor = await conn.execute("SELECT id, changes FROM event WHERE id > %s ORDER BY id", (self._last,))
         latest: dict[tuple[Any, ...], tuple[int, dict[str, Any]]] = {}
         for number, changes in await cursor.fetchall():
