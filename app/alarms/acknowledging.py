@@ -2,7 +2,8 @@
 
 tool_replaced   open corrections of the tool are superseded, averages and tool life begin again (once per tool change,
                 however many alarms the worn tool has raised)
-keep_cutting    the held correction is released to the machine; a jump was true, and readings are expected there from now on
+keep_cutting    the held correction is released to the machine; a jump was true, and readings are expected there from now on;
+                dropped instead where readings since then speak against it
 false_reading   the readings behind it are excluded; what they led to is withdrawn unless it is applied already
 sister_tool     the characteristics of the tool correct its sister from now on
 offset_set      this offset is true: handled as a manual edit (*offset differs* only, which a person answers so)
@@ -169,9 +170,12 @@ def _keep_cutting(session: Session, row: AlarmRow, comment: str, caller: Caller)
     if row.alarm.kind not in queries.HOLDING:
         return []
     outcome: Outcome = []
-    true = _level_follows(session, row)
-    if row.held is not None and not true and row.alarm.kind == "implausible":
+    denied = row.held is not None and row.alarm.kind == "tool_worn" and _within_wear_since(session, row)
+    true = not denied and _level_follows(session, row)
+    if row.held is not None and (denied or (not true and row.alarm.kind == "implausible")):
         outcome.append(_withdraw(session, row, row.held, comment, caller))
+        if denied:
+            outcome.append({"code": "readings_disagree"})
     elif row.held is not None:
         released = offsets.decide(session, row.machine, row.held.number, "release", comment, caller).correction
         outcome.append({"code": "correction_released", "number": released.number, "amount": released.amount})
@@ -180,6 +184,15 @@ def _keep_cutting(session: Session, row: AlarmRow, comment: str, caller: Caller)
     if row.alarm.kind == "implausible":
         outcome.append({"code": "level_followed" if true else "level_disagrees"})
     return outcome
+
+
+def _within_wear_since(session: Session, row: AlarmRow) -> bool:
+    """Whether parts since then came out within R37 although nothing was corrected: what was held would spoil the next one."""
+    alarm = row.alarm
+    last = alarm.last_sequence or alarm.sequence
+    if alarm.characteristic_id is None or last is None:
+        return False
+    return reading_queries.within_wear_since(session, alarm.machine_id, alarm.characteristic_id, last)
 
 
 def _level_follows(session: Session, row: AlarmRow) -> bool:

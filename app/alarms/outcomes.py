@@ -98,6 +98,8 @@ def _followed(item: dict[str, Any]) -> str:
             text = _("The next readings are expected where the jump has led.")
         case "level_disagrees":
             text = _("Readings since then lie where they were expected before the jump, so nothing of it is corrected.")
+        case "readings_disagree":
+            text = _("Readings since then lie within the wear limit R37, so nothing of it is corrected.")
         case "tool_resumed":
             text = _("Compensation through tool {tool} goes on.")
         case "resumed":

@@ -210,6 +210,7 @@ def consequences(row: AlarmRow, action: str) -> list[str]:
                         number=held.number, amount=um(held.amount), tool=held.tool_memory
                     )
                 )
+                said.append(_("If readings since then say that nothing is to be corrected, it is dropped instead."))
         case "sister_tool":
             said += [
                 _(

@@ -12,6 +12,7 @@ from app.characteristics.tables import Characteristic
 from app.core.compensation import Code
 from app.core.plausibility import uncorrected
 from app.core.variants import Results
+from app.core.zones import Zone
 from app.errors import NotFound
 from app.machines.tables import Machine
 from app.offsets.tables import Correction
@@ -130,6 +131,23 @@ def uncorrected_of(session: Session, machine_id: int, characteristic_id: int, se
         return None
     parameters = characteristics.parameters_of(session, machine_id, characteristic_id, row.parameters_version)
     return uncorrected(row.deviation, row.compensated, parameters.factor)
+
+
+def within_wear_since(session: Session, machine_id: int, characteristic_id: int, sequence: int) -> bool:
+    """Whether a reading after this one, of a part cut with the same tool, lies within the wear limit R37."""
+    found = session.scalar(
+        select(Reading.sequence)
+        .where(
+            Reading.machine_id == machine_id,
+            Reading.characteristic_id == characteristic_id,
+            Reading.sequence > sequence,
+            Reading.late.is_(False),
+            Reading.zone.not_in((Zone.WEAR, Zone.PROBE_FAULT)),
+            Reading.code.not_in((Code.BEFORE_TOOL_CHANGE, Code.IMPORTED)),
+        )
+        .limit(1)
+    )
+    return found is not None
 
 
 def course_of(session: Session, machine_id: int, characteristic_id: int, factor: float, limit: int) -> list[float]:

@@ -138,6 +138,23 @@ class TestKeepCutting:
         alarm = next(a for a in shop.alarms() if a["kind"] == "tool_worn")
         assert codes(shop.acknowledge(alarm["id"], "keep_cutting")) == ["nothing_held"]
 
+    def test_after_readings_within_the_wear_limit_it_is_dropped(self, shop: Shop) -> None:
+        """One bad touch looks like a worn tool; 350 µm on an edge that cuts well would spoil the next part."""
+        number = shop.read(350.0)["correction"]["number"]
+        for _part in range(3):
+            assert shop.read(0.2)["correction"] is None
+        alarm = next(a for a in shop.alarms() if a["kind"] == "tool_worn")
+        assert codes(shop.acknowledge(alarm["id"], "keep_cutting")) == ["correction_withdrawn", "readings_disagree"]
+        assert shop.correction(number)["status"] == "rejected"
+
+    def test_a_reading_that_lies_in_the_wear_zone_again_speaks_for_it(self, shop: Shop) -> None:
+        shop.read(350.0)
+        shop.read(0.2)
+        newer = shop.read(352.0)["correction"]["number"]
+        alarm = next(a for a in shop.alarms() if a["kind"] == "tool_worn")
+        assert codes(shop.acknowledge(alarm["id"], "keep_cutting")) == ["correction_released"]
+        assert shop.correction(newer)["status"] == "pending"
+
     def test_the_held_correction_of_another_characteristic_stays_held(self, shop: Shop) -> None:
         shop.add(f"{shop.characteristic}-b", average_memory=6)
         shop.read(350.0)
