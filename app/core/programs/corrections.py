@@ -25,6 +25,8 @@ TOLERANCE = 0.0006  # mm: a control keeps three decimals, and rounds
 HIGHEST_R, LAST_R = "R98", "R99"
 HIGHEST_VARIABLE, LAST_VARIABLE = "#598", "#599"
 MOST_STEPS = 200
+# Whole nanometres: the mean of three sections has digits without end, and controls refuse a word of more than eight.
+PLACES = 6
 
 
 class Form(StrEnum):
@@ -93,7 +95,7 @@ def steps(wanted: Sequence[Wanted], offsets: dict[int, float], highest: int, las
 
 
 def write(form: Form, machine: str, chain: Sequence[Step]) -> str:
-    """The text of these steps. The same steps always give the same text.
+    """The text of these steps, to whole nanometres. The same steps always give the same text.
 
     >>> print(write(Form.G10_ABSOLUTE, "lathe-1", steps([Wanted(18, 3, -0.0061, Axis.X)], {3: -0.0081}, 17, 17)))
     (INBAND CORRECTIONS FOR LATHE-1: 18)
@@ -102,7 +104,13 @@ def write(form: Form, machine: str, chain: Sequence[Step]) -> str:
     M99
     <BLANKLINE>
     """
-    return "\n".join(_WRITERS[form](machine, list(chain))) + "\n"
+    return "\n".join(_WRITERS[form](machine, [_to_places(step) for step in chain])) + "\n"
+
+
+def _to_places(step: Step) -> Step:
+    """The offsets rounded, and the amount as what lies between them, so that increments add up to where offsets lead."""
+    before, after = round(step.before, PLACES) + 0.0, round(step.after, PLACES) + 0.0
+    return step._replace(before=before, after=after, amount=round(after - before, PLACES) + 0.0)
 
 
 def _numbers(chain: Sequence[Step]) -> str:

@@ -1,5 +1,6 @@
 """Correction texts, run on simulated controls: twice, out of order, and with the power going between any two blocks."""
 
+import re
 from contextlib import nullcontext
 
 import pytest
@@ -189,10 +190,10 @@ def test_the_axis_says_which_offset() -> None:
 
 
 def test_numbers_have_no_exponent_and_comments_no_lower_case() -> None:
-    tiny = steps([Wanted(1, 3, 1e-7, Axis.X)], {3: 0.0}, 0, 0)
+    tiny = steps([Wanted(1, 3, 1e-6, Axis.X)], {3: 0.0}, 0, 0)
     for form in Form:
         text = write(form, "lathe-1", tiny)
-        assert "0.0000001" in text
+        assert "0.000001" in text
         assert "e-" not in text.lower().replace("lathe-1", "")
         assert text.isascii()
 
@@ -202,3 +203,17 @@ def test_every_control_has_a_form() -> None:
     assert {form for forms in FORMS.values() for form in forms} == set(Form)
     for form in Form:
         assert write(form, "m", []).count("NONE") == 1
+
+
+@pytest.mark.parametrize("form", [form for form in Form if form is not Form.LIST])
+def test_a_mean_of_three_has_no_more_digits_than_a_control_takes(form: Form) -> None:
+    """The lathe line corrects by the mean of three sections; a word of more than eight digits is refused by controls."""
+    chain = chain_of([(3, -0.011833333), (3, -0.051333334), (3, 0.000333333), (3, 0.000333333)], {3: 1.012166667})
+    text = write(form, "lathe-1", chain)
+    words = re.findall(r"\d*\.\d+", text)
+    assert words
+    assert max(len(word) - 1 for word in words) <= 8
+    assert all(len(word.split(".")[1]) <= 6 for word in words)
+    if form is Form.G10:  # increments add up to where the offsets lead
+        increments = [float(value) for value in re.findall(r"G10 P3 U(\S+)", text)]
+        assert round(1.012167 + sum(increments), 9) == round(chain[-1].after, 6)
