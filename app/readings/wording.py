@@ -1,6 +1,6 @@
 """The sentences about readings: why it was decided so, and what is wrong with touches."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from app.core.compensation import Code, average_of
@@ -9,6 +9,8 @@ from app.core.probing import TouchError
 from app.core.zones import Zone, nanometres, within_tolerance
 from app.readings.records import Record
 from app.web.i18n import _
+
+NAMED_AT_MOST = 3
 
 
 def um(length: float) -> str:
@@ -169,7 +171,7 @@ def _sentence(record: Record, parameters: Parameters) -> str:
 def _note(code: str, record: Record, parameters: Parameters) -> str:
     match code:
         case "outstanding":
-            numbers = ", ".join(map(str, record.outstanding or ()))
+            numbers = _listed(record.outstanding or ())
             return _(
                 "The part was cut before correction %(numbers)s took effect: its deviation of %(raw)s counts as %(decided)s."
             ) % {"numbers": numbers, "raw": signed(record.deviation), "decided": signed(record.decided)}
@@ -188,6 +190,13 @@ def _note(code: str, record: Record, parameters: Parameters) -> str:
             }
         case _:
             return _("It came late: a later measurement had arrived before it.")
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    """The numbers as a sentence lists them; of many only the first, for the reading itself lists them all."""
+    named = ", ".join(map(str, numbers[:NAMED_AT_MOST]))
+    more = len(numbers) - NAMED_AT_MOST
+    return _("%(numbers)s and %(n)s more") % {"numbers": named, "n": more} if more > 0 else named
 
 
 def touch_problem(error: TouchError) -> str:
