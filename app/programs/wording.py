@@ -59,6 +59,7 @@ def note(said: Note) -> str:
         "r44_for_r34": _("R44 is taken for R34, as the manual misprints it; check that it is the averaging limit"),
         "skip_block": _("The block begins with /: on the control it is left out while block skip is on"),
         "not_used": _("{r} is not used here"),
+        "no_tool": _("No tool is named (R10): as it stands it measures only, and nothing is corrected"),
         "l75_missing": _("L75 is not called; target and tolerance are computed from R40, R41 and R42 all the same"),
         "l75_wins": _("{r} is computed anew by L75, so this value does not count"),
         "two_point": _("{r} does not count, because R24 asks for two points"),

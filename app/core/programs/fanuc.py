@@ -232,6 +232,8 @@ def _complete(parameters: dict[str, Any], notes: list[Note]) -> None:
         if name not in parameters:
             parameters[name] = value
             notes.append(Note("assumed", {"name": name, "value": value}))
+    if "tool_memory" not in parameters:  # R10 = 0 corrects nothing, which nobody means by the macro of this line
+        notes.append(Note("no_tool", {}))
 
 
 def read(text: str) -> ProgramText:

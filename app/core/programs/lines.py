@@ -36,9 +36,9 @@ class Note(NamedTuple):
     """Something said about a line or a program: a code with values, worded at the edge.
 
     Taken: ``assigned``, ``setting``, ``call``, ``result``. Warnings about what was taken: ``r44_for_r34``, ``again``,
-    ``skip_block``, ``not_used``, ``macro``, ``assumed``, ``l75_missing``, ``l75_wins``, ``two_point``. Passed over:
-    ``comment``, ``empty``, ``words``, ``computed``. Not understood: ``expression``, ``no_value``, ``placeholder``,
-    ``unknown_r``, ``unknown``, ``too_large``, ``too_long``, ``bad_setting``.
+    ``skip_block``, ``not_used``, ``macro``, ``assumed``, ``l75_missing``, ``l75_wins``, ``two_point``,
+    ``no_tool``. Passed over: ``comment``, ``empty``, ``words``, ``computed``. Not understood: ``expression``,
+    ``no_value``, ``placeholder``, ``unknown_r``, ``unknown``, ``too_large``, ``too_long``, ``bad_setting``.
     """
 
     code: str
@@ -48,6 +48,7 @@ class Note(NamedTuple):
 TAKEN = frozenset({"assigned", "setting", "call", "result"})
 WARNINGS = frozenset(
     {"r44_for_r34", "again", "skip_block", "not_used", "macro", "assumed", "l75_missing", "l75_wins", "two_point"}
+    | {"no_tool"}  # of the whole program
 )
 NOT_UNDERSTOOD = frozenset(
     {"expression", "no_value", "placeholder", "unknown_r", "unknown", "too_large", "too_long", "bad_setting"}

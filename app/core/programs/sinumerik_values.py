@@ -50,6 +50,8 @@ class _Assembly:
             parameters = {}
         else:
             parameters = self._measuring()
+            if kind is ProgramKind.MEASURING and "tool_memory" not in parameters:
+                self.notes.append(Note("no_tool", {}))
         return Program(
             kind,
             self.built.first_line,

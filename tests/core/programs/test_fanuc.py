@@ -199,3 +199,11 @@ def test_much_of_anything_is_answered_quickly() -> None:
     for piece in ("#505=#", "X[", "[[[[", "IF", "G65P1A1.", "#[1]=", "(", "#5 = ", "N1 "):
         text = "\n".join(piece * (900 // len(piece)) for _ in range(60))
         assert len(fanuc.read(text).lines) == 60
+
+
+def test_a_text_that_names_no_tool_says_that_nothing_would_be_corrected() -> None:
+    drawing = "#505=25.\n#506=0.021\n#507=0.\n"
+    for text, said in ((drawing, True), (f"{drawing}G65 P9011 A4.", False)):
+        program = fanuc.read(text).program
+        assert program is not None
+        assert ("no_tool" in [note.code for note in program.notes]) is said

@@ -218,7 +218,7 @@ def test_l75_wins_over_a_target_and_a_target_over_a_drawing_without_it() -> None
     assert codes(without, 2)[-3:] == ["not_used"] * 3
     alone = sinumerik.read(f"{drawing}\nL93").program
     assert alone is not None
-    assert [note.code for note in alone.notes] == ["l75_missing"]
+    assert [note.code for note in alone.notes] == ["l75_missing", "no_tool"]
 
 
 def test_a_second_cycle_finds_what_was_assigned_for_the_first() -> None:
