@@ -159,7 +159,8 @@ def enter(
                 number = actions.calibrate_ring(session, shown, ringed, caller).row.record.number
     except Invalid as error:
         return _place(request, session, caller, machine, place, form=form, error=error)
-    return RedirectResponse(address(machine, place, done=verb or "calibrated", n=number), 303)
+    done = verb if verb in {"plan", "pairs"} else "calibrated"  # whatever else the form said
+    return RedirectResponse(address(machine, place, done=done, n=number), 303)
 
 
 def _add_pairs(session: Session, machine: Any, location: int, given: list[PairIn], caller: Caller) -> int:

@@ -54,6 +54,10 @@ class TestWithoutScripts:
         assert place(shop) in shown
         assert probe(shop) in shown
 
+    def test_a_form_that_says_what_nobody_knows_is_a_calibration(self, shop: Shop, operator: Person) -> None:
+        """What was stored is never answered by an error."""
+        assert "Calibration 1 is stored" in operator.send(place(shop), **GAUGE | {"do": "x" * 5000})
+
     def test_a_calibration_is_typed_in_and_accepted(self, shop: Shop, operator: Person) -> None:
         assert "Nobody has calibrated this yet" in operator.open(place(shop))
         text = operator.send(place(shop), **GAUGE)

@@ -1,9 +1,11 @@
 """Program text over REST: read, written, made into a characteristic, and back."""
 
+import time
 from typing import Any
 
 import pytest
 
+from app.programs.queries import guessed
 from tests.shop import Shop
 
 L15 = """L15
@@ -32,6 +34,14 @@ def written(shop: Shop, key: str, status: int = 200, **query: Any) -> str:
     answer = shop.admin.get(f"/api/v1/characteristics/{key}/program", params=query)
     assert answer.status_code == status, answer.text
     return answer.text
+
+
+def test_the_control_is_guessed_at_once_however_many_lines_look_like_it() -> None:
+    """Nothing else runs while a text is searched: thousands of lines must not each be searched to the end of the text."""
+    begun = time.perf_counter()
+    assert guessed(("#" + " " * 14 + "\n") * 4000) == "sinumerik"
+    assert time.perf_counter() - begun < 1
+    assert guessed("%\nO9011 (BORE)\nN5 # 505 = 40.\n") == "fanuc"
 
 
 class TestReading:
