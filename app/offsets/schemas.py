@@ -38,7 +38,7 @@ CORRECTION: dict[str, JsonValue] = {
     "fetched_by": None,
     "reason": {
         "code": "full_deviation",
-        "text": "Deviation +6.1 µm is beyond the averaging limit 5.3 µm: corrected in full.",
+        "text": "Deviation 6.1 µm is beyond the averaging limit 5.3 µm: corrected in full.",
         "notes": [],
     },
     "note": None,

@@ -84,7 +84,7 @@ ANSWER: dict[str, JsonValue] = {
     "alarms": [],
     "reason": {
         "code": "full_deviation",
-        "text": "Deviation +6.1 µm is beyond the averaging limit 5.3 µm: corrected in full.",
+        "text": "Deviation 6.1 µm is beyond the averaging limit 5.3 µm: corrected in full.",
         "notes": [],
     },
     "parameters_version": 4,

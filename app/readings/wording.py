@@ -20,12 +20,6 @@ def um(length: float) -> str:
     return f"{text} µm".replace("-", "\N{MINUS SIGN}")
 
 
-def signed(deviation: float) -> str:
-    """A deviation in µm as it is read in a sentence, with its sign, zero too: ``+6.1 µm``."""
-    text = um(deviation)
-    return text if text.startswith("\N{MINUS SIGN}") else f"+{text}"
-
-
 def reason(record: Record, parameters: Parameters, amount: float | None = None) -> dict[str, Any]:
     """Code, sentence and notes on one decision; `amount` (mm) is that of the correction it led to, if any."""
     notes = [code for code, applies in _notes(record, parameters, amount) if applies]
@@ -67,9 +61,7 @@ class _Values(dict[str, str]):
 
     def __missing__(self, name: str) -> str:
         made = _WORDED[name](self.record, self.parameters)
-        if not isinstance(made, float):
-            return str(made)
-        return signed(made) if name in _SIGNED else um(made)
+        return um(made) if isinstance(made, float) else str(made)
 
 
 def _of_reading(name: str) -> Callable[[Record, Parameters], Any]:
@@ -80,7 +72,6 @@ def _of_parameters(name: str) -> Callable[[Record, Parameters], Any]:
     return lambda _record, parameters: getattr(parameters, name)
 
 
-_SIGNED = frozenset({"deviation", "raw", "average", "averaged"})
 _WORDED: dict[str, Callable[[Record, Parameters], float | int | None]] = {
     "deviation": _of_reading("decided"),
     "raw": _of_reading("deviation"),
@@ -174,18 +165,16 @@ def _note(code: str, record: Record, parameters: Parameters) -> str:
             numbers = _listed(record.outstanding or ())
             return _(
                 "The part was cut before correction %(numbers)s took effect: its deviation of %(raw)s counts as %(decided)s."
-            ) % {"numbers": numbers, "raw": signed(record.deviation), "decided": signed(record.decided)}
+            ) % {"numbers": numbers, "raw": um(record.deviation), "decided": um(record.decided)}
         case "part_out_of_tolerance":
-            return _("The part itself is out of tolerance by its deviation of %(raw)s.") % {
-                "raw": signed(record.deviation)
-            }
+            return _("The part itself is out of tolerance by its deviation of %(raw)s.") % {"raw": um(record.deviation)}
         case "clamped":
             return _("The correction is limited to the largest step %(step)s.") % {
                 "step": um(parameters.max_step or 0.0)
             }
         case "empirical_value":
             return _("The empirical value %(value)s (R11 = %(location)s) is taken off.") % {
-                "value": signed(empirical_value(record, parameters)),
+                "value": um(empirical_value(record, parameters)),
                 "location": parameters.average_memory,
             }
         case _:

@@ -75,7 +75,7 @@ class TestGauge:
         answer = shop.read(20.5)
         assert answer["deviation"] == 0.0005
         assert answer["reason"]["notes"] == ["empirical_value"]
-        assert "empirical value +20.0 µm (R11 = 5)" in answer["reason"]["text"]
+        assert "empirical value 20.0 µm (R11 = 5)" in answer["reason"]["text"]
 
     def test_numbers_count_per_machine_and_the_list_has_them_all(self, shop: Shop) -> None:
         numbers = [calibrate(shop)["number"], ring(shop)["number"], calibrate(shop, average_memory=6)["number"]]

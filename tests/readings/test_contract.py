@@ -67,7 +67,7 @@ class TestZones:
             "alarms": [],
             "reason": {
                 "code": "within_zero_range",
-                "text": "Deviation +1.0 µm is within the zero range 1.0 µm: no correction, the average is kept.",
+                "text": "Deviation 1.0 µm is within the zero range 1.0 µm: no correction, the average is kept.",
                 "notes": [],
             },
             "parameters_version": 1,

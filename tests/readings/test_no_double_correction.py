@@ -87,7 +87,7 @@ def test_a_step_is_corrected_once_however_long_the_pipeline(shop: Shop, delay: i
         assert (answer["deviation"], answer["decided_deviation"], answer["outstanding"]) == (0.007, 0.0, [1])
         assert (answer["zone"], answer["action"]) == ("zero", "none")
         assert answer["reason"]["notes"] == ["outstanding"]
-        assert "before correction 1 took effect: its deviation of +7.0 µm counts as +0.0 µm" in answer["reason"]["text"]
+        assert "before correction 1 took effect: its deviation of 7.0 µm counts as 0.0 µm" in answer["reason"]["text"]
     for answer in answers[delay + 1 :]:
         assert (answer["deviation"], answer["outstanding"]) == (0.0, [])
     stored = history(shop.server.database.dsn, shop.characteristic)
