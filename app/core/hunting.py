@@ -26,8 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
-from scipy.special import ndtr
+from scipy.special import betainc, ndtr
 
 Values = NDArray[np.float64]
 
@@ -178,8 +177,13 @@ def judge(sizes: Sequence[float], readings: int, scatter: float, settings: Setti
 
 
 def _at_least(count: int, mean: float) -> float:
-    """The probability of so many or more, of a negative binomial with this mean and `DISPERSION` times its variance."""
-    return float(stats.nbinom.sf(count - 1, max(mean, 1e-9) / (DISPERSION - 1), 1 / DISPERSION))
+    """The probability of so many or more, of a negative binomial with this mean and `DISPERSION` times its variance.
+
+    With n = mean / (`DISPERSION` - 1) and p = 1 / `DISPERSION` it is the incomplete beta function I(1 - p; count, n).
+    """
+    if count <= 0:
+        return 1.0
+    return float(betainc(count, max(mean, 1e-9) / (DISPERSION - 1), 1 - 1 / DISPERSION))
 
 
 def _lowest(holds: Callable[[int], bool], low: int, high: int) -> int | None:

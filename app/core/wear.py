@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import fdtrc, stdtrit
 
 from app.core.parameters import Parameters
 
@@ -82,7 +82,7 @@ class Fit:
     @property
     def quantile(self) -> float:
         """Student's t for `LEVEL`."""
-        return float(stats.t.ppf((1 + LEVEL) / 2, max(1.0, self.effective - 2)))
+        return float(stdtrit(max(1.0, self.effective - 2), (1 + LEVEL) / 2))
 
     @property
     def slope_interval(self) -> tuple[float, float]:
@@ -320,4 +320,4 @@ def _breaks(x: Values, y: Values) -> bool:
         return whole > 1e-18 * len(x)
     rho = _nearby(y)
     f = (whole - parts) / 2 / (parts / (len(x) - 4)) * (1 - rho) / (1 + rho)
-    return bool(stats.f.sf(f, 2, len(x) - 4) < BREAK)
+    return bool(fdtrc(2, len(x) - 4, f) < BREAK)

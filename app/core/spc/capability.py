@@ -18,8 +18,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
-from scipy.special import ndtr, ndtri
-from scipy.stats import binom, chi2
+from scipy.special import bdtrc, gammaincinv, ndtr, ndtri
 
 from app.core.spc.constants import NODES, WEIGHTS
 from app.core.spc.normality import FEWEST_FOR_ANDERSON, anderson_darling
@@ -157,9 +156,14 @@ def _spread_index(limits: Limits, sigma: Sigma, confidence: float) -> Index | No
 def _chi_square(value: float, freedom: float, confidence: float) -> tuple[float, float]:
     tail = (1 - confidence) / 2
     return (
-        value * sqrt(float(chi2.ppf(tail, freedom)) / freedom),
-        value * sqrt(float(chi2.ppf(1 - tail, freedom)) / freedom),
+        value * sqrt(_chi2(tail, freedom) / freedom),
+        value * sqrt(_chi2(1 - tail, freedom) / freedom),
     )
+
+
+def _chi2(share: float, freedom: float) -> float:
+    """The quantile of chi-square: twice that of a gamma distribution with half the degrees of freedom."""
+    return 2 * float(gammaincinv(freedom / 2, share))
 
 
 def _centred_index(limits: Limits, mean: float, sigma: Sigma, readings: int, confidence: float) -> Index:
@@ -187,9 +191,10 @@ def _noncentral(value: float, readings: int, freedom: float, confidence: float) 
     """
     scale = 3 * sqrt(readings)
     near, tail = value * scale, (1 - confidence) / 2
-    low, high = (sqrt(float(chi2.ppf(q, freedom)) / freedom) for q in (1e-15, 1 - 1e-15))
+    low, high = (sqrt(_chi2(q, freedom) / freedom) for q in (1e-15, 1 - 1e-15))
     s = (low + high) / 2 + (high - low) / 2 * NODES
-    density = WEIGHTS * chi2.pdf(s * s * freedom, freedom) * s
+    logarithm = (freedom - 1) * np.log(s) - s * s * freedom / 2  # of the density of S, but for a constant
+    density = WEIGHTS * np.exp(logarithm - logarithm.max())
     density /= density.sum()
 
     def bound(share: float) -> float:
@@ -238,7 +243,7 @@ def observed_ppm(limits: Limits, values: Floats) -> float:
 def in_control(values: Floats, mean: float, within: Sigma) -> bool:
     """Whether no more readings lie beyond 3 sigma than chance brings in 999 of 1000 cases (binomial, 0.27 % each)."""
     beyond = int((np.abs(values - mean) > 3 * within.value).sum())
-    return beyond <= int(binom.ppf(0.999, len(values), 2 * ndtr(-3.0)))
+    return float(bdtrc(beyond - 1, len(values), 2 * ndtr(-3.0))) > 0.001
 
 
 def looks_normal(values: Floats) -> bool:

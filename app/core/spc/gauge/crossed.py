@@ -10,7 +10,7 @@ from math import nan, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from app.core.spc.constants import d2, d2_star
 from app.core.spc.refusal import Floats, Reason, Refused
@@ -160,7 +160,7 @@ def _tested(squares: float, freedom: int, error: float, freedom_error: int) -> t
     if freedom == 0 or freedom_error == 0 or not error > 0:
         return nan, nan
     ratio = (squares / freedom) / (error / freedom_error)
-    return ratio, float(fisher.sf(ratio, freedom, freedom_error))
+    return ratio, float(fdtrc(freedom, freedom_error, ratio))
 
 
 def _study(

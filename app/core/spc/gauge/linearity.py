@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import t as student
+from scipy.special import stdtr, stdtrit
 
 from app.core.spc.refusal import Reason, Refused, checked
 from app.core.spc.spread import mean_of
@@ -43,7 +43,7 @@ class Linearity:
         Where the band leaves 0 out, the gauge is biased at that size.
         """
         value = self.intercept.value + self.slope.value * reference
-        reach = float(student.ppf((1 + self.confidence) / 2, self.readings - 2)) * self.s
+        reach = float(stdtrit(self.readings - 2, (1 + self.confidence) / 2)) * self.s
         reach *= sqrt(1 / self.readings + (reference - self._mean) ** 2 / self._squares)
         return value, value - reach, value + reach
 
@@ -86,4 +86,4 @@ def linearity(studies: Mapping[float, ArrayLike], *, confidence: float = 0.95) -
 
 
 def _tested(value: float, error: float, freedom: int) -> Coefficient:
-    return Coefficient(value, error, value / error, float(2 * student.sf(abs(value / error), freedom)))
+    return Coefficient(value, error, value / error, float(2 * stdtr(freedom, -abs(value / error))))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import sqrt
 
 from numpy.typing import ArrayLike
-from scipy.stats import t as student
+from scipy.special import stdtr, stdtrit
 
 from app.core.spc.refusal import Reason, Refused, checked
 from app.core.spc.spread import mean_of, overall
@@ -47,7 +47,7 @@ def bias(values: ArrayLike, reference: float, *, confidence: float = 0.95, minim
         raise Refused(Reason.NO_VARIATION)
     off = mean_of(x) - reference
     error = sigma / sqrt(len(x))
-    reach = float(student.ppf((1 + confidence) / 2, len(x) - 1)) * error
+    reach = float(stdtrit(len(x) - 1, (1 + confidence) / 2)) * error
     return Bias(
         readings=len(x),
         mean=mean_of(x),
@@ -55,7 +55,7 @@ def bias(values: ArrayLike, reference: float, *, confidence: float = 0.95, minim
         repeatability=sigma,
         standard_error=error,
         t=off / error,
-        p_value=float(2 * student.sf(abs(off / error), len(x) - 1)),
+        p_value=float(2 * stdtr(len(x) - 1, -abs(off / error))),
         low=off - reach,
         high=off + reach,
     )
