@@ -210,7 +210,7 @@ def free_port() -> int:
         return port
 
 
-def wait_ready(url: str, process: subprocess.Popen[bytes], stderr: Path, seconds: float = 60) -> None:
+def wait_ready(url: str, process: subprocess.Popen[bytes], stderr: Path, seconds: float = 180) -> None:
     """Until ``/health/ready`` says 200."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:

@@ -230,6 +230,7 @@ class TestOverHttp:
     @pytest.mark.parametrize("body", [{"role": "king"}, {"disabled": "maybe"}, {"name": "x"}, [], None])
     def test_bad_changes_of_people_are_refused(self, server: Any, body: Any) -> None:
         client = server.client(server.key())
+        server.person(f"Changed to {body}", "viewer", PASSWORD)
         person = client.get("/api/v1/people").json()["items"][0]
         assert client.patch(f"/api/v1/people/{person['id']}", json=body).status_code == 422
         assert client.get(f"/api/v1/people/{person['id']}").json() == person
