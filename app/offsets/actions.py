@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session
 from app.alarms.tables import Alarm
 from app.audit.actions import record
 from app.core.compensation import DECIMALS
+from app.core.zones import Zone
 from app.db.events import publish
 from app.errors import Conflict
 from app.machines.queries import lock_machines
@@ -24,7 +25,8 @@ from app.offsets.news import average_changed, correction_changed, tool_changed
 from app.offsets.sisters import on_tool, switch_to_sister
 from app.offsets.tables import OPEN, AverageMemory, Correction, Tool, ToolEvent
 from app.people.callers import Caller
-from app.readings.tables import Stream
+from app.readings import queries as reading_queries
+from app.readings.tables import Reading, Stream
 from app.web.i18n import _
 
 __all__ = ["on_tool", "switch_to_sister"]  # so that the others find them with what else is done to tools
@@ -73,6 +75,14 @@ def decide(
             _("Take the text back and make sure that it was not run; then reject it with although_fetched = true."),
             correction_status=correction.status,
             fetched_at=correction.fetched_at.isoformat(),
+        )
+    if verb == "release" and _disproved(session, correction):
+        raise Conflict(
+            _(
+                "Parts measured since lie within the wear limit again: {number} of {amount} mm would spoil the next one."
+            ).format(number=correction.number, amount=f"{correction.amount:+.4f}"),
+            _("Reject the correction, and look at the reading that led to it: one bad touch looks like a worn tool."),
+            correction_status=correction.status,
         )
     before = correction.status
     correction.status, correction.reason = INTO[verb], reason
@@ -244,6 +254,17 @@ def restart_averages(session: Session, machine: Machine, locations: Sequence[int
         .execution_options(synchronize_session=False)
     )
     return sorted(begun)
+
+
+def _disproved(session: Session, correction: Correction) -> bool:
+    """Whether a held correction of the wear zone is spoken against by the parts measured since."""
+    at = (correction.machine_id, correction.characteristic_id, correction.sequence)
+    zone = session.scalar(
+        select(Reading.zone).where(
+            Reading.machine_id == at[0], Reading.characteristic_id == at[1], Reading.sequence == at[2]
+        )
+    )
+    return zone == Zone.WEAR and reading_queries.within_wear_since(session, *at)
 
 
 def _wear_alarm(session: Session, correction: Correction) -> int | None:

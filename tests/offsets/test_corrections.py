@@ -170,6 +170,15 @@ class TestDecided:
         assert answer["decided_by"].startswith("key ")
         assert shop.correction(number, "applied")["status"] == "applied"
 
+    def test_what_parts_measured_since_speak_against_is_not_released(self, shop: Shop) -> None:
+        """One bad touch of 350 µm, and an edge that cuts well: released, it would spoil the next part."""
+        number = shop.read(350.0)["correction"]["number"]
+        shop.read(0.3)
+        problem = shop.correction(number, "release", 409, reason="go on")
+        assert "within the wear limit again" in problem["detail"]
+        assert shop.correction(number)["status"] == "held"
+        shop.correction(number, "rejected", reason="chip on the stylus")
+
     def test_release_says_that_the_alarm_is_still_active(self, shop: Shop) -> None:
         number = held(shop)
         (alarm,) = shop.alarms()
