@@ -276,7 +276,8 @@ class Place:
             "POST",
             f"/machines/{shop.machine}/calibrations",
             201,
-            **BODIES["POST /api/v1/machines/{machine}/calibrations"] | {"average_memory": 6, "touches": [25.002, 25.0022], "key": None},
+            **BODIES["POST /api/v1/machines/{machine}/calibrations"]
+            | {"average_memory": 6, "touches": [25.002, 25.0022], "key": None},
         )
         pairs = [  # enough of them to suggest 0.001
             shop.call(
