@@ -90,7 +90,7 @@ def sign_out(session: Session, token: str) -> None:
 
 def _note_attempt(session: Session, name: str, address: str) -> int:
     for lock in sorted({_lock_number(name), _lock_number(address)}):
-        session.execute(select(func.pg_advisory_xact_lock(7291, lock)))
+        session.execute(select(func.pg_advisory_xact_lock(7292, lock)))  # a class of their own: 7291 is the house's
     session.execute(delete(LoginFailure).where(LoginFailure.at < func.now() - timedelta(days=1)))
     found = queries.failures(session, name, address, COUNTED)
     wait = max(_wait(found.pair, FREE["pair"]), _wait(found.address, FREE["address"]), _wait(found.name, FREE["name"]))
@@ -109,8 +109,7 @@ def _note_attempt(session: Session, name: str, address: str) -> int:
 
 
 def _lock_number(text: str) -> int:
-    # 7291, 1 is the lock of the journal of events.
-    return 2 + zlib.crc32(text.encode()) % 2_000_000_000
+    return zlib.crc32(text.encode()) % 2_000_000_000
 
 
 def _wait(failed: int, free: int) -> float:
