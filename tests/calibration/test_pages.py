@@ -157,7 +157,7 @@ class TestWithoutScripts:
         operator.send(f"{place(shop)}/accept/1", reason="Stylus replaced")
         shop.read(20.5)
         text = operator.open(f"/characteristics/{shop.characteristic}/readings/1")
-        assert "+20.0 µm</a>, set by" in text
+        assert ">+20.0" in text
         assert f"{operator.name}" in text
         assert "Calibration 1: Stylus replaced" in text
         assert place(shop) in text
