@@ -92,7 +92,10 @@ def test_of_two_processes_one_goes_the_rounds_and_the_other_takes_over(database:
 
 def test_a_connection_that_breaks_is_made_anew(database: Database, caplog: pytest.LogCaptureFixture) -> None:
     count = Count()
-    cut = text("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = 'inband-rounds'")
+    cut = text(
+        "SELECT pg_terminate_backend(pid) FROM pg_stat_activity"
+        " WHERE application_name = 'inband-rounds' AND datname = current_database()"
+    )
 
     async def interrupted() -> None:
         rounds = Rounds(database, [count.by("one")], every=0.02)

@@ -65,7 +65,9 @@ def test_the_pages_say_it(shop: Shop, server: Server) -> None:
         address, name="L", control="fanuc", signal_path="plc", signal_delay="0,25", signal_jitter="", probing_feed="150"
     )
     assert "0.625 µm" in page
-    assert "0.625 µm on this machine" in engineer.open(f"/setup/characteristics/{shop.characteristic}")
+    assert "below 0.625 µm makes no sense on this machine" in engineer.open(
+        f"/setup/characteristics/{shop.characteristic}"
+    )
     assert "150 mm/min × 0.25 ms" in engineer.open(f"/characteristics/{shop.characteristic}")
     shown = engineer.send(
         address,
