@@ -167,11 +167,13 @@ def test_a_chart_that_cannot_be_fetched_says_so_in_words(open_page: OpenPage, sh
 
 
 def test_the_keyboard_is_enough(open_page: OpenPage) -> None:
-    with open_page("/") as page:
+    with open_page("/chart") as page:
         page.keyboard.press("Tab")
         assert page.evaluate("document.activeElement.className") == "skip-link"
         page.keyboard.press("Enter")
         assert page.evaluate("document.activeElement.id") == "main"
+    with open_page("/") as page:
+        assert page.evaluate("document.activeElement.ariaInvalid") == "true", "the first field that is wrong"
         page.get_by_role("button", name="Acknowledge").focus()
         page.keyboard.press("Enter")
         expect(page.get_by_role("dialog")).to_be_visible()
