@@ -5,6 +5,7 @@ readings cost little more than ten thousand, and no extreme is thinned away.
 """
 
 from app.statistics.queries.course import Course, course_of, moments_of
+from app.statistics.queries.history import History, history_of
 from app.statistics.queries.numbers import MOST_IN_HISTOGRAM, Numbers, histogram_of, numbers_of
 from app.statistics.queries.pyramid import Block
 from app.statistics.queries.results import (
@@ -20,11 +21,13 @@ __all__ = [
     "MOST_IN_HISTOGRAM",
     "Block",
     "Course",
+    "History",
     "Numbers",
     "Rejects",
     "Window",
     "course_of",
     "histogram_of",
+    "history_of",
     "moments_of",
     "numbers_of",
     "rejects_by_characteristic",

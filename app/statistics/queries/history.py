@@ -1,0 +1,132 @@
+"""A long run of readings as columns: a million of them in the time the server needs to walk through them.
+
+The server packs a column of some thousand readings into one string of bytes (`float8send`, `int8send`), and NumPy takes
+it as it is. Row by row it would be ten times as long, nearly all of it spent on making Python objects.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import text
+from sqlalchemy.orm import Session
+
+from app.characteristics.tables import Characteristic
+from app.core.zones import Zone
+from app.errors import Invalid
+from app.statistics.queries.course import excluded_of
+from app.statistics.queries.window import Window
+from app.web.i18n import _
+
+BLOCK = 8_192  # readings in one string
+MOST_AT_ONCE = 10_000_000  # readings: 80 MB a column
+
+Floats = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+# What can be had: how it is sent, how NumPy reads it. A missing float is NaN, a missing whole number or moment -1.
+_FLOAT, _WHOLE, _SMALL, _FLAG = ">f8", ">i8", ">i4", "?"
+_ZONES = " ".join(f"WHEN '{zone.value}' THEN {number}" for number, zone in enumerate(Zone))
+COLUMNS: dict[str, tuple[str, str]] = {
+    "sequence": ("int8send(r.sequence)", _WHOLE),
+    "measured": ("float8send(r.measured)", _FLOAT),
+    "deviation": ("float8send(r.deviation)", _FLOAT),
+    "decided": ("float8send(r.decided)", _FLOAT),
+    "average_before": ("float8send(r.average_before)", _FLOAT),
+    "average_after": ("float8send(r.average_after)", _FLOAT),
+    "compensated": ("float8send(coalesce(r.compensated, 'NaN'))", _FLOAT),
+    "measured_at": ("timestamptz_send(r.measured_at)", _WHOLE),
+    "received_at": ("timestamptz_send(r.received_at)", _WHOLE),
+    "machined_at": ("coalesce(timestamptz_send(r.machined_at), int8send(-9223372036854775807))", _WHOLE),
+    "parameters_version": ("int4send(r.parameters_version)", _SMALL),
+    "correction_in_effect": ("int4send(coalesce(r.correction_in_effect, -1))", _SMALL),
+    "correction": ("int4send(coalesce(r.correction, -1))", _SMALL),
+    "paused": ("boolsend(r.paused_by IS NOT NULL)", _FLAG),
+    "zone": (f"int4send(CASE r.zone {_ZONES} END)", _SMALL),
+}
+"""Columns of `reading` by name; zone is the place of the zone in `app.core.zones.Zone`."""
+MOMENTS = frozenset({"measured_at", "received_at", "machined_at"})
+POSTGRES_EPOCH = np.datetime64("2000-01-01T00:00:00", "us")
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """Readings as columns, ascending by sequence; lengths in mm, moments as datetime64[us] in UTC (NaT where unknown).
+
+    `columns` holds what was asked for, `sequence` always. `excluded` is True for readings taken out of the statistics.
+    """
+
+    columns: dict[str, NDArray[Any]]
+    excluded: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.excluded)
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.columns[name]
+
+    @property
+    def counted(self) -> "History":
+        """Without the excluded readings."""
+        return self.only(~self.excluded) if self.excluded.any() else self
+
+    def only(self, wanted: NDArray[np.bool_]) -> "History":
+        """Those readings for which `wanted` is True."""
+        return History({name: values[wanted] for name, values in self.columns.items()}, self.excluded[wanted])
+
+
+def history_of(
+    session: Session,
+    characteristic: Characteristic,
+    window: Window,
+    columns: Iterable[str] = ("deviation",),
+    *,
+    start: datetime | None = None,
+    end: datetime | None = None,
+) -> History:
+    """The readings of the window, those measured from `start` to `end` where these are given; excluded ones are marked.
+
+    columns: names of `COLUMNS`; `sequence` comes in any case. Raises `Invalid` for more than ten million readings.
+    """
+    if window.count > MOST_AT_ONCE:
+        raise Invalid(
+            _("These are {count} readings; at most {most} can be worked on at once.").format(
+                count=window.count, most=MOST_AT_ONCE
+            ),
+            _("Choose a shorter period, or the last so many readings."),
+        )
+    names = list(dict.fromkeys(["sequence", *columns]))
+    packed = ", ".join(f"string_agg({COLUMNS[name][0]}, ''::bytea)" for name in names)
+    query = f"""
+        SELECT {packed} FROM (
+            SELECT * FROM reading
+            WHERE machine_id = :machine AND characteristic_id = :characteristic AND sequence BETWEEN :first AND :last
+            {"AND measured_at >= :start" if start is not None else ""} {"AND measured_at <= :end" if end is not None else ""}
+            ORDER BY sequence
+        ) r GROUP BY r.sequence / {BLOCK} ORDER BY r.sequence / {BLOCK}
+    """  # noqa: S608 - made of our own names
+    bounds: dict[str, Any] = {"machine": characteristic.machine_id, "characteristic": characteristic.id}
+    bounds |= {"first": window.first, "last": window.last}
+    bounds |= {name: value for name, value in (("start", start), ("end", end)) if value is not None}
+    rows = session.execute(text(query), bounds).all() if window.count else []
+    found: dict[str, NDArray[Any]] = {}
+    for at, name in enumerate(names):
+        kind = COLUMNS[name][1]
+        raw = np.frombuffer(b"".join(row[at] for row in rows), kind)
+        values = raw.astype(np.dtype(kind).newbyteorder("="))
+        found[name] = _moments(values) if name in MOMENTS else values
+    if (np.diff(found["sequence"]) < 0).any():  # an aggregate promises no order; one made by several processes has none
+        order = np.argsort(found["sequence"])
+        found = {name: values[order] for name, values in found.items()}
+    left_out = excluded_of(session, characteristic, window.first, window.last) if window.count else ()
+    return History(found, np.isin(found["sequence"], np.array(left_out, np.int64)))
+
+
+def _moments(microseconds: Whole) -> NDArray[np.datetime64]:
+    """Microseconds since 2000-01-01 as moments; the number that stands for none becomes NaT."""
+    moments = POSTGRES_EPOCH + microseconds.astype("timedelta64[us]")
+    moments[microseconds == np.iinfo(np.int64).min + 1] = np.datetime64("NaT")
+    return moments

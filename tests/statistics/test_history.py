@@ -1,0 +1,98 @@
+"""A history as columns is what the readings are, one by one."""
+
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import psycopg
+import pytest
+from sqlalchemy import select, text
+from sqlalchemy.orm import Session
+
+from app.characteristics import queries as characteristics
+from app.core.zones import Zone
+from app.errors import Invalid
+from app.readings.tables import Reading
+from app.statistics import queries
+from app.statistics.queries.history import BLOCK, COLUMNS, MOST_AT_ONCE, POSTGRES_EPOCH
+from app.statistics.queries.window import Window
+from bench.plant import PARAMETERS
+from bench.readings import fill
+from tests.conftest import Server
+from tests.shop import Shop
+
+COUNT = 2 * BLOCK + 77
+
+
+@pytest.fixture(scope="module")
+def filled(server: Server) -> str:
+    shop = Shop(server)
+    parameters = PARAMETERS | {"tool_memory": 3}
+    shop.call("POST", "/characteristics", 201, key="long", name="long", machine=shop.machine, parameters=parameters)
+    with psycopg.connect(server.database.dsn, autocommit=True) as connection:
+        fill(connection, "long", COUNT)
+    with server.database.begin() as session:
+        session.execute(
+            text("""INSERT INTO exclusion (machine_id, characteristic_id, sequence, actor, reason)
+                    SELECT machine_id, id, 78, 'a', 'b' FROM characteristic WHERE key = 'long'""")
+        )
+    return "long"
+
+
+def rows_of(session: Session, key: str, window: Window) -> list[Reading]:
+    standing = characteristics.characteristic_named(session, key)
+    query = select(Reading).where(
+        Reading.characteristic_id == standing.characteristic.id, Reading.sequence.between(window.first, window.last)
+    )
+    return list(session.scalars(query.order_by(Reading.sequence)))
+
+
+def test_every_column_says_what_the_rows_say(server: Server, filled: str) -> None:
+    with server.database.begin() as session:
+        characteristic = characteristics.characteristic_named(session, filled).characteristic
+        window = Window(5, COUNT - 3, COUNT)
+        history = queries.history_of(session, characteristic, window, COLUMNS)
+        rows = rows_of(session, filled, window)
+    assert len(history) == len(rows) == COUNT - 7
+    zones = list(Zone)
+    for name in COLUMNS:
+        if name in {"measured_at", "received_at", "machined_at"}:
+            told = [None if np.isnat(moment) else moment.item().replace(tzinfo=UTC) for moment in history[name]]
+            assert told == [getattr(row, name) for row in rows]
+        elif name == "zone":
+            assert [zones[number].value for number in history[name]] == [row.zone for row in rows]
+        elif name == "paused":
+            assert history[name].tolist() == [row.paused_by is not None for row in rows]
+        elif name == "compensated":
+            expected = np.array([np.nan if row.compensated is None else row.compensated for row in rows])
+            np.testing.assert_array_equal(history[name], expected)
+        else:
+            assert history[name].tolist() == [-1 if getattr(row, name) is None else getattr(row, name) for row in rows]
+
+
+def test_excluded_readings_are_marked_and_left_out_when_counted(server: Server, filled: str) -> None:
+    with server.database.begin() as session:
+        characteristic = characteristics.characteristic_named(session, filled).characteristic
+        history = queries.history_of(session, characteristic, Window(70, 80, COUNT))
+    assert history["sequence"][history.excluded].tolist() == [78]
+    assert history.counted["sequence"].tolist() == [70, 71, 72, 73, 74, 75, 76, 77, 79, 80]
+
+
+def test_a_period_takes_what_was_measured_in_it(server: Server, filled: str) -> None:
+    with server.database.begin() as session:
+        characteristic = characteristics.characteristic_named(session, filled).characteristic
+        whole = Window(1, COUNT, COUNT)
+        every = queries.history_of(session, characteristic, whole, ["measured_at"])
+        start = every["measured_at"][9].item().replace(tzinfo=UTC)
+        found = queries.history_of(session, characteristic, whole, start=start, end=start + timedelta(seconds=4))
+        assert found["sequence"].tolist() == [10, 11, 12, 13, 14]
+        nothing = queries.history_of(session, characteristic, whole, COLUMNS, start=datetime(2099, 1, 1, tzinfo=UTC))
+        empty = queries.history_of(session, characteristic, Window(1, 0, COUNT), COLUMNS)
+    assert len(nothing) == len(empty) == 0
+    assert nothing["measured_at"].dtype == POSTGRES_EPOCH.dtype
+
+
+def test_too_many_readings_at_once_are_refused_with_the_number(server: Server, filled: str) -> None:
+    with server.database.begin() as session:
+        characteristic = characteristics.characteristic_named(session, filled).characteristic
+        with pytest.raises(Invalid, match=str(MOST_AT_ONCE)):
+            queries.history_of(session, characteristic, Window(1, MOST_AT_ONCE + 1, MOST_AT_ONCE + 1))
