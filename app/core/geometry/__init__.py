@@ -1,0 +1,13 @@
+"""From touched points to elements and their form: least squares, minimum zone, and why some points will not do.
+
+==============  ==================================================================================
+points          what is asked of points before anything is fitted through them, and `Degenerate`
+circle          the circle, in its plane and in space
+line            the line, in a plane and in space
+plane           the plane
+zones           minimum zones (Chebyshev) of all three; largest inscribed, smallest circumscribed circle
+==============  ==================================================================================
+
+Every fit is geometric: what is minimised are the orthogonal distances, not the residuals of an equation. Points are
+moved to their centroid first, so that it does not matter how far from the machine's zero the part is clamped. mm.
+"""
