@@ -1,0 +1,1 @@
+"""Control charts: baselines frozen on purpose, and the readings since judged by them."""

@@ -1,0 +1,198 @@
+"""Baselines, and the readings as points of the chart that they judge. Never writes. Lengths in mm."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Select, select
+from sqlalchemy.orm import Session
+
+from app.characteristics.queries import Standing
+from app.characteristics.tables import Characteristic
+from app.control.series import Moments, Plan, Read, Whole, groups_of, read
+from app.control.tables import Baseline
+from app.core.spc import quantity, shewhart
+from app.core.spc.quantity import SETTLE, Quantity, Series
+from app.core.spc.refusal import Floats
+from app.core.spc.rules import RuleName
+from app.core.spc.shewhart import Chart, ControlChart
+from app.core.spc.spread import Estimator, Sigma, Subgroups, subgroups
+from app.errors import NotFound
+from app.statistics.queries import Window
+from app.web.i18n import _
+
+LOOK_BACK = 100_000
+"""Readings before the window that are looked through for what its first points need: the beginning of the edge, of the subgroup."""
+
+
+def baseline_in_force(session: Session, characteristic: Characteristic) -> Baseline | None:
+    """What readings are judged by now: the newest version, or None if there is none or it is retired."""
+    newest = session.scalars(_of(characteristic).order_by(Baseline.version.desc()).limit(1)).one_or_none()
+    return None if newest is None or newest.retired_at is not None else newest
+
+
+def baselines(
+    session: Session, characteristic: Characteristic, *, before: int | None = None, limit: int = 1000
+) -> Sequence[Baseline]:
+    """All versions, newest first; those before version `before` where it is given."""
+    query = _of(characteristic).order_by(Baseline.version.desc()).limit(limit)
+    return session.scalars(query if before is None else query.where(Baseline.version < before)).all()
+
+
+def baseline_of(session: Session, characteristic: Characteristic, version: int) -> Baseline:
+    """One version. Raises `NotFound`."""
+    found = session.scalars(_of(characteristic).where(Baseline.version == version)).one_or_none()
+    if found is None:
+        raise NotFound(
+            _("{key} has no baseline {version}.").format(key=characteristic.key, version=version),
+            _("GET /api/v1/characteristics/{key}/baselines lists them.").format(key=characteristic.key),
+        )
+    return found
+
+
+def _of(characteristic: Characteristic) -> Select[Baseline]:
+    return select(Baseline).where(
+        Baseline.machine_id == characteristic.machine_id, Baseline.characteristic_id == characteristic.id
+    )
+
+
+def main_chart(baseline: Baseline) -> Chart:
+    """The chart that `charted` answers: individuals or X-bar."""
+    return Chart.INDIVIDUALS if baseline.chart == "individuals" else Chart.XBAR
+
+
+def rules_of(baseline: Baseline) -> tuple[RuleName, ...]:
+    """Which rules have a sense on the individuals or X-bar chart of this baseline; `nelson_1` alone on differences."""
+    return quantity.fitting(Quantity(baseline.quantity), main_chart(baseline))
+
+
+def judged_by(baseline: Baseline, width: float = 3.0) -> shewhart.Baseline:
+    """The baseline as the core knows it: centre and sigma of a single value."""
+    sigma = Sigma(baseline.sigma, Estimator(baseline.estimator), baseline.readings, baseline.groups, baseline.freedom)
+    return shewhart.Baseline(baseline.centre, sigma, width, provisional=baseline.readings < shewhart.ENOUGH_READINGS)
+
+
+@dataclass(frozen=True, slots=True)
+class Charted:
+    """Points of the individuals or X-bar chart, ascending, judged by a frozen baseline.
+
+    chart: the points, their centre and limits, and z, which rules look at (`app.core.spc.rules.Scan(rules).feed(chart.z)`);
+    None where there is no point. first, last: the sequences of the readings that each point is made of (of individuals
+    both the same). measured_at: of the last of them, UTC. sizes: how many they are. begins: the point comes first of a tool,
+    or after a step of the reference. read: the readings themselves. series: the values that are grouped or charted singly.
+    waiting: readings of the last subgroup, which is not complete and no point yet. settling: readings that set the level
+    of an edge and are judged by nothing.
+    """
+
+    baseline: Baseline
+    chart: ControlChart | None
+    groups: Subgroups | None
+    first: Whole
+    last: Whole
+    measured_at: Moments
+    sizes: Whole
+    begins: NDArray[np.bool_]
+    series: Series
+    series_at: Moments
+    read: Read
+    waiting: int
+    settling: int
+
+    def __len__(self) -> int:
+        """How many points there are."""
+        return len(self.last)
+
+
+def charted(session: Session, standing: Standing, baseline: Baseline, window: Window) -> Charted:
+    """The points whose last reading lies in the window: what a point is does not depend on where the window begins.
+
+    Streaming: ask for Window(last judged sequence + 1, newest, newest) and feed z to a `Scan` that has seen the points
+    before. Only complete subgroups are points. Readings of the baseline's own period are judged too; monitoring begins at
+    ``baseline.last_sequence + 1``. Raises `Invalid` for more than ten million readings.
+    """
+    made = read(session, standing, baseline, Window(_earliest(baseline, window), window.last, window.newest))
+    return points_of(baseline, made, window)
+
+
+def _earliest(plan: Plan, window: Window) -> int:
+    """From where readings have to be read for the first point of the window to be what it always is."""
+    if plan.quantity == Quantity.WEAR_RESIDUALS or plan.grouping in ("pause", "part"):
+        return max(1, window.first - LOOK_BACK)
+    back = 1 if plan.grouping is None else plan.group_size or 1
+    if plan.quantity == Quantity.DIFFERENCES:
+        back += 100  # the one before may be excluded, and those before it
+    return max(1, window.first - back)
+
+
+def series_of(baseline: Baseline, made: Read) -> Series:
+    """The quantity itself, of what was read."""
+    match Quantity(baseline.quantity):
+        case Quantity.DIFFERENCES:
+            return quantity.differences(made.series)
+        case Quantity.WEAR_RESIDUALS:
+            return quantity.residuals(made.series, baseline.slope or 0.0, baseline.settle or SETTLE)
+        case _:
+            return made.series
+
+
+def points_of(baseline: Baseline, made: Read, window: Window) -> Charted:
+    """Readings as points; those whose last reading lies in the window."""
+    series = series_of(baseline, made)
+    kept = np.isin(made.series.sequence, series.sequence, assume_unique=True)
+    inside = made.series.sequence >= window.first
+    settling = int((inside & ~kept).sum()) if baseline.quantity == Quantity.WEAR_RESIDUALS else 0
+    shown = Read(series, made.measured_at[kept], made.labels[kept], made.unknown, made.taken_out)
+    if baseline.grouping is None:
+        return _singly(baseline, made, shown, window, settling)
+    number, waiting = groups_of(baseline, shown, window.newest)
+    complete = number >= 0
+    starts = np.flatnonzero(np.diff(number[complete], prepend=-1))
+    lasts = np.append(starts[1:], complete.sum())[: len(starts)] - 1
+    sequence, at = series.sequence[complete], shown.measured_at[complete]
+    # A subgroup that began before what was read is not whole, unless it begins exactly there.
+    points = sequence[lasts] >= window.first if len(lasts) else np.zeros(0, np.bool_)
+    groups = None
+    if len(starts):
+        whole = subgroups(series.values[complete], lasts - starts + 1)
+        groups = Subgroups(whole.sizes[points], whole.means[points], whole.ranges[points], whole.deviations[points])
+    starts, lasts = starts[points], lasts[points]
+    begins = np.add.reduceat(series.begins[complete].astype(np.int64), starts) > 0 if len(starts) else points
+    chart = shewhart.means(judged_by(baseline), groups) if groups is not None and len(starts) else None
+    return Charted(
+        baseline,
+        chart,
+        groups if len(starts) else None,
+        sequence[starts],
+        sequence[lasts],
+        at[lasts],
+        lasts - starts + 1,
+        begins,
+        series,
+        shown.measured_at,
+        made,
+        waiting,
+        settling,
+    )
+
+
+def _singly(baseline: Baseline, made: Read, shown: Read, window: Window, settling: int) -> Charted:
+    wanted = shown.series.sequence >= window.first
+    sequence, at = shown.series.sequence[wanted], shown.measured_at[wanted]
+    values: Floats = shown.series.values[wanted]
+    chart = shewhart.individuals(judged_by(baseline), values) if len(values) else None
+    return Charted(
+        baseline,
+        chart,
+        None,
+        sequence,
+        sequence,
+        at,
+        np.ones(len(values), np.int64),
+        shown.series.begins[wanted],
+        shown.series,
+        shown.measured_at,
+        made,
+        0,
+        settling,
+    )
