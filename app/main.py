@@ -33,6 +33,7 @@ from app.programs import api as programs
 from app.proof import api as proof
 from app.proof import pages as proof_pages
 from app.proof import queries as proofs
+from app.readings import actions as reading_chores
 from app.readings import api as readings
 from app.readings.by_hand import api as by_hand
 from app.readings.door import Directory, ReadingsDoor
@@ -96,6 +97,7 @@ CHORES: tuple[Chore, ...] = (
     Chore("tool lives are told", offset_chores.tell_tool_lives),
     Chore("wear is foretold, and hunting told", wear_chores.look_ahead),
     Chore("calibrations are overdue", raise_overdue),
+    Chore("results of other measuring systems become readings", reading_chores.push_waiting),
 )
 
 

@@ -15,10 +15,20 @@ from app.readings.by_hand.actions import Found as FoundByHand
 from app.readings.by_hand.actions import measure as measure_by_hand
 from app.readings.by_hand.actions import measure_typed as measure_typed_by_hand
 from app.readings.records import Entry
+from app.readings.results import Source, ask_for, push_waiting
 from app.readings.tables import Exclusion, Reading, Stream
 from app.web.i18n import _
 
-__all__ = ["FoundByHand", "exclude", "exclude_all", "measure_by_hand", "measure_typed_by_hand"]
+__all__ = [
+    "FoundByHand",
+    "Source",
+    "ask_for",
+    "exclude",
+    "exclude_all",
+    "measure_by_hand",
+    "measure_typed_by_hand",
+    "push_waiting",
+]
 
 
 def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: str) -> Exclusion:

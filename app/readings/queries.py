@@ -1,6 +1,6 @@
 """Everything that is read of readings."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from sqlalchemy import func, select, tuple_
@@ -13,14 +13,22 @@ from app.core.compensation import Code
 from app.core.plausibility import uncorrected
 from app.core.variants import Results
 from app.core.zones import Zone
-from app.errors import NotFound
+from app.errors import FieldError, Invalid, NotFound
 from app.machines.tables import Machine
 from app.offsets.tables import Correction
 from app.readings.answers import answer
 from app.readings.by_hand import queries as by_hand
 from app.readings.by_hand.wording import as_json as in_json
 from app.readings.records import Entry, Record
-from app.readings.tables import Exclusion, HandMeasurement, Reading, ReadingResults, ReadingTouches, Stream
+from app.readings.tables import (
+    Exclusion,
+    HandMeasurement,
+    Reading,
+    ReadingResults,
+    ReadingTouches,
+    ResultReading,
+    Stream,
+)
 from app.readings.wording import reason
 from app.web.fields import is_slug
 from app.web.i18n import _
@@ -39,6 +47,38 @@ def entry_of(session: Session, characteristic: str) -> Entry | None:
         .where(Characteristic.key == characteristic)
     ).one_or_none()
     return Entry(*row) if row else None
+
+
+def entry_by_id(session: Session, machine_id: int, characteristic_id: int) -> Entry:
+    """Where a characteristic is kept that is known to be there."""
+    row = session.execute(
+        select(Characteristic.machine_id, Machine.key, Characteristic.id, Characteristic.key)
+        .join(Machine, Machine.id == Characteristic.machine_id)
+        .where(Characteristic.machine_id == machine_id, Characteristic.id == characteristic_id)
+    ).one()
+    return Entry(*row)
+
+
+def entries_for_results(session: Session, machine_id: int, named: Mapping[str, str]) -> dict[str, Entry]:
+    """The characteristics that results are to become, by result. Raises `Invalid` for one that this machine has not."""
+    found: dict[str, Entry] = {}
+    errors = []
+    for result, characteristic in named.items():
+        entry = entry_of(session, characteristic)
+        if entry is None or entry.machine_id != machine_id:
+            wrong = _("there is no characteristic {key} on this machine").format(key=repr(characteristic[:64]))
+            errors.append(FieldError(f"characteristics.{result}", wrong))
+        else:
+            found[result] = entry
+    if errors:
+        raise Invalid(f"{errors[0].field}: {errors[0].message}.", _("Set the characteristic up first."), errors=errors)
+    return found
+
+
+def readings_of_results(session: Session, keys: Iterable[str]) -> dict[str, tuple[str, ResultReading]]:
+    """What became of results, by key: the key of their characteristic, and the row."""
+    rows = session.scalars(select(ResultReading).where(ResultReading.key.in_(list(keys)))).all()
+    return {row.key: (entry_by_id(session, row.machine_id, row.characteristic_id).characteristic, row) for row in rows}
 
 
 def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[str, Any]]:

@@ -200,3 +200,31 @@ class ReadingSummary(Base):
     zones: Mapped[list[int]] = mapped_column(ARRAY(Integer))
     first_at: Mapped[datetime]
     last_at: Mapped[datetime]
+
+
+class ResultReading(Base):
+    """A result of another measuring system (a work zero, an alignment) that is to become a reading, and what became of it.
+
+    The key is that of the reading, so that pushing it twice stores it once. Neither sequence nor refused: it waits.
+    """
+
+    __tablename__ = "result_reading"
+    __table_args__ = (
+        ForeignKeyConstraint(["machine_id", "characteristic_id"], ["characteristic.machine_id", "characteristic.id"]),
+        Index(
+            "result_reading_waiting_idx",
+            "machine_id",
+            postgresql_where=text("sequence IS NULL AND refused IS NULL"),
+        ),
+        Index("result_reading_key_idx", "key"),
+    )
+
+    machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    characteristic_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    key: Mapped[str] = mapped_column(primary_key=True)
+    measured: Mapped[float]
+    measured_at: Mapped[datetime]
+    part: Mapped[str | None]
+    asked_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    sequence: Mapped[int | None] = mapped_column(BigInteger)
+    refused: Mapped[str | None]

@@ -1,0 +1,1 @@
+"""Alignment and set-up error: where the part lies, from touches, with pallets composed with parts."""
