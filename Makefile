@@ -1,4 +1,4 @@
-# make run     the demonstration plant at http://127.0.0.1:8000
+# make run     the demonstration plant at http://127.0.0.1:8000; ARGS="--past 42" for six weeks behind it
 # make test    lint, then every test on a real PostgreSQL and in a real browser; ARGS="-k name" for some of them
 # make lint    style, types and the walls between the parts of the house
 # make bench   the benchmarks; each prints ratios
@@ -18,7 +18,7 @@ PYTHON ?= $(shell for each in python3 python3.14 python3.13 python3.12 python3.1
 	$$each -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$each; break; }; done)
 
 run: $(VENV)/installed
-	@$(BIN)/inband demo
+	@$(BIN)/inband demo $(ARGS)
 
 test: lint $(VENV)/browser
 	@$(BIN)/pytest -n auto $(ARGS)

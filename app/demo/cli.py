@@ -31,6 +31,15 @@ def demo(
     speed: Annotated[
         float, typer.Option(envvar="INBAND_SPEED", min=1, max=10_000, help="How many times faster than life.")
     ] = 60,
+    past: Annotated[
+        float | None,
+        typer.Option(
+            envvar="INBAND_PAST",
+            min=0.1,
+            max=120,
+            help="So many days of past at the first start, one shift a day: 42 for six weeks. Else some hours.",
+        ),
+    ] = None,
 ) -> None:
     """Run the server with a simulated plant: two lathes and a milling machine that call its public API."""
     settings = settings_from(host=host, port=port, data_dir=data_dir, database_url=database_url)
@@ -44,23 +53,28 @@ def demo(
             say(f"  {name:<9} {passwords.get(name, _('(the password you have chosen)'))}", style="bold")
 
     def beside(settings: Settings) -> None:
-        start(settings, plant_key[0], seed, speed)
+        start(settings, plant_key[0], seed, speed, past)
 
     run(settings, prepare=prepare, beside=beside)
 
 
-def start(settings: Settings, key: str, seed: int, speed: float) -> None:
+def start(settings: Settings, key: str, seed: int, speed: float, past: float | None = None) -> None:
     """Set the plant up and let every machine run in a thread of its own until the server's process ends."""
     ending = threading.Event()
     made = lines(f"http://{_here(settings.host)}:{settings.port}", key, seed, ending)
-    say(_("The plant is starting: it pushes some hours of the past, then goes on live."))
+    if past is not None and all(line.has_history() for line in made):
+        say(_("The plant has a past already and goes on from there: --past is for a folder of its own (--data-dir)."))
+    elif past is not None:
+        say(_("The plant is starting: it pushes {days:g} days of the past, then goes on live.").format(days=past))
+    else:
+        say(_("The plant is starting: it pushes some hours of the past, then goes on live."))
     for line in made:
-        threading.Thread(target=_run, args=(line, speed), name=f"demo {line.key}", daemon=True).start()
+        threading.Thread(target=_run, args=(line, speed, past), name=f"demo {line.key}", daemon=True).start()
 
 
-def _run(line: Line, speed: float) -> None:
+def _run(line: Line, speed: float, past: float | None) -> None:
     try:
-        run_line(line, speed)
+        run_line(line, speed, past)
     except Ending:
         pass
     except Refused as refusal:

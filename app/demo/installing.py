@@ -11,7 +11,7 @@ from app.demo.running import Line, Pace
 from app.demo.simulation import Machine
 
 KEY_NAME = "demonstration plant"
-PAST = 300  # parts of each machine
+PAST = 300  # parts of each machine, if no number of days is asked for
 
 
 def set_up(admin: Client, machine: plant.Machine) -> None:
@@ -69,10 +69,10 @@ def lines(
     return made
 
 
-def run_line(line: Line, speed: float, past: int = PAST) -> None:
-    """The past if there is none yet, then the present."""
+def run_line(line: Line, speed: float, past: float | None = None) -> None:
+    """The past if there is none yet (so many days, else some hours), then the present."""
     if line.has_history():
         line.settle()
     else:
-        line.fill(past)
+        line.fill(PAST, past)
     line.live(Pace(speed, datetime.now(UTC), line.machine.at))

@@ -18,6 +18,7 @@ from app.demo.client import Client, Ending, Refused
 from app.demo.simulation import Machine, Probe
 
 log = logging.getLogger(__name__)
+DAY = 24 * 3600.0  # s
 STOPS = {"tool_worn", "probe_fault", "offset_limit"}
 LARGEST_LAG = 30.0  # s of the wall clock: what was missed beyond it is not made up for
 PATIENCE = (60.0, 90.0)  # s of the wall clock until the simulated operator steps in
@@ -75,26 +76,51 @@ class Line:
         first = self.machine.spec.features[0].key
         return bool(self._gateway.get("/readings", characteristic=first, limit=1)["items"])
 
-    def fill(self, parts: int) -> None:
-        """Push a past that ends now, as fast as the server takes it; each part is cut with what had been decided by then."""
-        rehearsal = deepcopy(self.machine)  # how long it takes does not depend on what is decided
-        for _part in range(parts):
-            rehearsal.rest()
+    def fill(self, parts: int, days: float | None = None) -> None:
+        """Push a past that ends now, as fast as the server takes it; each part is cut with what had been decided by then.
+
+        parts: how many are cut, without a night between them. days: what is cut in so many working days and the nights
+        and weekends between them, instead.
+        """
+        machine, nights = self.machine, days is not None
+        rehearsal = deepcopy(machine)  # how long it takes does not depend on what is decided
+        while rehearsal.at < days * DAY if days is not None else rehearsal.serial < parts:
+            rehearsal.rest(nights=nights)
             rehearsal.cut()
         self.pace = Pace(1.0, datetime.now(UTC), rehearsal.at)
-        for _part in range(parts):
+        while machine.serial < rehearsal.serial:
             if self._ending.is_set():
                 return
-            self.machine.rest()
-            self.machine.cut()
-            self._apply(self._push_batch(self.machine.measure()))
+            if machine.rest(nights=nights):
+                self._note_alarms()
+            machine.cut()
+            self._apply(self._push_batch(machine.measure()))
+            self._change_worn_tools_of_the_past()
+        self._note_alarms()
+
+    def _note_alarms(self) -> None:
         for alarm in self._active_alarms():
             self._acknowledge(alarm, "noted", "Looked at; the loop has corrected it.")
+
+    def _change_worn_tools_of_the_past(self) -> None:
+        """Between two parts, when all that the old edge has cut is measured and what was decided on it stands in its offset."""
+        machine = self.machine
+        worn = [number for number, edge in machine.edges.items() if edge.parts >= edge.tool.life]
+        if not worn:
+            return
+        while machine.pipeline:
+            self._apply(self._push_batch(machine.measure(drain=True)))
+        self._fetch_corrections()
+        self._change_worn_tools()
+        for number in worn:
+            machine.fresh_edge(number, 0.0)
 
     def _push_batch(self, probes: list[Probe]) -> list[dict[str, Any]]:
         if not probes:
             return []
-        answer = self._gateway.post("/readings/batch?decisions=true", [self._reading(probe) for probe in probes])
+        answer = self._gateway.post(
+            "/readings/batch?decisions=true", [self._reading(probe, past=True) for probe in probes]
+        )
         return [item["correction"] for item in answer["items"] if item["correction"]]
 
     def _apply(self, corrections: list[dict[str, Any]]) -> None:
@@ -171,12 +197,15 @@ class Line:
                 self._fault_told = True
                 return
 
-    def _reading(self, probe: Probe) -> dict[str, Any]:
-        value = {"touches": probe.touches} if probe.touches else {"measured": probe.size}
+    def _reading(self, probe: Probe, *, past: bool = False) -> dict[str, Any]:
+        value: dict[str, Any] = {"touches": probe.touches} if probe.touches else {"measured": probe.size}
+        if (
+            not past
+        ):  # in which the tools are changed now, whatever time it has: only the corrections say what was cut when
+            value["machined_at"] = self.pace.moment(probe.part.cut_at).isoformat()
         return value | {
             "characteristic": probe.feature.key,
             "measured_at": self.pace.moment(probe.measured_at).isoformat(),
-            "machined_at": self.pace.moment(probe.part.cut_at).isoformat(),
             "part": f"{self._run}-{probe.part.serial:04d}",
             "key": f"{self._run}:{self.key}:{probe.part.serial}:{probe.feature.key}",
             "correction_in_effect": probe.part.in_effect[probe.feature.key],

@@ -23,6 +23,8 @@ COOL_DOWN = 80 * 60.0
 RUN_IN = 20.0  # parts
 SHIFT = 4 * 3600.0  # s of work between two breaks
 BREAK = 25 * 60.0
+NIGHT = 24 * 3600.0 - 2 * SHIFT - BREAK  # after two of them
+WEEKEND = 2 * 24 * 3600.0  # and after five days
 CHIP_RATE = 1 / 700  # per part
 DIRT_RATE = 1 / 450
 OUTLIER_RATE = 1 / 180
@@ -96,6 +98,7 @@ class Machine:
             Random(f"{seed}:{spec.key}:{what}") for what in ("cutting", "probing", "fate")
         )
         self._next_break = SHIFT * self._fate.uniform(0.4, 1.0)
+        self.breaks = 0
         self.edges = {tool.number: Edge(tool, self._setting_error()) for tool in spec.tools}
 
     def begin_live(self) -> None:
@@ -143,11 +146,17 @@ class Machine:
         self.theta *= exp(-pause / COOL_DOWN)
         self.at += pause
 
-    def rest(self) -> None:
-        """Take the break that is due, if one is."""
-        if self.at >= self._next_break:
-            self.stand(self.at + BREAK)
-            self._next_break = self.at + SHIFT
+    def rest(self, *, nights: bool = False) -> bool:
+        """Take the break that is due, if one is; with `nights` every second one lasts until the next working day."""
+        if self.at < self._next_break:
+            return False
+        self.breaks += 1
+        pause = BREAK
+        if nights and self.breaks % 2 == 0:
+            pause = NIGHT + (WEEKEND if self.breaks % 10 == 0 else 0.0)
+        self.stand(self.at + pause)
+        self._next_break = self.at + SHIFT
+        return True
 
     def fresh_edge(self, number: int, offset: float) -> None:
         """Somebody put a fresh edge in and set its offset."""

@@ -5,7 +5,9 @@ import stat
 import threading
 import time
 from collections.abc import Iterator
-from datetime import UTC, datetime
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from itertools import pairwise
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -82,6 +84,27 @@ def test_the_past_is_in_the_past_in_order_and_leaves_nothing_to_be_done(server: 
     assert [reading["sequence"] for reading in found] == list(range(1, len(found) + 1))
     left = [alarm["kind"] for alarm in filled[0]._operator.items("/alarms", state="active")]
     assert set(left) <= {"hunting"}, "which the rounds may raise at any minute"
+
+
+@pytest.mark.slow
+def test_a_past_of_weeks_has_nights_and_changed_tools_and_stays_in_control(server: Server) -> None:
+    tools = tuple(replace(tool, life=60) for tool in plant.MILL_1.tools)
+    features = tuple(replace(feature, key=f"{feature.key}-weeks") for feature in plant.MILL_1.features)
+    spec = replace(plant.MILL_1, key="mill-weeks", name="Mill of weeks", tools=tools, features=features)
+    (line,) = lines(server.url, server.key("admin"), 1, threading.Event(), [spec])
+    line.fill(0, days=1.05)
+    found = readings(server, "plate-w20-weeks")
+    changes = line._tools()[12]
+    line.close()
+    times = [datetime.fromisoformat(reading["measured_at"]) for reading in found]
+    assert times[-1] - times[0] > timedelta(days=1)
+    assert max(later - earlier for earlier, later in pairwise(times)) > timedelta(hours=15), "no night in it"
+    assert len(found) > 160
+    assert changes["changed_at"] is not None
+    assert changes["parts"] < 61
+    assert "before_tool_change" not in {reading["reason"]["code"] for reading in found}
+    width = features[1].upper - features[1].lower
+    assert fmean([abs(reading["deviation"]) for reading in found[-100:]]) < width / 6
 
 
 @pytest.mark.slow
