@@ -3,6 +3,7 @@
 Outlooks are not what readings are decided by: no machine is locked for them, and what the writer has in memory stays true.
 """
 
+import logging
 from typing import Any
 
 from sqlalchemy import Select, func, or_, select
@@ -23,6 +24,8 @@ from app.wear import queries, wording
 from app.wear.queries import Wear
 from app.wear.tables import Outlook
 
+log = logging.getLogger(__name__)
+
 MOST = 200  # characteristics on one round; those whose outlook is oldest come first
 
 
@@ -33,8 +36,13 @@ def look_ahead(session: Session) -> None:
         standing = characteristics.characteristic_named(session, key)
         before = session.get(Outlook, (standing.machine.id, standing.characteristic.id))
         hunted = before is not None and before.hunting in queries.OVERCORRECTS
-        wear = queries.wear_of(session, standing, _newest(session, standing))
-        _note(session, wear)
+        try:
+            with session.begin_nested():
+                wear = queries.wear_of(session, standing, _newest(session, standing))
+                _note(session, wear)
+        except Exception:  # one that cannot be worked out takes nothing of the others with it
+            log.exception("the outlook of %s could not be made", key)
+            continue
         found = wear.hunting
         if found is not None and found.state.value in queries.OVERCORRECTS and not hunted:
             begun.append((standing, found))
