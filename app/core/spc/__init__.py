@@ -12,6 +12,9 @@ readings is refused with a `Refusal` that says how many are missing.
     cusum        tabular cumulative sums with headstart
     rules        the Nelson and the Western Electric rules, all signals as runs of points
     chance       how often they fire though nothing has happened
+    false_alarms the same of several rules together, and of the limits of any chart
+    points       the points of any chart as readings come in
+    watch        rules that watch a chart while readings come in
     capability   Cp to Cpm with intervals, parts out of tolerance
     normality    Anderson-Darling, Shapiro-Wilk
     gauge        type 1, bias, linearity, gauge R&R, and what they say about R33

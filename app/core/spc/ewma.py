@@ -32,11 +32,18 @@ def _check(weight: float) -> None:
 
 
 def ewma(
-    baseline: Baseline, values: ArrayLike, weight: float = 0.2, *, exact: bool = True, start: float | None = None
+    baseline: Baseline,
+    values: ArrayLike,
+    weight: float = 0.2,
+    *,
+    exact: bool = True,
+    start: float | None = None,
+    seen: int = 0,
 ) -> ControlChart:
     """The EWMA of readings with lambda = `weight`; limits at baseline.width standard deviations of the average.
 
-    `start`: the average so far, where an earlier chart is continued (its limits then are the asymptotic ones).
+    `start`: the average so far, where an earlier chart is continued; `seen`: of how many readings (if that is not known,
+    the limits are the asymptotic ones).
 
     >>> from app.core.spc.shewhart import given
     >>> chart = ewma(given(50, 2.0539), [52.0, 47.0, 53.0, 49.3], 0.3, exact=False)
@@ -47,8 +54,9 @@ def ewma(
     x = checked(values)
     points = _smoothed(x, float(weight), float(baseline.centre if start is None else start))
     share: Floats = np.asarray(weight / (2 - weight))
-    if exact and start is None:
-        share = share * -np.expm1(2 * np.arange(1, len(x) + 1) * np.log1p(-weight)) if weight < 1 else np.ones(len(x))
+    if exact and (start is None or seen):
+        number = np.arange(seen + 1, seen + len(x) + 1)
+        share = share * -np.expm1(2 * number * np.log1p(-weight)) if weight < 1 else np.ones(len(x))
     deviation = baseline.sigma.value * np.sqrt(share)
     return _chart(Chart.EWMA, baseline, points, deviation)
 

@@ -21,9 +21,10 @@ Electric Co., Statistical Quality Control Handbook (1956) 25-28. "k of n" fires 
 that point lies beyond the limit itself.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -187,6 +188,37 @@ class Scan:
     def signals(self) -> Signals:
         """Every signal so far."""
         return Signals(self.length, dict(self._runs))
+
+    def memory(self) -> dict[str, Any]:
+        """What it takes to go on without the points seen so far, as JSON. Only runs that may still grow are in it.
+
+        >>> first, second = Scan(NELSON), Scan(NELSON)
+        >>> first.feed([0.5, 2.2]); second.recall(first.memory()); second.feed([2.1])
+        >>> [(run.rule.value, run.start, run.end, run.points) for run in second.signals()]
+        [('nelson_5', 1, 2, 2)]
+        """
+        return {
+            "length": self.length,
+            "last": self._last,
+            "rules": {
+                rule.name.value: {"state": self._states[rule.name].tolist(), "runs": _newest(self._runs[rule.name])}
+                for rule in self.rules
+            },
+        }
+
+    def recall(self, memory: Mapping[str, Any]) -> None:
+        """Go on where another scan of the same rules has left off."""
+        self.length, self._last = memory["length"], memory["last"]
+        for rule in self.rules:
+            kept = memory["rules"][rule.name.value]
+            self._states[rule.name] = np.array(kept["state"], np.int64).reshape(2, STATE)
+            self._runs[rule.name] = np.array(kept["runs"], np.int64).reshape(-1, 4)
+
+
+def _newest(rows: NDArray[np.int64]) -> list[list[int]]:
+    """The last run of each side, in order of time: of the others none can grow."""
+    of_sides = [rows[rows[:, 0] == side][-1:] for side in (1, 0, -1)]
+    return sorted(np.concatenate(of_sides).tolist(), key=lambda row: int(row[1]))
 
 
 def _fed(
