@@ -5,7 +5,8 @@ points          what is asked of points before anything is fitted through them, 
 circle          the circle, in its plane and in space
 line            the line, in a plane and in space
 plane           the plane
-zones           minimum zones (Chebyshev) of all three; largest inscribed, smallest circumscribed circle
+zones           minimum zones (Chebyshev) of all three, and of an axis
+discs           largest inscribed, smallest circumscribed circle
 ==============  ==================================================================================
 
 Every fit is geometric: what is minimised are the orthogonal distances, not the residuals of an equation. Points are
