@@ -12,6 +12,7 @@ from app.core.spc.capability import Limits, capability, percentile
 from app.core.spc.gauge.crossed import Study, by_anova, by_average_and_range
 from app.core.spc.gauge.linearity import linearity
 from app.core.spc.gauge.single import bias, type_one
+from app.core.spc.in_time import brown_forsythe, decompose, successive
 from app.core.spc.normality import anderson_darling, shapiro_wilk
 from app.core.spc.refusal import Floats
 from app.core.spc.rules import RULES, RuleName, signals_of_cusum
@@ -185,6 +186,26 @@ def shapiro(given: Given) -> Got:
     return {"statistic": found.statistic, "p_value": found.p_value}
 
 
+def variance_in_time(given: Given) -> Got:
+    found = decompose(given["groups"], given["at"])
+    return {
+        "between": found.between,
+        "lack_of_fit": found.lack_of_fit,
+        "within": found.within,
+        "slope": found.slope,
+        "f_between": found.means.statistic,
+        "f_beside_line": found.beside_line.statistic,
+    }
+
+
+def scatter_in_time(given: Given) -> Got:
+    return {"statistic": brown_forsythe(given["groups"]).statistic}
+
+
+def following(given: Given) -> Got:
+    return {"statistic": successive(given["values"]).statistic}
+
+
 def _block(given: Given) -> Floats:
     """Rows of operator and trial, one entry per part, as a block of parts, operators, trials."""
     rows = np.array(given["readings"], dtype=np.float64)
@@ -261,6 +282,9 @@ ENGINE: dict[str, Callable[[Given], Got]] = {
     "percentile": by_percentile,
     "anderson_darling": anderson,
     "shapiro_wilk": shapiro,
+    "variance_in_time": variance_in_time,
+    "scatter_in_time": scatter_in_time,
+    "following": following,
     "gauge_ranges": gauge_ranges,
     "gauge_anova": gauge_anova,
     "linearity": straight,

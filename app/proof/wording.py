@@ -19,6 +19,7 @@ def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
             ("rule_probability", "rule_run_length", "ewma_run_length", "cusum_run_length"),
         ),
         "capability": (_("Capability and normality"), ("capability", "percentile", "anderson_darling", "shapiro_wilk")),
+        "in_time": (_("Behaviour in time"), ("variance_in_time", "scatter_in_time", "following")),
         "gauge": (_("Gauge studies"), ("gauge_ranges", "gauge_anova", "linearity", "bias", "type_one")),
     }
 

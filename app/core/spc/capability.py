@@ -14,6 +14,7 @@ R. H. Kushler and P. Hurley, Confidence bounds for capability indices, J. Qual. 
 from dataclasses import dataclass
 from enum import StrEnum
 from math import inf, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -132,9 +133,9 @@ def capability(
         within=inner,
         overall=total,
         confidence=confidence,
-        cp=_spread_index(limits, inner, confidence),
+        cp=spread_index(limits, inner, confidence),
         cpk=_centred_index(limits, mean, inner, len(x), confidence),
-        pp=_spread_index(limits, total, confidence),
+        pp=spread_index(limits, total, confidence),
         ppk=_centred_index(limits, mean, total, len(x), confidence),
         cpm=_cpm(limits, mean, total, len(x), confidence),
         ppm_within=expected_ppm(limits, mean, inner.value),
@@ -144,7 +145,7 @@ def capability(
     )
 
 
-def _spread_index(limits: Limits, sigma: Sigma, confidence: float) -> Index | None:
+def spread_index(limits: Limits, sigma: Sigma, confidence: float) -> Index | None:
     """Cp or Pp. Interval: value sqrt(chi2(q, df)/df), exact for the root of a variance (Montgomery, eq. 8.20)."""
     if limits.lower is None or limits.upper is None:
         return None
@@ -222,22 +223,49 @@ def _cpm(limits: Limits, mean: float, sigma: Sigma, readings: int, confidence: f
     return Index(value, low, high, "boyles")
 
 
-def expected_ppm(limits: Limits, mean: float, sigma: float) -> float:
+class Fallout(NamedTuple):
+    """Parts per million beyond each limit; 0 where there is none."""
+
+    below: float
+    above: float
+
+    @property
+    def total(self) -> float:
+        """Beyond either."""
+        return self.below + self.above
+
+
+def expected(limits: Limits, mean: float, sigma: float) -> Fallout:
     """Parts per million beyond the limits under a normal distribution.
+
+    >>> expected(Limits(-3.0, None), 0.5, 1.0).below.__round__(1)
+    232.6
+    """
+    return Fallout(
+        0.0 if limits.lower is None else float(ndtr(-(mean - limits.lower) / sigma)) * 1e6,
+        0.0 if limits.upper is None else float(ndtr(-(limits.upper - mean) / sigma)) * 1e6,
+    )
+
+
+def expected_ppm(limits: Limits, mean: float, sigma: float) -> float:
+    """Parts per million beyond either limit under a normal distribution.
 
     >>> round(expected_ppm(Limits(-3.0, 3.0), 0.0, 1.0), 1)
     2699.8
     """
-    above = 0.0 if limits.upper is None else float(ndtr(-(limits.upper - mean) / sigma))
-    below = 0.0 if limits.lower is None else float(ndtr(-(mean - limits.lower) / sigma))
-    return (above + below) * 1e6
+    return expected(limits, mean, sigma).total
 
 
-def observed_ppm(limits: Limits, values: Floats) -> float:
+def observed(limits: Limits, values: Floats) -> Fallout:
     """Parts per million that were beyond the limits; a value on a limit is good."""
     below = 0 if limits.lower is None else int((values < limits.lower).sum())
     above = 0 if limits.upper is None else int((values > limits.upper).sum())
-    return (below + above) / len(values) * 1e6
+    return Fallout(below / len(values) * 1e6, above / len(values) * 1e6)
+
+
+def observed_ppm(limits: Limits, values: Floats) -> float:
+    """Parts per million that were beyond either limit."""
+    return observed(limits, values).total
 
 
 def in_control(values: Floats, mean: float, within: Sigma) -> bool:

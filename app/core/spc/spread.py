@@ -96,7 +96,7 @@ def overall(values: ArrayLike) -> Sigma:
     return Sigma(sqrt(float(left @ left) / (len(x) - 1)), Estimator.OVERALL, len(x), 1, float(len(x) - 1))
 
 
-def _freedom_of_moving_ranges(n: int) -> float:
+def freedom_of_moving_ranges(n: int) -> float:
     """Of MR-bar/d2 over n readings: neighbouring ranges share a reading, so they are worth less than n - 1 ranges.
 
     Var|D| = 2 - 4/pi, Cov(|D1|, |D2|) = (4/pi)(sqrt(1 - r^2) + r asin r - 1) with r = -1/2 (Cryer and Ryan 1990,
@@ -116,7 +116,7 @@ def moving_range(values: ArrayLike) -> Sigma:
     """
     x = checked(values, at_least=2)
     value = float(np.abs(np.diff(x)).mean()) / d2(2)
-    return Sigma(value, Estimator.MOVING_RANGE, len(x), len(x) - 1, _freedom_of_moving_ranges(len(x)))
+    return Sigma(value, Estimator.MOVING_RANGE, len(x), len(x) - 1, freedom_of_moving_ranges(len(x)))
 
 
 @dataclass(frozen=True, slots=True)

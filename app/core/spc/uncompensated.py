@@ -1,0 +1,92 @@
+"""What a compensated process would be without its compensation, and what the machine could do with an ideal one.
+
+Corrections make two questions of one. What left the machine is the deviations as they are: their spread holds scatter, wear
+that was not yet corrected, and whatever the corrections added. What the tool did is the wear curve (`core.wear`): each
+deviation with the corrections that were in effect taken out again. Its overall spread is that of a machine which nobody
+corrects, wear included; its scatter from part to part is what remains if wear were corrected ideally, which no policy beats::
+
+    sigma_tool   standard deviation of all w
+    sigma_ideal  mean range of neighbours within one tool life / d2(2), ranges beyond four times the mean left out
+    gain         sigma_tool / sigma_controlled
+    price        sigma_controlled / sigma_ideal: 1 is ideal, more is what the corrections leave or add
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.core.spc.capability import FEWEST_READINGS, Caution, Index, Limits, capability, spread_index
+from app.core.spc.constants import d2
+from app.core.spc.refusal import Floats, Reason, Refused, checked
+from app.core.spc.spread import Estimator, Sigma, freedom_of_moving_ranges, overall
+
+BEYOND = 4.0
+"""Ranges of more than so many mean ranges are steps, not scatter: a new edge, an offset set by hand."""
+
+
+@dataclass(frozen=True, slots=True)
+class Uncompensated:
+    """lives: tool lives that readings were left of. ppk: of the tool that nobody corrects. ideal: Cp of scatter alone, centred.
+
+    price and gain as above; gain below 1 says that the corrections made it worse.
+    """
+
+    readings: int
+    lives: int
+    mean: float
+    tool: Sigma
+    ideal_sigma: Sigma
+    ppk: Index
+    ideal: Index | None
+    gain: float
+    price: float
+    cautions: tuple[Caution, ...]
+
+
+def uncompensated(
+    lives: Sequence[Floats], controlled: Floats, limits: Limits, *, confidence: float = 0.95
+) -> Uncompensated:
+    """`lives`: wear curves, one per tool life, of the same readings whose deviations are `controlled`; mm.
+
+    >>> rng = np.sin(np.arange(1, 201) ** 2) / 1000
+    >>> wearing = np.arange(200) / 10000 + rng
+    >>> found = uncompensated([wearing[:100] , wearing[:100]], rng, Limits(-0.01, 0.01))
+    >>> found.lives, found.gain > 3, found.price < 1.5
+    (2, True, True)
+    """
+    parts = [checked(life) for life in lives if len(life)]
+    whole = checked(np.concatenate(parts) if parts else [], at_least=FEWEST_READINGS)
+    ideal = scatter([*parts])
+    now, tool = overall(controlled), overall(whole)
+    if not (now.value > 0 and tool.value > 0):
+        raise Refused(Reason.NO_VARIATION)
+    told = capability(whole, limits, confidence=confidence)
+    return Uncompensated(
+        readings=len(whole),
+        lives=len(parts),
+        mean=told.mean,
+        tool=tool,
+        ideal_sigma=ideal,
+        ppk=told.ppk,
+        ideal=spread_index(limits, ideal, confidence),
+        gain=tool.value / now.value,
+        price=now.value / ideal.value,
+        cautions=told.cautions,
+    )
+
+
+def scatter(lives: Sequence[Floats]) -> Sigma:
+    """Sigma from part to part within each life, steps left out.
+
+    >>> scatter([np.array([0.0, 1.128379, 0.0]), np.array([50.0, 51.128379])]).value.__round__(3)
+    1.0
+    """
+    ranges = np.concatenate([np.abs(np.diff(life)) for life in lives] or [np.empty(0)])
+    for _pass in range(2):
+        if len(ranges):
+            ranges = ranges[ranges <= BEYOND * ranges.mean()]
+    if not len(ranges) or not ranges.mean() > 0:
+        raise Refused(Reason.NO_VARIATION)
+    freedom = sum(freedom_of_moving_ranges(len(life)) for life in lives if len(life) > 1)
+    return Sigma(float(ranges.mean()) / d2(2), Estimator.MOVING_RANGE, sum(map(len, lives)), len(ranges), freedom)
