@@ -9,8 +9,10 @@ The map of the house. Whoever knows the shop floor knows where to look:
     offsets          tool memory (R10), average memory (R11), corrections and their life
     alarms           what needs a person, and what follows when one acknowledges it
     plant            the first page: every machine and characteristic at a glance
+    overview         every characteristic ranked by what needs attention, with the reasons
     statistics       what the readings say together: counts, spread, charts of ten million points
     wear             true wear behind the corrections, how long an edge will do, and loops that hunt
+    capability       Cp to Ppk with intervals, normality, behaviour in time, the tool without its corrections
     proof            published examples run through the live engine: what it says, what was published
     setup            the pages where all of that is set up
     people           who may do what: sign-in, sessions, roles, personal keys

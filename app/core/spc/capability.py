@@ -24,7 +24,7 @@ from scipy.special import bdtrc, gammaincinv, ndtr, ndtri
 from app.core.spc.constants import NODES, WEIGHTS
 from app.core.spc.normality import FEWEST_FOR_ANDERSON, anderson_darling
 from app.core.spc.refusal import Floats, Reason, Refused, checked
-from app.core.spc.spread import Sigma, mean_of, moving_range, overall
+from app.core.spc.spread import Estimator, Sigma, mean_of, moving_range, overall
 
 FEWEST_READINGS = 20
 """Below it there is no index at all: with 20 readings the interval of Cp already reaches from 0.69 to 1.31 of it."""
@@ -183,6 +183,18 @@ def _centred_index(limits: Limits, mean: float, sigma: Sigma, readings: int, con
         return Index(value, low, high, "noncentral_t")
     reach = float(-ndtri((1 - confidence) / 2)) * sqrt(1 / (9 * readings) + value**2 / (2 * sigma.degrees_of_freedom))
     return Index(value, value - reach, value + reach, "bissell")
+
+
+def ppk_of(limits: Limits, mean: float, sigma: float, readings: int, confidence: float = 0.95) -> Index:
+    """Ppk from what is known of readings: their mean, standard deviation and number.
+
+    >>> found = ppk_of(Limits(-0.008, 0.008), 0.001, 0.002, 100)
+    >>> round(found.value, 3), round(found.low, 3)
+    (1.167, 0.992)
+    """
+    return _centred_index(
+        limits, mean, Sigma(sigma, Estimator.OVERALL, readings, 1, readings - 1.0), readings, confidence
+    )
 
 
 def _noncentral(value: float, readings: int, freedom: float, confidence: float) -> tuple[float, float]:
