@@ -1,0 +1,96 @@
+"""A map of settings: what each cell of a grid of replays amounts to, where it is best, and what is as good. Lengths in mm."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from math import sqrt
+
+from app.core.parameters import Parameters
+from app.core.replay import Figures
+
+NEAR = 0.02  # so much worse than the best is as good as the best
+SIGMAS = 2.0  # and so many standard errors
+
+
+class Criterion(StrEnum):
+    """What is looked for on a map."""
+
+    PPK = "ppk"
+    REJECTS = "rejects"
+    SPREAD = "spread"
+    CORRECTIONS = "corrections"
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """Where a map is best: `best` is the index of the best cell, None where no cell has the number; `inside` those as good."""
+
+    best: int | None
+    inside: tuple[bool, ...]
+
+
+def value_of(figures: Figures, criterion: Criterion) -> float | None:
+    """The number that is looked for."""
+    return {
+        Criterion.PPK: figures.ppk,
+        Criterion.REJECTS: float(figures.rejects),
+        Criterion.SPREAD: figures.spread,
+        Criterion.CORRECTIONS: float(figures.corrections),
+    }[criterion]
+
+
+def with_settings(
+    parameters: Parameters,
+    *,
+    weighting_factor: float | None = None,
+    zero_range: float | None = None,
+    averaging_limit: float | None = None,
+    factor: float | None = None,
+) -> Parameters:
+    """Other settings of the loop; those not given stay."""
+    given = {
+        "weighting_factor": weighting_factor,
+        "zero_range": zero_range,
+        "averaging_limit": averaging_limit,
+        "factor": factor,
+    }
+    return replace(parameters, **{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
+
+
+def in_order(parameters: Parameters) -> bool:
+    """Whether R33 < R34 <= R35/2, the part of the order of the parameters that a map moves about in."""
+    limits = parameters.limits
+    return limits.zero_range < limits.averaging <= limits.tolerance
+
+
+def best_region(cells: Sequence[Figures | None], criterion: Criterion, most_rejects: int | None = None) -> Region:
+    """The best cell, and those that cannot be told from it: no worse by two standard errors of the best, or by 2 %.
+
+    Standard errors: of a count its root; of s, s / sqrt(2 n); of Ppk, Bissell's (1990, Appl. Stat. 39, 331). Cells share the
+    same parts, so they are told apart better than that: the region is rather too wide. `most_rejects`: cells with more
+    rejects are no choice, so that the fewest corrections are not those of a loop that sleeps.
+    """
+    values = [
+        None
+        if cell is None or (most_rejects is not None and cell.rejects > most_rejects)
+        else value_of(cell, criterion)
+        for cell in cells
+    ]
+    known = [(value, at) for at, value in enumerate(values) if value is not None]
+    if not known:
+        return Region(None, (False,) * len(cells))
+    sign = -1.0 if criterion is Criterion.PPK else 1.0
+    value, best = min(known, key=lambda each: sign * each[0])
+    figures = cells[best]
+    assert figures is not None
+    room = max(SIGMAS * _error(figures, criterion, value), NEAR * abs(value)) + 1e-12
+    return Region(best, tuple(each is not None and sign * (each - value) <= room for each in values))
+
+
+def _error(figures: Figures, criterion: Criterion, value: float) -> float:
+    count = max(2, figures.inner)
+    if criterion is Criterion.PPK:
+        return sqrt(1 / (9 * count) + value * value / (2 * count))
+    if criterion is Criterion.SPREAD:
+        return value / sqrt(2 * count)
+    return sqrt(max(1.0, value))

@@ -1,0 +1,29 @@
+"""Where a map of settings is best."""
+
+from app.core.policy_map import Criterion, best_region, in_order, with_settings
+from app.core.replay import Figures
+from tests.core.test_replay import SHAFT
+
+
+def cell(**numbers: float | None) -> Figures:
+    nothing = dict.fromkeys(Figures._fields, 0)
+    return Figures(**(nothing | {"readings": 1000, "inner": 1000} | numbers))  # type: ignore[arg-type]
+
+
+def test_the_best_region_holds_what_cannot_be_told_from_the_best() -> None:
+    cells = [cell(ppk=1.5), cell(ppk=1.49), cell(ppk=1.2), None, cell(ppk=None)]
+    found = best_region(cells, Criterion.PPK)
+    assert (found.best, found.inside) == (0, (True, True, False, False, False))
+    few = best_region([cell(rejects=4), cell(rejects=7), cell(rejects=9)], Criterion.REJECTS)
+    assert few.inside == (True, True, False)
+    # The fewest corrections of those that reject no more than now.
+    lazy = [cell(corrections=0, rejects=50), cell(corrections=30, rejects=2), cell(corrections=60, rejects=1)]
+    assert best_region(lazy, Criterion.CORRECTIONS, most_rejects=2).best == 1
+    assert best_region([None], Criterion.PPK).best is None
+
+
+def test_settings_out_of_order_are_told() -> None:
+    assert in_order(SHAFT)
+    assert not in_order(with_settings(SHAFT, zero_range=0.0053))
+    assert not in_order(with_settings(SHAFT, averaging_limit=0.0081))
+    assert with_settings(SHAFT, weighting_factor=3).weighting_factor == 3
