@@ -36,12 +36,12 @@ class Base(DeclarativeBase):
 
 
 def whole_metadata() -> MetaData:
-    """The tables of every part of the house: each ``app/*/tables.py`` is imported first."""
+    """The tables of every part of the house: each ``app/*/tables.py`` and ``app/*/…_tables.py`` is imported first."""
     import app
 
     for part in pkgutil.iter_modules(app.__path__, "app."):
-        if part.ispkg and any(
-            module.name == "tables" for module in pkgutil.iter_modules(import_module(part.name).__path__)
-        ):
-            import_module(f"{part.name}.tables")
+        if part.ispkg:
+            for module in pkgutil.iter_modules(import_module(part.name).__path__):
+                if module.name == "tables" or module.name.endswith("_tables"):
+                    import_module(f"{part.name}.{module.name}")
     return Base.metadata

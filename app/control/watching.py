@@ -1,0 +1,150 @@
+"""What can be watched: the charts of a baseline by their place, and the rules that have a sense on each. No input or output of its own."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from app.control.queries import Charted, judged_by, main_chart
+from app.control.tables import Baseline
+from app.core.spc import quantity, shewhart
+from app.core.spc.points import Drawn, Piece
+from app.core.spc.quantity import Quantity
+from app.core.spc.rules import FITTING, RuleName
+from app.core.spc.shewhart import Chart
+from app.core.spc.spread import Subgroups
+
+
+class Place(StrEnum):
+    """The charts of a characteristic; which kind the first two are, its baseline says."""
+
+    MAIN = "main"  # individuals, or subgroup means
+    SCATTER = "scatter"  # moving range, or R, or s
+    EWMA = "ewma"
+    MOVING_AVERAGE = "moving_average"
+    CUSUM = "cusum"
+
+
+class Do(StrEnum):
+    """What becomes of a signal: it is kept, or it raises an alarm too."""
+
+    WATCH = "watch"
+    ALARM = "alarm"
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A rule that is switched on, and the reading after which it begins (0: with the baseline)."""
+
+    do: Do
+    since: int = 0
+
+
+Rules = dict[Place, dict[RuleName, Setting]]
+
+DEFAULT: Rules = {Place.MAIN: {RuleName.NELSON_1: Setting(Do.WATCH)}}
+"""Until somebody says otherwise points beyond the limits are kept as signals: by chance one in 370. Nothing raises an alarm."""
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """The rules in force. version 0: the default, which nobody has set."""
+
+    rules: Rules
+    version: int = 0
+    at: datetime | None = None
+    actor: str | None = None
+    reason: str | None = None
+
+    def each(self) -> Iterator[tuple[Place, RuleName, Setting]]:
+        """Every rule that is on."""
+        for place, rules in self.rules.items():
+            for name, setting in rules.items():
+                yield place, name, setting
+
+
+def read_rules(stored: Mapping[str, Any]) -> Rules:
+    """Rules as they are stored.
+
+    >>> read_rules({"ewma": {"nelson_1": {"do": "alarm", "since": 812}}})[Place.EWMA][RuleName.NELSON_1].since
+    812
+    """
+    return {
+        Place(place): {RuleName(name): Setting(Do(each["do"]), each["since"]) for name, each in rules.items()}
+        for place, rules in stored.items()
+        if rules
+    }
+
+
+def stored_rules(rules: Rules) -> dict[str, Any]:
+    """The same the other way round, in the order of the charts and rules."""
+    return {
+        place.value: {
+            name.value: {"do": rules[place][name].do.value, "since": rules[place][name].since}
+            for name in RuleName
+            if name in rules[place]
+        }
+        for place in Place
+        if rules.get(place)
+    }
+
+
+def chart_at(baseline: Baseline | None, place: Place) -> Chart:
+    """The chart at this place; of single values while there is no baseline."""
+    kind = "individuals" if baseline is None else baseline.chart
+    if place is Place.MAIN:
+        return Chart.INDIVIDUALS if baseline is None else main_chart(baseline)
+    if place is Place.SCATTER:
+        return {"individuals": Chart.MOVING_RANGE, "xbar_r": Chart.RANGES, "xbar_s": Chart.DEVIATIONS}[kind]
+    return {Place.EWMA: Chart.EWMA, Place.MOVING_AVERAGE: Chart.MOVING_AVERAGE, Place.CUSUM: Chart.CUSUM}[place]
+
+
+def rules_at(baseline: Baseline | None, place: Place) -> tuple[RuleName, ...]:
+    """The rules that have a sense there; none where the chart itself has none."""
+    chart = chart_at(baseline, place)
+    return FITTING[chart] if baseline is None else quantity.fitting(Quantity(baseline.quantity), chart)
+
+
+def drawn_at(baseline: Baseline, place: Place) -> Drawn:
+    """The chart at this place as its baseline has frozen it."""
+    return Drawn(
+        chart_at(baseline, place),
+        width=baseline.ewma_width if place is Place.EWMA else 3.0,
+        weight=baseline.ewma_lambda,
+        exact=baseline.ewma_exact,
+        span=baseline.average_span,
+        reference=baseline.cusum_k,
+        limit=baseline.cusum_h,
+        headstart=baseline.cusum_headstart,
+    )
+
+
+def size_of(baseline: Baseline) -> int:
+    """Readings in a subgroup: as set, or as many as the baseline's own had on average."""
+    if baseline.grouping is None:
+        return 1
+    if baseline.group_size is not None:
+        return baseline.group_size
+    return max(2, round(baseline.readings / max(1, baseline.groups)))
+
+
+def piece_at(charted: Charted, place: Place) -> Piece | None:
+    """The points as z, as the chart at this place takes them; None where there is none."""
+    if charted.chart is None:
+        return None
+    piece = Piece([charted.chart.z], charted.first, charted.last, charted.begins)
+    if place is not Place.SCATTER or charted.groups is None:
+        return piece
+    scattering = charted.groups.sizes > 1  # what was excluded may have left one reading, which has no range
+    if not scattering.any():
+        return None
+    piece, groups = piece.only(scattering), _only(charted.groups, scattering)
+    made = shewhart.ranges if chart_at(charted.baseline, place) is Chart.RANGES else shewhart.deviations
+    return piece._replace(rows=[made(judged_by(charted.baseline), groups).z])
+
+
+def _only(groups: Subgroups, wanted: np.ndarray[Any, np.dtype[np.bool_]]) -> Subgroups:
+    return Subgroups(groups.sizes[wanted], groups.means[wanted], groups.ranges[wanted], groups.deviations[wanted])
