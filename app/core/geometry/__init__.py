@@ -7,6 +7,9 @@ line            the line, in a plane and in space
 plane           the plane
 zones           minimum zones (Chebyshev) of all three, and of an axis
 discs           largest inscribed, smallest circumscribed circle
+elements        axes and planes as they are touched, with how certain they are
+form, relations form and position, verdicts
+doubt, suspicion  touches that do not belong
 ==============  ==================================================================================
 
 Every fit is geometric: what is minimised are the orthogonal distances, not the residuals of an equation. Points are

@@ -1,0 +1,350 @@
+"""Form and position from touches: what is asked, how it is answered, and the verdict.
+
+===================  ===========================================================  ====================================
+what                 least squares                                                minimum zone
+===================  ===========================================================  ====================================
+roundness            greatest less smallest radius about the circle's centre      narrowest ring
+straightness         highest less lowest touch from the line                      narrowest strip
+axis straightness    2 x greatest distance of a section's centre from the line    diameter of the narrowest cylinder
+                     in space
+flatness             highest less lowest touch from the plane                     narrowest slab
+coaxiality           2 x greatest distance of a centre from the datum axis        --
+position             2 x distance from where it should be                         --
+parallelism,         length x sine of the angle that is wrong                     narrowest slab or cylinder in the
+perpendicularity                                                                  datum's direction
+===================  ===========================================================  ====================================
+
+The verdict goes by the minimum zone, which is what ISO 1101 means, unless another method is asked for. A deviation on the
+limit is good. Lengths are mm; `relations` holds what needs a datum.
+"""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from enum import StrEnum
+from math import hypot, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from app.core.geometry.certainty import COVERAGE, range_cofactor, zone_multipliers
+from app.core.geometry.circle import Circle, fit_circle
+from app.core.geometry.discs import circumscribed, inscribed
+from app.core.geometry.elements import Point, Section, WrongSection, axis_through, centres_of, heights_of
+from app.core.geometry.line import fit_line
+from app.core.geometry.plane import fit_plane
+from app.core.geometry.points import Degenerate, Floats, Reason, frame
+from app.core.geometry.suspicion import Suspect, Suspicion, in_bore, in_line, in_plane, in_section
+from app.core.geometry.zones import minimum_zone_axis, minimum_zone_circle, minimum_zone_line, minimum_zone_plane
+from app.core.zones import nanometres
+
+
+class Kind(StrEnum):
+    """What is looked at."""
+
+    ROUNDNESS = "roundness"
+    STRAIGHTNESS = "straightness"
+    AXIS_STRAIGHTNESS = "axis_straightness"
+    FLATNESS = "flatness"
+    COAXIALITY = "coaxiality"
+    POSITION = "position"
+    PARALLELISM = "parallelism"
+    PERPENDICULARITY = "perpendicularity"
+
+
+class Method(StrEnum):
+    """By which rule a deviation is told."""
+
+    MINIMUM_ZONE = "minimum_zone"
+    LEAST_SQUARES = "least_squares"
+    PRINTED = "printed"
+    INSCRIBED = "inscribed"
+    CIRCUMSCRIBED = "circumscribed"
+
+
+class Verdict(StrEnum):
+    """Within the tolerance or not, and whether the uncertainty leaves it at that."""
+
+    GOOD = "good"
+    GOOD_UNSURE = "good_unsure"
+    BAD_UNSURE = "bad_unsure"
+    BAD = "bad"
+
+    @property
+    def good(self) -> bool:
+        """Whether the deviation as found is within the tolerance."""
+        return self in {Verdict.GOOD, Verdict.GOOD_UNSURE}
+
+    @property
+    def sure(self) -> bool:
+        """Whether the limit lies outside the uncertainty."""
+        return self in {Verdict.GOOD, Verdict.BAD}
+
+
+@dataclass(frozen=True, slots=True)
+class Touched:
+    """A feature: a bore or shaft in sections, or a surface or profile in points."""
+
+    sections: tuple[Section, ...] = ()
+    points: tuple[Point, ...] = ()
+
+
+class Value(NamedTuple):
+    """A deviation by one method, mm, and its cofactor where there is one."""
+
+    method: Method
+    value: float
+    cofactor: float | None = None
+
+    def uncertainty(self, repeatability: float | None) -> float | None:
+        """Expanded (k = 2), mm. repeatability: standard deviation of a touch, mm."""
+        if repeatability is None or self.cofactor is None:
+            return None
+        return COVERAGE * repeatability * sqrt(self.cofactor)
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """What was found. details: centres, axes, residuals, as plain lists, for tables and pictures."""
+
+    values: tuple[Value, ...]
+    suspicion: Suspicion = field(default_factory=Suspicion)  # touches of the feature that do not belong
+    datum: Suspicion = field(default_factory=Suspicion)  # touches of the datum that do not
+    details: dict[str, Any] = field(default_factory=dict)
+
+    def by(self, method: Method | None) -> Value:
+        """The value by this method; by the first, which is what the standard means, where it has none such."""
+        return next((value for value in self.values if value.method is method), self.values[0])
+
+
+def verdict(value: float, tolerance: float, uncertainty: float | None) -> Verdict:
+    """Whether a deviation keeps its tolerance, to the nanometre; on the limit is good. mm.
+
+    >>> verdict(0.005, 0.005, None).value, verdict(0.0045, 0.005, 0.001).value, verdict(0.0082, 0.005, 0.001).value
+    ('good', 'good_unsure', 'bad')
+    """
+    good = nanometres(value) <= nanometres(tolerance)
+    if uncertainty is not None and abs(value - tolerance) < uncertainty:
+        return Verdict.GOOD_UNSURE if good else Verdict.BAD_UNSURE
+    return Verdict.GOOD if good else Verdict.BAD
+
+
+def printed_straightness(centres: Sequence[Point]) -> float:
+    """Straightness of an axis by the printed method, mm: ``2 max |A X_i - Y_i + B|/sqrt(A^2 + 1)``, ``Y = A X + B`` by
+    least squares in Y. It ignores the heights, so it sees a bend only where it does not lie along the tilt.
+
+    >>> round(printed_straightness([(0.0, 0.0), (1.0, 0.01), (2.0, 0.0)]), 6)
+    0.013333
+    """
+    x, y = np.asarray(centres, dtype=np.float64).T
+    about = x - x.mean()
+    square = float(about @ about)
+    if square <= 0:
+        raise Degenerate(Reason.NO_DIRECTION)
+    slope = float(about @ (y - y.mean())) / square
+    return 2 * float(np.abs(slope * about - (y - y.mean())).max()) / hypot(slope, 1)
+
+
+def roundness(feature: Touched) -> Form:
+    """Of one section or more; the worst one counts. Raises `Degenerate` and `WrongSection`.
+
+    >>> lobed = ((10.01, 0.0), (0.0, 9.99), (-10.01, 0.0), (0.0, -9.99))
+    >>> [(value.method.value, round(value.value, 6)) for value in roundness(Touched((Section(lobed),))).values[:2]]
+    [('minimum_zone', 0.02), ('least_squares', 0.02)]
+    """
+    if not feature.sections:
+        raise Degenerate(Reason.TOO_FEW, have=0, needed=1)
+    found, told, tested = [], [], True
+    suspects: list[Suspect] = []
+    for number, section in enumerate(feature.sections, start=1):
+        try:
+            _enough(section.touches, 4)
+            values, circle, ring = _round(section)
+        except Degenerate as reason:
+            raise WrongSection(number, reason) from None
+        doubted = in_section(section.touches, number)
+        found.append(values)
+        suspects += doubted.suspects
+        tested = tested and doubted.tested
+        told.append(_circle_told(circle, section) | {"ring": ring} | {each.method.value: each.value for each in values})
+    methods = [method for method in Method if all(any(v.method is method for v in values) for values in found)]
+    worst = [
+        max((v for values in found for v in values if v.method is method), key=lambda v: v.value) for method in methods
+    ]
+    return Form(tuple(worst), Suspicion(tuple(suspects), tested), details={"sections": told})
+
+
+def _round(section: Section) -> tuple[list[Value], Circle, dict[str, Any]]:
+    touches = np.asarray(section.touches, dtype=np.float64)
+    circle, ring = fit_circle(touches), minimum_zone_circle(touches)
+    away = touches - circle.centre
+    jacobian = np.column_stack([away / np.linalg.norm(away, axis=1)[:, None], np.ones(len(away))])
+    least = range_cofactor(circle.residuals, jacobian)
+    bearing = list(ring.at)
+    distances = np.linalg.norm(touches[bearing] - ring.centre, axis=1)
+    sides = np.where(distances > (ring.inner + ring.outer) / 2, 1.0, -1.0)
+    zone = zone_multipliers(-(touches[bearing] - ring.centre) / distances[:, None], sides)
+    values = [
+        Value(Method.MINIMUM_ZONE, ring.width, float(zone @ zone)),
+        Value(Method.LEAST_SQUARES, circle.range, least),
+    ]
+    try:
+        inner = inscribed(touches)
+        reach = float(np.linalg.norm(touches - inner.centre, axis=1).max())
+        values.append(Value(Method.INSCRIBED, reach - inner.radius))
+    except Degenerate:
+        pass  # an arc holds no circle; the other methods stand
+    outer = circumscribed(touches)
+    least_reach = float(np.linalg.norm(touches - outer.centre, axis=1).min())
+    values.append(Value(Method.CIRCUMSCRIBED, outer.radius - least_reach))
+    return values, circle, {"centre": ring.centre.tolist(), "inner": ring.inner, "outer": ring.outer}
+
+
+def straightness(feature: Touched) -> Form:
+    """Of a profile: points along it and across it. Raises `Degenerate`."""
+    _enough(feature.points, 3)
+    line, strip = fit_line(feature.points), minimum_zone_line(feature.points)
+    points = np.asarray(feature.points, dtype=np.float64)
+    jacobian = np.column_stack([line.along, np.ones(len(points))])
+    along = (points - strip.point) @ np.array([strip.normal[1], -strip.normal[0]])
+    return Form(
+        (
+            Value(Method.MINIMUM_ZONE, strip.width, _slab_cofactor(points, strip, along[:, None])),
+            Value(Method.LEAST_SQUARES, float(np.ptp(line.residuals)), range_cofactor(line.residuals, jacobian)),
+        ),
+        in_line(feature.points),
+        details={"along": line.along.tolist(), "residuals": line.residuals.tolist(), "point": line.point.tolist()}
+        | {"direction": line.direction.tolist()},
+    )
+
+
+def flatness(feature: Touched) -> Form:
+    """Of a surface. Raises `Degenerate`."""
+    _enough(feature.points, 4)
+    plane, slab = fit_plane(feature.points), minimum_zone_plane(feature.points)
+    points = np.asarray(feature.points, dtype=np.float64)
+    local = (points - plane.point) @ frame(plane.normal)[:2].T
+    jacobian = np.column_stack([local, np.ones(len(points))])
+    levers = (points - slab.point) @ frame(slab.normal)[:2].T
+    return Form(
+        (
+            Value(Method.MINIMUM_ZONE, slab.width, _slab_cofactor(points, slab, levers)),
+            Value(Method.LEAST_SQUARES, plane.range, range_cofactor(plane.residuals, jacobian)),
+        ),
+        in_plane(feature.points),
+        details={"residuals": plane.residuals.tolist(), "point": plane.point.tolist(), "normal": plane.normal.tolist()},
+    )
+
+
+def _slab_cofactor(points: Floats, slab: Any, levers: Floats) -> float:
+    bearing = list(slab.at)
+    sides = np.where((points[bearing] - slab.point) @ slab.normal > 0, 1.0, -1.0)
+    shares = zone_multipliers(levers[bearing], sides)
+    return float(shares @ shares)
+
+
+def axis_straightness(feature: Touched) -> Form:
+    """Of the axis through the centres of three sections or more; without heights by the printed method alone.
+
+    Raises `Degenerate` and `WrongSection`.
+    """
+    sections = feature.sections
+    if len(sections) < 3:
+        raise Degenerate(Reason.TOO_FEW, have=len(sections), needed=3)
+    centres = centres_of(sections)
+    told = sections_told(sections)
+    printed: tuple[Value, ...] = ()
+    with suppress(Degenerate):  # where all centres have one X the printed method has no line
+        printed = (Value(Method.PRINTED, printed_straightness([tuple(each.at) for each in centres])),)
+    heights = heights_of(sections)
+    if heights is None:
+        if not printed:
+            raise Degenerate(Reason.NO_DIRECTION)
+        return Form(printed, in_bore(sections), details={"sections": told})
+    axis = axis_through(sections)
+    zone = minimum_zone_axis(axis.points)
+    away = across(axis.points, axis.point, axis.direction)
+    distances = np.linalg.norm(away, axis=1)
+    levers = np.column_stack([np.ones(len(heights)), (heights - heights.mean()) / np.ptp(heights)])
+    hat = levers @ np.linalg.pinv(levers)
+    worst = int(distances.argmax())
+    direction = away[worst] / distances[worst] if distances[worst] > 0 else frame(axis.direction)[0]
+    spread = np.einsum("i,jik,k->j", direction, axis.cofactors, direction)
+    least = 4 * float(((np.eye(len(hat)) - hat)[worst] ** 2) @ spread)
+    values = (
+        Value(Method.MINIMUM_ZONE, 2 * zone.radius, _cylinder_cofactor(axis.points, axis.cofactors, zone)),
+        Value(Method.LEAST_SQUARES, 2 * float(distances.max()), least),
+        *printed,
+    )
+    for each, off in zip(told, away.tolist(), strict=True):
+        each["off"] = off
+    return Form(values, in_bore(sections), details={"sections": told, "axis": axis_told(axis)})
+
+
+def _cylinder_cofactor(points: Floats, cofactors: Floats, zone: Any) -> float:
+    bearing = list(zone.at)
+    away = across(points[bearing], zone.point, zone.direction)
+    units = away / np.maximum(np.linalg.norm(away, axis=1), 1e-300)[:, None]
+    axes = frame(zone.direction)
+    flat = units @ axes[:2].T
+    along = (points[bearing] - zone.point) @ zone.direction
+    shares = zone_multipliers(np.hstack([flat, flat * along[:, None]]), np.ones(len(bearing)))
+    return 4 * float(shares**2 @ np.einsum("ji,jik,jk->j", units, cofactors[bearing], units))
+
+
+def across(points: Floats, point: Floats, direction: Floats) -> Floats:
+    """What of each point lies across a line in space."""
+    about = points - point
+    found: Floats = about - np.outer(about @ direction, direction)
+    return found
+
+
+def sections_told(sections: Sequence[Section]) -> list[dict[str, Any]]:
+    """Sections with centre, radius, residuals, as plain values."""
+    told = []
+    for section, centre in zip(sections, centres_of(sections), strict=True):
+        if centre.circle is None:
+            told.append({"centre": centre.at.tolist(), "height": section.height, "radius": None, "residuals": []})
+        else:
+            told.append(_circle_told(centre.circle, section))
+    return told
+
+
+def _circle_told(circle: Circle, section: Section) -> dict[str, Any]:
+    return {
+        "centre": circle.centre.tolist(),
+        "height": section.height,
+        "radius": circle.radius,
+        "arc": circle.arc,
+        "residuals": circle.residuals.tolist(),
+    }
+
+
+def axis_told(element: Any) -> dict[str, Any]:
+    """An axis or plane as plain values."""
+    return {
+        "point": element.point.tolist(),
+        "direction": element.direction.tolist(),
+        "length": element.length,
+        "lengthwise": element.lengthwise,
+    }
+
+
+def replaced(feature: Touched, suspects: Sequence[Suspect]) -> Touched:
+    """The feature with suspected touches where they would have to be."""
+    sections, points = [list(section.touches) for section in feature.sections], list(feature.points)
+    for suspect in suspects:
+        place = points if suspect.section is None else sections[suspect.section - 1]
+        place[suspect.touch - 1] = suspect.nearest
+    return Touched(
+        tuple(
+            section._replace(touches=tuple(touches))
+            for section, touches in zip(feature.sections, sections, strict=True)
+        ),
+        tuple(points),
+    )
+
+
+def _enough(points: Sequence[Point], needed: int) -> None:
+    if len(points) < needed:
+        raise Degenerate(Reason.TOO_FEW, have=len(points), needed=needed)
