@@ -1,0 +1,170 @@
+"""Do corrections act in full? The share e of a commanded change of size that arrives, measured on a closed loop.
+
+A deviation is the process without corrections less what the corrections in effect, S (mm of offset), have changed::
+
+    D_i = w_i - e S_i / f,    e = 1: a correction of 10 µm moves the part by 10 µm.
+
+Comparing parts before and after a correction would overstate e: a loop corrects when scatter, too, points away, and that
+does not come again. A straight line through everything would understate it: the loop corrects most while the machine warms
+up. So w is a local line, which wears and warms up now quicker, now slower, under scatter::
+
+    w_i = level_i + noise,  level_i+1 = level_i + slope_i + random step,  slope_i+1 = slope_i + random step
+
+and e the size of interventions in it (Box and Tiao 1975, J. Am. Stat. Assoc. 70, 70; Harvey 1989, Forecasting, structural time
+series models and the Kalman filter, section 7.3). One Kalman filter foretells D and -S / f each reading alike; what it
+misses of D is e times what it misses of -S / f, and scatter: a weighted least-squares line, whose slope is e. S_i was decided from
+readings before i, so what is missed of it owes nothing to the scatter of i: the loop being closed does no harm.
+
+The variances of the steps are those of the greatest likelihood on a grid. Readings further off than `OUTLIER` standard deviations are
+taken as missing (a chip under the stylus); after three of them in a row the course begins anew (an edge that broke). Lengths are mm.
+"""
+
+from itertools import product
+from math import inf, log, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from app.core.compiled import compiled
+from app.core.spc.refusal import Reason, Refused
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+FEWEST_CORRECTIONS, FEWEST_READINGS = 10, 50
+LONGEST = 10_000  # readings that are looked at
+LEVEL = 0.95  # of confidence, two-sided
+OUTLIER = 4.5
+STEPS_OF_LEVEL = (0.0, 0.001, 0.01, 0.05, 0.2, 1.0)  # variance of a step over that of the scatter
+STEPS_OF_SLOPE = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+PASSES = 4
+
+
+class Effect(NamedTuple):
+    """The share of a correction that arrives, with its confidence interval.
+
+    corrections: changes of the offset that it is told by, among so many readings; typical: the median change of size that they
+    commanded, mm. scatter: standard deviation of a part about the course of the process, mm.
+    """
+
+    value: float
+    low: float
+    high: float
+    corrections: int
+    readings: int
+    typical: float
+    scatter: float
+
+    @property
+    def is_full(self) -> bool:
+        """Whether corrections may well act in full: the interval holds 1."""
+        return self.low <= 1 <= self.high
+
+
+def measured_effect(deviation: Floats, compensated: Floats, factor: float, begins: Flags) -> Effect:
+    """What corrections did, by the newest `LONGEST` readings. begins: those that continue nothing, such as the first of an edge.
+
+    Raises `Refused` with fewer than ten corrections or fifty readings, and where nothing varies.
+
+    >>> chance = np.random.default_rng(1)
+    >>> s = -np.repeat(np.arange(40), 10) * 0.002
+    >>> d = np.arange(400) * 0.0002 + chance.normal(0, 0.0005, 400) + 0.9 * s
+    >>> found = measured_effect(d, s, -1.0, np.arange(400) == 0)
+    >>> found.low < 0.9 < found.high, found.is_full, found.corrections
+    (True, False, 39)
+    """
+    y = np.asarray(deviation, np.float64)[-LONGEST:]
+    x = (-np.asarray(compensated, np.float64) / factor)[-LONGEST:]
+    begins = np.array(begins[-LONGEST:], np.bool_)
+    begins[:1] = True
+    steps = np.abs(np.diff(x))[~begins[1:]]
+    steps = steps[steps > 1e-9]
+    if len(y) < FEWEST_READINGS:
+        raise Refused(Reason.TOO_FEW_READINGS, have=len(y), needed=FEWEST_READINGS)
+    if len(steps) < FEWEST_CORRECTIONS:
+        raise Refused(Reason.INCOMPLETE_STUDY, have=len(steps), needed=FEWEST_CORRECTIONS, what="corrections")
+    scatter = float(np.median(np.abs(np.diff(y - x)))) * 1.4826 / sqrt(2)
+    if not scatter > 1e-9:
+        raise Refused(Reason.NO_VARIATION)
+    slope, line = 1.0, None
+    for _pass in range(PASSES):
+        lines = (
+            _line(y / scatter, x / scatter, begins, steps_, slope) for steps_ in product(STEPS_OF_LEVEL, STEPS_OF_SLOPE)
+        )
+        line = min(lines, key=lambda each: each.unlikely)
+        before, slope = slope, line.slope
+        scatter *= sqrt(line.variance) if line.variance > 0 else 1.0
+        if abs(slope - before) < 0.001:
+            break
+    if line is None or not line.sxx > 0 or line.freedom < 1:
+        raise Refused(Reason.NO_VARIATION)
+    half = float(stdtrit(line.freedom, (1 + LEVEL) / 2)) * sqrt(line.variance / line.sxx)
+    return Effect(slope, slope - half, slope + half, len(steps), len(y), float(np.median(steps)), scatter)
+
+
+class _Line(NamedTuple):
+    slope: float
+    sxx: float
+    variance: float
+    freedom: int
+    unlikely: float
+
+
+def _line(y: Floats, x: Floats, begins: Flags, steps: tuple[float, float], slope: float) -> _Line:
+    missed_y, missed_x, variance, used, left_out = _missed(y, x, begins, *steps, slope, OUTLIER)
+    weight = 1 / np.sqrt(variance[used])
+    dy, dx = missed_y[used] * weight, missed_x[used] * weight
+    sxx, freedom = float(dx @ dx), len(dy) - 1
+    if not sxx > 0 or freedom < 1:
+        return _Line(slope, 0.0, 0.0, freedom, inf)
+    found = float(dx @ dy) / sxx
+    left = dy - found * dx
+    each = float(left @ left) / freedom
+    unlikely = len(dy) * log(max(each, 1e-12)) + float(np.log(variance[used]).sum()) + left_out * OUTLIER**2
+    return _Line(found, sxx, each, freedom, unlikely)
+
+
+@compiled
+def _missed(
+    y: Floats, x: Floats, begins: Flags, level_step: float, slope_step: float, share: float, outlier: float
+) -> tuple[Floats, Floats, Floats, Flags, int]:
+    """What the filter misses of y and x, the variance of it, which of them count, and how many were outliers.
+
+    The scatter has the variance 1. At a beginning nothing is known: the first two readings count for nothing.
+    """
+    count = len(y)
+    missed_y, missed_x, variances = np.zeros(count), np.zeros(count), np.ones(count)
+    used = np.zeros(count, np.bool_)
+    left_out, since, in_row = 0, 0, 0
+    level_y = slope_y = level_x = slope_x = 0.0
+    p11 = p12 = p22 = 0.0
+    for i in range(count):
+        if begins[i] or in_row == 3:
+            level_y, slope_y, level_x, slope_x = y[i], 0.0, x[i], 0.0
+            p11, p12, p22 = 1.0, 0.0, 1.0e6
+            since, in_row = 1, 0
+        else:
+            variance = p11 + 1.0
+            vy, vx = y[i] - level_y, x[i] - level_x
+            if since > 1 and abs(vy - share * vx) > outlier * np.sqrt(variance):
+                left_out += 1
+                in_row += 1
+            else:
+                in_row = 0
+                if since > 1:
+                    missed_y[i], missed_x[i], variances[i], used[i] = vy, vx, variance, True
+                since += 1
+                k1, k2 = p11 / variance, p12 / variance
+                level_y, slope_y = level_y + k1 * vy, slope_y + k2 * vy
+                level_x, slope_x = level_x + k1 * vx, slope_x + k2 * vx
+                p22 -= k2 * p12
+                p12 -= k2 * p11
+                p11 -= k1 * p11
+        level_y += slope_y
+        level_x += slope_x
+        p11 += 2 * p12 + p22 + level_step
+        p12 += p22
+        p22 += slope_step
+    return missed_y, missed_x, variances, used, left_out

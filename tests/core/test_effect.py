@@ -1,0 +1,113 @@
+"""The measured effect of corrections: planted ones are found again, though the loop is closed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from app.core.compiled import plain
+from app.core.effect import FEWEST_CORRECTIONS, FEWEST_READINGS, LONGEST, Effect, _missed, measured_effect
+from app.core.replay import Lane, Policy, run, undisturbed
+from app.core.spc.refusal import Reason, Refused
+from tests.core.test_replay import SHAFT
+
+Values = NDArray[np.float64]
+LIFE = 520
+
+
+def loop(effect: float, delay: int, seed: int, count: int = 1500) -> tuple[Values, Values, NDArray[np.bool_]]:
+    """Deviations, corrections in effect and beginnings of a shaft that wears, warms up, scatters, with single outliers."""
+    chance, part = np.random.default_rng(seed), np.arange(count) % LIFE
+    free = part * 0.00006 + 0.004 * (1 - np.exp(-part / 20)) + 0.006 * (1 - np.exp(-part / 40))
+    free += chance.normal(0, 0.0008, count) + (chance.random(count) < 1 / 180) * 0.005
+    way = undisturbed(free.round(9))
+    way.marks[::LIFE] = 1
+    begins = int((way.marks > 0).sum())
+    way = way._replace(offset=np.zeros(begins), pending=np.zeros(begins), averages=np.zeros((begins, 1)))
+    course, _figures = run(way, Policy((Lane(replace(SHAFT, zero_range=0.002), effect),), delay))
+    return course.deviation, course.offset, way.marks > 0
+
+
+@pytest.mark.parametrize("delay", [0, 2])
+@pytest.mark.parametrize("effect", [1.0, 0.9, 0.6])
+def test_a_planted_effect_is_found_again(effect: float, delay: int) -> None:
+    found = []
+    for seed in range(12):
+        deviation, offset, begins = loop(effect, delay, seed)
+        found.append(measured_effect(deviation, offset, -1.0, begins))
+    assert np.mean([each.value for each in found]) == pytest.approx(effect, abs=0.03)
+    assert sum(each.low <= effect <= each.high for each in found) >= 9
+    assert max(each.high - each.low for each in found) < 0.2
+
+
+def test_comparing_before_and_after_would_not_do() -> None:
+    """What the module says of the simple ways: too much without the pipeline, for the loop follows scatter."""
+    deviation, offset, begins = loop(0.9, 0, 1)
+    steps = np.flatnonzero((np.diff(offset) != 0) & ~begins[1:])
+    simple = np.polyfit(np.diff(offset)[steps], np.diff(deviation)[steps], 1)[0]
+    assert simple > 1.0
+    found = measured_effect(deviation, offset, -1.0, begins)
+    assert found.high < 1.0
+    assert not found.is_full
+
+
+def test_an_edge_that_broke_does_not_change_it() -> None:
+    deviation, offset, begins = loop(1.0, 2, 5)
+    broken = deviation + np.where(np.arange(1500) >= 900, 0.05, 0.0)
+    assert measured_effect(broken, offset, -1.0, begins).value == pytest.approx(1.0, abs=0.06)
+
+
+@pytest.mark.parametrize("factor", [-0.5, 0.5, -2.0])
+def test_the_factor_only_turns_offsets_into_sizes(factor: float) -> None:
+    deviation, offset, begins = loop(0.9, 2, 7)
+    expected = measured_effect(deviation, offset, -1.0, begins)
+    found = measured_effect(deviation, -offset * factor, factor, begins)
+    assert found == pytest.approx(expected)
+    assert isinstance(found, Effect)
+
+
+def test_it_is_the_same_in_any_unit_and_in_the_mirror() -> None:
+    deviation, offset, begins = loop(0.9, 1, 9)
+    expected = measured_effect(deviation, offset, -1.0, begins)
+    for scale in (1000.0, -1.0):
+        found = measured_effect(scale * deviation, scale * offset, -1.0, begins)
+        assert found.value == pytest.approx(expected.value)
+        assert found.low == pytest.approx(expected.low)
+
+
+def test_only_the_newest_readings_are_looked_at() -> None:
+    deviation, offset, begins = loop(0.9, 1, 9, count=LONGEST + 500)
+    found = measured_effect(deviation, offset, -1.0, begins)
+    assert found == measured_effect(deviation[500:], offset[500:], -1.0, begins[500:])
+    assert found.readings == LONGEST
+
+
+def test_what_does_not_carry_it_is_refused_with_what_is_missing() -> None:
+    deviation, offset, begins = loop(1.0, 1, 2)
+    with pytest.raises(Refused) as few:
+        measured_effect(deviation[: FEWEST_READINGS - 1], offset[: FEWEST_READINGS - 1], -1.0, begins[:49])
+    assert (few.value.reason, few.value.missing) == (Reason.TOO_FEW_READINGS, 1)
+    with pytest.raises(Refused) as none:
+        measured_effect(deviation, np.zeros(1500), -1.0, begins)
+    assert (none.value.reason, none.value.missing) == (Reason.INCOMPLETE_STUDY, FEWEST_CORRECTIONS)
+    steps = np.repeat(np.arange(20.0), 5) * 0.001
+    with pytest.raises(Refused) as same:
+        measured_effect(-steps, -steps, -1.0, np.arange(100) == 0)
+    assert same.value.reason is Reason.NO_VARIATION
+
+
+def test_the_compiled_filter_is_its_python() -> None:
+    deviation, offset, begins = loop(0.9, 1, 3, count=300)
+    arguments = (deviation * 1000, offset * 1000, begins, 0.01, 1e-4, 1.0, 4.5)
+    for quick, slow in zip(_missed(*arguments), plain(_missed)(*arguments), strict=True):
+        np.testing.assert_allclose(np.asarray(quick, float), np.asarray(slow, float), rtol=1e-12, atol=1e-12)
+
+
+def test_a_filter_by_hand() -> None:
+    # Scatter 1, level and slope steady: the third reading of 0, 1, 2 is foretold as 2, with variance 1 + 4 + 1 - 0.
+    y = np.array([0.0, 1.0, 2.5])
+    missed, _x, variance, used, _out = _missed(y, y, np.array([True, False, False]), 0.0, 0.0, 1.0, 4.5)
+    assert used.tolist() == [False, False, True]
+    assert missed[2] == pytest.approx(0.5, abs=1e-5)
+    assert variance[2] == pytest.approx(6.0, abs=1e-4)
