@@ -1,0 +1,255 @@
+"""The protocol that a control writes after cycle 451 or 452 (TCHPRAUTO.html), read by its labels: German, English, Slovene.
+
+The labels are those of the cycle's manual; controls and versions word them differently, so what is not understood is
+handed back line by line. Lengths become mm, angles degrees. Nothing raises.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from app.core.kinematics.axis import ERRORS, AxisName
+from app.core.kinematics.results import SCALARS, STRINGS
+from app.formats.markup import Row, rows_of
+from app.formats.rotary_words import AXIS_KEYS, HEAD_KEYS, LABELS, OPTIMISED, WORTHLESS
+from app.formats.values import folded
+
+LARGEST = 1e6
+LONGEST_LABEL = 120
+_AXIS = re.compile(
+    r"\b(?:drehachse|achse|axis|os|osi|rotacijska os|rotary axis)\s+([abc])\b"
+    r"|\b([abc])\s?(?:achse|drehachse|axis|os|osi)\b"
+)
+_NUMBER = re.compile(r"(?<![\w.,])([+-]?\d{1,12}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm|°|deg|grad|inch|in|\")?(?![\w])")
+_COORDINATE = re.compile(r"\b([xyz])\s*[=:]?\s*([+-]?\d{1,12}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm)?", re.IGNORECASE)
+_DEVIATION = re.compile(r"\be([xyz])([abc])\b")
+_CLOCK = re.compile(r"\d{1,2}:\d{2}")
+_PARAMETER = re.compile(r"\b(QS?1[0-9]{2})\b", re.IGNORECASE)
+SIGNS = {"+": 1, "-": -1, "positiv": 1, "negativ": -1, "positive": 1, "negative": -1, "pozitivna": 1, "negativna": -1}
+Point = tuple[float, float, float]
+
+
+class Unread(NamedTuple):
+    """A line of the protocol that was not understood."""
+
+    line: int
+    text: str
+
+
+class Deviation(NamedTuple):
+    """A row of the table behind a diagram, mm: deviations before and, where they are given, after; None: no such column."""
+
+    angle: float
+    approach: int
+    measured: tuple[float | None, float | None, float | None]
+    optimised: tuple[float | None, float | None, float | None]
+
+
+@dataclass
+class AxisProtocol:
+    """What stands of one axis. numbers: by `AXIS_KEYS`; vectors: X Y Z of correction, before, after."""
+
+    numbers: dict[str, float] = field(default_factory=dict)
+    vectors: dict[str, Point] = field(default_factory=dict)
+    angles: tuple[float, ...] = ()
+    errors: dict[str, float] = field(default_factory=dict)
+    deviations: list[Deviation] = field(default_factory=list)
+
+
+@dataclass
+class Protocol:
+    """What was understood: texts of the head, axes, result parameters as they stand there, and the lines left over."""
+
+    head: dict[str, str] = field(default_factory=dict)
+    ball_radius: float | None = None
+    incidence: float | None = None
+    axes: dict[AxisName, AxisProtocol] = field(default_factory=dict)
+    parameters: list[str] = field(default_factory=list)
+    unread: list[Unread] = field(default_factory=list)
+
+
+def read_protocol(text: str) -> Protocol:
+    """What a protocol says.
+
+    >>> made = read_protocol("<h2>C-Achse</h2><table><tr><td>Lose</td><td>0,0021 °</td></tr></table>")
+    >>> made.axes["C"].numbers
+    {'backlash': 0.0021}
+    """
+    made = Protocol()
+    rows, broken = rows_of(text)
+    made.unread += [Unread(line, "<") for line in broken]
+    axis: AxisName | None = None
+    columns: list[tuple[str, int]] = []
+    for row in rows:
+        label, values = _split(row)
+        words = folded(label[:LONGEST_LABEL])
+        named = _AXIS.search(words)
+        if named is not None:
+            axis = _axis_of(named)
+            made.axes.setdefault(axis, AxisProtocol())
+            words = " ".join(_AXIS.sub(" ", words).split())
+        if found := _columns(row):
+            axis, columns = found
+            continue
+        if columns and axis is not None and _deviation(made, axis, columns, row):
+            continue
+        columns = []
+        if words in WORTHLESS and not values:
+            continue
+        if not _take(made, axis, words, label, values):
+            made.unread.append(Unread(row.line, row.text[:200]))
+    made.axes = {axis: found for axis, found in made.axes.items() if found != AxisProtocol()}
+    made.unread.sort(key=lambda each: each.line)
+    return made
+
+
+def _split(row: Row) -> tuple[str, list[str]]:
+    if len(row.cells) > 1:
+        return row.cells[0].rstrip(":= "), list(row.cells[1:])
+    text = row.cells[0]
+    clock = _CLOCK.search(text)
+    for mark in (":", "=", "\t"):
+        at = text.find(mark)
+        if at > 0 and not (mark == ":" and clock is not None and clock.start() < at < clock.end()):
+            return text[:at].strip(), [text[at + 1 :].strip()] if text[at + 1 :].strip() else []
+    return text.strip(), []
+
+
+def _axis_of(found: re.Match[str]) -> AxisName:
+    letter = (found[1] or found[2]).upper()
+    return "A" if letter == "A" else "B" if letter == "B" else "C"
+
+
+def _take(made: Protocol, axis: AxisName | None, words: str, label: str, values: Sequence[str]) -> bool:
+    """Keep what a row says; False when it is not understood."""
+    said = " ".join(values)
+    if (parameter := _PARAMETER.search(label)) is not None:
+        name = parameter[1].upper()
+        if name in {*SCALARS, *STRINGS} and said:
+            made.parameters.append(f"{name} = {said}")
+            return True
+    if not words:
+        return not values  # the heading of an axis
+    bare = label.strip().upper()
+    for owner, names in ERRORS.items():
+        if bare in names and (numbers := numbers_in(said)):
+            made.axes.setdefault(owner, AxisProtocol()).errors[bare] = numbers[0]
+            return True
+    key = next((key for key, words_of in LABELS if words in words_of), None)
+    if key is None:
+        key = next((key for key, words_of in LABELS if any(words.startswith(f"{each} ") for each in words_of)), None)
+    if key is None:
+        return False
+    if key == "scatter_before" and any(word in folded(label[:LONGEST_LABEL].replace("(", " ")) for word in OPTIMISED):
+        key = "scatter_after"
+    if key in HEAD_KEYS:
+        if not said:
+            return False
+        made.head.setdefault(key, said[:200])
+        return True
+    return _number(made, axis, key, said)
+
+
+def _number(made: Protocol, axis: AxisName | None, key: str, said: str) -> bool:
+    numbers = numbers_in(said)
+    if key == "ball_radius":
+        if not numbers:
+            return False
+        made.ball_radius = numbers[0]
+        return True
+    if axis is None:
+        if key == "incidence" and numbers:
+            made.incidence = numbers[0]
+            return True
+        return False
+    kept = made.axes[axis]
+    if key == "angles":
+        kept.angles = tuple(numbers)
+        return bool(numbers)
+    if key in {"correction", "before", "after"}:
+        vector = _vector(said)
+        if vector is None:
+            return False
+        kept.vectors[key] = vector
+        return True
+    assert key in AXIS_KEYS
+    if not numbers:
+        return False
+    kept.numbers[key] = numbers[0]
+    return True
+
+
+def numbers_in(text: str) -> list[float]:
+    """The numbers of a text, µm as mm; inches are nothing that a control writes here.
+
+    >>> numbers_in("−90,000 ° 0 90.5°"), numbers_in("3,4 µm"), numbers_in("2 inch")
+    ([-90.0, 0.0, 90.5], [0.0034], [])
+    """
+    found = []
+    for number, unit in _NUMBER.findall(text.replace("\N{MINUS SIGN}", "-")):
+        value = float(number.replace(",", "."))
+        if unit in {"inch", "in", '"'} or abs(value) > LARGEST:
+            continue
+        found.append(round(value / 1000, 12) if unit in {"um", "µm", "μm"} else value)
+    return found
+
+
+def _vector(said: str) -> Point | None:
+    plain = said.replace("\N{MINUS SIGN}", "-")
+    named = {letter.upper(): numbers_in(f"{number} {unit}")[:1] for letter, number, unit in _COORDINATE.findall(plain)}
+    if named:
+        x, y, z = ((named.get(letter) or [0.0])[0] for letter in "XYZ")
+        return x, y, z
+    numbers = numbers_in(plain)
+    return (numbers[0], numbers[1], numbers[2]) if len(numbers) == 3 else None
+
+
+def _columns(row: Row) -> tuple[AxisName, list[tuple[str, int]]] | None:
+    """The columns of the table behind a diagram, if this row is its head: (what, which of X Y Z)."""
+    if len(row.cells) < 2:
+        return None
+    columns: list[tuple[str, int]] = []
+    letters = set()
+    for cell in row.cells:
+        words = folded(cell[:LONGEST_LABEL].replace("(", " ").replace(")", " "))
+        if (found := _DEVIATION.search(words)) is not None:
+            letters.add(found[2].upper())
+            after = any(word in words for word in OPTIMISED)
+            columns.append(("optimised" if after else "measured", "xyz".index(found[1])))
+        elif any(word in words for word in ("richtung", "direction", "smer")):
+            columns.append(("approach", 0))
+        else:
+            columns.append(("angle" if not any(kind == "angle" for kind, _at in columns) else "other", 0))
+    if len(letters) != 1 or not any(kind == "angle" for kind, _at in columns):
+        return None
+    letter = letters.pop()
+    return ("A" if letter == "A" else "B" if letter == "B" else "C"), columns
+
+
+def _deviation(made: Protocol, axis: AxisName, columns: Sequence[tuple[str, int]], row: Row) -> bool:
+    if len(row.cells) != len(columns):
+        return False
+    kept: dict[str, list[float | None]] = {"measured": [None] * 3, "optimised": [None] * 3}
+    angle, approach = None, 0
+    for (kind, at), cell in zip(columns, row.cells, strict=True):
+        numbers = numbers_in(cell)
+        if kind == "approach":
+            approach = SIGNS.get(folded(cell[:LONGEST_LABEL]) or cell.strip().replace("\N{MINUS SIGN}", "-"), 0) or SIGNS.get(
+                cell.strip(), 0
+            )
+        elif kind == "other":
+            continue
+        elif len(numbers) != 1:
+            return False
+        elif kind == "angle":
+            angle = numbers[0]
+        else:
+            kept[kind][at] = numbers[0]
+    if angle is None:
+        return False
+    x, y, z = kept["measured"]
+    xo, yo, zo = kept["optimised"]
+    found = made.axes.setdefault(axis, AxisProtocol())
+    found.deviations.append(Deviation(angle, approach, (x, y, z), (xo, yo, zo)))
+    return True
