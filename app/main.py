@@ -15,15 +15,21 @@ from app.audit import api as audit
 from app.calibration import api as calibration
 from app.calibration import pages as calibration_pages
 from app.calibration.overdue import raise_overdue
+from app.capability import api as capability
+from app.capability import pages as capability_pages
 from app.characteristics import api as characteristics
 from app.characteristics import figures_api
 from app.characteristics import pages as characteristic_pages
+from app.control import api as control
+from app.control import pages as control_pages
 from app.db.engine import Database
 from app.machines import api as machines
 from app.offsets import api as offsets
 from app.offsets import chores as offset_chores
 from app.offsets import edge_pages, edges_api, queue_pages, text_api, text_pages
 from app.offsets import pages as offset_pages
+from app.overview import api as overview
+from app.overview import pages as overview_pages
 from app.people import api as people
 from app.people import keys_api
 from app.people import pages as sign_in_pages
@@ -60,8 +66,11 @@ ROUTERS: tuple[APIRouter, ...] = (
     characteristics.router,
     figures_api.router,
     statistics.router,
+    capability.router,
+    overview.router,
     proof.router,
     wear.router,
+    control.router,
     readings.push,
     readings.router,
     by_hand.router,
@@ -78,7 +87,10 @@ ROUTERS: tuple[APIRouter, ...] = (
     health.router,
     api_docs.router,
     plant_pages.router,
+    overview_pages.router,
     characteristic_pages.router,
+    control_pages.router,
+    capability_pages.router,
     alarm_pages.router,
     queue_pages.router,
     text_pages.router,

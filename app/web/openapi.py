@@ -44,6 +44,7 @@ TAGS = {
     "machines": "The machines that push readings.",
     "characteristics": "What is measured, by which R parameters it is judged, and its charts.",
     "statistics": "What a run of readings amounts to.",
+    "overview": "What needs attention first: every characteristic ranked, with the reasons.",
     "wear": "True wear behind the corrections, how long an edge will do, and whether a loop runs after its own scatter.",
     "events": "What changes, as it changes.",
     "keys": "Keys by which machines and other programs call.",

@@ -20,6 +20,7 @@ SIZES = {"desk": (1280, 800), "large": (1920, 1080), "panel": (800, 1280)}
 # By the address of the route: how it is opened, as a function of the shop.
 PAGES = {
     "/": ["/", "/?show=attention"],
+    "/overview": ["/overview", "/overview?by=ppk&machine={machine}"],
     "/plant/{machine}": ["/plant/{machine}"],
     "/characteristics/{characteristic}": [
         "/characteristics/{characteristic}",

@@ -1,0 +1,1 @@
+"""What needs attention first: every characteristic ranked by its state, signals, capability, wear and load of alarms."""

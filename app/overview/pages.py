@@ -1,0 +1,62 @@
+"""Page: what needs attention first."""
+
+from datetime import UTC, datetime
+from typing import Annotated
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request, Response
+
+from app.machines import queries as machines
+from app.overview import queries, wording
+from app.overview.queries import By
+from app.overview.ranking import CAPABLE
+from app.plant.wording import state_word
+from app.proof.queries import failing
+from app.proof.wording import warning
+from app.wear.queries import foretold
+from app.web.deps import SessionDep, require
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False, dependencies=[require("viewer")])
+
+ON_PAGE = 50
+
+
+@router.get("/overview")
+def overview_page(
+    request: Request,
+    session: SessionDep,
+    machine: Annotated[str | None, Query()] = None,
+    by: Annotated[By, Query()] = By.ATTENTION,
+    after: Annotated[int, Query(ge=0, le=1_000_000)] = 0,
+) -> Response:
+    """Every characteristic ranked, with the reasons in words."""
+    ranked = queries.ranking(session, machine=machine or None, by=by)
+
+    def link(**changes: object) -> str:
+        """This page with something else chosen."""
+        chosen = {"machine": machine or None, "by": by.value if by is not By.ATTENTION else None} | changes
+        kept = {name: value for name, value in chosen.items() if value}
+        return f"/overview?{urlencode(kept)}" if kept else "/overview"
+
+    return page(
+        request,
+        "overview/overview.html",
+        ranked=ranked[after : after + ON_PAGE],
+        total=len(ranked),
+        need=sum(1 for each in ranked if each.told.reasons),
+        after=after,
+        on_page=ON_PAGE,
+        by=by.value,
+        machine=machine or "",
+        machines=machines.machines(session),
+        link=link,
+        reasons=wording.reasons,
+        state_word=state_word,
+        foretold=foretold,
+        capable=CAPABLE,
+        last=queries.LAST,
+        now=datetime.now(UTC),
+        proof_failing=failing(),
+        proof_warning=warning(len(failing())),
+    )
