@@ -1,12 +1,13 @@
 """Pages: the plant, and one machine of it."""
 
 from datetime import UTC, datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
 
 from app.characteristics.figures import band_picture, sparkline
+from app.machines.tables import Machine
 from app.plant import queries
 from app.plant.queries import Group, Row
 from app.plant.state import State
@@ -17,7 +18,19 @@ from app.web.deps import SessionDep, require
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False, dependencies=[require("viewer")])
-Show = Annotated[Literal["all", "attention"], Query()]
+Show = Annotated[Literal["all", "attention", "short"], Query()]
+
+MOST = 300  # characteristics that the plant's page shows one by one
+MOST_OF_A_MACHINE = 500
+
+
+class Shown(NamedTuple):
+    """A machine with the characteristics that are shown, and how many are not; `alarms` are those of its tools."""
+
+    machine: Machine
+    rows: list[Row]
+    alarms: list[tuple[int, str]]
+    folded: int
 
 
 @router.get("/")
@@ -28,7 +41,7 @@ def plant_page(request: Request, session: SessionDep, show: Show = "all") -> Res
 
 @router.get("/plant/{machine}")
 def machine_page(request: Request, session: SessionDep, machine: str, show: Show = "all") -> Response:
-    """One machine; also the part of the plant's page that is fetched again when something happens to it."""
+    """One machine; also the part of the plant's page that is fetched again when something happens to it (`short` if folded)."""
     return _page(request, session, show, machine)
 
 
@@ -41,10 +54,12 @@ def summary(request: Request, session: SessionDep, show: Show = "all") -> Respon
 
 def _page(request: Request, session: Session, show: str, machine: str | None) -> Response:
     groups, now = queries.plant(session, machine=machine), datetime.now(UTC)
+    if show == "all" and machine is None and sum(len(group.rows) for group in groups) > MOST:
+        show = "short"
     return page(
         request,
         "plant/plant.html",
-        groups=[Group(each.machine, [row for row in each.rows if _shown(row, show)], each.alarms) for each in groups],
+        groups=[_shown(group, show, MOST_OF_A_MACHINE if machine else MOST // max(1, len(groups))) for group in groups],
         machine=groups[0].machine if machine else None,
         show=show,
         state_word=state_word,
@@ -57,8 +72,13 @@ def _page(request: Request, session: Session, show: str, machine: str | None) ->
     )
 
 
-def _shown(row: Row, show: str) -> bool:
-    return show == "all" or row.needs_someone
+def _shown(group: Group, show: str, most: int) -> Shown:
+    """Those that are asked for; those that need someone first where they are too many, or where `short` folds the others."""
+    rows = [row for row in group.rows if show == "all" or row.needs_someone]
+    if len(rows) > most:
+        rows = sorted(rows, key=lambda row: not row.needs_someone)[:most]
+    folded = 0 if show == "attention" else len(group.rows) - len(rows)
+    return Shown(group.machine, rows, group.alarms, folded)
 
 
 def _summary(groups: list[Group]) -> dict[str, Any]:

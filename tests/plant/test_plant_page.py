@@ -53,6 +53,18 @@ class TestWithoutScripts:
         assert "Nothing is measured on this machine yet" in viewer.open(f"/plant/{shop.machine}-new")
         assert "There is no machine" in viewer.open("/plant/nowhere", 404)
 
+    def test_of_very_many_those_that_run_by_themselves_are_folded(self, shop: Shop, viewer: Person) -> None:
+        calm = f"{shop.characteristic}-calm"
+        shop.add(calm, tool_memory=4)
+        shop.read(0.1, calm)
+        shop.read(12.0)
+        text = viewer.open(f"/plant/{shop.machine}?show=short")
+        assert f'id="c-{shop.characteristic}"' in text
+        assert f'id="c-{calm}"' not in text
+        assert f'<a href="/plant/{shop.machine}">' in text
+        assert "1 characteristic runs by itself" in text
+        assert f'id="c-{calm}"' in viewer.open(f"/plant/{shop.machine}")
+
     def test_only_those_that_need_someone(self, shop: Shop, viewer: Person) -> None:
         shop.add(f"{shop.characteristic}-calm", tool_memory=4)
         shop.read(0.1, f"{shop.characteristic}-calm")
