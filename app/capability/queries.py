@@ -137,6 +137,15 @@ class Study:
         return self.stable is True
 
     @property
+    def quote(self) -> Literal["cpk", "ppk", "percentile", "none"]:
+        """Which number may be quoted: Cpk of a stable, normal process only, Ppk of any, by percentiles if it is not normal."""
+        if isinstance(self.found, Refused):
+            return "none"
+        if not self.normal:
+            return "ppk" if isinstance(self.by_percentile, Refused) else "percentile"
+        return "cpk" if self.potential_allowed else "ppk"
+
+    @property
     def ppk(self) -> float | None:
         """The number to quote: Ppk by the normal distribution, or by percentiles where that does not hold."""
         if isinstance(self.found, Refused):

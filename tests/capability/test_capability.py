@@ -1,0 +1,170 @@
+"""The capability of a characteristic through the front door: by hand, by limits in force, and with the loop taken out."""
+
+from random import Random
+from typing import Any
+
+import pytest
+
+from app.capability.queries import capability_by_characteristic
+from app.characteristics.queries import characteristic_named
+from tests.conftest import Server
+from tests.shop import Shop
+
+
+@pytest.fixture
+def shop(server: Server) -> Shop:
+    return Shop(server)
+
+
+def push(shop: Shop, values: list[float], characteristic: str | None = None) -> None:
+    """Readings that deviate by so many µm, at once."""
+    body = [
+        {"characteristic": characteristic or shop.characteristic, "measured": round(40 + value / 1000, 6)}
+        for value in values
+    ]
+    answer = shop.admin.post("/api/v1/readings/batch", json=body)
+    assert answer.status_code == 201, answer.text
+
+
+def of(shop: Shop, query: str = "last=all", characteristic: str | None = None, status: int = 200) -> Any:
+    return shop.call("GET", f"/characteristics/{characteristic or shop.characteristic}/capability?{query}", status)
+
+
+def quiet(count: int, seed: int = 1, sigma: float = 0.9, mean: float = 0.0) -> list[float]:
+    rng = Random(seed)
+    return [round(rng.gauss(mean, sigma), 3) for _ in range(count)]
+
+
+def test_by_hand(shop: Shop) -> None:
+    """-2, -1, 0, 1, 2 µm by turns, 20 of each: mean 0, s^2 = 2 x 100/99; limits ±8 µm."""
+    shop.add("by-hand", mode="measure_only", tool_memory=0)
+    push(shop, [-2.0, -1.0, 0.0, 1.0, 2.0] * 20, "by-hand")
+    found = of(shop, characteristic="by-hand")
+    s = (2 * 100 / 99) ** 0.5
+    assert found["readings"] == 100
+    assert found["sigma_overall"] * 1000 == pytest.approx(s)
+    assert found["ppk"]["value"] == found["pp"]["value"] == pytest.approx(8 / (3 * s))
+    assert found["ppk"]["low"] < found["ppk"]["value"] < found["ppk"]["high"]
+    # Moving ranges: 1, 1, 1, 1 and from 2 to -2 4; 80 of 1 and 19 of 4 over 99.
+    assert found["sigma_within"] * 1000 == pytest.approx((80 + 19 * 4) / 99 / 1.1283791671)
+    assert (found["outside"], found["ppm_observed"]["total"], found["compensated"]) == (0, 0.0, False)
+    upper = of(shop, "last=all&side=upper", "by-hand")
+    assert (upper["lower_limit"], upper["cp"], upper["ppk"]["method"]) == (None, None, "noncentral_t")
+
+
+def test_what_too_few_readings_carry(shop: Shop) -> None:
+    nothing = of(shop)
+    assert (nothing["readings"], nothing["ppk"], nothing["stable"], nothing["quote"]) == (0, None, None, "none")
+    assert "20 are missing" in nothing["refused"]
+    push(shop, quiet(1))
+    assert "19 are missing" in of(shop)["refused"]
+    push(shop, quiet(40))
+    some = of(shop)
+    assert some["ppk"] is not None
+    assert some["in_time"] is None
+    assert any("Fewer than 100" in each for each in some["cautions"])
+    shop.add("equal", mode="measure_only", tool_memory=0)
+    push(shop, [1.0] * 60, "equal")
+    equal = of(shop, characteristic="equal")
+    assert "All values are the same" in equal["refused"]
+    assert [each["p_value"] for each in equal["normality"]] == [None, None]
+
+
+def test_excluded_readings_and_probe_faults_are_named_and_left_out(shop: Shop) -> None:
+    shop.add("named", mode="measure_only", tool_memory=0)
+    push(shop, [*quiet(60), 7.9, 1500.0], "named")
+    shop.call("POST", "/readings/named/61/exclude", 200, reason="chip under the stylus")
+    found = of(shop, characteristic="named")
+    assert (found["readings"], found["excluded"], found["probe_faults"]) == (60, [61], [62])
+    assert found["sigma_overall"] < 0.0015
+
+
+def test_every_part_is_judged_by_the_tolerance_in_force(shop: Shop) -> None:
+    shop.add("changed", mode="measure_only", tool_memory=0)
+    push(shop, [6.0, -6.0, 7.0] * 10, "changed")
+    shop.call(
+        "PATCH",
+        "/characteristics/changed",
+        parameters={"target": 40.0, "tolerance_width": 0.01, "averaging_limit": None},
+        reason="new drawing",
+    )
+    push(shop, [6.0, *quiet(29)], "changed")
+    found = of(shop, characteristic="changed")
+    assert [(each["half"], each["readings"]) for each in found["versions"]] == [(0.008, 30), (0.005, 30)]
+    assert found["upper_limit"] == 0.005
+    assert found["outside"] == 1, "only the one that was judged by the narrow tolerance"
+    assert any("tolerance changed" in each for each in found["cautions"])
+
+
+def test_a_compensated_process_three_ways(shop: Shop) -> None:
+    """Wear 0.2 µm a part, scatter 0.5 µm, corrected at once: without corrections the tool runs out of its tolerance."""
+    rng, offset, known = Random(3), 0.0, 0
+    for part in range(300):
+        answer = shop.read(round(0.2 * part + rng.gauss(0, 0.5) + 1000 * offset, 4), correction_in_effect=known)
+        if answer["correction"]:
+            offset += answer["correction"]["amount"]
+            known = answer["correction"]["number"]
+    found = of(shop)
+    without = found["without"]
+    assert found["compensated"]
+    assert without["readings"] == 300
+    assert without["lives"] == 1
+    assert without["standard_deviation"] * 1000 == pytest.approx(300 * 0.2 / 12**0.5, rel=0.03)
+    assert without["scatter"] * 1000 == pytest.approx(0.5, rel=0.12)
+    assert without["ideal"]["value"] == pytest.approx(8 / 1.5, rel=0.12)
+    assert without["gain"] > 10
+    assert without["price"] > 1.2
+    assert without["ppk"]["value"] < 0 < found["ppk"]["value"] < without["ideal"]["value"]
+    assert found["quote"] != "cpk" or found["stable"]
+
+
+def test_the_model_in_time_and_which_number_it_allows(shop: Shop) -> None:
+    shop.add("drifting", mode="measure_only", tool_memory=0)
+    push(shop, [value + 0.02 * place for place, value in enumerate(quiet(250))], "drifting")
+    found = of(shop, characteristic="drifting")
+    assert (found["in_time"]["model"], found["in_time"]["location"], found["stable"]) == ("C3", "systematic", False)
+    assert found["quote"] in {"ppk", "percentile"}
+    shop.add("steady", mode="measure_only", tool_memory=0)
+    push(shop, quiet(250, seed=5), "steady")
+    found = of(shop, characteristic="steady")
+    assert (found["in_time"]["model"], found["stable"], found["quote"]) == ("A1", True, "cpk")
+
+
+def test_which_readings(shop: Shop) -> None:
+    shop.add("chosen", mode="measure_only", tool_memory=0)
+    push(shop, quiet(80), "chosen")
+    assert of(shop, "last=30", "chosen")["first_sequence"] == 51
+    assert of(shop, "", "chosen")["readings"] == 80
+    assert of(shop, "from=2001-01-01T00:00:00Z&to=2001-01-02T00:00:00Z", "chosen")["readings"] == 0
+    for wrong in ("last=0", "last=-3", "side=left", "confidence=1", "confidence=nan", "last=x", "from=yesterday"):
+        of(shop, wrong, "chosen", 422)
+    of(shop, "from=2026-01-02T00:00:00Z&to=2026-01-01T00:00:00Z", "chosen", 422)
+    of(shop, "last=999999999999999999", "chosen")
+    shop.call("GET", "/characteristics/nobody/capability", 404)
+
+
+@pytest.mark.parametrize("picture", ["histogram", "probability"])
+def test_figures_have_limits_and_every_reading(shop: Shop, picture: str) -> None:
+    key = f"drawn-{picture}"
+    shop.add(key, mode="measure_only", tool_memory=0)
+    path = f"/characteristics/{key}/figures/capability?picture={picture}"
+    assert shop.call("GET", path)["data"] == []
+    push(shop, quiet(200), key)
+    figure = shop.call("GET", path)
+    assert [shape["x0"] for shape in figure["layout"]["shapes"]][:2] == [-8.0, 8.0]
+    (drawn, *_lines) = figure["data"]
+    assert (sum(drawn["y"]) if picture == "histogram" else len(drawn["x"])) == 200
+
+
+def test_ppk_of_every_characteristic_for_ranking(server: Server, shop: Shop) -> None:
+    shop.add("ranked", mode="measure_only", tool_memory=0)
+    push(shop, [*([7.9] * 30), *quiet(200, seed=9)], "ranked")
+    told = of(shop, "last=200", "ranked")
+    with server.database.begin() as session:
+        standing = characteristic_named(session, "ranked")
+        mine = capability_by_characteristic(session, standing.machine.id)
+        every = capability_by_characteristic(session)
+    found = mine[standing.characteristic.id]
+    assert found == every[standing.characteristic.id]
+    assert (found.readings, found.ppk and found.ppk.value) == (200, pytest.approx(told["ppk"]["value"]))
+    assert {each.ppk for each in mine.values() if each.readings < 20} == {None}
