@@ -111,8 +111,12 @@ def charted(session: Session, standing: Standing, baseline: Baseline, window: Wi
     before. Only complete subgroups are points. Readings of the baseline's own period are judged too; monitoring begins at
     ``baseline.last_sequence + 1``. Raises `Invalid` for more than ten million readings.
     """
-    made = read(session, standing, baseline, Window(_earliest(baseline, window), window.last, window.newest))
-    return points_of(baseline, made, window)
+    return points_of(baseline, read_back(session, standing, baseline, window), window)
+
+
+def read_back(session: Session, standing: Standing, baseline: Baseline, window: Window) -> Read:
+    """The readings of the window, and those before it without which its first point would be another one."""
+    return read(session, standing, baseline, Window(_earliest(baseline, window), window.last, window.newest))
 
 
 def _earliest(plan: Plan, window: Window) -> int:

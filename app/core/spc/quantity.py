@@ -15,8 +15,8 @@ wear_residuals         w_i - level of the edge - slope (i - first of the edge)  
 
 Differences of neighbours share a reading, so they go up and down by turns by themselves: only the limits have a meaning
 on them, and sigma is their standard deviation. Of residuals the slope is that of the baseline and stays so; the level is
-set anew by the first readings of every edge, which are judged by nothing, for how an edge was set is no signal of the
-process (Mandel 1969, The regression control chart, J. Qual. Technol. 1). Lengths are mm.
+set anew by every edge when it has run in, and its readings until then are judged by nothing, for how an edge was set is no
+signal of the process (Mandel 1969, The regression control chart, J. Qual. Technol. 1). Lengths are mm.
 """
 
 from dataclasses import dataclass
@@ -34,6 +34,8 @@ from app.core.spc.spread import Estimator, Sigma, mean_of, moving_range, overall
 
 SETTLE = 20
 """Readings that set the level of an edge: it is then known to sigma/sqrt(20), a fifth of sigma."""
+RUN_INS = (20, 30, 45, 70, 100, 150, 220, 330, 500)
+"""Readings after which edges may have run in; a fresh edge wears faster at first, so its first readings say little of its level."""
 
 
 class Quantity(StrEnum):
@@ -133,7 +135,9 @@ def wear_line(series: Series) -> WearLine:
 
 
 def residuals(series: Series, slope: float, settle: int = SETTLE) -> Series:
-    """What is left of the wear curve without its wear: of every stretch all but the first `settle` values, which set its level.
+    """What is left of the wear curve without its wear: of every stretch what comes after its first `settle` values.
+
+    They let the edge run in; the last `SETTLE` of them set its level.
 
     >>> s = Series(np.arange(1, 6), np.array([5.0, 6.0, 7.0, 8.5, 9.0]), np.array([True, False, False, False, False]))
     >>> residuals(s, 1.0, settle=2).values.tolist(), residuals(s, 1.0, settle=2).sequence.tolist()
@@ -141,13 +145,46 @@ def residuals(series: Series, slope: float, settle: int = SETTLE) -> Series:
     """
     if not len(series):
         return series
+    edge, place, flat = _flat(series, slope)
+    return Series(series.sequence, flat - _levels(edge, place, flat, settle)[edge], series.begins).only(place >= settle)
+
+
+def _flat(series: Series, slope: float) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+    """Of each value its stretch, its place in it, and what it is without the slope."""
     edge = series.edge
     first = np.concatenate(([0], np.flatnonzero(np.diff(edge)) + 1))
-    place = np.arange(len(series)) - first[edge]
     flat = series.values - slope * (series.sequence - series.sequence[first][edge])
-    setting = place < settle
-    levels = np.bincount(edge[setting], flat[setting]) / np.bincount(edge[setting])
-    return Series(series.sequence, flat - levels[edge], series.begins).only(~setting)
+    return edge, np.arange(len(series)) - first[edge], flat
+
+
+def _levels(edge: NDArray[np.int64], place: NDArray[np.int64], flat: Floats, settle: int) -> Floats:
+    setting = (place < settle) & (place >= settle - SETTLE)
+    count = np.bincount(edge[setting], minlength=int(edge[-1]) + 1)
+    levels: Floats = np.bincount(edge[setting], flat[setting], minlength=len(count)) / np.maximum(count, 1)
+    return levels
+
+
+def run_in(series: Series, first: int, slope: float, sigma: float) -> int:
+    """After how many readings the level of an edge is that of its readings from the sequence `first` on: of `RUN_INS` the
+    smallest for which all edges agree within 3 standard errors; the smallest of all if none does.
+
+    >>> x = np.arange(400)
+    >>> s = Series(x, np.minimum(x, 60) * 0.1 + np.where(x % 2, 0.5, -0.5), x == 0)
+    >>> run_in(s, 200, 0.0, 0.5)
+    70
+    """
+    if not len(series):
+        return SETTLE
+    edge, place, flat = _flat(series, slope)
+    for settle in RUN_INS:
+        later = (series.sequence >= first) & (place >= settle)
+        count = np.bincount(edge[later], minlength=int(edge[-1]) + 1)
+        mean = np.bincount(edge[later], flat[later], minlength=len(count)) / np.maximum(count, 1)
+        error = 3 * sigma * np.sqrt(1 / SETTLE + 1 / np.maximum(count, 1))
+        off = np.abs(mean - _levels(edge, place, flat, settle)) > error
+        if (count > 0).any() and not off[count > 0].any():
+            return settle
+    return SETTLE
 
 
 def individuals_of(

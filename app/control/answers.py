@@ -1,0 +1,103 @@
+"""Baselines and charts as their JSON. Lengths in mm."""
+
+from typing import Any
+
+import numpy as np
+
+from app.control.drafting import Draft
+from app.control.schemas import BaselineOut, CautionOut, ControlOut, DraftAnswer, DraftOut, PointsOut, SignalOut
+from app.control.tables import Baseline
+from app.control.view import View
+from app.core.spc.refusal import Floats
+from app.core.spc.rules import RULES
+from app.core.spc.shewhart import ENOUGH_READINGS
+from app.statistics import wording as statistics
+
+MOST_POINTS, MOST_SIGNALS = 10_000, 1_000
+_RENAMED = {"freedom": "degrees_of_freedom", "slope": "wear_per_reading", "slope_error": "wear_error"}
+
+
+def _numbers(baseline: Baseline, key: str) -> dict[str, Any]:
+    names = set(DraftOut.model_fields) | set(_RENAMED)
+    values = {name: getattr(baseline, name) for name in names if hasattr(baseline, name)}
+    values = {_RENAMED.get(name, name): value for name, value in values.items()}
+    return values | {
+        "characteristic": key,
+        "lower": baseline.centre - 3 * baseline.sigma,
+        "upper": baseline.centre + 3 * baseline.sigma,
+        "provisional": baseline.readings < ENOUGH_READINGS,
+    }
+
+
+def draft_out(draft: Draft, key: str) -> DraftAnswer:
+    """What would be frozen."""
+    cautions = [CautionOut(code=code, text=text) for code, text in draft.said]
+    return DraftAnswer(**_numbers(draft.baseline, key), left_out=draft.left_out, cautions=cautions)
+
+
+def baseline_out(baseline: Baseline, key: str, in_force: int | None) -> BaselineOut:
+    """What was frozen. in_force: the version that is."""
+    names = (
+        "version",
+        "repeats",
+        "parameters_version",
+        "at",
+        "actor",
+        "reason",
+        "retired_at",
+        "retired_by",
+        "retired_why",
+    )
+    frozen = {name: getattr(baseline, name) for name in names}
+    return BaselineOut(**_numbers(baseline, key), **frozen, in_force=baseline.version == in_force)
+
+
+def signals_out(view: View, most: int) -> list[SignalOut]:
+    """The newest signals, newest first; their sequences are those of the readings."""
+    runs = sorted(view.signals or (), key=lambda run: run.end)[-most:]
+    return [
+        SignalOut(
+            rule=run.rule.value,
+            side=run.side,
+            first=int(view.first[run.start]),
+            last=int(view.last[run.end]),
+            points=run.points,
+            text=statistics.rule(RULES[run.rule]),
+        )
+        for run in reversed(runs)
+    ]
+
+
+def control_out(view: View, key: str, baseline: Baseline | None) -> ControlOut:
+    """A chart in numbers."""
+    cut = slice(-MOST_POINTS, None)
+
+    def limit(values: float | Floats | None) -> list[float] | float | None:
+        if values is None or np.ndim(values) == 0:
+            return None if values is None else float(values)
+        listed: list[float] = np.asarray(values)[cut].tolist()
+        return listed
+
+    return ControlOut(
+        characteristic=key,
+        chart=view.kind.value,
+        quantity=view.quantity,
+        baseline=None if baseline is None else baseline.version,
+        first_sequence=int(view.first[0]) if len(view) else None,
+        last_sequence=int(view.last[-1]) if len(view) else None,
+        count=len(view),
+        waiting=view.waiting,
+        settling=view.settling,
+        points=PointsOut(
+            first=view.first[cut].tolist(),
+            last=view.last[cut].tolist(),
+            size=view.sizes[cut].tolist(),
+            value=view.points[cut].tolist(),
+            below=None if view.below is None else view.below[cut].tolist(),
+            centre=limit(view.centre),
+            lower=limit(view.lower),
+            upper=limit(view.upper),
+        ),
+        signal_count=sum(len(rows) for rows in view.signals.runs.values()) if view.signals else 0,
+        signals=signals_out(view, MOST_SIGNALS),
+    )

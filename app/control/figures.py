@@ -1,0 +1,349 @@
+"""Control charts as Plotly takes them. Pure; lengths in mm in, µm on the axes.
+
+Points are steady grey; one that makes a signal is orange and a triangle that points the way it lies, or a diamond where a rule knows no
+side. Of more points than pixels each stretch shows its lowest and its highest, and those of its signals, so no extreme is
+thinned away.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from app.control.view import Marked, View
+from app.control.wording import axis, chart_name
+from app.core.spc.rules import Signals
+from app.core.spc.shewhart import Chart
+from app.web.i18n import _
+from app.web.numbers import signed
+from app.web.theme import Palette, ThemeName, layout, palette
+
+MOST_POINTS = 3_000
+STRETCHES = 750
+MOST_CHANGES = 40  # lines of tool changes; more are a fence
+WITH_MARKERS = 400
+ROOM = 0.08
+UNSIGNED = (Chart.MOVING_RANGE, Chart.RANGES, Chart.DEVIATIONS)
+SYMBOLS = {1: "triangle-up", 0: "diamond", -1: "triangle-down"}
+
+
+def control_figure(
+    view: View,
+    *,
+    key: str,
+    marked: Marked | None = None,
+    theme: ThemeName = "light",
+    width: int = 1240,
+    picks: bool = False,
+) -> dict[str, Any]:
+    """One control chart. picks: dragging chooses a period, and a click a point (see pick-period.js)."""
+    colours = palette(theme)
+    if not len(view.points):
+        return {"data": [], "layout": _empty(theme, colours)}
+    sides = _sides(view.signals, len(view))
+    drawn = thinned(view.points if view.below is None else view.points - view.below, sides != NO_SIGNAL)
+    data = _limits(view, drawn, colours)
+    data += _line(view, view.points, drawn, colours, key, picks=picks)
+    if view.below is not None:
+        data += _line(view, view.below, drawn, colours, key, picks=picks)
+        data += _signals(view, np.where(sides == -1, view.below, view.points), drawn, sides, colours, key, picks=picks)
+    else:
+        data += _signals(view, view.points, drawn, sides, colours, key, picks=picks)
+    low, high = _reach(view)
+    room = (high - low) * ROOM
+    changes = _changes(view, colours)
+    period = _period(marked, view, colours) if marked is not None else ([], [])
+    first, last = int(view.first[0]), int(view.last[-1])
+    edge = max(1.0, (last - first) * 0.01)
+    return {
+        "data": data,
+        "layout": layout(
+            theme,
+            margin={"l": 76, "r": 20 if width < 600 or view.centre is None else 118, "t": 26, "b": 44},
+            xaxis={
+                "range": [first - edge, last + edge],
+                "showgrid": False,
+                "showline": True,
+                "tickformat": "d",
+                "nticks": 8 if width > 900 else 5,
+                "title": _title(_("Reading"), colours),
+            },
+            yaxis={
+                "range": [low - room, high + room],
+                "tickformat": _format(view.kind, high - low),
+                "nticks": 7,
+                "title": _title(_axis(view), colours),
+                "fixedrange": picks,
+            },
+            shapes=[*period[0], *changes],
+            annotations=[*period[1], *_names(view, colours, width)],
+            **({"dragmode": "select", "selectdirection": "h"} if picks else {}),
+        ),
+    }
+
+
+NO_SIGNAL = 9
+
+
+def _sides(signals: Signals | None, count: int) -> NDArray[np.int8]:
+    """Of each point the side of its signal, or `NO_SIGNAL`."""
+    sides = np.full(count, NO_SIGNAL, np.int8)
+    for run in signals or ():
+        sides[run.start : run.end + 1] = run.side
+    return sides
+
+
+def thinned(values: ArrayLike, wanted: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Which points are drawn: all of few; of many the first, last, lowest and highest of each stretch, and of its signals.
+
+    >>> thinned([1.0, 2.0], np.array([False, False])).tolist()
+    [0, 1]
+    """
+    points = np.asarray(values, np.float64)
+    count = len(points)
+    if count <= MOST_POINTS:
+        return np.arange(count)
+    stretch = np.arange(count) * STRETCHES // count
+    chosen = [np.flatnonzero(np.diff(stretch, prepend=-1)), np.array([count - 1])]
+    chosen += _extremes(points, stretch, np.arange(count))
+    chosen += _extremes(points, stretch, np.flatnonzero(wanted))
+    return np.unique(np.concatenate(chosen))
+
+
+def _extremes(
+    points: NDArray[np.float64], stretch: NDArray[np.int64], some: NDArray[np.int64]
+) -> list[NDArray[np.int64]]:
+    """Of these points the lowest and the highest of each stretch."""
+    if not len(some):
+        return []
+    order = some[np.lexsort((points[some], stretch[some]))]
+    starts = np.flatnonzero(np.diff(stretch[order], prepend=-1))
+    ends = np.append(starts[1:], len(order)) - 1
+    return [order[starts], order[ends]]
+
+
+def _um(values: Any) -> Any:
+    return np.round(np.asarray(values) * 1000, 4)
+
+
+def _line(
+    view: View, values: NDArray[np.float64], drawn: NDArray[np.int64], colours: Palette, key: str, *, picks: bool
+) -> list[dict[str, Any]]:
+    """The points, joined within each tool: a gap at each change of it, unless a chart carries over."""
+    few = len(drawn) <= WITH_MARKERS
+    x: list[Any] = view.last[drawn].tolist()
+    y: list[Any] = _um(values[drawn]).tolist()
+    data = _custom(view, drawn, key, picks=picks)
+    edges = np.cumsum(view.begins)[drawn]
+    if view.kind in (Chart.INDIVIDUALS, Chart.MOVING_RANGE):
+        for at in reversed((np.flatnonzero(np.diff(edges)) + 1).tolist()):
+            for column in (x, y, data):
+                column.insert(at, None)
+    return [
+        {
+            "type": "scatter",
+            "mode": "lines+markers" if few or picks else "lines",
+            "name": chart_name(view.kind),
+            "meta": "points",
+            "x": x,
+            "y": y,
+            "customdata": data,
+            "connectgaps": False,
+            "line": {"width": 1.2, "color": colours.faint if few else colours.steady},
+            "marker": {"size": 6 if few else 3, "color": colours.steady},
+            "hovertemplate": _hover(view),
+        }
+    ]
+
+
+def _signals(
+    view: View,
+    values: NDArray[np.float64],
+    drawn: NDArray[np.int64],
+    sides: NDArray[np.int8],
+    colours: Palette,
+    key: str,
+    *,
+    picks: bool,
+) -> list[dict[str, Any]]:
+    at = drawn[sides[drawn] != NO_SIGNAL]
+    if not len(at):
+        return []
+    return [
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": _("Signal"),
+            "meta": "signals",
+            "x": view.last[at].tolist(),
+            "y": _um(values[at]).tolist(),
+            "customdata": _custom(view, at, key, picks=picks),
+            "marker": {
+                "size": 12 if len(at) <= 60 else 8,
+                "color": colours.attention,
+                "symbol": [SYMBOLS[int(side)] for side in sides[at]],
+                "line": {"width": 1, "color": colours.surface},
+            },
+            "hovertemplate": _hover(view),
+        }
+    ]
+
+
+def _custom(view: View, at: NDArray[np.int64], key: str, *, picks: bool) -> list[Any]:
+    """What a click opens: the reading; where it picks, its number."""
+    last = view.last[at].tolist()
+    return last if picks else [f"/characteristics/{key}/readings/{number}" for number in last]
+
+
+def _hover(view: View) -> str:
+    value = "%{y:.2f}" if view.kind in UNSIGNED else "%{y:+.2f}"
+    return f"{_('Reading')} %{{x:d}}<br>{value} µm<extra></extra>"
+
+
+def _limits(view: View, drawn: NDArray[np.int64], colours: Palette) -> list[dict[str, Any]]:
+    lines = (
+        ("centre", view.centre, {"width": 1.5, "color": colours.quiet}),
+        ("lower", view.lower, {"width": 1.5, "color": colours.ink, "dash": "dash"}),
+        ("upper", view.upper, {"width": 1.5, "color": colours.ink, "dash": "dash"}),
+    )
+    made = []
+    first, last = int(view.first[0]), int(view.last[-1])
+    for name, values, line in lines:
+        if values is None:
+            continue
+        single = np.ndim(values) == 0
+        made.append(
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "meta": name,
+                "x": [first, last] if single else view.last[drawn].tolist(),
+                "y": [float(_um(values))] * 2 if single else _um(np.asarray(values)[drawn]).tolist(),
+                "line": line | ({} if single else {"shape": "hvh"}),
+                "hoverinfo": "skip",
+            }
+        )
+    return made
+
+
+def _names(view: View, colours: Palette, width: int) -> list[dict[str, Any]]:
+    """The limits by name, at the right of the newest point."""
+    if width < 600 or view.centre is None:
+        return []
+    decimals = 2 if _span(view) < 20 else 1
+    names = [(_("centre"), view.centre), (_("lower"), view.lower), (_("upper"), view.upper)]
+    return [
+        {
+            "x": 1,
+            "xref": "paper",
+            "xanchor": "left",
+            "xshift": 6,
+            "y": newest,
+            "yanchor": "middle",
+            "showarrow": False,
+            "text": f"{name} {f'{newest:.{decimals}f}' if view.kind in UNSIGNED else signed(newest, decimals)}",
+            "font": {"size": 12, "color": colours.quiet},
+        }
+        for name, values in names
+        if values is not None
+        for newest in [float(np.atleast_1d(_um(values))[-1])]
+    ]
+
+
+def _span(view: View) -> float:
+    low, high = _reach(view)
+    return high - low
+
+
+def _reach(view: View) -> tuple[float, float]:
+    """What the axis shows: all points and limits."""
+    shown = [view.points, *(part for part in (view.below, view.lower, view.upper, view.centre) if part is not None)]
+    low = min(float(np.min(part)) for part in shown) * 1000
+    high = max(float(np.max(part)) for part in shown) * 1000
+    return (low, high) if high > low else (low - 1, high + 1)
+
+
+def _changes(view: View, colours: Palette) -> list[dict[str, Any]]:
+    """Where a tool was changed, or what sizes are measured by."""
+    at = view.first[view.begins]
+    at = at[at > view.first[0]]
+    if len(at) > MOST_CHANGES:
+        return []
+    return [
+        {
+            "type": "line",
+            "x0": number - 0.5,
+            "x1": number - 0.5,
+            "y0": 0,
+            "y1": 1,
+            "yref": "paper",
+            "line": {"width": 1, "color": colours.faint, "dash": "dot"},
+        }
+        for number in at.tolist()
+    ]
+
+
+def _period(marked: Marked, view: View, colours: Palette) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    first, last = max(marked.first, int(view.first[0])), min(marked.last, int(view.last[-1]))
+    if first > last:
+        return [], []
+    box = {"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "layer": "below", "line": {"width": 0}}
+    shapes = [box | {"x0": first - 0.5, "x1": last + 0.5, "fillcolor": colours.bands[2]}]
+    shapes += [
+        box | {"x0": low - 0.5, "x1": high + 0.5, "fillcolor": colours.bands[4]}
+        for low, high in marked.excluded
+        if high >= first and low <= last
+    ]
+    name = {
+        "x": first,
+        "xanchor": "left",
+        "y": 1,
+        "yref": "paper",
+        "yanchor": "bottom",
+        "showarrow": False,
+        "text": marked.name,
+        "font": {"size": 12, "color": colours.quiet},
+    }
+    return shapes, [name]
+
+
+def _axis(view: View) -> str:
+    match view.kind:
+        case Chart.MOVING_RANGE:
+            return _("Moving range, µm")
+        case Chart.RANGES:
+            return _("Range, µm")
+        case Chart.DEVIATIONS:
+            return _("Standard deviation, µm")
+        case Chart.CUSUM:
+            return _("Cumulative sum, µm")
+        case _:
+            return axis(view.quantity)
+
+
+def _format(kind: Chart, span: float) -> str:
+    sign = "" if kind in UNSIGNED else "+"
+    return f"{sign}.0f" if span > 8 else f"{sign}.1f" if span > 0.8 else f"{sign}.2f"
+
+
+def _title(text: str, colours: Palette) -> dict[str, Any]:
+    return {"text": text, "font": {"size": 13, "color": colours.quiet}, "standoff": 8}
+
+
+def _empty(theme: ThemeName, colours: Palette) -> dict[str, Any]:
+    return layout(
+        theme,
+        xaxis={"visible": False},
+        yaxis={"visible": False},
+        annotations=[
+            {
+                "text": _("No points in this period."),
+                "x": 0.5,
+                "y": 0.5,
+                "xref": "paper",
+                "yref": "paper",
+                "showarrow": False,
+                "font": {"size": 14, "color": colours.quiet},
+            }
+        ],
+    )

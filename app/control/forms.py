@@ -1,0 +1,77 @@
+"""What people type about a baseline: a period, its subgroups, and runs of readings that are left out."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from app.calibration.forms import whole
+from app.control.schemas import PeriodIn
+from app.core.spc.quantity import Quantity
+from app.errors import FieldError, Invalid
+from app.web.forms import by_field, length
+from app.web.i18n import _
+
+WHOLE = ("first_sequence", "last_sequence", "group_size", "settle", "average_span")
+NUMBERS = ("group_pause", "ewma_lambda", "ewma_width", "cusum_k", "cusum_h", "cusum_headstart")
+FIELDS = ("chart", "quantity", "grouping", "ewma_exact", *WHOLE, *NUMBERS, "excluded")
+_RUN = re.compile(r"(\d{1,15})(?:\s*[-\N{EN DASH}\N{HYPHEN}]\s*(\d{1,15}))?(?:[\s,;:]+(\S.*))?")
+
+
+def period(form: Mapping[str, str]) -> dict[str, Any]:
+    """The form as the fields of `PeriodIn`; what belongs to the other kinds of subgroup is not said. Raises `Invalid`."""
+    given: dict[str, Any] = {name: form.get(name) for name in ("chart", "quantity")}
+    given |= {name: whole(form.get(name)) for name in WHOLE}
+    given |= {name: length(form.get(name)) for name in NUMBERS}
+    if form.get("ewma_exact"):
+        given["ewma_exact"] = form["ewma_exact"] == "true"
+    if form.get("chart", "individuals") != "individuals":
+        given["grouping"] = form.get("grouping")
+    if given.get("grouping") != "consecutive":
+        given["group_size"] = None
+    if given.get("grouping") != "pause":
+        given["group_pause"] = None
+    if form.get("quantity") != Quantity.WEAR_RESIDUALS:
+        given["settle"] = None
+    return given | {"excluded": runs(form.get("excluded", ""))}
+
+
+def runs(text: str) -> list[dict[str, Any]]:
+    """One run of readings a line: a number, or two with a dash, and the reason. Raises `Invalid` that names the line.
+
+    >>> runs("640-641 chip on the stylus")
+    [{'first': 640, 'last': 641, 'reason': 'chip on the stylus'}]
+    """
+    made = []
+    for number, line in enumerate(text.splitlines(), 1):
+        if not line.strip():
+            continue
+        found = _RUN.fullmatch(line.strip())
+        if found is None or found[3] is None:
+            wrong = (
+                _("line {line} is no run of readings: write 640-641 and the reason")
+                if found is None
+                else _("line {line} says no reason; write it behind the numbers")
+            ).format(line=number)
+            raise Invalid(f"excluded: {wrong}.", errors=[FieldError("excluded", wrong)])
+        made.append({"first": int(found[1]), "last": int(found[2] or found[1]), "reason": found[3]})
+    return made
+
+
+def at_fields(error: Invalid) -> dict[str, str]:
+    """What is wrong, by the field of the form: all runs stand in one field."""
+    errors: dict[str, str] = {}
+    for name, message in by_field(error).items():
+        field = "excluded" if name.startswith("excluded") else name
+        errors[field] = f"{errors[field]}. {message}" if field in errors else message
+    return errors
+
+
+def begun(given: PeriodIn | None) -> dict[str, str]:
+    """What the settings of a form begin with."""
+    usual = {
+        name: field.default
+        for name, field in PeriodIn.model_fields.items()
+        if name in NUMBERS + WHOLE and field.default is not None and not field.is_required()
+    }
+    values = usual if given is None else {name: getattr(given, name) for name in usual}
+    return {name: f"{value:g}" for name, value in values.items()}

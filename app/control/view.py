@@ -1,0 +1,84 @@
+"""One control chart as values: what figures draw and what the API says. Pure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.spc.quantity import Quantity
+from app.core.spc.refusal import Floats
+from app.core.spc.rules import Signals
+from app.core.spc.shewhart import Chart
+
+Whole = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """One chart of a window; mm. below: the lower sum of a CUSUM, whose points are the upper one.
+
+    centre, lower, upper: single numbers, or one for each point; None without a baseline. begins: comes first of a tool.
+    """
+
+    kind: Chart
+    quantity: Quantity
+    first: Whole
+    last: Whole
+    sizes: Whole
+    points: Floats
+    begins: NDArray[np.bool_]
+    centre: float | Floats | None = None
+    lower: float | Floats | None = None
+    upper: float | Floats | None = None
+    below: Floats | None = None
+    signals: Signals | None = None
+    waiting: int = 0
+    settling: int = 0
+
+    def __len__(self) -> int:
+        """How many points there are."""
+        return len(self.last)
+
+
+@dataclass(frozen=True)
+class Marked:
+    """What is marked beside the points: the period of a baseline with its name, and runs of readings that it leaves out."""
+
+    first: int
+    last: int
+    name: str
+    excluded: Sequence[tuple[int, int]] = ()
+
+
+def since(view: View, first: int) -> View:
+    """Without the points that end before this reading; a signal that goes on over the edge is cut there."""
+    cut = int(np.searchsorted(view.last, first))
+    if cut == 0:
+        return view
+
+    def rest(values: float | Floats | None) -> float | Floats | None:
+        return values if values is None or np.ndim(values) == 0 else np.asarray(values)[cut:]
+
+    return replace(
+        view,
+        first=view.first[cut:],
+        last=view.last[cut:],
+        sizes=view.sizes[cut:],
+        points=view.points[cut:],
+        begins=view.begins[cut:],
+        centre=rest(view.centre),
+        lower=rest(view.lower),
+        upper=rest(view.upper),
+        below=None if view.below is None else view.below[cut:],
+        signals=None if view.signals is None else _rest_of(view.signals, cut),
+    )
+
+
+def _rest_of(signals: Signals, cut: int) -> Signals:
+    runs = {}
+    for name, rows in signals.runs.items():
+        kept = rows[rows[:, 2] >= cut].copy()
+        kept[:, 1:3] = np.maximum(kept[:, 1:3] - cut, 0)
+        runs[name] = kept
+    return Signals(signals.length - cut, runs)
