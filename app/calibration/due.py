@@ -1,6 +1,7 @@
 """Every place that is calibrated: when it was, what has passed since, and what is due. Never writes."""
 
 from collections import defaultdict
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
@@ -81,9 +82,9 @@ GROUP BY 1, 2, 3
 """)
 
 
-def places(session: Session, machine: Machine | None = None) -> list[PlaceRow]:
-    """All places that are measured with, planned for or have been calibrated, by machine and number."""
-    machines = {row.id: row for row in session.scalars(select(Machine))} if machine is None else {machine.id: machine}
+def places(session: Session, of: Sequence[Machine] | None = None) -> list[PlaceRow]:
+    """All places that are measured with, planned for or have been calibrated, by machine and number; of all machines or of these."""
+    machines = {row.id: row for row in (session.scalars(select(Machine)) if of is None else of)}
     ids = list(machines)
     plans = {
         (plan.machine_id, Place(plan.memory, plan.location)): plan
@@ -121,7 +122,7 @@ def places(session: Session, machine: Machine | None = None) -> list[PlaceRow]:
 
 def place_row(session: Session, machine: Machine, place: Place, value: float) -> PlaceRow:
     """One place; also one about which nothing is known yet."""
-    found = next((row for row in places(session, machine) if row.place == place), None)
+    found = next((row for row in places(session, [machine]) if row.place == place), None)
     return found or PlaceRow(machine, place, [], value, None, 0, None)
 
 

@@ -35,14 +35,32 @@ def address(machine: str, place: Place, **query: Any) -> str:
     return f"/calibration/{machine}/{folder}/{place.location}" + (f"?{urlencode(given)}" if given else "")
 
 
+ON_PAGE = 25  # machines
+
+
 @router.get("/calibration", dependencies=[require("viewer")])
-def overview(request: Request, session: SessionDep) -> Response:
-    """All machines and places: what was found last, and when the next calibration is due."""
-    rows = due.places(session)
-    groups = [
-        (machine, [row for row in rows if row.machine.id == machine.id]) for machine in machines.machines(session)
-    ]
-    return page(request, "calibration/overview.html", groups=groups, wording=wording, address=address)
+def overview(
+    request: Request,
+    session: SessionDep,
+    machine: Annotated[str | None, Query(max_length=64)] = None,
+    after: Annotated[int, Query(ge=0, le=1_000_000)] = 0,
+) -> Response:
+    """Machines and places: what was found last, and when the next calibration is due."""
+    every = machines.machines(session)
+    shown = [machine_named(session, machine)] if machine else every[after : after + ON_PAGE]
+    rows = due.places(session, shown)
+    groups = [(machine, [row for row in rows if row.machine.id == machine.id]) for machine in shown]
+    return page(
+        request,
+        "calibration/overview.html",
+        groups=groups,
+        machines=every,
+        machine=machine,
+        after=after,
+        on_page=ON_PAGE,
+        wording=wording,
+        address=address,
+    )
 
 
 @router.get("/calibration/probes", dependencies=[require("viewer")])

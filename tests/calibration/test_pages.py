@@ -48,11 +48,26 @@ class TestWithoutScripts:
         shop.add(f"{shop.characteristic}-b", average_memory=6)
         calibrate(shop)
         ring(shop, sections=[], first_move_triggered=True)
-        shown = operator.open("/calibration").partition(f'id="machine-{shop.machine}"')[2].partition("</section>")[0]
+        shown = (
+            operator.open(f"/calibration?machine={shop.machine}")
+            .partition(f'id="machine-{shop.machine}"')[2]
+            .partition("</section>")[0]
+        )
         states = [state for state in ("proposed", "never", "refused") if f'data-state="{state}"' in shown]
         assert states == ["proposed", "never", "refused"]
         assert place(shop) in shown
         assert probe(shop) in shown
+
+    def test_of_many_machines_a_page_shows_some(self, shop: Shop, operator: Person) -> None:
+        for number in range(27):
+            shop.call("POST", "/machines", 201, key=f"{shop.machine}-{number:02}", name="One of many", control="other")
+        first = operator.open("/calibration")
+        assert first.count('id="machine-') == 25
+        assert 'href="/calibration?after=25"' in first
+        second = operator.open("/calibration?after=25")
+        assert 'href="/calibration?after=0"' in second
+        assert operator.open(f"/calibration?machine={shop.machine}-26").count('id="machine-') == 1
+        assert "There is no machine" in operator.open("/calibration?machine=nowhere", 404)
 
     def test_a_form_that_says_what_nobody_knows_is_a_calibration(self, shop: Shop, operator: Person) -> None:
         """What was stored is never answered by an error."""
