@@ -22,6 +22,8 @@ from app.characteristics import figures_api
 from app.characteristics import pages as characteristic_pages
 from app.control import api as control
 from app.control import pages as control_pages
+from app.control import rules_api, signals_api
+from app.control.signals_actions import SignalRounds
 from app.db.engine import Database
 from app.machines import api as machines
 from app.offsets import api as offsets
@@ -71,6 +73,8 @@ ROUTERS: tuple[APIRouter, ...] = (
     proof.router,
     wear.router,
     control.router,
+    rules_api.router,
+    signals_api.router,
     readings.push,
     readings.router,
     by_hand.router,
@@ -109,6 +113,7 @@ CHORES: tuple[Chore, ...] = (
     Chore("tool lives are told", offset_chores.tell_tool_lives),
     Chore("wear is foretold, and hunting told", wear_chores.look_ahead),
     Chore("calibrations are overdue", raise_overdue),
+    Chore("signals of the rules are kept", SignalRounds().look),
     Chore("results of other measuring systems become readings", reading_chores.push_waiting),
 )
 

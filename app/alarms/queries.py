@@ -156,9 +156,12 @@ def active_by_machine(session: Session) -> dict[str, int]:
 def readings_behind(session: Session, row: AlarmRow) -> tuple[str | None, list[int]]:
     """The characteristic whose readings raised the alarm, and their sequence numbers.
 
-    An alarm about a tool (*offset limit*) names the characteristic that raised it first in its data.
+    An alarm about a tool (*offset limit*) names the characteristic that raised it first in its data; one about a signal the
+    reading that may be false.
     """
     found = row.alarm
+    if found.kind == "signal":
+        return row.characteristic.key if row.characteristic else None, list(found.data.get("readings", []))
     key = row.characteristic.key if row.characteristic else found.data.get("characteristic")
     if key is None or found.sequence is None:
         return None, []

@@ -6,6 +6,7 @@ from typing import Any
 from app.alarms.queries import MEASURED_BY_HAND, AlarmRow
 from app.alarms.tables import Alarm
 from app.calibration.wording import refusal
+from app.control.signals_wording import alarm_sentence
 from app.wear.wording import hunting_sentence, remedy_sentence
 from app.web.i18n import _, ngettext
 from app.web.numbers import mm, um, um_limit
@@ -94,6 +95,8 @@ def sentence(row: AlarmRow) -> str:
             text = _("A calibration was refused and changes nothing: {place}. {why}")
         case "hunting":
             text = f"{hunting_sentence(data)} {remedy_sentence(data, data['settings'])}"
+        case "signal" if data.get("signals"):
+            text = alarm_sentence(data)
         case _:
             text = str(data.get("text") or kind_word(alarm.kind))
     return text.format(**values) if alarm.kind in _KNOWN else text
@@ -147,6 +150,7 @@ def what_to_do(kind: str) -> str:
         ),
         "tool_life": _("Change the tool, or go on with its sister."),
         "hunting": _("An engineer sets the parameters in Set-up; the page of the characteristic says to what."),
+        "signal": _("Look at the chart and at the parts; then say what it was. The parts need not be bad."),
         "calibration_overdue": _("Calibrate it; that ends this alarm."),
         "calibration_refused": _("Clean stylus and gauge and look at the program, then calibrate again."),
     }.get(kind, _("Look at it and say what it was."))
@@ -177,6 +181,7 @@ def offered(row: AlarmRow) -> list[str]:
         "implausible": ["false_reading", "keep_cutting", "tool_replaced", "sister_tool", "noted"],
         "tool_life": ["tool_replaced", "sister_tool", "noted"],
         "hunting": ["noted"],
+        "signal": ["noted", "tool_replaced", *(["false_reading"] if alarm.data.get("readings") else [])],
         "calibration_overdue": ["noted"],
         "calibration_refused": ["noted"],
     }.get(alarm.kind, ["noted", "tool_replaced", "false_reading"])
@@ -287,6 +292,12 @@ def comments(kind: str, action: str) -> list[str]:
         ("calibration_overdue", "noted"): [_("At the end of the batch"), _("At the change of shift"), _("Seen")],
         ("calibration_refused", "noted"): [_("Stylus cleaned"), _("Gauge cleaned"), _("Wrong gauge"), _("Seen")],
         ("offset_limit", "noted"): [_("Seen"), _("Limit is looked at")],
+        ("signal", "noted"): [
+            _("Seen"),
+            _("New batch of material"),
+            _("Warmed up"),
+            _("Looked for, nothing found"),
+        ],
         ("acceptance", "noted"): [_("Measured by hand"), _("Plug gauge"), _("Part set aside"), _("Seen")],
     }
     return special.get((kind, action), common.get(action, [_("Seen")]))

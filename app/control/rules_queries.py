@@ -34,7 +34,7 @@ def rules_in_force(session: Session, characteristic: Characteristic) -> Watched:
     ).one_or_none()
     if newest is None:
         return Watched(DEFAULT)
-    return Watched(read_rules(newest.rules), newest.version, newest.at, newest.actor, newest.reason)
+    return _watched(newest)
 
 
 def rules_history(session: Session, characteristic: Characteristic, limit: int = 20) -> list[Watched]:
@@ -45,9 +45,11 @@ def rules_history(session: Session, characteristic: Characteristic, limit: int =
         .order_by(RuleSet.version.desc())
         .limit(limit)
     )
-    return [
-        Watched(read_rules(row.rules), row.version, row.at, row.actor, row.reason) for row in session.scalars(query)
-    ]
+    return [_watched(row) for row in session.scalars(query)]
+
+
+def _watched(row: RuleSet) -> Watched:
+    return Watched(read_rules(row.rules), row.version, row.at, row.actor, row.reason)
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ def preview(session: Session, standing: Standing, rules: Rules, last: int | None
     together: dict[Place, Tried] = {}
     for place in Place:
         names = rules_at(baseline, place)
-        piece = piece_at(points, place)
+        piece = piece_at(points, place, window.first - 1)
         found = _found(baseline, place, names, piece)
         on = [name for name in rules.get(place, {}) if name in names]
         tried |= {(place, name): _tried(baseline, place, [name], found, piece) for name in names}

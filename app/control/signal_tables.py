@@ -12,9 +12,9 @@ SIGNAL_NUMBERS = Sequence("signal_id", metadata=Base.metadata)
 
 
 class RuleSet(Base):
-    """Which rules watch a characteristic; the newest version does. Without any, `rules_queries.DEFAULT`.
+    """Which rules watch a characteristic; the newest version does. Without any, `watching.DEFAULT`.
 
-    rules: {chart: {rule: {"do": "watch" | "alarm", "since": the reading after which it began}}}; charts are `watching.Place`.
+    rules: {chart: {rule: {"do": "watch" | "alarm", "since", "back"}}}, see `watching.Place` and `watching.Setting`.
     """
 
     __tablename__ = "rule_set"

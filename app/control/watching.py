@@ -7,6 +7,7 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.control.queries import Charted, judged_by, main_chart
 from app.control.tables import Baseline
@@ -27,6 +28,11 @@ class Place(StrEnum):
     MOVING_AVERAGE = "moving_average"
     CUSUM = "cusum"
 
+    @property
+    def remembers(self) -> bool:
+        """Whether its points are made of all readings before them; such charts take single values, of subgroups too."""
+        return self not in {Place.MAIN, Place.SCATTER}
+
 
 class Do(StrEnum):
     """What becomes of a signal: it is kept, or it raises an alarm too."""
@@ -37,10 +43,19 @@ class Do(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A rule that is switched on, and the reading after which it begins (0: with the baseline)."""
+    """A rule that is switched on.
+
+    It begins after the reading `since` (0: with the baseline), and never before its baseline came into force; unless somebody
+    has asked for what lies between the period of the baseline `back` and now.
+    """
 
     do: Do
     since: int = 0
+    back: int | None = None
+
+    def after(self, baseline: Baseline, begun: int) -> int:
+        """The reading after which it judges by this baseline; begun: the last one before that came into force."""
+        return baseline.last_sequence if self.back == baseline.version else max(self.since, begun)
 
 
 Rules = dict[Place, dict[RuleName, Setting]]
@@ -73,7 +88,9 @@ def read_rules(stored: Mapping[str, Any]) -> Rules:
     812
     """
     return {
-        Place(place): {RuleName(name): Setting(Do(each["do"]), each["since"]) for name, each in rules.items()}
+        Place(place): {
+            RuleName(name): Setting(Do(each["do"]), each["since"], each.get("back")) for name, each in rules.items()
+        }
         for place, rules in stored.items()
         if rules
     }
@@ -83,9 +100,9 @@ def stored_rules(rules: Rules) -> dict[str, Any]:
     """The same the other way round, in the order of the charts and rules."""
     return {
         place.value: {
-            name.value: {"do": rules[place][name].do.value, "since": rules[place][name].since}
+            name.value: {"do": setting.do.value, "since": setting.since, "back": setting.back}
             for name in RuleName
-            if name in rules[place]
+            if (setting := rules[place].get(name)) is not None
         }
         for place in Place
         if rules.get(place)
@@ -131,20 +148,29 @@ def size_of(baseline: Baseline) -> int:
     return max(2, round(baseline.readings / max(1, baseline.groups)))
 
 
-def piece_at(charted: Charted, place: Place) -> Piece | None:
-    """The points as z, as the chart at this place takes them; None where there is none."""
+def piece_at(charted: Charted, place: Place, after: int) -> Piece | None:
+    """What the chart at this place takes: points as z whose last reading comes after this one; None where there is none."""
+    if place.remembers:
+        judge, series = judged_by(charted.baseline), charted.series
+        z = (series.values - judge.centre) / judge.sigma.value
+        return _after(Piece([z], series.sequence, series.sequence, series.begins), after)
     if charted.chart is None:
         return None
     piece = Piece([charted.chart.z], charted.first, charted.last, charted.begins)
-    if place is not Place.SCATTER or charted.groups is None:
-        return piece
-    scattering = charted.groups.sizes > 1  # what was excluded may have left one reading, which has no range
-    if not scattering.any():
-        return None
-    piece, groups = piece.only(scattering), _only(charted.groups, scattering)
-    made = shewhart.ranges if chart_at(charted.baseline, place) is Chart.RANGES else shewhart.deviations
-    return piece._replace(rows=[made(judged_by(charted.baseline), groups).z])
+    if place is Place.SCATTER and charted.groups is not None:
+        scattering = charted.groups.sizes > 1  # what was excluded may have left one reading, which has no range
+        if not scattering.any():
+            return None
+        piece, groups = piece.only(scattering), _only(charted.groups, scattering)
+        made = shewhart.ranges if chart_at(charted.baseline, place) is Chart.RANGES else shewhart.deviations
+        piece = piece._replace(rows=[made(judged_by(charted.baseline), groups).z])
+    return _after(piece, after)
 
 
-def _only(groups: Subgroups, wanted: np.ndarray[Any, np.dtype[np.bool_]]) -> Subgroups:
+def _after(piece: Piece, reading: int) -> Piece | None:
+    wanted = piece.last > reading
+    return piece.only(wanted) if wanted.any() else None
+
+
+def _only(groups: Subgroups, wanted: NDArray[np.bool_]) -> Subgroups:
     return Subgroups(groups.sizes[wanted], groups.means[wanted], groups.ranges[wanted], groups.deviations[wanted])
