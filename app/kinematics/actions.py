@@ -1,0 +1,263 @@
+"""Taking runs, confirming them, entering them on the control, putting a kinematics back. Lengths in mm, angles in degrees.
+
+Every verb locks the machine first: of two who enter at once one wins, and the other is told.
+"""
+
+from datetime import UTC, datetime
+from typing import Any, NamedTuple
+from zoneinfo import ZoneInfo
+
+from sqlalchemy.orm import Session
+
+from app.alarms import actions as alarms
+from app.audit.actions import record as audit
+from app.core.zones import nanometres
+from app.db.events import publish
+from app.errors import Conflict
+from app.formats.values import Unreadable, moment
+from app.kinematics import queries, wording
+from app.kinematics.evaluation import Evaluated, Limits, evaluate
+from app.kinematics.queries import RunRow
+from app.kinematics.schemas import PlanIn, RunIn
+from app.kinematics.tables import KinematicsBackup, KinematicsDecision, KinematicsPlan, KinematicsRun
+from app.kinematics.values import AXIS_OF, as_reading, errors_of, values_of
+from app.machines.queries import lock_machines
+from app.machines.tables import Machine
+from app.people.callers import Caller
+from app.readings import actions as readings
+from app.readings import queries as reading_queries
+from app.web.fields import AHEAD, EARLIEST
+from app.web.i18n import _
+
+DRIFT = "kinematics_drift"
+SETTINGS = ("ball_radius", "max_modification", "max_modification_angle", "max_dev_cal_ball")
+
+
+class Taken(NamedTuple):
+    """A run; again: it was sent before with the same key, and nothing happened now."""
+
+    row: RunRow
+    again: bool = False
+
+
+def take(session: Session, machine: Machine, given: RunIn, caller: Caller) -> Taken:
+    """Evaluate a run and keep it; a refused one is kept as well and counts for nothing.
+
+    Raises `Invalid` for what determines nothing; `Conflict` for a key that was used otherwise.
+    """
+    lock_machines(session, [machine.id])
+    sent = given.model_dump(mode="json", exclude={"machine", "key", "confirm"}, exclude_none=True)
+    if given.key is not None and (before := queries.run_by_key(session, machine, given.key)) is not None:
+        if before.run.given == sent:
+            return Taken(before, again=True)
+        raise Conflict(
+            _("Run {number} was sent with the key {key} already, and with other values.").format(
+                number=before.run.id, key=repr(given.key)
+            ),
+            _("A key names one run for ever: use another one."),
+            run=before.run.id,
+        )
+    plan = queries.plan(session, machine.id)
+    limits = limits_of(plan)
+    found = evaluate(given, limits)
+    head = given.head or ""
+    made = KinematicsRun(
+        machine_id=machine.id,
+        id=queries.next_run(session),
+        form=found.form,
+        head=head,
+        measured_at=given.measured_at or _said_time(found) or datetime.now(UTC),
+        actor=caller.name,
+        key=given.key,
+        given=sent,
+        limits={name: getattr(limits, name) for name in SETTINGS},
+        outcome=found.outcome,
+        reason=found.reason,
+        results=found.results | {"head": found.head},
+        in_effect=queries.in_effect(session, machine.id, head),
+        version=queries.version_of(session, machine.id, head),
+    )
+    session.add(made)
+    session.flush()
+    if made.outcome == "too_large" and given.confirm is not None and caller.may("operator"):
+        _decide(session, made, "confirmed", given.confirm, caller)
+    changes = [news(machine, made)]
+    if made.outcome != "refused":
+        changes += _watch(session, machine, plan, made)
+        _to_readings(session, plan, made)
+    if caller.kind == "person":
+        after = {"outcome": made.outcome, "form": made.form} | errors_of(made.results)
+        audit(session, caller.name, "kinematics measured", f"kinematics-run/{made.id}", None, after)
+    publish(session, *changes)
+    return Taken(queries.run(session, made.id))
+
+
+def limits_of(plan: KinematicsPlan) -> Limits:
+    return Limits(*(getattr(plan, name) for name in SETTINGS))
+
+
+def _said_time(found: Evaluated) -> datetime | None:
+    """When the protocol says it was written; clocks of controls know no zone, so it is taken for UTC, and said."""
+    text = found.head.get("created")
+    if text is None:
+        return None
+    try:
+        said = moment(text, ZoneInfo("UTC"))
+    except Unreadable as error:
+        found.results["notes"].append(_("the time “{text}” {why}").format(text=text[:60], why=error))
+        return None
+    if not EARLIEST <= said <= datetime.now(UTC) + AHEAD:
+        found.results["notes"].append(_("the time {text} cannot be; when it came in counts").format(text=text[:60]))
+        return None
+    return said
+
+
+def _watch(session: Session, machine: Machine, plan: KinematicsPlan, made: KinematicsRun) -> list[dict[str, Any]]:
+    """Hold the values against their limits: raise the alarm, or end it."""
+    values, changes = values_of(made.results), []
+    for name, limit in plan.limits.items():
+        if name not in values:
+            continue
+        about = {"memory": "kinematics", "location": name}
+        if nanometres(abs(values[name])) > nanometres(limit):
+            data = about | {"value": values[name], "limit": limit, "run": made.id}
+            changes.append(alarms.news(machine.key, alarms.raise_for_place(session, machine.id, DRIFT, data)))
+        else:
+            changes += _settle(session, machine, name, made)
+    return changes
+
+
+def _settle(session: Session, machine: Machine, name: str, run: KinematicsRun, actor: str = "") -> list[dict[str, Any]]:
+    ended = alarms.settle_for_place(
+        session,
+        machine.id,
+        DRIFT,
+        {"memory": "kinematics", "location": name},
+        actor or run.actor,
+        _("Run {number}").format(number=run.id),
+        {"code": "kinematics_run", "number": run.id},
+    )
+    return [] if ended is None else [alarms.news(machine.key, ended)]
+
+
+def _to_readings(session: Session, plan: KinematicsPlan, made: KinematicsRun) -> None:
+    """Values that are characteristics become readings, by the door that all readings take."""
+    if not plan.characteristics:
+        return
+    entries = reading_queries.entries_for_results(session, made.machine_id, plan.characteristics)
+    values = {name: as_reading(name, value) for name, value in values_of(made.results).items()}
+    source = readings.Source(f"kinematics:{made.id}", made.measured_at)
+    readings.ask_for(session, entries, values, source)
+
+
+def confirm(session: Session, number: int, reason: str, caller: Caller) -> RunRow:
+    """A change larger than permitted is meant. Raises `NotFound`; `Conflict` when nothing is to be confirmed."""
+    lock_machines(session, [queries.run(session, number).machine.id])
+    row = queries.run(session, number)
+    if row.status != "to_confirm":
+        raise Conflict(*wording.cannot_confirm(row))
+    _decide(session, row.run, "confirmed", reason, caller)
+    audit(session, caller.name, "kinematics confirmed", f"kinematics-run/{number}", None, row.run.reason, reason)
+    publish(session, news(row.machine, row.run))
+    return queries.run(session, number)
+
+
+def enter(session: Session, number: int, reason: str, caller: Caller) -> RunRow:
+    """The position errors of the run have been entered on the control: the kinematics before and after are kept.
+
+    Raises `NotFound`; `Conflict` when it is refused, waits to be confirmed, was entered, or was overtaken.
+    """
+    lock_machines(session, [queries.run(session, number).machine.id])
+    row = queries.run(session, number)
+    if row.status == "to_confirm" or not row.may_be_entered:
+        raise Conflict(*wording.cannot_enter(row), run_status=row.status)
+    run, machine = row.run, row.machine
+    before = queries.in_effect(session, machine.id, run.head)
+    after = before | {
+        name: round(before.get(name, 0.0) + value, 9) + 0.0 for name, value in errors_of(run.results).items()
+    }
+    version = queries.next_version(session, machine.id)
+    if run.version == 0:  # the kinematics that the machine came with has no back-up yet
+        began = _("As it was before run {number}").format(number=number)
+        _keep(session, machine, KinematicsBackup(version=version, head=run.head, reason=began, errors=before), caller)
+        version += 1
+    _keep(
+        session,
+        machine,
+        KinematicsBackup(version=version, head=run.head, reason=reason, errors=after, run=number),
+        caller,
+    )
+    _decide(session, run, "entered", reason, caller)
+    axes = {AXIS_OF[name] for name in errors_of(run.results)}
+    changes = [news(machine, run)]
+    for name in queries.plan(session, machine.id).limits:
+        if name.startswith("E") and AXIS_OF[name] in axes:
+            changes += _settle(session, machine, name, run, caller.name)
+    audit(session, caller.name, "kinematics changed", f"kinematics/{machine.key}/{version}", before, after, reason)
+    publish(session, *changes)
+    return queries.run(session, number)
+
+
+def restore(session: Session, machine: Machine, version: int, reason: str, caller: Caller) -> KinematicsBackup:
+    """Put a kinematics back that was in effect before; that is a new version. Raises `NotFound`; `Conflict` if it is in effect."""
+    lock_machines(session, [machine.id])
+    old = queries.backup(session, machine, version)
+    before = queries.in_effect(session, machine.id, old.head)
+    if queries.version_of(session, machine.id, old.head) == version:
+        raise Conflict(
+            _("The kinematics of back-up {version} is in effect.").format(version=version),
+            _("There is nothing to put back."),
+        )
+    made = KinematicsBackup(
+        version=queries.next_version(session, machine.id),
+        head=old.head,
+        reason=reason,
+        errors=dict(old.errors),
+        restores=version,
+    )
+    _keep(session, machine, made, caller)
+    subject = f"kinematics/{machine.key}/{made.version}"
+    audit(session, caller.name, "kinematics put back", subject, before, made.errors, reason)
+    publish(session, {"kind": "kinematics", "machine": machine.key})
+    return made
+
+
+def _keep(session: Session, machine: Machine, made: KinematicsBackup, caller: Caller) -> None:
+    made.machine_id, made.actor = machine.id, caller.name
+    session.add(made)
+    session.flush()
+
+
+def _decide(session: Session, run: KinematicsRun, what: str, reason: str, caller: Caller) -> None:
+    session.add(KinematicsDecision(machine_id=run.machine_id, run=run.id, what=what, actor=caller.name, reason=reason))
+    session.flush()
+
+
+def recompute(session: Session, number: int) -> tuple[RunRow, Evaluated]:
+    """A run evaluated anew from what was sent, with the limits of then; what is on record stays as it is."""
+    row = queries.run(session, number)
+    given = RunIn.model_validate({"machine": row.machine.key, **row.run.given})
+    return row, evaluate(given, Limits(**row.run.limits))
+
+
+def set_plan(session: Session, machine: Machine, given: PlanIn, caller: Caller) -> KinematicsPlan:
+    """What the runs of a machine are held against. Raises `Invalid` for a characteristic that this machine has not."""
+    lock_machines(session, [machine.id])
+    reading_queries.entries_for_results(session, machine.id, given.characteristics)
+    wanted = given.model_dump(exclude={"reason"})
+    plan = session.get(KinematicsPlan, machine.id, populate_existing=True)
+    before = None if plan is None else {name: getattr(plan, name) for name in wanted}
+    if plan is None:
+        plan = KinematicsPlan(machine_id=machine.id)
+        session.add(plan)
+    for name, value in wanted.items():
+        setattr(plan, name, value)
+    session.flush()
+    audit(session, caller.name, "kinematics planned", f"kinematics-plan/{machine.key}", before, wanted, given.reason)
+    publish(session, {"kind": "kinematics", "machine": machine.key})
+    return plan
+
+
+def news(machine: Machine, made: KinematicsRun) -> dict[str, Any]:
+    """What live pages are told of a run."""
+    return {"kind": "kinematics", "machine": machine.key, "run": made.id}
