@@ -21,7 +21,10 @@ from app.characteristics.schemas import PARAMETERS, CharacteristicIn
 from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from app.machines import actions as machines
+from app.machines import queries as machine_queries
 from app.machines.schemas import MachineIn
+from app.offsets import actions as offsets
+from app.people.callers import Caller
 from app.readings import queries
 from app.readings.importing.actions import import_readings
 from app.readings.importing.history import Flawed, Summary
@@ -206,6 +209,22 @@ def test_parameters_changed_in_the_middle_stop_it(plant: Database, tmp_path: Pat
                 characteristics.change_characteristic(session, "shaft-d40", change, "ana")
 
     with pytest.raises(Conflict, match="ana has changed the parameters"):
+        run(plant, table(tmp_path / "a.csv", VALUES), progress=change_at_the_third)
+    assert stored(plant) == []
+
+
+def test_an_empirical_value_changed_in_the_middle_stops_it(plant: Database, tmp_path: Path) -> None:
+    count = 0
+
+    def change_at_the_third() -> None:
+        nonlocal count
+        count += 1
+        if count == 3:
+            with plant.begin() as session:
+                lathe = machine_queries.machine_named(session, "lathe-1")
+                offsets.set_empirical_value(session, lathe, 5, 0.002, "compared with the CMM", Caller("person", "ana"))
+
+    with pytest.raises(Conflict, match=r"from \+0\.0 µm to \+2\.0 µm"):
         run(plant, table(tmp_path / "a.csv", VALUES), progress=change_at_the_third)
     assert stored(plant) == []
 

@@ -197,7 +197,9 @@ def store_history(
         cursor.execute("ANALYZE staged")
         machines.lock_machines(session, [entry.machine_id])
         session.expire_all()
-        _refuse_change(standing, characteristics.characteristic_named(session, entry.characteristic))
+        now = characteristics.characteristic_named(session, entry.characteristic)
+        _refuse_change(standing, now)
+        _refuse_new_empirical_value(judge.empirical_value, _empirical_value(session, now))
         _move_over(cursor, entry, standing.version.version, judge.now, summary)
     if summary.stored:
         counted = {"file": source, "readings": summary.stored, "first": summary.first_sequence}
@@ -208,11 +210,13 @@ def store_history(
 
 
 def _judge(session: Session, standing: Standing) -> _Judge:
-    parameters = standing.parameters
-    value = 0.0
-    if parameters.average_memory:
-        value = offsets.average(session, standing.machine, parameters.average_memory).empirical_value
-    return _Judge(replace(parameters, mode=Mode.MEASURE_ONLY), value, datetime.now(UTC))
+    parameters = replace(standing.parameters, mode=Mode.MEASURE_ONLY)
+    return _Judge(parameters, _empirical_value(session, standing), datetime.now(UTC))
+
+
+def _empirical_value(session: Session, standing: Standing) -> float:
+    location = standing.parameters.average_memory
+    return offsets.average(session, standing.machine, location).empirical_value if location else 0.0
 
 
 def _driver(session: Session) -> Connection[Any]:
@@ -275,6 +279,16 @@ def _refuse_change(then: Standing, now: Standing) -> None:
                 who=now.version.created_by
             ),
             _("Nothing was imported. Import the file again, so that it is judged by the new ones."),
+        )
+
+
+def _refuse_new_empirical_value(then: float, now: float) -> None:
+    if then != now:
+        raise Conflict(
+            _("The empirical value was changed from {then:+.1f} µm to {now:+.1f} µm while the file was read.").format(
+                then=then * 1000, now=now * 1000
+            ),
+            _("Nothing was imported. Import the file again, so that it is judged by the new one."),
         )
 
 
