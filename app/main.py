@@ -48,6 +48,8 @@ from app.readings.door import Directory, ReadingsDoor
 from app.readings.importing import pages as import_pages
 from app.readings.quiet import compile_now
 from app.readings.writer import Writer
+from app.reports import api as reports
+from app.reports import pages as report_pages
 from app.rounds import Chore, Rounds
 from app.settings import Settings
 from app.setup import pages as setup_pages
@@ -72,6 +74,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     overview.router,
     proof.router,
     wear.router,
+    reports.router,
     control.router,
     rules_api.router,
     signals_api.router,
@@ -105,6 +108,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     setup_pages.router,
     import_pages.router,
     proof_pages.router,
+    report_pages.router,
 )
 
 # What is looked after once a minute; see app.rounds.

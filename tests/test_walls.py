@@ -8,7 +8,8 @@ OPEN = {
     "actions",
     "wording",
     "figures",
-}  # wording and figures are pure: values in, sentences and pictures out
+    "chart",
+}  # wording and figures are pure: values in, sentences and pictures out; chart reads what a figure draws
 WORDS = {"app.people.callers"}  # who calls: a plain value that everybody may speak of
 EDGE = {"api", "pages", "schemas", "figures"}  # these take no tables; what lies behind a door (readings/saving.py) may
 

@@ -1,0 +1,106 @@
+"""JSON routes: one report as JSON, PDF, XLSX or CSV."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Annotated, Any, NamedTuple
+
+from fastapi import Depends, Path, Query, Response
+
+from app.characteristics import queries as characteristics
+from app.people.callers import Caller
+from app.reports import queries
+from app.reports.asking import Format, Paper, SectionName, Wishes, section_names
+from app.reports.content import Report
+from app.reports.files import MEDIA_TYPES, file_name, file_of
+from app.reports.schemas import ReportOut
+from app.web.api import api_router, problems
+from app.web.deps import AnyCaller, SessionDep
+from app.web.fields import LARGEST_ID, Moment
+
+router = api_router("reports")
+
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+FILE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "The report as a file",
+        "content": {
+            media.partition(";")[0]: {"schema": {"type": "string", "format": "binary"}}
+            for media in MEDIA_TYPES.values()
+        },
+    }
+}
+
+
+def asked(
+    start: Annotated[
+        Moment | None, Query(alias="from", description="Measured at this moment or later.", examples=[None])
+    ] = None,
+    end: Annotated[
+        Moment | None, Query(alias="to", description="Measured at this moment or earlier.", examples=[None])
+    ] = None,
+    last: Annotated[
+        int | None,
+        Query(
+            ge=1, le=LARGEST_ID, description="Only of the last so many readings; without any period of the last 1000."
+        ),
+    ] = None,
+    section: Annotated[
+        Sequence[SectionName], Query(description="Only these sections; all of them where none is named.", examples=[[]])
+    ] = (),
+    paper: Annotated[Paper, Query(description="For the PDF.")] = Paper.A4,
+    timezone: Annotated[
+        str, Query(max_length=64, description="In which moments are written.", examples=["Europe/Belgrade"])
+    ] = "UTC",
+) -> Wishes:
+    """What a report is to be made of."""
+    return Wishes(start, end, last, section_names(section), paper, timezone)
+
+
+Asked = Annotated[Wishes, Depends(asked)]
+
+
+def made(session: SessionDep, caller: Caller, characteristic: str, wishes: Wishes) -> Report:
+    """The report, if the caller may see it."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    return queries.report_of(session, standing, wishes, datetime.now(UTC))
+
+
+class Named(NamedTuple):
+    """A file with its name and kind."""
+
+    content: bytes
+    name: str
+    media_type: str
+
+
+def download(file: Named) -> Response:
+    """A file to keep: never shown in the browser's place, never guessed at."""
+    headers = {
+        "Content-Disposition": f'attachment; filename="{file.name}"',
+        "Cache-Control": "no-store",
+        "X-Content-Type-Options": "nosniff",
+    }
+    return Response(file.content, media_type=file.media_type, headers=headers)
+
+
+@router.get("/characteristics/{characteristic}/report.json", responses=problems(404))
+def get_report(session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, wishes: Asked) -> ReportOut:
+    """A report of a characteristic and a period: numbers, capability, wear, corrections, alarms, parameters, decisions.
+
+    Tables hold the newest rows; `more` says how many are left out.
+    """
+    return ReportOut.of(made(session, caller, characteristic, wishes))
+
+
+@router.get("/characteristics/{characteristic}/report.{form}", responses=problems(404) | FILE, response_model=None)
+def get_report_file(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    form: Annotated[Format, Path(description="How it is written.", examples=["pdf"])],
+    wishes: Asked,
+) -> Response:
+    """The same report as a file to print, to work on, or to read by a program (CSV: one line per value)."""
+    report = made(session, caller, characteristic, wishes)
+    return download(Named(file_of(report, form, wishes.paper), file_name(report, form), MEDIA_TYPES[form]))
