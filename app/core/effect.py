@@ -132,7 +132,7 @@ def _missed(
 ) -> tuple[Floats, Floats, Floats, Flags, int]:
     """What the filter misses of y and x, the variance of it, which of them count, and how many were outliers.
 
-    The scatter has the variance 1. At a beginning nothing is known: the first two readings count for nothing.
+    The scatter has the variance 1. At a beginning nothing is known of the level: the first two readings count for nothing.
     """
     count = len(y)
     missed_y, missed_x, variances = np.zeros(count), np.zeros(count), np.ones(count)
@@ -143,7 +143,7 @@ def _missed(
     for i in range(count):
         if begins[i] or in_row == 3:
             level_y, slope_y, level_x, slope_x = y[i], 0.0, x[i], 0.0
-            p11, p12, p22 = 1.0, 0.0, 1.0e6
+            p11, p12, p22 = 1.0, 0.0, 1.0  # of the slope: a scatter per part is more than any machine warms up
             since, in_row = 1, 0
         else:
             variance = p11 + 1.0

@@ -105,9 +105,10 @@ def test_the_compiled_filter_is_its_python() -> None:
 
 
 def test_a_filter_by_hand() -> None:
-    # Scatter 1, level and slope steady: the third reading of 0, 1, 2 is foretold as 2, with variance 1 + 4 + 1 - 0.
+    # Variances 1 of scatter, level and slope: after 0 the second is foretold with 1 + 1 + 1 and pulls the level by 2/3, the
+    # slope by 1/3; so 1 is foretold for the third, with (2/3 + 2/3 + 2/3) + 1.
     y = np.array([0.0, 1.0, 2.5])
     missed, _x, variance, used, _out = _missed(y, y, np.array([True, False, False]), 0.0, 0.0, 1.0, 4.5)
     assert used.tolist() == [False, False, True]
-    assert missed[2] == pytest.approx(0.5, abs=1e-5)
-    assert variance[2] == pytest.approx(6.0, abs=1e-4)
+    assert missed[2] == pytest.approx(1.5)
+    assert variance[2] == pytest.approx(3.0)

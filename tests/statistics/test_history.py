@@ -9,6 +9,7 @@ from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.characteristics import queries as characteristics
+from app.core.compensation import Code
 from app.core.zones import Zone
 from app.errors import Invalid
 from app.readings.tables import Reading
@@ -53,13 +54,15 @@ def test_every_column_says_what_the_rows_say(server: Server, filled: str) -> Non
         history = queries.history_of(session, characteristic, window, COLUMNS)
         rows = rows_of(session, filled, window)
     assert len(history) == len(rows) == COUNT - 7
-    zones = list(Zone)
+    zones, codes = list(Zone), list(Code)
     for name in COLUMNS:
         if name in {"measured_at", "received_at", "machined_at"}:
             told = [None if np.isnat(moment) else moment.item().replace(tzinfo=UTC) for moment in history[name]]
             assert told == [getattr(row, name) for row in rows]
         elif name == "zone":
             assert [zones[number].value for number in history[name]] == [row.zone for row in rows]
+        elif name == "code":
+            assert [codes[number].value for number in history[name]] == [row.code for row in rows]
         elif name == "paused":
             assert history[name].tolist() == [row.paused_by is not None for row in rows]
         elif name == "compensated":

@@ -15,6 +15,7 @@ from sqlalchemy import text
 from sqlalchemy.orm import Session
 
 from app.characteristics.tables import Characteristic
+from app.core.compensation import Code
 from app.core.zones import Zone
 from app.errors import Invalid
 from app.statistics.queries.course import excluded_of
@@ -30,6 +31,7 @@ Whole = NDArray[np.int64]
 # What can be had: how it is sent, how NumPy reads it. A missing float is NaN, a missing whole number or moment -1.
 _FLOAT, _WHOLE, _SMALL, _FLAG = ">f8", ">i8", ">i4", "?"
 _ZONES = " ".join(f"WHEN '{zone.value}' THEN {number}" for number, zone in enumerate(Zone))
+_CODES = " ".join(f"WHEN '{code.value}' THEN {number}" for number, code in enumerate(Code))
 COLUMNS: dict[str, tuple[str, str]] = {
     "sequence": ("int8send(r.sequence)", _WHOLE),
     "measured": ("float8send(r.measured)", _FLOAT),
@@ -46,8 +48,9 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "correction": ("int4send(coalesce(r.correction, -1))", _SMALL),
     "paused": ("boolsend(r.paused_by IS NOT NULL)", _FLAG),
     "zone": (f"int4send(CASE r.zone {_ZONES} END)", _SMALL),
+    "code": (f"int4send(CASE r.code {_CODES} END)", _SMALL),
 }
-"""Columns of `reading` by name; zone is the place of the zone in `app.core.zones.Zone`."""
+"""Columns of `reading` by name; zone and code are the place of each in `Zone` and `Code` of the core."""
 MOMENTS = frozenset({"measured_at", "received_at", "machined_at"})
 POSTGRES_EPOCH = np.datetime64("2000-01-01T00:00:00", "us")
 

@@ -1,0 +1,288 @@
+"""What truly happened to a tool, as a replay needs it: readings, edges, pauses, and the parameters of then. Never writes.
+
+A tool that several characteristics correct is replayed with all of them: each keeps deciding as it did, and only the
+one that is asked about gets other settings. Readings that nobody knows the corrections of (cut before a tool change,
+imported, or from before that was kept) are left out, and counted.
+"""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.characteristics import queries as characteristics
+from app.characteristics.queries import Standing
+from app.core.closed_loop import Mark, Way
+from app.core.compensation import Code
+from app.core.parameters import Parameters
+from app.core.replay import LONGEST_DELAY, Lane, Policy, parts_of, rebuilt
+from app.errors import Invalid
+from app.offsets.tables import ToolEvent
+from app.statistics import queries as statistics
+from app.statistics.queries import History, Window
+from app.web.i18n import _
+
+LARGEST = 1_000_000  # readings in one replay
+BREAK = 5.0  # times the usual time between two parts
+COLUMNS = (
+    "measured",
+    "deviation",
+    "decided",
+    "compensated",
+    "average_before",
+    "received_at",
+    "measured_at",
+    "machined_at",
+    "parameters_version",
+    "correction_in_effect",
+    "correction",
+    "paused",
+    "zone",
+    "code",
+)
+CODE = {code: place for place, code in enumerate(Code)}
+
+Values = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Past:
+    """The readings of a period. mine: those of `way` that are of the characteristic, whose columns `history` holds.
+
+    then: each version as it was in force. unknown: readings left out. others: characteristics that correct the same tool.
+    delay: parts between a correction and its effect, as it was most often; None where no correction has taken effect.
+    compensated: of every reading of `way`, mm of offset.
+    """
+
+    standing: Standing
+    window: Window
+    history: History
+    mine: Flags
+    way: Way
+    then: Policy
+    slots: dict[int, int]
+    deviations: Values
+    compensated: Values
+    unknown: int
+    others: list[str]
+    delay: int | None
+
+    def with_effect(self, effect: float) -> Way:
+        """The way, had corrections acted by this share."""
+        free = rebuilt(self.deviations, self.compensated, self.standing.parameters.factor, effect)
+        return self.way._replace(free=free)
+
+    def policy(self, parameters: Parameters, delay: int, effect: float = 1.0) -> Policy:
+        """These parameters throughout; the others as they were."""
+        slot = self.slots.get(parameters.average_memory, -1)
+        lanes = tuple(
+            replace_lane(lane, effect, parameters if lane.counts else lane.parameters, slot if lane.counts else None)
+            for lane in self.then.lanes
+        )
+        return Policy(lanes, delay)
+
+    def as_then(self, delay: int, effect: float = 1.0) -> Policy:
+        """As it was set then."""
+        return Policy(tuple(replace_lane(lane, effect, lane.parameters, None) for lane in self.then.lanes), delay)
+
+    @cached_property
+    def steady(self) -> tuple[Flags, Flags]:
+        """Readings of the characteristic by which the effect of corrections can be told, and those of them that continue nothing.
+
+        Left out are readings from R37 on, and after a break, in which the machine cools down, the parts that had been cut
+        before it: the course begins anew behind them.
+        """
+        history, count = self.history, len(self.history)
+        own = np.cumsum(self.way.marks & Mark.BEGIN > 0)[self.mine]
+        begins = np.concatenate((np.ones(min(1, count), np.bool_), np.diff(own) > 0))
+        usable = np.abs(history["deviation"]) < self.standing.parameters.wear_limit
+        pauses = np.diff(history["measured_at"]).astype(np.float64)
+        after = np.flatnonzero(pauses > BREAK * np.median(pauses)) + 1 if len(pauses) else np.zeros(0, np.int64)
+        for late in range(2 * (self.delay or 0) + 2):
+            usable[np.minimum(after + late, count - 1)] = False
+        gaps = np.concatenate((np.zeros(min(1, count), np.bool_), ~usable[:-1]))
+        return usable, (begins | gaps)[usable]
+
+    @property
+    def versions(self) -> list[int]:
+        """Versions of the parameters that these readings were judged by."""
+        return [int(number) for number in np.unique(self.history["parameters_version"])]
+
+
+def replace_lane(lane: Lane, effect: float, parameters: Parameters, slot: int | None) -> Lane:
+    """The lane with other parameters, on a machine where corrections act by this share."""
+    return Lane(parameters, lane.response * effect, lane.memory if slot is None else slot, lane.counts)
+
+
+def past_of(
+    session: Session,
+    standing: Standing,
+    window: Window,
+    *,
+    start: datetime | None = None,
+    end: datetime | None = None,
+) -> Past:
+    """Load it. Raises `Invalid` for more than a million readings."""
+    if window.count > LARGEST:
+        raise Invalid(
+            _("These are {count} readings; at most {most} can be replayed at once.").format(
+                count=window.count, most=LARGEST
+            ),
+            _("Choose a shorter period, or the last so many readings."),
+        )
+    whole = statistics.history_of(session, standing.characteristic, window, COLUMNS, start=start, end=end)
+    own = whole.only(np.isfinite(whole["compensated"]))
+    others = _others(session, standing)
+    histories = [(standing, own)]
+    if len(own):
+        began, ended = (_moment(moment) for moment in (own["measured_at"].min(), own["measured_at"].max()))
+        for other in others:
+            span = statistics.window_of(session, other.characteristic, start=began, end=ended)
+            if span.count > LARGEST:
+                continue
+            found = statistics.history_of(session, other.characteristic, span, COLUMNS, start=began, end=ended)
+            histories.append((other, found.only(np.isfinite(found["compensated"]))))
+    return _joined(session, standing, window, histories, len(whole) - len(own))
+
+
+def _others(session: Session, standing: Standing) -> list[Standing]:
+    """Characteristics that correct the same tool."""
+    number = standing.parameters.tool_memory
+    if not number:
+        return []
+    return [
+        each
+        for each in characteristics.characteristics(session, machine_id=standing.machine.id)
+        if each.characteristic.id != standing.characteristic.id
+        and each.parameters.tool_memory == number
+        and not each.parameters.measures_only
+    ]
+
+
+def _joined(
+    session: Session, standing: Standing, window: Window, histories: list[tuple[Standing, History]], unknown: int
+) -> Past:
+    lanes: list[Lane] = []
+    slots: dict[int, int] = {}
+    columns: dict[str, list[NDArray[Any]]] = {}
+    for at, (each, history) in enumerate(histories):
+        lane = np.zeros(len(history), np.int64)
+        for version in np.unique(history["parameters_version"]).tolist():
+            parameters = _version(session, each, version)
+            slots.setdefault(parameters.average_memory, len(slots))
+            lane[history["parameters_version"] == version] = len(lanes)
+            lanes.append(Lane(parameters, -1 / each.parameters.factor, slots[parameters.average_memory], at == 0))
+        targets = np.array([known.parameters.target for known in lanes])[lane] if len(lane) else np.zeros(0)
+        empirical = history["measured"] - history["deviation"] - targets
+        for name, values in {
+            "lane": lane,
+            "whose": np.full(len(history), at),
+            "restart": _changed(targets) | _changed(empirical),
+            "excluded": history.excluded,
+            "place": np.arange(len(history)),
+            **{name: history[name] for name in COLUMNS},
+        }.items():
+            columns.setdefault(name, []).append(values)
+    slots.setdefault(standing.parameters.average_memory, len(slots))
+    joined = {name: np.concatenate(values) for name, values in columns.items()}
+    order = np.lexsort((joined["whose"], joined["place"], joined["measured_at"], joined["received_at"]))
+    joined = {name: values[order] for name, values in joined.items()}
+    own = histories[0][1]
+    way = _way(session, standing, joined, len(slots), [known.memory for known in lanes])
+    if not lanes:
+        lanes.append(
+            Lane(standing.parameters, -1 / standing.parameters.factor, slots[standing.parameters.average_memory])
+        )
+    return Past(
+        standing=standing,
+        window=window,
+        history=own,
+        mine=joined["whose"] == 0,
+        way=way,
+        then=Policy(tuple(lanes)),
+        slots=slots,
+        deviations=joined["deviation"],
+        compensated=joined["compensated"],
+        unknown=unknown,
+        others=[each.characteristic.key for each, _history in histories[1:]],
+        delay=_delay(own),
+    )
+
+
+def _version(session: Session, standing: Standing, version: int) -> Parameters:
+    return characteristics.parameters_of(session, standing.machine.id, standing.characteristic.id, version)
+
+
+def _changed(values: Values) -> Flags:
+    """Where a value is another than before, by a nanometre at least."""
+    return np.concatenate((np.zeros(min(1, len(values)), np.bool_), np.abs(np.diff(values)) > 0.5e-6))
+
+
+def _way(session: Session, standing: Standing, joined: dict[str, NDArray[Any]], slots: int, memories: list[int]) -> Way:
+    """The readings with what happened at each."""
+    parameters, compensated = standing.parameters, joined["compensated"]
+    begins = _beginnings(session, standing, joined["received_at"])
+    # A held correction that was let go shows as a step that no reading may ask for by itself.
+    held = parameters.wear_limit if parameters.plausible_jump is None else parameters.plausible_jump
+    step = np.abs(np.diff(compensated, prepend=compensated[:1])) / abs(parameters.factor)
+    marks = (
+        begins * Mark.BEGIN
+        + joined["restart"] * Mark.RESTART
+        + joined["paused"] * Mark.PAUSED
+        + (joined["code"] == CODE[Code.REJECTED]) * Mark.REJECTED
+        + (joined["code"] == CODE[Code.IMPLAUSIBLE]) * Mark.JUMP
+        + ((step >= held) & ~begins) * Mark.RELEASED
+        + joined["excluded"] * Mark.LEFT_OUT
+    ).astype(np.int8)
+    offset = compensated[begins]
+    pending, averages = np.zeros(len(offset)), np.zeros((len(offset), slots))
+    if len(compensated):
+        pending[0] = round(-(joined["decided"][0] - joined["deviation"][0]) * parameters.factor, 9) + 0.0
+        lanes, first = np.unique(joined["lane"], return_index=True)
+        for at in np.argsort(-first):  # of lanes that share a memory the earliest tells what it held
+            averages[0, memories[lanes[at]]] = joined["average_before"][first[at]]
+    free = rebuilt(joined["deviation"], compensated, parameters.factor)
+    return Way(free, joined["lane"], marks, parts_of(joined["whose"]), offset, pending, averages)
+
+
+def _beginnings(session: Session, standing: Standing, received_at: NDArray[np.datetime64]) -> Flags:
+    """The first reading, and the first after each tool change and each offset set by hand."""
+    found = np.zeros(len(received_at), np.bool_)
+    if not len(found):
+        return found
+    found[0] = True
+    rows = session.scalars(
+        select(ToolEvent.at).where(
+            ToolEvent.machine_id == standing.machine.id,
+            ToolEvent.number == standing.parameters.tool_memory,
+            ToolEvent.kind != "correction",
+            ToolEvent.at >= _moment(received_at[0]),
+        )
+    ).all()
+    moments = np.array([moment.astimezone(UTC).replace(tzinfo=None) for moment in rows], "datetime64[us]")
+    at = np.searchsorted(received_at, moments, side="right")
+    found[at[at < len(found)]] = True
+    return found
+
+
+def _moment(moment: np.datetime64) -> datetime:
+    found: datetime = moment.astype("datetime64[us]").item()
+    return found.replace(tzinfo=UTC)
+
+
+def _delay(history: History) -> int | None:
+    """Parts that came out with the old offset after a correction was issued: the median, where machines tell."""
+    issued = np.flatnonzero(history["correction"] >= 0)
+    in_effect = np.maximum.accumulate(history["correction_in_effect"]) if len(history) else np.zeros(0)
+    if not len(issued) or (in_effect < 0).all():
+        return None
+    seen = np.searchsorted(in_effect, history["correction"][issued])
+    between = seen - issued - 1
+    between = between[(seen < len(history)) & (between >= 0)]
+    return min(LONGEST_DELAY, int(np.median(between))) if len(between) else None

@@ -1,0 +1,309 @@
+"""What would have been: today's settings and others side by side, the map, and whether the replay can be believed. Never writes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+from math import isfinite, sqrt
+
+import numpy as np
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.characteristics import wording
+from app.characteristics.queries import Standing
+from app.core.closed_loop import Course
+from app.core.compensation import Code
+from app.core.effect import Effect, measured_effect
+from app.core.parameters import ParameterError, Parameters, read
+from app.core.policy_map import Criterion, Region, best_region, in_order, with_settings
+from app.core.replay import FEWEST_FOR_PPK, Figures, agreement, figures_of, run
+from app.core.spc.refusal import Refused
+from app.core.zones import Zone, nanometres
+from app.errors import Invalid
+from app.offsets.tables import Correction
+from app.statistics.queries import Window
+from app.web.i18n import _
+from app.whatif.past import CODE, Past, past_of
+from app.whatif.turns import on_all_cores
+
+USUAL = 5_000  # readings that are replayed unless somebody says otherwise
+MOST_CELLS = 2_500
+MOST_DECISIONS = 200_000_000  # in one map: some seconds
+WELL, ROUGHLY = (0.05, 0.10), (0.15, 0.30)  # how far spread and corrections of the replay may be off
+FEW_CORRECTIONS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What is asked: settings of the loop in place of today's (None: as today), mm; parts; the share of a correction that acts.
+
+    `delay` None: as it was most often.
+    """
+
+    weighting_factor: float | None = None
+    zero_range: float | None = None
+    averaging_limit: float | None = None
+    factor: float | None = None
+    delay: int | None = None
+    effect: float = 1.0
+
+    def applied_to(self, parameters: Parameters) -> Parameters:
+        """The parameters with these settings."""
+        return with_settings(
+            parameters,
+            weighting_factor=self.weighting_factor,
+            zero_range=self.zero_range,
+            averaging_limit=self.averaging_limit,
+            factor=self.factor,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Likeness:
+    """How well the rebuilt loop, set as it was then, follows what truly happened.
+
+    off: root mean square of the difference, mm; same: share of parts that are the same to 0.1 µm. verdict: well, roughly, badly, or
+    unknown of too few readings.
+    """
+
+    figures: Figures
+    off: float | None
+    same: float | None
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Side by side: what was, today's settings and the others, replayed."""
+
+    past: Past
+    settings: Settings
+    delay: int
+    truly: Figures
+    likeness: Likeness
+    today: Figures
+    other: Figures
+    today_course: Course
+    other_course: Course
+    parameters: Parameters
+
+    @cached_property
+    def effect(self) -> Effect | Refused:
+        """The measured effect of past corrections, or why nobody can say."""
+        return effect_of(self.past)
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One cell of a map; figures None where R33 < R34 ≤ R35/2 does not hold."""
+
+    weighting_factor: float
+    zero_range: float
+    figures: Figures | None
+
+
+@dataclass(frozen=True)
+class Map:
+    """Cells row by row, a row a k. today: figures of today's settings; region: where it is best by the criterion."""
+
+    past: Past
+    weighting_factors: Sequence[float]
+    zero_ranges: Sequence[float]
+    averaging_limit: float
+    delay: int
+    criterion: Criterion
+    cells: list[Cell]
+    today: Figures
+    region: Region
+
+
+def load(
+    session: Session, standing: Standing, window: Window, start: datetime | None = None, end: datetime | None = None
+) -> Past:
+    """The past, and a refusal in words where there is nothing that could be replayed. Raises `Invalid`."""
+    past = past_of(session, standing, window, start=start, end=end)
+    if len(past.history) < 2:
+        raise Invalid(
+            _("This period holds {count} readings that can be replayed; a loop needs two at least.").format(
+                count=len(past.history)
+            ),
+            _("Choose a longer period.")
+            if not past.unknown
+            else _(
+                "Choose another period: of {count} of its readings nobody knows with which corrections they were cut."
+            ).format(count=past.unknown),
+        )
+    return past
+
+
+def side_by_side(session: Session, past: Past, settings: Settings) -> Answer:
+    """Replay today's settings and the others, and hold the replay against what truly happened."""
+    today = past.standing.parameters
+    other = settings.applied_to(today)
+    check_order(other)
+    delay = _delay(past, settings)
+    way = past.with_effect(settings.effect)
+    then_course, then = run(way, past.as_then(delay, settings.effect))
+    today_course, today_figures = run(way, past.policy(today, delay, settings.effect))
+    other_course, other_figures = run(way, past.policy(other, delay, settings.effect))
+    truly = truly_of(session, past)
+    return Answer(
+        past,
+        settings,
+        delay,
+        truly,
+        _likeness(past, truly, then, then_course),
+        today_figures,
+        other_figures,
+        today_course,
+        other_course,
+        other,
+    )
+
+
+def map_of(
+    past: Past,
+    settings: Settings,
+    weighting_factors: Sequence[float],
+    zero_ranges: Sequence[float],
+    criterion: Criterion,
+) -> Map:
+    """Replay a grid of k and R33 with the R34 of `settings`. Raises `Invalid` for a grid that would take too long."""
+    cells = len(weighting_factors) * len(zero_ranges)
+    readings = len(past.way.free)
+    if cells > MOST_CELLS or cells * readings > MOST_DECISIONS:
+        most = min(MOST_CELLS, MOST_DECISIONS // max(1, readings))
+        raise Invalid(
+            _("A map of {cells} settings over {readings} readings takes too long; {most} settings can be had.").format(
+                cells=cells, readings=readings, most=most
+            ),
+            _("Ask for fewer settings, or for a shorter period."),
+        )
+    today, delay = past.standing.parameters, _delay(past, settings)
+    base = settings.applied_to(today)
+    way = past.with_effect(settings.effect)
+    grid = [with_settings(base, weighting_factor=k, zero_range=r33) for k in weighting_factors for r33 in zero_ranges]
+    valid = [at for at, parameters in enumerate(grid) if in_order(parameters)]
+    policies = [past.policy(today, delay, settings.effect)]
+    policies += [past.policy(grid[at], delay, settings.effect) for at in valid]
+    of_today, *found = on_all_cores(lambda share: figures_of(way, share), policies)
+    figures = dict(zip(valid, found, strict=True))
+    made = [
+        Cell(parameters.weighting_factor, parameters.zero_range, figures.get(at)) for at, parameters in enumerate(grid)
+    ]
+    region = best_region(
+        [cell.figures for cell in made],
+        criterion,
+        of_today.rejects if criterion is Criterion.CORRECTIONS else None,
+    )
+    return Map(past, weighting_factors, zero_ranges, base.averaging_limit, delay, criterion, made, of_today, region)
+
+
+def effect_of(past: Past) -> Effect | Refused:
+    """Whether corrections act in full, by the readings of the period."""
+    try:
+        usable, begins = past.steady
+        deviation, compensated = past.history["deviation"][usable], past.history["compensated"][usable]
+        return measured_effect(deviation, compensated, past.standing.parameters.factor, begins)
+    except Refused as refused:
+        return refused
+
+
+def check_order(parameters: Parameters) -> None:
+    """Raises `Invalid` with the pair that is out of order, as the set-up would."""
+    try:
+        read(parameters.as_dict())
+    except ParameterError as error:
+        errors = wording.field_errors(error.problems)
+        raise Invalid(
+            "; ".join(f"{field}: {message}" for field, message in errors[:3]),
+            _("Choose settings that hold to R33 < R34 ≤ R35/2."),
+            errors=errors,
+        ) from None
+
+
+def _delay(past: Past, settings: Settings) -> int:
+    if settings.delay is not None:
+        return settings.delay
+    return past.delay or 0
+
+
+def truly_of(session: Session, past: Past) -> Figures:
+    """What truly happened, counted as a replay counts it; each part by the tolerance that was in force."""
+    history = past.history
+    kept = ~history.excluded
+    limits = {lane: known.parameters.limits for lane, known in enumerate(past.then.lanes)}
+    lane = past.way.lane[past.mine]
+    tolerance, wear, confidence = (
+        np.array([getattr(limits[at], name) for at in range(len(limits))])[lane]
+        for name in ("tolerance", "wear", "confidence")
+    )
+    deviation = history["deviation"]
+    raw = np.abs(np.rint(deviation * 1e6))
+    zone, code = history["zone"], history["code"]
+    fault, worn = zone == list(Zone).index(Zone.PROBE_FAULT), zone == list(Zone).index(Zone.WEAR)
+    outside = (raw > tolerance) & ~fault & ~worn
+    issued = (history["correction"] >= 0) & kept
+    held = issued & ((code == CODE[Code.TOOL_WORN_HELD]) | (code == CODE[Code.IMPLAUSIBLE]))
+    inner = deviation[(raw < wear) & kept]
+    spread = float(inner.std(ddof=1)) if len(inner) > 1 else None
+    if spread is not None and not nanometres(spread * 1000):
+        spread = 0.0
+    mean = float(inner.mean()) if len(inner) else None
+    half = past.standing.parameters.tolerance_width / 2
+    ppk = None
+    if spread and mean is not None and len(inner) >= FEWEST_FOR_PPK:
+        ppk = (half - abs(mean)) / (3 * spread)
+    return Figures(
+        readings=int(kept.sum()),
+        rejects=int(((raw > tolerance) & (raw < confidence) & kept).sum()),
+        oversize=int((outside & (deviation > 0) & kept).sum()),
+        undersize=int((outside & (deviation < 0) & kept).sum()),
+        worn=int((worn & kept).sum()),
+        faults=int((fault & kept).sum()),
+        offset_limit=int(((code == CODE[Code.OFFSET_LIMIT]) & kept).sum()),
+        corrections=int((issued & ~held).sum()),
+        of_tool=int((issued & ~held).sum()),
+        held=int(held.sum()),
+        mean_size=_mean_size(session, past),
+        inner=len(inner),
+        mean=mean,
+        spread=spread,
+        ppk=ppk,
+        largest=float(np.abs(inner).max()) if len(inner) else None,
+    )
+
+
+def _mean_size(session: Session, past: Past) -> float | None:
+    """Mean size error that the corrections of these readings removed, mm."""
+    sequence = past.history["sequence"]
+    return session.scalar(
+        select(func.avg(func.abs(Correction.size_error))).where(
+            Correction.machine_id == past.standing.machine.id,
+            Correction.characteristic_id == past.standing.characteristic.id,
+            Correction.sequence.between(int(sequence[0]), int(sequence[-1])),
+            func.abs(Correction.size_error) < past.standing.parameters.wear_limit,
+        )
+    )
+
+
+def _likeness(past: Past, truly: Figures, then: Figures, course: Course) -> Likeness:
+    kept = ~past.history.excluded & (np.abs(past.history["deviation"]) < past.standing.parameters.wear_limit)
+    off, same = agreement(course.deviation[past.mine][kept], past.history["deviation"][kept])
+    if not isfinite(off):
+        return Likeness(then, None, None, "unknown")
+    verdict = "unknown"
+    if truly.spread and then.spread is not None and truly.inner >= FEWEST_FOR_PPK:
+        verdict = next(
+            (word for word, bounds in (("well", WELL), ("roughly", ROUGHLY)) if _near(truly, then, *bounds)), "badly"
+        )
+    return Likeness(then, off, same, verdict)
+
+
+def _near(truly: Figures, then: Figures, of_spread: float, of_corrections: float) -> bool:
+    assert truly.spread is not None
+    assert then.spread is not None
+    room = max(of_spread, 2 / sqrt(2 * truly.inner)) * truly.spread
+    allowed = max(FEW_CORRECTIONS, of_corrections * truly.corrections)
+    return abs(then.spread - truly.spread) <= room and abs(then.corrections - truly.corrections) <= allowed
