@@ -8,8 +8,9 @@ thinned away.
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from app.control.thinning import thinned
 from app.control.view import Marked, View
 from app.control.wording import axis, chart_name
 from app.core.spc.rules import Signals
@@ -18,8 +19,6 @@ from app.web.i18n import _
 from app.web.numbers import signed
 from app.web.theme import Palette, ThemeName, layout, palette
 
-MOST_POINTS = 3_000
-STRETCHES = 750
 MOST_CHANGES = 40  # lines of tool changes; more are a fence
 WITH_MARKERS = 400
 ROOM = 0.08
@@ -91,35 +90,6 @@ def _sides(signals: Signals | None, count: int) -> NDArray[np.int8]:
     for run in signals or ():
         sides[run.start : run.end + 1] = run.side
     return sides
-
-
-def thinned(values: ArrayLike, wanted: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Which points are drawn: all of few; of many the first, last, lowest and highest of each stretch, and of its signals.
-
-    >>> thinned([1.0, 2.0], np.array([False, False])).tolist()
-    [0, 1]
-    """
-    points = np.asarray(values, np.float64)
-    count = len(points)
-    if count <= MOST_POINTS:
-        return np.arange(count)
-    stretch = np.arange(count) * STRETCHES // count
-    chosen = [np.flatnonzero(np.diff(stretch, prepend=-1)), np.array([count - 1])]
-    chosen += _extremes(points, stretch, np.arange(count))
-    chosen += _extremes(points, stretch, np.flatnonzero(wanted))
-    return np.unique(np.concatenate(chosen))
-
-
-def _extremes(
-    points: NDArray[np.float64], stretch: NDArray[np.int64], some: NDArray[np.int64]
-) -> list[NDArray[np.int64]]:
-    """Of these points the lowest and the highest of each stretch."""
-    if not len(some):
-        return []
-    order = some[np.lexsort((points[some], stretch[some]))]
-    starts = np.flatnonzero(np.diff(stretch[order], prepend=-1))
-    ends = np.append(starts[1:], len(order)) - 1
-    return [order[starts], order[ends]]
 
 
 def _um(values: Any) -> Any:
@@ -209,7 +179,7 @@ def _limits(view: View, drawn: NDArray[np.int64], colours: Palette) -> list[dict
     made = []
     first, last = int(view.first[0]), int(view.last[-1])
     for name, values, line in lines:
-        if values is None:
+        if values is None or _is_floor(view, values):
             continue
         single = np.ndim(values) == 0
         made.append(
@@ -245,9 +215,14 @@ def _names(view: View, colours: Palette, width: int) -> list[dict[str, Any]]:
             "font": {"size": 12, "color": colours.quiet},
         }
         for name, values in names
-        if values is not None
+        if values is not None and not _is_floor(view, values)
         for newest in [float(np.atleast_1d(_um(values))[-1])]
     ]
+
+
+def _is_floor(view: View, values: Any) -> bool:
+    """A lower limit of 0 limits nothing where there is nothing below."""
+    return view.kind in UNSIGNED and not np.any(values)
 
 
 def _span(view: View) -> float:

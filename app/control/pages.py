@@ -20,6 +20,7 @@ from app.control.schemas import BaselineIn, PeriodIn, SignalOut
 from app.control.tables import Baseline
 from app.control.view import View
 from app.core.spc.quantity import Quantity
+from app.core.spc.rules import RuleName
 from app.core.spc.shewhart import Chart
 from app.errors import InbandError, Invalid
 from app.proof import queries as proof
@@ -166,6 +167,7 @@ def _control(
         problem=error,
         wording=wording,
         said=statistics_wording,
+        rule_name=lambda name: statistics_wording.rule_name(RuleName(name)),
         proof_failing=proof.failing(),
         proof_warning=proof_wording.warning(len(proof.failing())),
         may_freeze=caller.may("engineer"),

@@ -1,0 +1,36 @@
+"""Which of very many points are drawn, so that no extreme and no signal is lost. Pure."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+MOST_POINTS = 3_000
+STRETCHES = 750
+
+
+def thinned(values: ArrayLike, wanted: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Which points are drawn: all of few; of many the first, last, lowest and highest of each stretch, and of its signals.
+
+    >>> thinned([1.0, 2.0], np.array([False, False])).tolist()
+    [0, 1]
+    """
+    points = np.asarray(values, np.float64)
+    count = len(points)
+    if count <= MOST_POINTS:
+        return np.arange(count)
+    stretch = np.arange(count) * STRETCHES // count
+    chosen = [np.flatnonzero(np.diff(stretch, prepend=-1)), np.array([count - 1])]
+    chosen += _extremes(points, stretch, np.arange(count))
+    chosen += _extremes(points, stretch, np.flatnonzero(wanted))
+    return np.unique(np.concatenate(chosen))
+
+
+def _extremes(
+    points: NDArray[np.float64], stretch: NDArray[np.int64], some: NDArray[np.int64]
+) -> list[NDArray[np.int64]]:
+    """Of these points the lowest and the highest of each stretch."""
+    if not len(some):
+        return []
+    order = some[np.lexsort((points[some], stretch[some]))]
+    starts = np.flatnonzero(np.diff(stretch[order], prepend=-1))
+    ends = np.append(starts[1:], len(order)) - 1
+    return [order[starts], order[ends]]
