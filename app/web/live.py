@@ -20,6 +20,7 @@ from app.db.events import CHANNEL
 log = logging.getLogger(__name__)
 
 PAUSE = 0.1  # s between two looks into the journal
+IDLE = 0.5  # s, while no page is open
 HEARTBEAT = 5.0  # s; a page that hears nothing for longer says so
 KEPT_HOURS = 6
 MOST_MISSED = 1000  # transactions that a client which comes back is told one by one
@@ -41,6 +42,7 @@ class Live:
     def __init__(self, dsn: str) -> None:
         self._dsn = dsn
         self._clients: set[asyncio.Queue[Message | None]] = set()
+        self._opened = asyncio.Event()  # the first page, after a time without
         self._last: int | None = None  # the last event that was passed on; None before the journal was seen
         self._tasks: list[asyncio.Task[None]] = []
         self.closing = asyncio.Event()
@@ -78,7 +80,7 @@ class Live:
                         await self._pass_on(conn)
                         async for _ in conn.notifies(timeout=HEARTBEAT, stop_after=1):
                             pass
-                        await asyncio.sleep(PAUSE)
+                        await self._rest()
             except psycopg.Error as error:
                 log.warning("live events are interrupted: %s", error)
                 if not listening:  # the database is away: no page may go on calling itself live
@@ -87,6 +89,14 @@ class Live:
             except Exception:
                 log.exception("live events met what nobody foresaw")
                 await asyncio.sleep(1)
+
+    async def _rest(self) -> None:
+        if self._clients:
+            await asyncio.sleep(PAUSE)
+            return
+        self._opened.clear()
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._opened.wait(), IDLE)
 
     async def _pass_on(self, conn: AsyncConnection[Any]) -> None:
         if not self._clients:
@@ -123,6 +133,7 @@ class Live:
         """Server-sent events from now on, or from number `after` on; of one machine, or of all."""
         client: asyncio.Queue[Message | None] = asyncio.Queue()
         self._clients.add(client)
+        self._opened.set()
         try:
             yield b"retry: 2000\n\n"
             known = self._last if after is None else after
