@@ -178,7 +178,12 @@ def orientation(task: Task, datum: Element) -> Form:
         "length": length,
     }
     if feature.lengthwise:
-        details["sections"] = sections_told(task.feature.sections)
+        about = feature.points - feature.point
+        wrong = across(about, np.zeros(3), d) if agree else np.outer(about @ d, d)
+        told = sections_told(task.feature.sections)
+        for each, out in zip(told, wrong.tolist(), strict=True):
+            each["off"] = out
+        details["sections"] = told
     else:
         details["residuals"] = ((feature.points - feature.point) @ f).tolist()
     return Form(values, suspicion, details=details)
