@@ -11,6 +11,7 @@ from starlette.types import ASGIApp
 
 from app.alarms import api as alarms
 from app.alarms import pages as alarm_pages
+from app.alignments import api as alignments
 from app.audit import api as audit
 from app.calibration import api as calibration
 from app.calibration import pages as calibration_pages
@@ -22,9 +23,12 @@ from app.characteristics import figures_api
 from app.characteristics import pages as characteristic_pages
 from app.control import api as control
 from app.control import pages as control_pages
-from app.control import rules_api, signals_api
+from app.control import rules_api, rules_pages, signals_api, signals_pages
 from app.control.signals_actions import SignalRounds
 from app.db.engine import Database
+from app.forms import api as forms
+from app.forms import pages as form_pages
+from app.kinematics import api as kinematics
 from app.machines import api as machines
 from app.offsets import api as offsets
 from app.offsets import chores as offset_chores
@@ -48,8 +52,12 @@ from app.readings.door import Directory, ReadingsDoor
 from app.readings.importing import pages as import_pages
 from app.readings.quiet import compile_now
 from app.readings.writer import Writer
+from app.reports import actions as report_chores
 from app.reports import api as reports
+from app.reports import jobs_api as report_jobs
+from app.reports import jobs_pages as report_job_pages
 from app.reports import pages as report_pages
+from app.reports.making import Reporter
 from app.rounds import Chore, Rounds
 from app.settings import Settings
 from app.setup import pages as setup_pages
@@ -63,6 +71,7 @@ from app.web.openapi import document
 from app.web.problems import add_problem_handlers
 from app.web.security import SecurityHeaders
 from app.web.templates import assets
+from app.zeros import api as zeros
 
 # Each part of the shop floor brings its JSON routes (api) and its pages.
 ROUTERS: tuple[APIRouter, ...] = (
@@ -74,7 +83,10 @@ ROUTERS: tuple[APIRouter, ...] = (
     overview.router,
     proof.router,
     wear.router,
+    zeros.router,
+    alignments.router,
     reports.router,
+    report_jobs.router,
     control.router,
     rules_api.router,
     signals_api.router,
@@ -83,7 +95,9 @@ ROUTERS: tuple[APIRouter, ...] = (
     by_hand.router,
     offsets.router,
     calibration.router,
+    kinematics.router,
     edges_api.router,
+    forms.router,
     programs.router,
     text_api.router,
     alarms.router,
@@ -97,6 +111,8 @@ ROUTERS: tuple[APIRouter, ...] = (
     overview_pages.router,
     characteristic_pages.router,
     control_pages.router,
+    rules_pages.router,
+    signals_pages.router,
     capability_pages.router,
     alarm_pages.router,
     queue_pages.router,
@@ -104,11 +120,13 @@ ROUTERS: tuple[APIRouter, ...] = (
     edge_pages.router,
     offset_pages.router,
     calibration_pages.router,
+    form_pages.router,
     sign_in_pages.router,
     setup_pages.router,
     import_pages.router,
     proof_pages.router,
     report_pages.router,
+    report_job_pages.router,
 )
 
 # What is looked after once a minute; see app.rounds.
@@ -117,6 +135,7 @@ CHORES: tuple[Chore, ...] = (
     Chore("tool lives are told", offset_chores.tell_tool_lives),
     Chore("wear is foretold, and hunting told", wear_chores.look_ahead),
     Chore("calibrations are overdue", raise_overdue),
+    Chore("old reports are thrown away", report_chores.drop_old),
     Chore("signals of the rules are kept", SignalRounds().look),
     Chore("results of other measuring systems become readings", reading_chores.push_waiting),
 )
@@ -130,12 +149,14 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
     database = Database(settings.database_url, pool_size=settings.pool_size)
     keys, directory = KeyRing(database), Directory(database)
     writer, live, rounds = Writer(database.dsn), Live(database.dsn), Rounds(database, CHORES)
+    reporter = Reporter(database)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         writer.start()
         live.start()
         rounds.start()
+        reporter.start()
         compiling = asyncio.get_running_loop().run_in_executor(None, compile_now)
         proving = proofs.begin_later()
         # What has been made so far stays for good: the collector need not walk it again, which halves the p99.
@@ -146,6 +167,7 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
         await compiling
         await live.stop()
         await rounds.stop()
+        await reporter.stop()
         await writer.stop()
         database.close()
 
@@ -156,6 +178,7 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
     app.state.directory = directory
     app.state.writer = writer
     app.state.live = live
+    app.state.reporter = reporter
     app.state.metrics = health.registry(database)
     add_problem_handlers(app)
     app.add_middleware(BodyLimit)

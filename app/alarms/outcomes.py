@@ -84,6 +84,10 @@ def _followed(item: dict[str, Any]) -> str:
             text = _("Correction {number} of {amount} was withdrawn.")
         case "correction_applied":
             text = _("Correction {number} of {amount} is in the offset already; the next readings correct it.")
+        case "fixture_back":
+            text = _("Work zero {number} is within the limit.")
+        case "kinematics_run":
+            text = _("Run {number} of the rotary axes lies within the limit, or was entered on the control.")
         case "calibrated":
             text = _("Calibration {number} was made.")
         case "switched":

@@ -26,6 +26,8 @@ KINDS = (
     "offset_differs",
     "calibration_overdue",
     "calibration_refused",
+    "fixture_shifted",
+    "kinematics_drift",
     "signal",
     "implausible",
     "tool_life",

@@ -7,9 +7,11 @@ from app.alarms.queries import MEASURED_BY_HAND, AlarmRow
 from app.alarms.tables import Alarm
 from app.calibration.wording import refusal
 from app.control.signals_wording import alarm_sentence
+from app.kinematics.wording import alarm_sentence as kinematics_sentence
 from app.wear.wording import hunting_sentence, remedy_sentence
 from app.web.i18n import _, ngettext
 from app.web.numbers import mm, um, um_limit
+from app.zeros.wording import shifted
 
 
 def kind_word(kind: str) -> str:
@@ -24,6 +26,8 @@ def kind_word(kind: str) -> str:
         "offset_differs": _("Offset differs"),
         "calibration_overdue": _("Calibration overdue"),
         "calibration_refused": _("Calibration refused"),
+        "fixture_shifted": _("Fixture shifted"),
+        "kinematics_drift": _("Rotary axis drifted"),
         "implausible": _("Implausible jump"),
         "tool_life": _("Tool life reached"),
         "hunting": _("Hunting"),
@@ -93,6 +97,10 @@ def sentence(row: AlarmRow) -> str:
             text = _("The probe has not been calibrated for {passed}: {place}.")
         case "calibration_refused":
             text = _("A calibration was refused and changes nothing: {place}. {why}")
+        case "fixture_shifted":
+            text = shifted(data)
+        case "kinematics_drift":
+            text = kinematics_sentence(data)
         case "hunting":
             text = f"{hunting_sentence(data)} {remedy_sentence(data, data['settings'])}"
         case "signal" if data.get("signals"):
@@ -152,6 +160,13 @@ def what_to_do(kind: str) -> str:
         "hunting": _("An engineer sets the parameters in Set-up; the page of the characteristic says to what."),
         "signal": _("Look at the chart and at the parts; then say what it was. The parts need not be bad."),
         "calibration_overdue": _("Calibrate it; that ends this alarm."),
+        "fixture_shifted": _(
+            "Look for chips under the part and at the bolts of the fixture. The next work zero within the limit ends this alarm."
+        ),
+        "kinematics_drift": _(
+            "Look at the run: enter what it asks for on the control, or look for what has moved. The next run within the limit "
+            "ends this alarm."
+        ),
         "calibration_refused": _("Clean stylus and gauge and look at the program, then calibrate again."),
     }.get(kind, _("Look at it and say what it was."))
 
@@ -183,6 +198,8 @@ def offered(row: AlarmRow) -> list[str]:
         "hunting": ["noted"],
         "signal": ["noted", "tool_replaced", *(["false_reading"] if alarm.data.get("readings") else [])],
         "calibration_overdue": ["noted"],
+        "fixture_shifted": ["noted"],
+        "kinematics_drift": ["noted"],
         "calibration_refused": ["noted"],
     }.get(alarm.kind, ["noted", "tool_replaced", "false_reading"])
     return [
@@ -289,6 +306,13 @@ def comments(kind: str, action: str) -> list[str]:
             _("New material"),
         ],
         ("tool_life", "noted"): [_("Edge looked at, still good"), _("Until the end of the batch"), _("Seen")],
+        ("fixture_shifted", "noted"): [
+            _("Chips under the part"),
+            _("Fixture bolted anew"),
+            _("Vice aligned anew"),
+            _("Seen"),
+        ],
+        ("kinematics_drift", "noted"): [_("Machine was cold"), _("After a collision"), _("Ball clamped anew"), _("Seen")],
         ("calibration_overdue", "noted"): [_("At the end of the batch"), _("At the change of shift"), _("Seen")],
         ("calibration_refused", "noted"): [_("Stylus cleaned"), _("Gauge cleaned"), _("Wrong gauge"), _("Seen")],
         ("offset_limit", "noted"): [_("Seen"), _("Limit is looked at")],

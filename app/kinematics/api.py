@@ -1,0 +1,237 @@
+"""JSON routes: runs of the preset compensation, what they ask to enter, the kinematics of machines and its back-ups."""
+
+from typing import Annotated, Any, Literal
+
+from fastapi import Path, Query, Response
+
+from app.errors import FieldError, Invalid
+from app.kinematics import actions, figures, looking, queries
+from app.kinematics.answers import AxisOut, RecomputedOut, RunOut, run_out
+from app.kinematics.drift import drift
+from app.kinematics.drift_answers import (
+    BackupOut,
+    ComparisonOut,
+    MachineKinematicsOut,
+    backup_out,
+    changes_out,
+    machine_out,
+)
+from app.kinematics.schemas import PlanIn, ReasonIn, RunIn
+from app.kinematics.values import UNITS, errors_of
+from app.machines.queries import machine_named
+from app.machines.tables import Machine
+from app.web.api import api_router, problems
+from app.web.deps import AnyCaller, Caller, Engineer, Operator, SessionDep
+from app.web.fields import LARGEST_SERIAL, Cursor, Limit, Page, Text200, page_of
+from app.web.i18n import _
+from app.web.theme import theme_from
+
+router = api_router("kinematics")
+MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
+RunNumber = Annotated[int, Path(description="Number of the run.", examples=[118])]
+Version = Annotated[int, Path(description="Version of the kinematics.", examples=[3])]
+After = Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")]
+Theme = Annotated[str | None, Query(description="`light` or `dark`", max_length=20)]
+Other = Annotated[int, Query(alias="with", ge=1, le=2**63 - 1, description="Number of the other run.", examples=[97])]
+FIGURE: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}
+}
+AGAIN: dict[int | str, dict[str, Any]] = {
+    200: {"model": RunOut, "description": "It was sent before with the same key; nothing happened now."}
+}
+
+
+# --- runs
+
+
+@router.post("/kinematics/runs", status_code=201, responses=problems(404, 409) | AGAIN)
+def take_kinematics_run(session: SessionDep, caller: AnyCaller, given: RunIn, response: Response) -> RunOut:
+    """Take a run of cycle 452: ball touches or centres (`axes`, `shift`), result parameters, or the control's protocol.
+
+    A ball further off than maxDevCalBall makes a refused run: that is kept, and counts for nothing. A change larger than
+    maxModification waits to be confirmed (`"status": "to_confirm"`). What of a protocol was not understood is answered.
+    """
+    machine = machine_named(session, given.machine)
+    caller.must_at(machine.id, "operator")
+    taken = actions.take(session, machine, given, caller)
+    response.status_code = 200 if taken.again else 201
+    return run_out(taken.row)
+
+
+@router.get("/kinematics/runs", responses=problems(404))
+def list_kinematics_runs(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: Annotated[str | None, Query(max_length=64, description="Only of this machine.")] = None,
+    head: Annotated[Text200 | None, Query(max_length=64, description="Only with this head.")] = None,
+    after: After = 0,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[RunOut]:
+    """Runs, oldest first, refused ones too."""
+    only = caller.only_machine
+    if machine is not None:
+        found = machine_named(session, machine)
+        caller.must_at(found.id, "viewer")
+        only = found.id
+    elif only is None:
+        caller.must("viewer")
+    rows = queries.runs(session, only, head=head, after=after, limit=limit + 1)
+    return page_of([run_out(row) for row in rows], limit, lambda made: made.run)
+
+
+@router.get("/kinematics/runs/{run}", responses=problems(404))
+def get_kinematics_run(session: SessionDep, caller: AnyCaller, run: RunNumber) -> RunOut:
+    """One run."""
+    return run_out(_run(session, caller, run))
+
+
+def _run(session: SessionDep, caller: Caller, run: int) -> queries.RunRow:
+    row = queries.run(session, run)
+    caller.must_at(row.machine.id, "viewer")
+    return row
+
+
+@router.post("/kinematics/runs/{run}/confirm", responses=problems(404, 409))
+def confirm_kinematics_run(session: SessionDep, caller: Operator, run: RunNumber, given: ReasonIn) -> RunOut:
+    """A change larger than maxModification is meant. 409 where nothing is to be confirmed; says who was first."""
+    return run_out(actions.confirm(session, run, given.reason, caller))
+
+
+@router.post("/kinematics/runs/{run}/enter", responses=problems(404, 409))
+def enter_kinematics_run(session: SessionDep, caller: Operator, run: RunNumber, given: ReasonIn) -> RunOut:
+    """Its position errors have been entered on the control. The kinematics before and after is backed up.
+
+    409 for a run that was refused, has to be confirmed, was entered already, or was measured on another kinematics.
+    """
+    return run_out(actions.enter(session, run, given.reason, caller))
+
+
+@router.post("/kinematics/runs/{run}/recompute", responses=problems(404))
+def recompute_kinematics_run(session: SessionDep, caller: AnyCaller, run: RunNumber) -> RecomputedOut:
+    """Evaluate it anew from what was sent, and say whether that comes to what is on record; nothing is changed."""
+    _run(session, caller, run)
+    row, found = actions.recompute(session, run)
+    return RecomputedOut(
+        run=run,
+        same=looking.same(row.run.results, found.results),
+        outcome=found.outcome,
+        axes=[AxisOut.model_validate(axis) for axis in found.results["axes"]],
+        offsets=found.results["offsets"],
+    )
+
+
+@router.get("/kinematics/runs/{run}/comparison", responses=problems(404))
+def compare_kinematics_runs(session: SessionDep, caller: AnyCaller, run: RunNumber, other: Other) -> ComparisonOut:
+    """What moved between two runs of a machine, whichever is older, and what the later asks to enter."""
+    _run(session, caller, run)
+    before, after = queries.two_runs(session, run, other)
+    changes = looking.changes(before, after)
+    return ComparisonOut(
+        machine=before.machine.key,
+        before=before.run.id,
+        after=after.run.id,
+        changes=changes_out(changes, errors_of(after.run.results)),
+    )
+
+
+@router.get("/kinematics/runs/{run}/comparison-figure", responses=problems(404) | FIGURE)
+def kinematics_comparison_figure(
+    session: SessionDep, caller: AnyCaller, run: RunNumber, other: Other, theme: Theme = None
+) -> dict[str, Any]:
+    """The same as one picture: an arrow from then to now for every position error, and what to enter."""
+    _run(session, caller, run)
+    before, after = queries.two_runs(session, run, other)
+    entered = looking.to_enter(after)
+    return figures.comparison(looking.changes(before, after), entered, theme=theme_from(theme))
+
+
+@router.get("/kinematics/runs/{run}/figure", responses=problems(404) | FIGURE)
+def kinematics_run_figure(
+    session: SessionDep,
+    caller: AnyCaller,
+    run: RunNumber,
+    axis: Annotated[Literal["A", "B", "C"], Query(description="The axis.", examples=["C"])],
+    letter: Annotated[Literal["X", "Y", "Z"], Query(description="The direction of the deviation.", examples=["Y"])],
+    theme: Theme = None,
+) -> dict[str, Any]:
+    """The deviation in one direction against the angle of the axis (EYC: Y against C), measured and optimised."""
+    row = _run(session, caller, run)
+    found = next((each for each in row.run.results["axes"] if each["axis"] == axis), None)
+    if found is None:
+        wrong = _("run {run} did not measure axis {axis}").format(run=run, axis=axis)
+        raise Invalid(f"axis: {wrong}.", errors=[FieldError("axis", wrong)])
+    return figures.diagram(found, letter, theme=theme_from(theme), height=figures.greatest(found))
+
+
+# --- machines
+
+
+@router.get("/machines/{machine}/kinematics", responses=problems(404))
+def get_kinematics(session: SessionDep, caller: AnyCaller, machine: MachineKey) -> MachineKinematicsOut:
+    """What the runs of a machine are held against, what has been entered, and how every value drifts."""
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "viewer")
+    return _machine(session, found)
+
+
+def _machine(session: SessionDep, machine: Machine) -> MachineKinematicsOut:
+    plan = queries.plan(session, machine.id)
+    head = plan.reference_head or ""
+    return machine_out(
+        machine.key, plan, queries.in_effect(session, machine.id, head), looking.drifts(session, machine, head)
+    )
+
+
+@router.put("/machines/{machine}/kinematics", responses=problems(404))
+def plan_kinematics(session: SessionDep, caller: Engineer, machine: MachineKey, given: PlanIn) -> MachineKinematicsOut:
+    """Set maxModification, maxDevCalBall, the ball, limits of the drift, and which values become readings.
+
+    A value beyond its limit raises the alarm `kinematics_drift`; the next run inside it ends it.
+    """
+    found = machine_named(session, machine)
+    actions.set_plan(session, found, given, caller)
+    return _machine(session, found)
+
+
+@router.get("/machines/{machine}/kinematics/drift-figure", responses=problems(404) | FIGURE)
+def kinematics_drift_figure(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineKey,
+    value: Annotated[str, Query(max_length=20, description="EX0C, Q146, backlash.C …", examples=["EX0C"])],
+    head: Annotated[str, Query(max_length=64, description="With this head.")] = "",
+    theme: Theme = None,
+) -> dict[str, Any]:
+    """A value over the runs with its limit, what has been entered, and the trend."""
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "viewer")
+    if value not in UNITS:
+        wrong = _("there is no such value; there are EX0C, EY0C, EA0C, Q141 to Q149, backlash.C …")
+        raise Invalid(f"value: {wrong}.", errors=[FieldError("value", wrong)])
+    limits = queries.plan(session, found.id).limits
+    course = drift(value, looking.measured(session, found, head), limits.get(value))
+    return figures.course(course, theme=theme_from(theme))
+
+
+@router.get("/machines/{machine}/kinematics/backups", responses=problems(404))
+def list_kinematics_backups(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineKey,
+    after: After = 0,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[BackupOut]:
+    """Every kinematics that was in effect, oldest first, as cycle 450 keeps them."""
+    found = machine_named(session, machine)
+    caller.must_at(found.id, "viewer")
+    rows = queries.backups(session, found.id, after=min(after, LARGEST_SERIAL), limit=limit + 1)
+    return page_of([backup_out(row) for row in rows], limit, lambda made: made.version)
+
+
+@router.post("/machines/{machine}/kinematics/backups/{version}/restore", status_code=201, responses=problems(404, 409))
+def restore_kinematics(
+    session: SessionDep, caller: Engineer, machine: MachineKey, version: Version, given: ReasonIn
+) -> BackupOut:
+    """Put this kinematics back; that is a new version. 409 when it is in effect."""
+    found = machine_named(session, machine)
+    return backup_out(actions.restore(session, found, version, given.reason, caller))

@@ -1,0 +1,210 @@
+"""The kinematics of a machine, its back-ups and drift, and two runs compared, as they are answered. mm and degrees."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from app.kinematics import wording
+from app.kinematics.drift import Compared, Drift
+from app.kinematics.tables import KinematicsBackup, KinematicsPlan
+from app.kinematics.values import UNITS
+
+BACKUP: dict[str, JsonValue] = {
+    "version": 3,
+    "head": None,
+    "at": "2026-11-21T07:02:11Z",
+    "by": "ana",
+    "reason": "Monthly check",
+    "errors": {"EX0C": 0.0123, "EY0C": -0.0081, "EA0C": 0.0021, "EB0C": -0.0013},
+    "run": 118,
+    "restores": None,
+}
+DRIFT: dict[str, JsonValue] = {
+    "name": "EX0C",
+    "unit": "mm",
+    "limit": 0.01,
+    "beyond": True,
+    "last": 0.0123,
+    "true": 0.0123,
+    "runs": 5,
+    "slope_per_day": 0.0004,
+    "slope_low": 0.0001,
+    "slope_high": 0.0007,
+    "text": "+0.40 µm a day, with 95 % certainty +0.10 to +0.70: it drifts.",
+}
+STATE: dict[str, JsonValue] = {
+    "machine": "lathe-1",
+    "ball_radius": 12.5,
+    "max_modification": 0.05,
+    "max_modification_angle": 0.01,
+    "max_dev_cal_ball": 0.01,
+    "reference_head": None,
+    "limits": {"EX0C": 0.01},
+    "characteristics": {},
+    "in_effect": {"EX0C": 0.0041, "EY0C": 0.0, "EA0C": 0.0, "EB0C": 0.0},
+    "drift": [DRIFT],
+}
+
+
+class BackupOut(BaseModel):
+    """The kinematics as it was from one moment on. errors: what has been entered so far, by name."""
+
+    model_config = ConfigDict(json_schema_extra={"example": BACKUP})
+
+    version: int
+    head: str | None
+    at: datetime
+    by: str
+    reason: str
+    errors: dict[str, float]
+    run: Annotated[int | None, Field(description="The run that led to it.")]
+    restores: Annotated[int | None, Field(description="The version that was put back.")]
+
+
+class DriftOut(BaseModel):
+    """A value over the runs. true: with what had been entered by then; the slope, per day, is of that."""
+
+    name: str
+    unit: str
+    limit: float | None
+    beyond: bool
+    last: float | None
+    true: float | None
+    runs: int
+    slope_per_day: float | None
+    slope_low: float | None
+    slope_high: float | None
+    text: str
+
+
+class MachineKinematicsOut(BaseModel):
+    """What the runs of a machine are held against, what is in effect, and how it drifts."""
+
+    model_config = ConfigDict(json_schema_extra={"example": STATE})
+
+    machine: str
+    ball_radius: float | None
+    max_modification: float | None
+    max_modification_angle: float | None
+    max_dev_cal_ball: float | None
+    reference_head: str | None
+    limits: dict[str, float]
+    characteristics: dict[str, str]
+    in_effect: dict[str, float]
+    drift: list[DriftOut]
+
+
+def backup_out(row: KinematicsBackup) -> BackupOut:
+    """A back-up as it is answered."""
+    return BackupOut(
+        version=row.version,
+        head=row.head or None,
+        at=row.at,
+        by=row.actor,
+        reason=row.reason,
+        errors=row.errors,
+        run=row.run,
+        restores=row.restores,
+    )
+
+
+def drift_out(drift: Drift) -> DriftOut:
+    """A drift as it is answered."""
+    last, trend = drift.last, drift.trend
+    return DriftOut(
+        name=drift.name,
+        unit=UNITS[drift.name],
+        limit=drift.limit,
+        beyond=drift.beyond,
+        last=last.value if last else None,
+        true=last.true if last else None,
+        runs=len(drift.points),
+        slope_per_day=trend.slope if trend else None,
+        slope_low=trend.low if trend else None,
+        slope_high=trend.high if trend else None,
+        text=wording.trend_sentence(drift),
+    )
+
+
+def machine_out(
+    machine: str, plan: KinematicsPlan, in_effect: dict[str, float], drifts: list[Drift]
+) -> MachineKinematicsOut:
+    """The kinematics of a machine as it is answered."""
+    return MachineKinematicsOut(
+        machine=machine,
+        ball_radius=plan.ball_radius,
+        max_modification=plan.max_modification,
+        max_modification_angle=plan.max_modification_angle,
+        max_dev_cal_ball=plan.max_dev_cal_ball,
+        reference_head=plan.reference_head,
+        limits=plan.limits,
+        characteristics=plan.characteristics,
+        in_effect=in_effect,
+        drift=[drift_out(each) for each in drifts],
+    )
+
+
+class ChangeOut(BaseModel):
+    """A value in two runs. moved: the difference is more than scatter; none where no run says how sure it is."""
+
+    name: str
+    words: str
+    unit: str
+    before: float
+    after: float
+    difference: float
+    deviation: float | None
+    moved: bool | None
+    enter: Annotated[float | None, Field(description="What the later run asks to enter on the control.")]
+
+
+class ComparisonOut(BaseModel):
+    """What moved between two runs, and what to enter on the control."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "machine": "lathe-1",
+                "before": 97,
+                "after": 118,
+                "changes": [
+                    {
+                        "name": "EX0C",
+                        "words": "C stands off in X",
+                        "unit": "mm",
+                        "before": 0.0041,
+                        "after": 0.0123,
+                        "difference": 0.0082,
+                        "deviation": 0.0011,
+                        "moved": True,
+                        "enter": 0.0123,
+                    }
+                ],
+            }
+        }
+    )
+
+    machine: str
+    before: int
+    after: int
+    changes: list[ChangeOut]
+
+
+def changes_out(changes: list[Compared], errors: Mapping[str, float]) -> list[ChangeOut]:
+    """Every value that both runs hold."""
+    return [
+        ChangeOut(
+            name=each.name,
+            words=wording.name_words(each.name),
+            unit=each.unit,
+            before=each.change.before,
+            after=each.change.after,
+            difference=each.change.difference,
+            deviation=each.change.deviation,
+            moved=each.change.moved,
+            enter=errors.get(each.name),
+        )
+        for each in changes
+    ]
