@@ -6,7 +6,7 @@ from typing import Any
 from app.alarms.queries import MEASURED_BY_HAND, AlarmRow
 from app.alarms.tables import Alarm
 from app.calibration.wording import refusal
-from app.control.signals_wording import alarm_sentence
+from app.control.signals_wording import alarm_sentence, page_of
 from app.kinematics.wording import alarm_sentence as kinematics_sentence
 from app.wear.wording import hunting_sentence, remedy_sentence
 from app.web.i18n import _, ngettext
@@ -125,6 +125,12 @@ _KNOWN = frozenset(
         "calibration_refused",
     }
 )
+
+
+def chart_of(row: AlarmRow) -> str:
+    """The control chart about the last signal that an alarm names; empty for other alarms."""
+    signals = row.alarm.data.get("signals")
+    return page_of(row.characteristic.key, signals[-1]) if signals and row.characteristic else ""
 
 
 def place(data: Mapping[str, Any]) -> str:
@@ -312,7 +318,12 @@ def comments(kind: str, action: str) -> list[str]:
             _("Vice aligned anew"),
             _("Seen"),
         ],
-        ("kinematics_drift", "noted"): [_("Machine was cold"), _("After a collision"), _("Ball clamped anew"), _("Seen")],
+        ("kinematics_drift", "noted"): [
+            _("Machine was cold"),
+            _("After a collision"),
+            _("Ball clamped anew"),
+            _("Seen"),
+        ],
         ("calibration_overdue", "noted"): [_("At the end of the batch"), _("At the change of shift"), _("Seen")],
         ("calibration_refused", "noted"): [_("Stylus cleaned"), _("Gauge cleaned"), _("Wrong gauge"), _("Seen")],
         ("offset_limit", "noted"): [_("Seen"), _("Limit is looked at")],

@@ -144,6 +144,34 @@ def why_more() -> str:
     )
 
 
+def listed(rules: Rules) -> str:
+    """Which rules are on, in a line."""
+    said = [
+        _("{place}: {rules}").format(
+            place=at(place),
+            rules=", ".join(
+                (statistics.rule_name(name) if place is Place.MAIN else _("limits"))
+                + (f" ({does(each.do)})" if each.do is Do.ALARM else "")
+                for name, each in named.items()
+            ),
+        )
+        for place, named in rules.items()
+        if named
+    ]
+    return "; ".join(said) or _("none")
+
+
+def at(place: Place) -> str:
+    """A chart by its place, whichever kind it is."""
+    return {
+        Place.MAIN: _("individuals or means"),
+        Place.SCATTER: _("scatter"),
+        Place.EWMA: statistics.chart(Chart.EWMA),
+        Place.MOVING_AVERAGE: statistics.chart(Chart.MOVING_AVERAGE),
+        Place.CUSUM: statistics.chart(Chart.CUSUM),
+    }[place]
+
+
 def as_told(rules: Rules) -> dict[str, Any]:
     """Rules as they stand in the record of changes."""
     return {place.value: {name.value: each.do.value for name, each in rules[place].items()} for place in rules}

@@ -202,6 +202,7 @@ class _Look:
                 row.first_sequence, row.last_sequence, row.points = run[2:]
                 row.last_at, row.withdrawn_at = now, None
                 changed.append(row)
+        added.sort(key=lambda key: (found[key].last, found[key].first))  # numbers go up with the readings
         gone = self._gone(before, set(rows.values())) if self.anew and self.same_baseline else []
         for row in gone:
             row.withdrawn_at = now

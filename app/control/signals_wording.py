@@ -63,10 +63,11 @@ def told(signal: Signal) -> dict[str, Any]:
 
 def sentence(data: Mapping[str, Any]) -> str:
     """A signal: the rule, the chart, the readings, and what the rule looks for."""
-    chart, name = Chart(data["chart"]), RuleName(data["rule"])
-    return _("{rule}, {chart}, {run}: {what}").format(
-        rule=rule(chart, name), chart=statistics.chart(chart), run=run(data), what=what(data)
-    )
+    chart = Chart(data["chart"])
+    values = {"chart": statistics.chart(chart), "run": run(data), "what": what(data)}
+    if chart not in {Chart.INDIVIDUALS, Chart.XBAR}:  # which know no rule but their limits
+        return _("{chart}, {run}: {what}").format(**values)
+    return _("{rule}, {chart}, {run}: {what}").format(rule=rule(chart, RuleName(data["rule"])), **values)
 
 
 def rule(chart: Chart, name: RuleName) -> str:
@@ -131,11 +132,13 @@ def _with_repeats(data: Mapping[str, Any]) -> str:
     return _("{signal}, the last of {n} since").format(signal=sentence(data), n=runs)
 
 
+def window(data: Mapping[str, Any]) -> dict[str, Any]:
+    """The readings about a signal, as charts and pages are asked for them."""
+    return {"first": max(1, data["first"] - AROUND), "through": data["last"] + AROUND}
+
+
 def page_of(key: str, data: Mapping[str, Any]) -> str:
-    """The chart with the readings about a signal."""
-    query = {
-        "chart": data["chart"],
-        "first": max(1, data["first"] - AROUND),
-        "through": data["last"] + AROUND,
-    }
+    """The control chart about a signal."""
+    remembers = data["chart"] in {Chart.EWMA, Chart.MOVING_AVERAGE, Chart.CUSUM}
+    query = ({"chart": data["chart"]} if remembers else {}) | window(data)
     return f"/characteristics/{key}/control?{urlencode(query)}"

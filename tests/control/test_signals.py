@@ -98,7 +98,7 @@ def test_a_run_that_goes_on_stays_one_signal_and_grows(shop: Shop) -> None:
 
 
 def test_looking_often_finds_what_looking_once_finds(shop: Shop) -> None:
-    every = {
+    every: dict[str, Any] = {
         "main": dict.fromkeys([f"nelson_{n}" for n in range(1, 9)] + ["western_4"], "watch"),
         **{place: {"nelson_1": "watch"} for place in ("scatter", "ewma", "moving_average", "cusum")},
     }

@@ -1,0 +1,114 @@
+"""Pages: the signals of a characteristic, and one of them with its chart, where an engineer says what it was."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request, Response
+from starlette.responses import RedirectResponse
+
+from app.characteristics import queries as characteristics
+from app.control import rules_wording, signals_actions, signals_queries
+from app.control import signals_wording as words
+from app.control.signals_queries import SignalRow, State
+from app.control.signals_schemas import CommentIn
+from app.control.signals_wording import Cause
+from app.core.spc.rules import RuleName
+from app.core.spc.shewhart import Chart
+from app.errors import Invalid
+from app.proof import queries as proof
+from app.proof import wording as proof_wording
+from app.statistics import wording as statistics
+from app.web.deps import Caller, Engineer, FormDep, SessionDep, Viewer, require
+from app.web.fields import LARGEST_ID
+from app.web.forms import by_field, parsed
+from app.web.i18n import _
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+ON_PAGE = 30
+
+
+@router.get("/characteristics/{characteristic}/signals", dependencies=[require("viewer")])
+def signals_page(
+    request: Request,
+    session: SessionDep,
+    characteristic: str,
+    state: Annotated[State, Query()] = "all",
+    before: Annotated[int | None, Query(ge=1, le=LARGEST_ID)] = None,
+) -> Response:
+    """What the rules have found, newest first."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    rows = signals_queries.signals(
+        session, characteristic=standing.characteristic, state=state, before=before, limit=ON_PAGE + 1
+    )
+
+    def link(which: str, older: int | None = None) -> str:
+        query = {"state": which} | ({} if older is None else {"before": older})
+        return f"/characteristics/{characteristic}/signals?{urlencode(query)}"
+
+    return page(
+        request,
+        "control/signals_page.html",
+        characteristic=standing.characteristic,
+        machine=standing.machine,
+        rows=rows[:ON_PAGE],
+        more=len(rows) > ON_PAGE,
+        counts=signals_queries.counts(session, standing.characteristic),
+        state=state,
+        before=before,
+        link=link,
+        words=words,
+        **_proof(),
+    )
+
+
+@router.get("/signals/{number}")
+def signal_page(request: Request, session: SessionDep, caller: Viewer, number: int) -> Response:
+    """One signal on its chart, and what it was."""
+    return _signal(request, signals_queries.signal(session, number), caller)
+
+
+@router.post("/signals/{number}")
+def explain(request: Request, session: SessionDep, caller: Engineer, number: int, form: FormDep) -> Response:
+    """Say what it was."""
+    try:
+        given = parsed(CommentIn, {"cause": form.get("cause"), "comment": form.get("comment", "").strip()})
+        signals_actions.explain(session, number, given.cause, given.comment, caller)
+    except Invalid as error:
+        return _signal(request, signals_queries.signal(session, number), caller, form, error)
+    return RedirectResponse(f"/signals/{number}", 303)
+
+
+def _signal(
+    request: Request,
+    row: SignalRow,
+    caller: Caller,
+    form: Mapping[str, str] | None = None,
+    error: Invalid | None = None,
+) -> Response:
+    told = words.told(row.signal)
+    query = words.window(told) | {"chart": row.signal.chart, "baseline": row.signal.baseline_version}
+    return page(
+        request,
+        "control/signal.html",
+        status=error.status if error else 200,
+        row=row,
+        told=told,
+        chart=Chart(row.signal.chart),
+        rule=RuleName(row.signal.rule),
+        figure=f"/api/v1/characteristics/{row.characteristic.key}/figures/control?{urlencode(query)}",
+        causes=[("", _("Choose what it was")), *((cause.value, words.cause(cause)) for cause in Cause)],
+        form=form or {},
+        errors=by_field(error) if error else {},
+        words=words,
+        rules=rules_wording,
+        said=statistics,
+        may_explain=caller.may("engineer"),
+        **_proof(),
+    )
+
+
+def _proof() -> dict[str, Any]:
+    failing = proof.failing()
+    return {"proof_failing": failing, "proof_warning": proof_wording.warning(len(failing))}
