@@ -21,6 +21,7 @@ log = logging.getLogger(__name__)
 DAY = 24 * 3600.0  # s
 STOPS = {"tool_worn", "probe_fault", "offset_limit"}
 LARGEST_LAG = 30.0  # s of the wall clock: what was missed beyond it is not made up for
+LOOKS_EVERY, IN_A_ROW = 10, 3  # parts between two looks at the board; parts not accepted that ask for a hand
 PATIENCE = (60.0, 90.0)  # s of the wall clock until the simulated operator steps in
 
 
@@ -83,6 +84,7 @@ class Line:
         and weekends between them, instead.
         """
         machine, nights = self.machine, days is not None
+        accepting = any("accept" in feature.more for feature in machine.spec.features)
         rehearsal = deepcopy(machine)  # how long it takes does not depend on what is decided
         while rehearsal.at < days * DAY if days is not None else rehearsal.serial < parts:
             rehearsal.rest(nights=nights)
@@ -91,7 +93,7 @@ class Line:
         while machine.serial < rehearsal.serial:
             if self._ending.is_set():
                 return
-            if machine.rest(nights=nights):
+            if machine.rest(nights=nights) or (accepting and machine.serial % LOOKS_EVERY == 0):
                 self._note_alarms()
             machine.cut()
             self._apply(self._push_batch(machine.measure()))
@@ -101,6 +103,13 @@ class Line:
     def _note_alarms(self) -> None:
         for alarm in self._active_alarms():
             self._acknowledge(alarm, "noted", "Looked at; the loop has corrected it.")
+            if _all_rejected(alarm):
+                self._measure_what_waits()
+                self._set_by_hand(alarm)
+
+    def _measure_what_waits(self) -> None:
+        while self.machine.pipeline:
+            self._apply(self._push_batch(self.machine.measure(drain=True)))
 
     def _change_worn_tools_of_the_past(self) -> None:
         """Between two parts, when all that the old edge has cut is measured and what was decided on it stands in its offset."""
@@ -108,8 +117,7 @@ class Line:
         worn = [number for number, edge in machine.edges.items() if edge.parts >= edge.tool.life]
         if not worn:
             return
-        while machine.pipeline:
-            self._apply(self._push_batch(machine.measure(drain=True)))
+        self._measure_what_waits()
         self._fetch_corrections()
         self._change_worn_tools()
         for number in worn:
@@ -257,6 +265,9 @@ class Line:
         for what, step_in in waiting.items():
             if now >= self._patience[what]:
                 step_in()
+        for alarm in alarms:
+            if _all_rejected(alarm) and now >= self._patience[f"alarm {alarm['id']}"]:
+                self._set_by_hand(alarm)
 
     def _active_alarms(self) -> list[dict[str, Any]]:
         return list(self._operator.items("/alarms", state="active", machine=self.key))
@@ -268,6 +279,18 @@ class Line:
         except Refused as refusal:
             if refusal.status != 409:  # somebody was first
                 raise
+
+    def _set_by_hand(self, alarm: dict[str, Any]) -> None:
+        """What the bore gauge says of the last part is taken out of the offset."""
+        feature = next(f for f in self.machine.spec.features if f.key == alarm["characteristic"])
+        offset = self._tools()[feature.tool]["offset"] + feature.factor * alarm["data"]["deviation"]
+        reason = f"{alarm['count']} parts not accepted: set by the bore gauge (simulated operator)"
+        self._operator.call(
+            "PUT",
+            f"/machines/{self.key}/tools/{feature.tool}",
+            json={"offset": round(offset, 6), "reason": reason},
+        )
+        self.machine.edges[feature.tool].offset = round(offset, 6)
 
     def _measured_by_hand(self, alarm: dict[str, Any]) -> dict[str, Any]:
         """A rejected part is measured with a bore gauge: what lies far out was a chip under the stylus, not the part."""
@@ -293,6 +316,14 @@ class Line:
             self.machine.stand(self.pace.now())
         elif due > 0:
             self._ending.wait(due)
+
+
+def _all_rejected(alarm: dict[str, Any]) -> bool:
+    """Whether part after part is not accepted: such parts correct nothing, so only a person ends it."""
+    if alarm["kind"] != "acceptance":
+        return False
+    in_a_row: bool = alarm["count"] == alarm["last_sequence"] - alarm["sequence"] + 1 >= IN_A_ROW
+    return in_a_row
 
 
 NOTED = ("noted", "Looked at.")
