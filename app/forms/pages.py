@@ -11,7 +11,7 @@ from starlette.responses import RedirectResponse
 from app.core.geometry.relations import ENGINE
 from app.errors import FieldError, InbandError, Invalid, NotFound
 from app.forms import actions, queries, typed, wording
-from app.forms.schemas import OF_POINTS, OF_SECTIONS, WITH_DATUM, FormIn
+from app.forms.schemas import FormIn
 from app.machines.queries import machine_named, machines
 from app.web.deps import FormDep, Operator, SessionDep, Viewer, require
 from app.web.fields import LARGEST_ID
@@ -34,6 +34,21 @@ PRINTED = {
 Word = Annotated[str | None, Query(max_length=64)]
 Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
 # Where the form shows what is wrong with the parts of a measurement.
+FIELDS = (
+    *(
+        "machine",
+        "feature",
+        "kind",
+        "method",
+        "tolerance",
+        "repeatability",
+        "part",
+        "characteristic",
+        "touches",
+        "side",
+    ),
+    *("tip_diameter", "datum", "length", "nominal_x", "nominal_y"),
+)
 SHOWN_AT = {"sections": "touches", "points": "touches", "nominal": "nominal_x"}
 
 
@@ -130,11 +145,9 @@ def _new(request: Request, session: Session, form: Mapping[str, Any], error: Inb
         form=form,
         errors=_at_fields(error) if error else {},
         error=error,
+        shown=FIELDS,
         machines=machines(session),
         kinds=wording.kinds(),
-        of_points=OF_POINTS,
-        of_sections=OF_SECTIONS,
-        with_datum=WITH_DATUM,
     )
 
 

@@ -1,7 +1,7 @@
 """A section round: its touches about the fitted circle, the deviations magnified, the minimum zone as two circles."""
 
 from collections.abc import Mapping, Sequence
-from math import atan2, cos, hypot, sin
+from math import atan2, cos, sin
 from typing import Any
 
 from app.forms.figures.parts import circle, framed, line, note, rounded_up
@@ -10,6 +10,8 @@ from app.web.numbers import signed
 from app.web.theme import ThemeName, palette
 
 DEEP = 0.32  # of the radius in the picture, that the greatest deviation takes
+BESIDE = 0.09  # of the radius: where the number of a touch stands
+MOST_NAMES = 72
 
 
 def round_figure(
@@ -63,14 +65,11 @@ def round_figure(
             data.append(
                 {
                     "type": "scatter",
-                    "mode": "markers+text",
+                    "mode": "markers",
                     "name": name,
                     "meta": symbol,
                     "x": [places[k][0] for k in chosen],
                     "y": [places[k][1] for k in chosen],
-                    "text": [f" {k + 1}" for k in chosen],
-                    "textposition": [_side(places[k]) for k in chosen],
-                    "textfont": {"size": 12, "color": colours.quiet},
                     "marker": {"symbol": symbol, "size": size, "color": colour},
                     "hovertext": [
                         _("touch {n}: {off} µm").format(n=k + 1, off=signed(residuals[k] * 1000, 1)) for k in chosen
@@ -79,6 +78,19 @@ def round_figure(
                     "cliponaxis": False,
                 }
             )
+    if len(touches) <= MOST_NAMES:
+        data.append(
+            {
+                "type": "scatter",
+                "mode": "text",
+                "x": [x + BESIDE * cos(angle) for (x, _y), angle in zip(places, angles, strict=True)],
+                "y": [y + BESIDE * sin(angle) for (_x, y), angle in zip(places, angles, strict=True)],
+                "text": [str(k + 1) for k in range(len(touches))],
+                "textfont": {"size": 12, "color": colours.quiet},
+                "hoverinfo": "skip",
+                "showlegend": False,
+            }
+        )
     reach = 1 + 1.25 * max(DEEP, 2 * step * deep)
     hidden = {"visible": False, "range": [-reach, reach]}
     words = _("deviations magnified {times:.0f} ×; from one thin circle to the next {step:g} µm").format(
@@ -97,10 +109,3 @@ def round_figure(
             ],
         ),
     }
-
-
-def _side(place: tuple[float, float]) -> str:
-    x, y = place
-    if abs(y) > 0.7 * hypot(x, y):
-        return "top center" if y > 0 else "bottom center"
-    return "middle right" if x > 0 else "middle left"
