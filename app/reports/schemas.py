@@ -1,7 +1,6 @@
 """A report as JSON. Numbers in the unit that stands beside them; lengths as people read them, in µm and mm."""
 
 from datetime import datetime
-from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -159,6 +158,3 @@ class ReportOut(BaseModel):
             head=[FactOut.of_fact(fact, report) for fact in report.head],
             sections=[SectionOut.of(section, report) for section in report.sections],
         )
-
-
-BundleFormat = Literal["pdf", "xlsx", "csv", "workbook"]

@@ -5,5 +5,6 @@ job, jobs, …   reports that were asked for many at once
 """
 
 from app.reports.queries.gathering import report_of, title_of
+from app.reports.queries.jobs import content, count_open, job, jobs, open_jobs, parts, troubles
 
-__all__ = ["report_of", "title_of"]
+__all__ = ["content", "count_open", "job", "jobs", "open_jobs", "parts", "report_of", "title_of", "troubles"]

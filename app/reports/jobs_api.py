@@ -1,0 +1,82 @@
+"""JSON routes: many reports at once, made in the background."""
+
+from typing import Annotated, Any
+
+from fastapi import Path, Query, Request, Response
+
+from app.reports import actions, queries
+from app.reports.api import Named, download
+from app.reports.bundle import media_type
+from app.reports.jobs_schemas import ReportsIn, ReportsOut
+from app.reports.making import Reporter
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep, Viewer, require
+from app.web.fields import LARGEST_SERIAL, Limit, Page, page_of
+
+router = api_router("reports")
+
+Number = Annotated[int, Path(ge=1, le=LARGEST_SERIAL, description="The number of the request for reports.")]
+FILE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "The file: a ZIP, or an XLSX workbook",
+        "content": {
+            media: {"schema": {"type": "string", "format": "binary"}}
+            for media in (media_type("pdf"), media_type("workbook"))
+        },
+    }
+}
+
+
+def reporter(request: Request) -> Reporter:
+    """The thread of this process that makes them."""
+    found: Reporter = request.app.state.reporter
+    return found
+
+
+@router.post("/reports", status_code=201, responses=problems(429))
+def ask_for_reports(request: Request, session: SessionDep, caller: Viewer, given: ReportsIn) -> ReportsOut:
+    """Reports of many characteristics in one file. They are made in the background; `GET /reports/{id}` says how far.
+
+    A characteristic whose report cannot be made spoils no other: it is named in the summary with why.
+    """
+    job = actions.ask(session, given.bundle(), caller)
+    reporter(request).wake()
+    return ReportsOut.of(job)
+
+
+@router.get("/reports", dependencies=[require("viewer")])
+def list_reports(
+    session: SessionDep,
+    before: Annotated[
+        int | None, Query(ge=1, le=LARGEST_SERIAL, description="Cursor: the `next` of the page before.")
+    ] = None,
+    limit: Limit = 100,
+) -> Page[ReportsOut]:
+    """All requests for reports, newest first; finished ones for a week."""
+    page = page_of(queries.jobs(session, before=before, limit=limit + 1), limit, lambda job: job.id)
+    return Page(items=[ReportsOut.of(job) for job in page.items], next=page.next)
+
+
+@router.get("/reports/{number}", dependencies=[require("viewer")], responses=problems(404))
+def get_reports(session: SessionDep, number: Number) -> ReportsOut:
+    """How far one request for reports is, and which characteristics have none."""
+    return ReportsOut.of(queries.job(session, number), queries.troubles(session, number))
+
+
+@router.post("/reports/{number}/cancel", responses=problems(404, 409))
+def cancel_reports(session: SessionDep, caller: Viewer, number: Number) -> ReportsOut:
+    """End it. Whoever asked for it may, and every engineer. What is ready of it is thrown away."""
+    return ReportsOut.of(actions.cancel(session, number, caller))
+
+
+@router.get(
+    "/reports/{number}/file",
+    dependencies=[require("viewer")],
+    responses=problems(404, 409) | FILE,
+    response_model=None,
+)
+def get_reports_file(session: SessionDep, number: Number) -> Response:
+    """The file, once they are done."""
+    job = queries.job(session, number)
+    content = queries.content(session, job)
+    return download(Named(content, job.file_name or f"reports-{job.id}", media_type(job.request["format"])))

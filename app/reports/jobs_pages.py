@@ -1,0 +1,140 @@
+"""Page: many reports at once – choose, watch, fetch, cancel."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Query, Request, Response
+from sqlalchemy.orm import Session
+from starlette.datastructures import FormData
+from starlette.responses import RedirectResponse
+
+from app.characteristics import queries as characteristics
+from app.characteristics.queries import Standing
+from app.errors import InbandError, Invalid
+from app.proof import queries as proof
+from app.proof import wording as proof_wording
+from app.reports import actions, queries
+from app.reports.actions import KEPT_DAYS
+from app.reports.asking import Paper, SectionName, typed
+from app.reports.bundle import Bundle
+from app.reports.jobs_api import Number, reporter
+from app.web.deps import Caller, SessionDep, Viewer, texts
+from app.web.forms import by_field
+from app.web.i18n import _, current_language
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+SHOWN = 30
+MOST_SHOWN = 2_000  # characteristics that are offered
+
+
+@router.get("/reports")
+def reports_page(
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    characteristic: Annotated[list[str] | None, Query()] = None,
+    x_live_part: Annotated[str | None, Header()] = None,
+) -> Response:
+    """What is being made, and a form for more."""
+    return _page(request, session, caller, chosen=characteristic or (), part=x_live_part)
+
+
+@router.post("/reports")
+async def send_request(request: Request, session: SessionDep, caller: Viewer) -> Response:
+    """Ask for reports."""
+    from starlette.concurrency import run_in_threadpool
+
+    form = await request.form(max_files=0, max_fields=3_000)
+    return await run_in_threadpool(_send, request, session, caller, form)
+
+
+def _send(request: Request, session: Session, caller: Caller, form: FormData) -> Response:
+    fields = texts(form)
+    keys = [value for value in form.getlist("characteristic") if isinstance(value, str)]
+    try:
+        wishes = typed(fields, [value for value in form.getlist("section") if isinstance(value, str)])
+        form_of = fields.get("format", "pdf")
+        if form_of not in FORMATS:
+            raise Invalid(_("There is no such form of report."), _("Choose one of the list."))
+        actions.ask(session, Bundle(wishes, form_of, keys, (), current_language()), caller)  # type: ignore[arg-type]
+    except InbandError as error:
+        session.rollback()
+        return _page(request, session, caller, chosen=keys, given=fields, problem=error)
+    reporter(request).wake()
+    return RedirectResponse("/reports#jobs", 303)
+
+
+@router.post("/reports/{number}/cancel")
+def send_cancellation(request: Request, session: SessionDep, caller: Viewer, number: Number) -> Response:
+    """Cancel one."""
+    try:
+        actions.cancel(session, number, caller)
+    except InbandError as error:
+        if error.status == 404:
+            raise
+        session.rollback()
+        return _page(request, session, caller, problem=error)
+    return RedirectResponse("/reports#jobs", 303)
+
+
+FORMATS = ("pdf", "xlsx", "csv", "workbook")
+
+
+def _page(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    *,
+    chosen: Sequence[str] = (),
+    given: dict[str, str] | None = None,
+    problem: InbandError | None = None,
+    part: str | None = None,
+) -> Response:
+    failing = proof.failing()
+    jobs = queries.jobs(session, limit=SHOWN)
+    return page(
+        request,
+        "reports/jobs.html",
+        status=problem.status if problem else 200,
+        jobs=jobs,
+        troubles={job.id: queries.troubles(session, job.id) for job in jobs if job.problems},
+        may_cancel=lambda job: job.asked_by == caller.name or caller.may("engineer"),
+        state_word=state_word,
+        wanted=lambda name: part is None or part == name,
+        machines=_by_machine(session) if part is None else [],
+        chosen=set(chosen),
+        given=given or {},
+        problem=problem,
+        errors=by_field(problem) if problem else {},
+        sections=[(name.value, queries.title_of(name)) for name in SectionName],
+        papers=[(Paper.A4.value, "A4"), (Paper.LETTER.value, "Letter")],
+        forms=[
+            ("pdf", _("PDF for each, in a ZIP")),
+            ("xlsx", _("XLSX for each, in a ZIP")),
+            ("csv", _("CSV for each, in a ZIP")),
+            ("workbook", _("One XLSX with a sheet for each")),
+        ],
+        kept_days=KEPT_DAYS,
+        proof_failing=failing,
+        proof_warning=proof_wording.warning(len(failing)),
+    )
+
+
+def _by_machine(session: Session) -> list[tuple[str, list[Standing]]]:
+    """Characteristics under their machines."""
+    found: dict[str, list[Standing]] = {}
+    for standing in characteristics.characteristics(session, limit=MOST_SHOWN):
+        found.setdefault(standing.machine.name, []).append(standing)
+    return sorted(found.items())
+
+
+def state_word(state: str) -> str:
+    """How far it is, in a word."""
+    return {
+        "queued": _("Waits"),
+        "running": _("Being made"),
+        "done": _("Done"),
+        "failed": _("Failed"),
+        "cancelled": _("Cancelled"),
+    }.get(state, state)
