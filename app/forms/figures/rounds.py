@@ -38,7 +38,11 @@ def round_figure(
     ]
     order = sorted(range(len(touches)), key=angles.__getitem__)
     step = rounded_up(most / 2)
-    data = [line(*circle(0, 0, 1 + k * step * deep), colours.grid, line={"width": 1}) for k in (-2, -1, 1, 2)]
+    data = [
+        line(*circle(0, 0, 1 + k * step * deep), colours.grid, line={"width": 1})
+        for k in (-2, -1, 1, 2)
+        if abs(k) * step * deep < 0.6
+    ]
     data += [
         line(*circle(0, 0, 1), colours.quiet, _("Fitted circle")),
         line(
@@ -91,7 +95,7 @@ def round_figure(
                 "showlegend": False,
             }
         )
-    reach = 1 + 1.25 * max(DEEP, 2 * step * deep)
+    reach = 1 + DEEP + 2 * BESIDE
     hidden = {"visible": False, "range": [-reach, reach]}
     words = _("deviations magnified {times:.0f} ×; from one thin circle to the next {step:g} µm").format(
         times=deep * radius, step=step * 1000
