@@ -16,7 +16,9 @@ FROM stream s
 JOIN parameters_version v ON v.machine_id = s.machine_id AND v.characteristic_id = s.characteristic_id
     AND v.version = s.parameters_version
 CROSS JOIN LATERAL (
-    SELECT count(*) AS count, avg(r.deviation) AS mean, stddev_samp(r.deviation) AS deviation FROM reading r
+    SELECT count(*) AS count, avg(r.deviation) AS mean,
+        CASE WHEN max(r.deviation) > min(r.deviation) THEN stddev_samp(r.deviation) END AS deviation
+    FROM reading r
     WHERE r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
         AND r.sequence > s.sequence - :back AND r.zone <> 'probe_fault' AND NOT EXISTS (
             SELECT FROM exclusion e WHERE e.machine_id = r.machine_id AND e.characteristic_id = r.characteristic_id

@@ -6,6 +6,7 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 
+from app.capability.ranking import LOOKED_BACK
 from app.machines import queries as machines
 from app.overview import queries, wording
 from app.overview.queries import By
@@ -55,7 +56,7 @@ def overview_page(
         state_word=state_word,
         foretold=foretold,
         capable=CAPABLE,
-        last=queries.LAST,
+        last=LOOKED_BACK,
         now=datetime.now(UTC),
         proof_failing=failing(),
         proof_warning=warning(len(failing())),

@@ -6,14 +6,12 @@ weighed against anything else: the order can be told in words, reason by reason.
 
 from dataclasses import dataclass
 from enum import IntEnum
-from math import inf, sqrt
+from math import inf
 
 from app.plant.state import NEED_SOMEONE, State
 
 CAPABLE = 1.33
 """Ppk from which a process is usually called capable (ISO 22514-2; AIAG SPC asks for 1.33 or more)."""
-FEWEST = 20
-"""Readings below which no index is told, as on the page of capability."""
 NEAR = 100
 """Parts: a limit that wear comes to sooner than this is to be planned for now."""
 LOUD = 1.0
@@ -88,17 +86,3 @@ class Told:
         """
         reasons = (*self.reasons, *(len(Why) + 1,) * len(Why))[: len(Why)]
         return (*reasons, inf if self.ppk is None else self.ppk, -self.per_shift)
-
-
-def ppk(mean: float, squares: float, count: int, half: float) -> float | None:
-    """Ppk of so many deviations from the middle of a tolerance of ± half, mm; None of too few or without any spread.
-
-    Ppk = min(half - mean, half + mean) / (3 s), s² = squares / (count - 1) with the squares about the mean: the same as
-    `app.core.spc.capability.capability` says of the readings themselves (ISO 22514-2, Montgomery chapter 8).
-
-    >>> ppk(0.001, 19e-6, 20, 0.008)
-    2.3333333333333335
-    """
-    if count < FEWEST or not squares > 0:
-        return None
-    return min(half - mean, half + mean) / (3 * sqrt(squares / (count - 1)))

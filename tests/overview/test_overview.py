@@ -13,10 +13,10 @@ def shop(server: Server) -> Shop:
     shop = Shop(server)  # its first characteristic is left without readings
     for key in ("wide", "narrow", "broken"):
         shop.add(f"{shop.machine}-{key}", tool_memory=0, average_memory=0)
-    shop.add(f"{shop.machine}-changed", tool_memory=0, average_memory=0)
+    shop.add(f"{shop.machine}-equal", tool_memory=0, average_memory=0)
     readings: list[tuple[str, float]] = []
     for at in range(24):
-        readings += [("wide", 5.0 * (-1) ** at), ("narrow", 1.5 * (-1) ** at), ("broken", 0.0), ("changed", 1.0)]
+        readings += [("wide", 5.0 * (-1) ** at), ("narrow", 1.5 * (-1) ** at), ("broken", 0.0), ("equal", 1.0)]
     for key, micrometres in readings:
         shop.read(micrometres, f"{shop.machine}-{key}")
     shop.read(1500.0, f"{shop.machine}-narrow")  # a probe fault is no size of a part
@@ -26,12 +26,6 @@ def shop(server: Server) -> Shop:
     shop.read(9.0, narrow)
     shop.call("POST", f"/readings/{narrow}/26/exclude", reason="chip under the stylus")
     shop.read(12.0, f"{shop.machine}-broken")
-    shop.call(
-        "PATCH",
-        f"/characteristics/{shop.machine}-changed",
-        parameters={"target": 40.001},
-        reason="drawing changed",
-    )
     return shop
 
 
@@ -45,7 +39,7 @@ def ranked(shop: Shop, **query: Any) -> list[dict[str, Any]]:
 def test_the_part_that_is_out_of_tolerance_comes_first_and_says_why(shop: Shop) -> None:
     found = ranked(shop)
     assert len(found) == 5
-    assert [item["key"] for item in found] == ["narrow", "broken", "wide", "changed", shop.characteristic]
+    assert [item["key"] for item in found] == ["narrow", "broken", "wide", "equal", shop.characteristic]
     narrow, broken, wide, *calm = ([reason["code"] for reason in item["reasons"]] for item in found)
     assert narrow == ["outside", "alarm", "loud"], "two alarms within one shift"
     assert broken == ["outside", "alarm", "barely_capable"]
@@ -63,8 +57,8 @@ def test_ppk_is_told_of_what_counts(shop: Shop) -> None:
     # The probe fault and the excluded reading are left out.
     assert by_key["narrow"]["readings"] == 24
     assert by_key["narrow"]["ppk"] == pytest.approx(8 / 3 / (1.5 * (24 / 23) ** 0.5), rel=1e-6)
-    # Readings judged by another target say nothing about the one of now; nothing was measured here at all.
-    assert (by_key["changed"]["readings"], by_key["changed"]["ppk"]) == (0, None)
+    # Equal ones have no spread; nothing was measured here at all.
+    assert (by_key["equal"]["readings"], by_key["equal"]["ppk"]) == (24, None)
     assert by_key[shop.characteristic]["ppk"] is None
 
 
