@@ -21,6 +21,7 @@ PARTS = (
     "app.cli.backup",
     "app.cli.people",
     "app.cli.data",
+    "app.cli.reports",
     "app.cli.replay",
     "app.cli.programs",
     "app.cli.proof",
