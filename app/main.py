@@ -29,6 +29,8 @@ from app.db.engine import Database
 from app.forms import api as forms
 from app.forms import pages as form_pages
 from app.kinematics import api as kinematics
+from app.gauges import api as gauges
+from app.gauges import pages as gauge_pages
 from app.machines import api as machines
 from app.offsets import api as offsets
 from app.offsets import chores as offset_chores
@@ -95,6 +97,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     by_hand.router,
     offsets.router,
     calibration.router,
+    gauges.router,
     kinematics.router,
     edges_api.router,
     forms.router,
@@ -120,6 +123,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     edge_pages.router,
     offset_pages.router,
     calibration_pages.router,
+    gauge_pages.router,
     form_pages.router,
     sign_in_pages.router,
     setup_pages.router,

@@ -85,7 +85,7 @@ class Unfit(ValueError):
     ) -> None:
         """Say why."""
         super().__init__(f"{why.value}: touches {', '.join(map(str, at))}" if at else why.value)
-        self.why, self.at, self.axis, self.have, self.needed = why, tuple(at), axis, have, needed
+        self.why, self.at, self.axis, self.have, self.needed = why, tuple(sorted(at)), axis, have, needed
 
 
 Solver = Callable[[Sequence[Touch], float], tuple[Values, Floats]]

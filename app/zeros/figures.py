@@ -1,0 +1,124 @@
+"""How far a fixture is from where it was, over time, as a chart. Pure; lengths in mm in, µm on the axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from app.web.i18n import _
+from app.web.numbers import um
+from app.web.theme import ThemeName, date_axis, layout, palette
+
+SYMBOLS = {"x": "circle", "y": "square", "z": "diamond"}
+DASHES = {"x": "solid", "y": "dash", "z": "dot"}
+
+
+@dataclass(frozen=True)
+class Mark:
+    """One zero. shifts: by axis, mm; state: as `core.geometry.work_zero.Shift`."""
+
+    number: int
+    at: datetime
+    shifts: dict[str, float]
+    state: str
+    offset: str
+
+
+def shift_figure(
+    marks: Sequence[Mark], warning: float | None, alarm: float | None, *, theme: ThemeName = "light"
+) -> dict[str, Any]:
+    """X, Y and Z of each zero against what the fixture is compared with, with the limits."""
+    colours = palette(theme)
+    tones = {"x": colours.ink, "y": colours.steady, "z": colours.quiet}
+    traces = []
+    for axis, symbol in SYMBOLS.items():
+        mine = [mark for mark in marks if axis in mark.shifts]
+        if not mine:
+            continue
+        outline = [
+            colours.stop if mark.state == "alarm" else colours.attention if mark.state == "warning" else tones[axis]
+            for mark in mine
+        ]
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "lines+markers",
+                "name": axis.upper(),
+                "meta": axis,
+                "x": [mark.at.isoformat() for mark in mine],
+                "y": [mark.shifts[axis] * 1000 for mark in mine],
+                "line": {"width": 1.5, "color": tones[axis], "dash": DASHES[axis]},
+                "marker": {"symbol": symbol, "size": 9, "color": outline},
+                "customdata": [f"/work-zeros/{mark.number}" for mark in mine],
+                "text": [
+                    f"<b>{_('Work zero {n}').format(n=mark.number)}</b>, {mark.offset}<br>{axis.upper()} {um(mark.shifts[axis])}"
+                    for mark in mine
+                ],
+                "hovertemplate": "%{text}<extra></extra>",
+                "cliponaxis": False,
+            }
+        )
+    shapes: list[dict[str, Any]] = []
+    names: list[dict[str, Any]] = []
+    for limit, word, tone in ((warning, _("warning"), colours.attention), (alarm, _("alarm"), colours.stop)):
+        if limit is None:
+            continue
+        shapes += [
+            {
+                "type": "line",
+                "xref": "paper",
+                "x0": 0,
+                "x1": 1,
+                "y0": height * 1000,
+                "y1": height * 1000,
+                "line": {"width": 1.5, "dash": "dash", "color": tone},
+            }
+            for height in (-limit, limit)
+        ]
+        names.append(
+            {
+                "x": 0.004,
+                "xref": "paper",
+                "xanchor": "left",
+                "y": limit * 1000,
+                "yanchor": "bottom",
+                "showarrow": False,
+                "text": word,
+                "font": {"size": 12, "color": tone},
+            }
+        )
+    heights = [abs(value) for mark in marks for value in mark.shifts.values()]
+    heights += [limit for limit in (warning, alarm) if limit is not None]
+    reach = max([*heights, 0.001]) * 1150
+    legend = {
+        "orientation": "h",
+        "x": 0,
+        "xanchor": "left",
+        "y": 1.02,
+        "yanchor": "bottom",
+        "font": {"size": 13, "color": colours.quiet},
+        "itemclick": False,
+        "itemdoubleclick": False,
+    }
+    return {
+        "data": traces,
+        "layout": layout(
+            theme,
+            margin={"l": 84, "t": 34},
+            showlegend=True,
+            legend=legend,
+            xaxis=date_axis(),
+            yaxis={
+                "range": [-reach, reach],
+                "tickformat": "+.4~g",
+                "nticks": 7,
+                "zeroline": True,
+                "zerolinecolor": colours.faint,
+                "title": {"text": _("Shift, µm"), "font": {"size": 13, "color": colours.quiet}, "standoff": 8},
+            },
+            shapes=shapes,
+            annotations=names,
+        ),
+    }

@@ -1,0 +1,243 @@
+"""Work zeros and fixtures: what was found, and how far a fixture is from where it was. Never writes. Lengths in mm."""
+
+from collections.abc import Sequence
+from math import hypot
+from statistics import median
+from typing import NamedTuple
+
+from sqlalchemy import Select, func, select
+from sqlalchemy.orm import Session, aliased
+
+from app.core.geometry.work_zero import Shift, judge_shift
+from app.errors import NotFound
+from app.machines.queries import machine_named
+from app.machines.tables import Machine
+from app.readings import queries as readings
+from app.web.fields import LARGEST_ID
+from app.web.i18n import _
+from app.zeros.tables import Fixture, WorkZero
+
+AXES = ("x", "y", "z")
+MOST_BEFORE = 100  # zeros whose median a fixture is compared with
+
+
+class Compared(NamedTuple):
+    """A zero against what its fixture is compared with.
+
+    shifts: by axis, of those that both know. reference: the number of the zero compared with, None for a median.
+    """
+
+    zero: WorkZero
+    state: Shift
+    shifts: dict[str, float]
+    reference: int | None
+
+    @property
+    def total(self) -> float | None:
+        """All axes together."""
+        return hypot(*self.shifts.values()) if self.shifts else None
+
+
+class Pushed(NamedTuple):
+    """A result that is, or becomes, a reading. sequence: its number; refused: why it is none."""
+
+    result: str
+    characteristic: str
+    sequence: int | None
+    refused: str | None
+
+
+class FixtureRow(NamedTuple):
+    """A fixture as the overview shows it."""
+
+    machine: Machine
+    key: str
+    zeros: int
+    last: Compared
+    settings: Fixture
+
+
+def work_zero(session: Session, number: int, only: int | None = None) -> WorkZero:
+    """One work zero; ``only`` of this machine, for a machine's key. Raises `NotFound`."""
+    found = (
+        session.scalars(select(WorkZero).where(WorkZero.id == number)).one_or_none()
+        if 0 < number <= LARGEST_ID
+        else None
+    )
+    if found is None or (only is not None and found.machine_id != only):
+        raise NotFound(
+            _("There is no work zero {number}.").format(number=number), _("GET /api/v1/work-zeros lists them.")
+        )
+    return found
+
+
+def by_key(session: Session, machine: Machine, key: str) -> WorkZero | None:
+    """The zero that was sent with this key."""
+    return session.scalars(select(WorkZero).where(WorkZero.machine_id == machine.id, WorkZero.key == key)).one_or_none()
+
+
+def work_zeros(
+    session: Session,
+    machine_id: int | None = None,
+    fixture: str | None = None,
+    *,
+    after: int = 0,
+    before: int | None = None,
+    newest_first: bool = False,
+    limit: int = 100,
+) -> list[WorkZero]:
+    """Work zeros of all machines, of one, or of one fixture, in the order in which they came."""
+    wanted = select(WorkZero).where(WorkZero.id > after).limit(limit)
+    if machine_id is not None:
+        wanted = wanted.where(WorkZero.machine_id == machine_id)
+    if fixture is not None:
+        wanted = wanted.where(WorkZero.fixture == fixture)
+    if before is not None:
+        wanted = wanted.where(WorkZero.id < before)
+    return list(session.scalars(wanted.order_by(WorkZero.id.desc() if newest_first else WorkZero.id)))
+
+
+def settings_of(session: Session, machine_id: int, key: str) -> Fixture:
+    """What is watched of a fixture; where nobody has said, the first zero without limits."""
+    found = session.get(Fixture, (machine_id, key), populate_existing=True)
+    return found or Fixture(machine_id=machine_id, key=key, basis="first", characteristics={})
+
+
+def _standing(machine_id: int, fixture: str) -> Select[WorkZero]:
+    """The zeros of a fixture that count: one that was computed again counts as that one."""
+    later = aliased(WorkZero)
+    again = select(later.id).where(later.machine_id == WorkZero.machine_id, later.recomputed_from == WorkZero.id)
+    return select(WorkZero).where(WorkZero.machine_id == machine_id, WorkZero.fixture == fixture, ~again.exists())
+
+
+def compared(session: Session, zero: WorkZero) -> Compared | None:
+    """A zero against what its fixture is compared with; None for one without a fixture.
+
+    Only zeros of the same work offset are compared: two parts may lie in one fixture.
+    """
+    if zero.fixture is None:
+        return None
+    settings = settings_of(session, zero.machine_id, zero.fixture)
+    others = _standing(zero.machine_id, zero.fixture).where(WorkZero.work_offset == zero.work_offset)
+    if settings.basis == "frozen":
+        found = select(WorkZero).where(WorkZero.machine_id == zero.machine_id, WorkZero.id == settings.reference)
+        before = list(session.scalars(found))
+    else:
+        earlier = others.where(WorkZero.id < (zero.recomputed_from or zero.id))
+        order = WorkZero.id if settings.basis == "first" else WorkZero.id.desc()
+        limit = 1 if settings.basis == "first" else MOST_BEFORE
+        before = list(session.scalars(earlier.order_by(order).limit(limit)))
+    return _against(zero, before, settings)
+
+
+def _against(zero: WorkZero, before: Sequence[WorkZero], settings: Fixture) -> Compared:
+    shifts = {}
+    for axis in AXES:
+        here = getattr(zero, axis)
+        there = [value for each in before if (value := getattr(each, axis)) is not None]
+        if here is not None and there and not (len(before) == 1 and before[0].id == zero.id):
+            shifts[axis] = round(here - median(there), 9) + 0.0
+    state = judge_shift(list(shifts.values()), settings.warning, settings.alarm)
+    return Compared(zero, state, shifts, before[0].id if settings.basis != "median" and before else None)
+
+
+def history(
+    session: Session, machine: Machine, fixture: str, *, before: int | None = None, limit: int = 200
+) -> list[Compared]:
+    """The last zeros of a fixture, oldest first, each against what it was, or would now be, compared with."""
+    settings = settings_of(session, machine.id, fixture)
+    wanted = _standing(machine.id, fixture)
+    newest = wanted if before is None else wanted.where(WorkZero.id < before)
+    shown = list(session.scalars(newest.order_by(WorkZero.id.desc()).limit(limit)))[::-1]
+    if not shown:
+        return []
+    if settings.basis == "median":
+        earlier = list(
+            session.scalars(wanted.where(WorkZero.id < shown[0].id).order_by(WorkZero.id.desc()).limit(MOST_BEFORE))
+        )[::-1]
+        rows = [*earlier, *shown]
+        found = []
+        for at, zero in enumerate(rows[len(earlier) :], len(earlier)):
+            same = [each for each in rows[max(0, at - MOST_BEFORE) : at] if each.work_offset == zero.work_offset]
+            found.append(_against(zero, same, settings))
+        return found
+    frozen = settings.basis == "frozen"
+    references = session.scalars(
+        select(WorkZero).where(WorkZero.machine_id == machine.id, WorkZero.id == settings.reference)
+        if frozen
+        else _standing(machine.id, fixture).where(
+            WorkZero.id.in_(
+                select(func.min(WorkZero.id))
+                .where(WorkZero.machine_id == machine.id, WorkZero.fixture == fixture)
+                .group_by(WorkZero.work_offset)
+            )
+        )
+    ).all()
+    return [
+        _against(zero, [each for each in references if frozen or each.work_offset == zero.work_offset], settings)
+        for zero in shown
+    ]
+
+
+def fixtures(session: Session, only: int | None = None) -> list[FixtureRow]:
+    """Every fixture with its last zero, by machine and name."""
+    newest = select(func.max(WorkZero.id), func.count()).where(WorkZero.fixture.is_not(None))
+    if only is not None:
+        newest = newest.where(WorkZero.machine_id == only)
+    counts = dict(session.execute(newest.group_by(WorkZero.machine_id, WorkZero.fixture)).tuples().all())
+    rows = []
+    wanted = (
+        select(WorkZero, Machine)
+        .join(Machine, Machine.id == WorkZero.machine_id)
+        .where(WorkZero.id.in_(list(counts)))
+        .order_by(Machine.key, WorkZero.fixture)
+    )
+    for zero, machine in session.execute(wanted):
+        last = compared(session, zero)
+        assert last is not None
+        assert zero.fixture is not None
+        rows.append(
+            FixtureRow(machine, zero.fixture, counts[zero.id], last, settings_of(session, machine.id, zero.fixture))
+        )
+    return rows
+
+
+def fixture_of(session: Session, machine: str, fixture: str) -> FixtureRow:
+    """One fixture. Raises `NotFound`."""
+    found = machine_named(session, machine)
+    last = session.scalars(
+        _standing(found.id, fixture[:64].replace("\0", "")).order_by(WorkZero.id.desc()).limit(1)
+    ).one_or_none()
+    if last is None:
+        raise NotFound(
+            _("Machine {machine} has no work zero of a fixture {fixture}.").format(
+                machine=found.key, fixture=repr(fixture[:64])
+            ),
+            _("Name the fixture with a work zero: that makes it known. GET /api/v1/work-zeros/fixtures lists them."),
+        )
+    count = session.scalar(
+        select(func.count())
+        .select_from(WorkZero)
+        .where(WorkZero.machine_id == found.id, WorkZero.fixture == last.fixture)
+    )
+    mine = compared(session, last)
+    assert mine is not None
+    return FixtureRow(found, fixture, count or 0, mine, settings_of(session, found.id, fixture))
+
+
+def pushed(session: Session, zero: WorkZero) -> list[Pushed]:
+    """The results of a zero that are, or become, readings."""
+    keys = {f"work-zero:{zero.id}:{name}": name for name in (*AXES, "diameter", "length", "width")}
+    rows = readings.readings_of_results(session, keys)
+    return [
+        Pushed(name, rows[key][0], rows[key][1].sequence, rows[key][1].refused)
+        for key, name in keys.items()
+        if key in rows
+    ]
+
+
+def recomputed_as(session: Session, zero: WorkZero) -> int | None:
+    """The number of the zero that these touches were computed again as, the last of them."""
+    return session.scalar(
+        select(func.max(WorkZero.id)).where(WorkZero.machine_id == zero.machine_id, WorkZero.recomputed_from == zero.id)
+    )
