@@ -13,6 +13,7 @@ The map of the house. Whoever knows the shop floor knows where to look:
     statistics       what the readings say together: counts, spread, charts of ten million points
     wear             true wear behind the corrections, how long an edge will do, and loops that hunt
     capability       Cp to Ppk with intervals, normality, behaviour in time, the tool without its corrections
+    gauges           gauge studies: Cg, R&R, linearity, bias, and what they say about R33
     proof            published examples run through the live engine: what it says, what was published
     setup            the pages where all of that is set up
     people           who may do what: sign-in, sessions, roles, personal keys

@@ -28,9 +28,9 @@ from app.control.signals_actions import SignalRounds
 from app.db.engine import Database
 from app.forms import api as forms
 from app.forms import pages as form_pages
-from app.kinematics import api as kinematics
 from app.gauges import api as gauges
 from app.gauges import pages as gauge_pages
+from app.kinematics import api as kinematics
 from app.machines import api as machines
 from app.offsets import api as offsets
 from app.offsets import chores as offset_chores

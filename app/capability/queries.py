@@ -22,6 +22,7 @@ from app.control.series import read as read_series
 from app.core.spc import in_time, normality, stability, uncompensated
 from app.core.spc.capability import (
     ENOUGH_READINGS,
+    FEWEST_READINGS,
     Capability,
     Caution,
     Fallout,
@@ -49,6 +50,7 @@ __all__ = [
     "Study",
     "capability_by_characteristic",
     "capability_of",
+    "scatter_of_parts",
 ]
 
 Side = Literal["both", "upper", "lower"]
@@ -296,3 +298,16 @@ def _without(
     controlled = kept["deviation"][np.isin(kept["sequence"], series.sequence)]
     found = _or_refused(lambda: uncompensated.uncompensated(lives, controlled, limits, confidence=confidence))
     return found, len(kept) - len(series)
+
+
+def scatter_of_parts(session: Session, standing: Standing, last: int) -> tuple[float | None, int]:
+    """Sigma from part to part of the last readings, wear and corrections taken out, mm, and of how many; None of too few."""
+    window = statistics.window_of(session, standing.characteristic, last=last)
+    if not window.count:
+        return None, 0
+    series = read_series(session, standing, _Rebuilt(standing.parameters.factor), window).series
+    if len(series) < FEWEST_READINGS:
+        return None, len(series)
+    lives = np.split(series.values, np.flatnonzero(np.diff(series.edge)) + 1)
+    found = _or_refused(lambda: uncompensated.scatter(lives))
+    return (None if isinstance(found, Refused) else found.value), len(series)

@@ -11,6 +11,7 @@ from starlette.responses import RedirectResponse
 from app.characteristics import actions, queries
 from app.characteristics.actions import CharacteristicChange, CharacteristicIn
 from app.characteristics.wording import history
+from app.core.parameters import BY_NAME
 from app.core.plausibility import suggested_jump
 from app.errors import Conflict, InbandError, Invalid
 from app.machines import queries as machines
@@ -99,7 +100,13 @@ def prefilled_new(request: Request, session: Session, caller: Caller, typed: Map
 
 @router.get("/setup/characteristics/{characteristic}")
 def characteristic_page(request: Request, session: SessionDep, caller: Viewer, characteristic: str) -> Response:
-    return _characteristic(request, session, caller, queries.characteristic_named(session, characteristic))
+    """Parameters named in the address (`?zero_range=0.0012&reason=…`) are typed into the form; nothing is changed by it."""
+    standing = queries.characteristic_named(session, characteristic)
+    suggested = {name: text[:1000] for name, text in request.query_params.items() if name in {*BY_NAME, "reason"}}
+    if not suggested:
+        return _characteristic(request, session, caller, standing)
+    typed = parameter_form.typed_from(standing.version.parameters) | suggested
+    return prefilled_change(request, session, caller, standing, typed)
 
 
 @router.post("/setup/characteristics/{characteristic}")

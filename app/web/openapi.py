@@ -39,6 +39,7 @@ TAGS = {
     "readings": "What the probe measured. The answer says what was decided, why, and what to correct.",
     "offsets": "Tool memory (R10), average memory (R11), and the corrections on their way into the offsets.",
     "calibration": "Gauge, ring and external gauge: what the machine reads too much, and when to look again.",
+    "gauges": "Gauge studies: type 1, bias, linearity, repeatability and reproducibility, and what they say about R33.",
     "kinematics": "Rotary axes by the preset compensation (cycle 452): runs, what to enter, drift, back-ups.",
     "programs": "Program text of the controls: read, written, and fetched where a machine has no network.",
     "alarms": "What needs a person, and what that person did about it.",

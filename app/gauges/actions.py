@@ -1,0 +1,182 @@
+"""Entering gauge studies, taking them from readings, and putting them right. Lengths in mm."""
+
+from typing import Any, NamedTuple
+
+from sqlalchemy.orm import Session
+
+from app.audit.actions import record as audit
+from app.characteristics import queries as characteristics
+from app.characteristics.queries import Standing
+from app.db.events import publish
+from app.errors import Conflict, FieldError, Invalid
+from app.gauges import queries
+from app.gauges.evaluating import design
+from app.gauges.queries import StudyRow
+from app.gauges.schemas import CorrectionIn, FromReadingsIn, SettingsIn, StudyIn
+from app.gauges.tables import GaugeStudy, GaugeStudyRevision
+from app.machines.queries import lock_machines
+from app.machines.tables import Machine
+from app.people.callers import Caller
+from app.web.forms import parsed
+from app.web.i18n import _
+
+
+class Made(NamedTuple):
+    """A study; again: it was sent before with the same key, and nothing happened now."""
+
+    row: StudyRow
+    again: bool = False
+
+
+def add_study(
+    session: Session, machine: Machine, given: StudyIn, caller: Caller, source: dict[str, Any] | None = None
+) -> Made:
+    """Keep a study with all its values. source: the readings that it was taken from.
+
+    Raises `NotFound`; `Invalid` for what is no study of its kind; `Conflict` for a key that was used otherwise.
+    """
+    lock_machines(session, [machine.id])  # of two that send the same key, one waits for the other
+    standing = _served(session, machine, given.characteristic)
+    settings, rows = _settings(given, standing, source), [_row(row.model_dump()) for row in given.rows]
+    before = None if given.key is None else queries.by_key(session, machine, given.key)
+    if before is not None:
+        if (before.study.kind, before.settings, before.revision.rows) == (given.kind, settings, rows):
+            return Made(before, again=True)
+        raise Conflict(
+            _("Gauge study {number} was sent with the key {key} already, and with other values.").format(
+                number=before.study.id, key=repr(given.key)
+            ),
+            _("A key names one study for ever: use another one."),
+            id=before.study.id,
+        )
+    design(given.kind, settings, rows)
+    made = GaugeStudy(
+        machine_id=machine.id,
+        kind=given.kind,
+        characteristic_id=None if standing is None else standing.characteristic.id,
+        key=given.key,
+        created_by=caller.name,
+    )
+    session.add(made)
+    session.flush()
+    _keep(session, made, 1, settings, rows, caller, None)
+    subject, values = f"gauge-study/{made.id}", sum(len(row["values"]) for row in rows)
+    audit(session, caller.name, "gauge study entered", subject, None, {"kind": given.kind, "values": values})
+    publish(session, _news(machine, standing, made.id))
+    return Made(queries.study(session, made.id))
+
+
+def take_study(session: Session, standing: Standing, given: FromReadingsIn, caller: Caller) -> Made:
+    """A study of readings that are stored: one part probed again and again, or the repeats of each touch.
+
+    Raises `Invalid` where these readings make no study, `Conflict` for a key that was used otherwise.
+    """
+    rows = rows_from_readings(session, standing, given.kind, given.first, given.through, given.take)
+    fields = given.model_dump(exclude={"first", "through", "take", "characteristic"})
+    fields["each"] = "touch" if given.take == "touches" else "reading"
+    named = {"machine": standing.machine.key, "characteristic": standing.characteristic.key, "rows": rows}
+    study = parsed(StudyIn, fields | named)
+    source = {"first": given.first, "through": given.through, "take": given.take}
+    return add_study(session, standing.machine, study, caller, source)
+
+
+def rows_from_readings(
+    session: Session, standing: Standing, kind: str, first: int, through: int, take: str
+) -> list[dict[str, Any]]:
+    """The rows of a study that these readings make. Raises `Invalid`."""
+    if kind == "grr" and take != "touches":
+        wrong = _("a study of parts and operators takes the touches of each reading: a reading alone has no repeats")
+        raise Invalid(f"take: {wrong}.", _("Take the touches."), errors=[FieldError("take", wrong)])
+    found = queries.taken(session, standing, first, through, take)
+    if kind == "grr":
+        return [{"part": str(sequence), "operator": "1", "values": values} for sequence, values in found]
+    return [{"values": [value for _sequence, values in found for value in values]}]
+
+
+def correct_study(session: Session, number: int, given: CorrectionIn, caller: Caller) -> StudyRow:
+    """Put a study right, with a reason: a new revision. Nothing that was entered before is lost. Raises `NotFound`, `Invalid`."""
+    found = queries.study(session, number)
+    lock_machines(session, [found.machine.id])
+    found = queries.study(session, number)  # as it stands now that nobody else changes it
+    standing = _served(session, found.machine, found.characteristic)
+    settings = _settings(given, standing, found.settings.get("source"))
+    rows = [_row(row.model_dump()) for row in given.rows]
+    if (settings, rows) == (found.settings, found.revision.rows):
+        wrong = _("nothing differs from revision {n}").format(n=found.newest)
+        raise Invalid(
+            f"rows: {wrong}.",
+            _("Change what is wrong, or leave the study as it is."),
+            errors=[FieldError("rows", wrong)],
+        )
+    design(found.study.kind, settings, rows)
+    _keep(session, found.study, found.newest + 1, settings, rows, caller, given.reason)
+    before, after = _changes(found, settings, rows)
+    audit(session, caller.name, "gauge study corrected", f"gauge-study/{number}", before, after, given.reason)
+    publish(session, _news(found.machine, standing, number))
+    return queries.study(session, number)
+
+
+def _served(session: Session, machine: Machine, key: str | None) -> Standing | None:
+    if key is None:
+        return None
+    standing = characteristics.characteristic_named(session, key)
+    if standing.machine.id != machine.id:
+        wrong = _("belongs to machine {machine}").format(machine=standing.machine.key)
+        raise Invalid(
+            f"characteristic: {wrong}.",
+            _("Name one of the same machine."),
+            errors=[FieldError("characteristic", wrong)],
+        )
+    return standing
+
+
+def _settings(given: SettingsIn, standing: Standing | None, source: dict[str, Any] | None) -> dict[str, Any]:
+    made = {name: getattr(given, name) for name in SettingsIn.model_fields}
+    if made["tolerance"] is None and standing is not None:
+        made["tolerance"] = standing.parameters.tolerance_width
+    return made | ({} if source is None else {"source": source})
+
+
+def _row(row: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in row.items() if value is not None}
+
+
+def _keep(
+    session: Session,
+    made: GaugeStudy,
+    revision: int,
+    settings: dict[str, Any],
+    rows: list[dict[str, Any]],
+    caller: Caller,
+    reason: str | None,
+) -> None:
+    session.add(
+        GaugeStudyRevision(
+            machine_id=made.machine_id,
+            study_id=made.id,
+            revision=revision,
+            actor=caller.name,
+            reason=reason,
+            settings=settings,
+            rows=rows,
+        )
+    )
+    session.flush()
+
+
+def _changes(
+    found: StudyRow, settings: dict[str, Any], rows: list[dict[str, Any]]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What differs, for the record of changes: settings, and the rows that are not as they were."""
+    names = [name for name in settings if settings[name] != found.settings.get(name)]
+    before = {name: found.settings.get(name) for name in names} | {"revision": found.newest}
+    after = {name: settings[name] for name in names} | {"revision": found.newest + 1}
+    old = [row for row in found.revision.rows if row not in rows]
+    new = [row for row in rows if row not in found.revision.rows]
+    return before | ({"rows": old[:20]} if old else {}), after | ({"rows": new[:20]} if new else {})
+
+
+def _news(machine: Machine, standing: Standing | None, number: int) -> dict[str, Any]:
+    """What live pages are told."""
+    told = {"kind": "gauge_study", "machine": machine.key, "id": number}
+    return told if standing is None else told | {"characteristic": standing.characteristic.key}

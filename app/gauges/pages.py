@@ -1,0 +1,240 @@
+"""Pages: the list of gauge studies, a new one, one of them, and one put right."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.characteristics import queries as characteristics
+from app.core.spc.refusal import Refused
+from app.errors import FieldError, InbandError, Invalid, NotFound
+from app.gauges import actions, forms, labels, queries, wording
+from app.gauges.forms import Grid
+from app.gauges.queries import Advice, StudyRow
+from app.gauges.schemas import CorrectionIn, StudyIn
+from app.gauges.tables import KINDS
+from app.machines import queries as machines
+from app.proof import queries as proof
+from app.proof import wording as proof_wording
+from app.web.deps import Engineer, FormDep, Operator, SessionDep, Viewer
+from app.web.fields import LARGEST_ID
+from app.web.forms import by_field, parsed
+from app.web.i18n import _
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+ON_PAGE = 25
+Before = Annotated[int | None, Query(ge=1, le=LARGEST_ID)]
+
+
+def _failing() -> dict[str, Any]:
+    failing = proof.failing()
+    return {"proof_failing": failing, "proof_warning": proof_wording.warning(len(failing))}
+
+
+@router.get("/gauges")
+def list_page(
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    machine: Annotated[str, Query(max_length=64)] = "",
+    before: Before = None,
+) -> Response:
+    """Every study with its verdict, newest first."""
+    chosen = machines.find_machine(session, machine)
+    rows = queries.studies(session, machine_id=chosen.id if chosen else None, before=before, limit=ON_PAGE + 1)
+    return page(
+        request,
+        "gauges/list.html",
+        rows=rows[:ON_PAGE],
+        older=rows[ON_PAGE - 1].study.id if len(rows) > ON_PAGE else None,
+        before=before,
+        machine=chosen,
+        machines=machines.machines(session, limit=100_000),
+        may_enter=caller.may("operator"),
+        wording=wording,
+        **_failing(),
+    )
+
+
+@router.get("/gauges/new")
+def new_page(
+    request: Request,
+    session: SessionDep,
+    _caller: Operator,
+    kind: Annotated[str, Query(max_length=20)] = "",
+    machine: Annotated[str, Query(max_length=64)] = "",
+    characteristic: Annotated[str, Query(max_length=64)] = "",
+) -> Response:
+    """Choose a kind, then its form with an empty grid."""
+    if kind not in KINDS:
+        return page(request, "gauges/kinds.html", kinds=wording.kinds(), machine=machine, characteristic=characteristic)
+    typed = {"machine": machine, "characteristic": characteristic}
+    if characteristic:
+        standing = characteristics.characteristic_named(session, characteristic)
+        p = standing.parameters
+        typed |= {"machine": standing.machine.key, "tolerance": forms.written(p.tolerance_width)}
+        typed |= {"reference": forms.written(p.target)} if kind in {"type_one", "bias"} else {}
+    return _form(request, session, kind, typed, forms.shape(kind, typed))
+
+
+@router.post("/gauges/new")
+def send_new(request: Request, session: SessionDep, caller: Operator, form: FormDep) -> Response:
+    """`do`: another grid, a pasted table, readings put into the grid, or the study as it is."""
+    kind, typed = form.get("kind", ""), dict(form)
+    if kind not in KINDS:
+        raise NotFound(_("There is no such kind of gauge study."), _("Choose one on the page “New gauge study”."))
+    try:
+        with session.begin_nested():
+            filled = _filled(session, kind, typed)
+            if filled is not None:
+                return _form(request, session, kind, *filled)
+            fields = {"kind": kind, "rows": forms.rows_of(kind, forms.typed_grid(kind, typed))}
+            named = {"machine": typed.get("machine"), "characteristic": typed.get("characteristic")}
+            given = parsed(StudyIn, forms.settings_of(typed) | named | fields)
+            machine = machines.machine_named(session, given.machine)
+            source = _source(typed, given.characteristic)
+            made = actions.add_study(session, machine, given, caller, source)
+    except InbandError as error:
+        if not error.errors and error.status != NotFound.status:
+            raise
+        return _form(request, session, kind, typed, _grid_or_none(kind, typed), error=error)
+    return RedirectResponse(f"/gauges/{made.row.study.id}?done=entered", 303)
+
+
+def _filled(session: Session, kind: str, typed: dict[str, str]) -> tuple[dict[str, str], Grid] | None:
+    """The form again with another grid; None when the study is to be stored."""
+    match typed.get("do"):
+        case "grid":
+            return typed, forms.shape(kind, typed)
+        case "paste":
+            return forms.pasted_grid(kind, typed)
+        case "readings":
+            return _from_readings(session, kind, typed)
+    return None
+
+
+def _from_readings(session: Session, kind: str, typed: dict[str, str]) -> tuple[dict[str, str], Grid]:
+    key, take = typed.get("characteristic", ""), typed.get("take", "readings")
+    if not key:
+        words = _("name the characteristic whose readings are to be taken")
+        raise Invalid(words, errors=[FieldError("characteristic", words)])
+    standing = characteristics.characteristic_named(session, key)
+    first, through = (forms.whole(typed, name) for name in ("first", "through"))
+    rows = actions.rows_from_readings(session, standing, kind, first, through, take)
+    fields, grid = forms.grid_of(kind, rows)
+    each = "touch" if take == "touches" else "reading"
+    return typed | fields | {"machine": standing.machine.key, "each": each, "from": f"{first}-{through}-{take}"}, grid
+
+
+def _source(typed: Mapping[str, str], characteristic: str | None) -> dict[str, Any] | None:
+    """What the grid was filled from, if it was filled from readings."""
+    first, _dash, rest = typed.get("from", "").partition("-")
+    through, _dash, take = rest.partition("-")
+    if characteristic and first.isdigit() and through.isdigit() and take in {"readings", "touches"} and len(rest) < 40:
+        return {"first": int(first), "through": int(through), "take": take}
+    return None
+
+
+def _grid_or_none(kind: str, typed: Mapping[str, str]) -> Grid | None:
+    try:
+        return forms.typed_grid(kind, typed)
+    except Invalid:
+        return None
+
+
+def _form(
+    request: Request,
+    session: Session,
+    kind: str,
+    typed: Mapping[str, str],
+    grid: Grid | None,
+    *,
+    error: InbandError | None = None,
+    study: StudyRow | None = None,
+) -> Response:
+    begun = forms.begun(kind, typed)
+    chosen = machines.find_machine(session, begun.get("machine", ""))
+    usable = characteristics.characteristics(session, machine_id=chosen.id if chosen else None, limit=100_000)
+    return page(
+        request,
+        "gauges/form.html",
+        status=error.status if error else 200,
+        kind=kind,
+        typed=begun,
+        grid=grid or forms.shape(kind, {}),
+        errors=by_field(error) if error else {},
+        problem=error,
+        study=study,
+        machines=[(each.key, each.name) for each in machines.machines(session, limit=100_000)],
+        characteristics=[("", _("none"))]
+        + [(each.characteristic.key, f"{each.characteristic.key} – {each.characteristic.name}") for each in usable],
+        heading=forms.heading,
+        wording=wording,
+    )
+
+
+@router.get("/gauges/{number}")
+def study_page(
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    number: int,
+    revision: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
+    done: Annotated[str, Query(max_length=20)] = "",
+) -> Response:
+    """Verdicts, charts, table of variance, values, and what the study suggests for R33."""
+    row = queries.study(session, number, revision)
+    advice = queries.advice(session, row)
+    return page(
+        request,
+        "gauges/study.html",
+        row=row,
+        found=row.found,
+        advice=advice if isinstance(advice, Advice) else None,
+        verdicts=wording.verdicts(row.found, row.tolerance),
+        grid=forms.grid_of(row.study.kind, row.revision.rows)[1],
+        heading=forms.heading,
+        revisions=queries.revisions(session, row),
+        refused=lambda value: isinstance(value, Refused),
+        components=labels.components,
+        done={"entered": _("The study is stored."), "corrected": _("The study is put right; the revision before stays on record.")}.get(done),
+        figure=lambda picture: f"/api/v1/gauge-studies/{number}/figure?picture={picture}" + (f"&revision={revision}" if revision else ""),
+        may_correct=caller.may("engineer"),
+        wording=wording,
+        **_failing(),
+    )  # fmt: skip
+
+
+@router.get("/gauges/{number}/correct")
+def correct_page(request: Request, session: SessionDep, _caller: Engineer, number: int) -> Response:
+    """The form with everything that is stored in it."""
+    row = queries.study(session, number)
+    fields, grid = forms.grid_of(row.study.kind, row.revision.rows)
+    typed = forms.typed_settings(row.settings) | fields | _named(row)
+    return _form(request, session, row.study.kind, typed, grid, study=row)
+
+
+def _named(row: StudyRow) -> dict[str, str]:
+    return {"machine": row.machine.key, "characteristic": row.characteristic or ""}
+
+
+@router.post("/gauges/{number}/correct")
+def send_correction(request: Request, session: SessionDep, caller: Engineer, number: int, form: FormDep) -> Response:
+    """A new revision, with the reason; or another grid, as for a new study."""
+    row = queries.study(session, number)
+    kind, typed = row.study.kind, dict(form) | _named(row)
+    try:
+        with session.begin_nested():
+            filled = _filled(session, kind, typed)
+            if filled is not None:
+                return _form(request, session, kind, *filled, study=row)
+            fields = {"rows": forms.rows_of(kind, forms.typed_grid(kind, typed)), "reason": typed.get("reason")}
+            actions.correct_study(session, number, parsed(CorrectionIn, forms.settings_of(typed) | fields), caller)
+    except InbandError as error:
+        if not error.errors:
+            raise
+        return _form(request, session, kind, typed, _grid_or_none(kind, typed), error=error, study=row)
+    return RedirectResponse(f"/gauges/{number}?done=corrected", 303)
