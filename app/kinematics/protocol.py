@@ -1,0 +1,239 @@
+"""The protocol of a run: everything that the control's own has, as page, PDF, XLSX and CSV. Lengths in mm, angles in degrees."""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Any
+
+from app.kinematics import wording
+from app.kinematics.answers import parameters_of
+from app.kinematics.figures import LETTERS, diagram, greatest
+from app.kinematics.queries import RunRow
+from app.reports.content import (
+    Column,
+    Fact,
+    Picture,
+    Report,
+    Section,
+    Table,
+    Value,
+    count,
+    deviation,
+    moment,
+    number,
+    size,
+    width,
+    words,
+)
+from app.web.i18n import _
+
+SETTINGS = {
+    "Q407": "ball_radius",
+    "Q320": "clearance",
+    "Q408": "retract_height",
+    "Q253": "feed",
+    "Q380": "reference_angle",
+    "Q423": "touches_per_ball",
+    "Q432": "backlash_angle",
+}
+WIDE, TALL = 1040, 250
+
+
+def protocol_of(row: RunRow, made_at: datetime) -> Report:
+    """The protocol, with its diagrams as they stand on the page."""
+    run, results = row.run, row.run.results
+    return Report(
+        key=f"kinematics-{run.id}",
+        name=_("Rotary axes, run {n}").format(n=run.id),
+        machine=row.machine.name,
+        part="",
+        period=f"{row.machine.name}, {run.measured_at:%Y-%m-%d %H:%M} UTC, {wording.status_word(row.status)}",
+        zone="UTC",
+        made_at=moment(made_at),
+        head=_head(row),
+        sections=(
+            _outcome(row),
+            *(section for axis in results["axes"] for section in _axis(axis)),
+            *((_balls(results["balls"]),) if results["balls"] else ()),
+            _settings(row),
+        ),
+    )
+
+
+def _head(row: RunRow) -> tuple[Fact, ...]:
+    run = row.run
+    said = dict(run.results.get("head") or {}) | {k: v for k, v in run.given.items() if isinstance(v, str)}
+    return (
+        Fact("measured", _("Measured"), moment(run.measured_at)),
+        Fact("program", _("NC program"), words(said.get("program"))),
+        Fact("tool", _("Tool"), words(said.get("tool"))),
+        Fact("kinematics", _("Active kinematics"), words(said.get("kinematics"))),
+        Fact("mode", _("Mode"), words(said.get("mode"))),
+        Fact("came", _("Came as"), words(wording.form_word(run.form))),
+        Fact("head", _("Head"), words(run.head)),
+        Fact("by", _("Sent by"), words(run.actor)),
+    )
+
+
+def _outcome(row: RunRow) -> Section:
+    run = row.run
+    warned = [wording.sentence(run)] if run.outcome != "measured" else []
+    warned += [_("not understood: {n} lines").format(n=len(run.results["notes"]))] if run.results["notes"] else []
+    decided = tuple(
+        _("{what} by {who} on {at}: {reason}").format(
+            what=wording.status_word(what), who=each.actor, at=f"{each.at:%Y-%m-%d %H:%M} UTC", reason=each.reason
+        )
+        for what, each in row.decisions.items()
+    )
+    facts = [Fact(name, wording.name_words(name), width(value), code=name) for name, value in _scalars(run.results)]
+    strings = [
+        Fact(name, _("position errors"), words(str(text)), code=name)
+        for name, text in parameters_of(run.results).items()
+        if name.startswith("QS")
+    ]
+    said = (wording.sentence(run),) if run.outcome == "measured" else ()
+    return Section("outcome", _("Result"), said + decided, tuple(warned), tuple(facts + strings))
+
+
+def _scalars(results: Mapping[str, Any]) -> list[tuple[str, float]]:
+    return [(name, float(value)) for name, value in parameters_of(results).items() if not name.startswith("QS")]
+
+
+def _axis(axis: Mapping[str, Any]) -> tuple[Section, ...]:
+    letter = axis["axis"]
+    backlash = axis["backlash"] or {"value": None, "deviation": None}
+    facts = (
+        Fact("start", _("Start angle"), _degrees(axis["start_angle"])),
+        Fact("end", _("End angle"), _degrees(axis["end_angle"])),
+        Fact("incidence", _("Incidence angle"), _degrees(axis["incidence"])),
+        Fact("points", _("Measuring points"), count(axis["points"])),
+        Fact("radius", _("Measuring circle radius"), size(axis["radius"])),
+        Fact("backlash", _("Backlash"), _degrees(backlash["value"]), note=_plus_minus(backlash["deviation"], "°")),
+        Fact("angles", _("Axis positions"), words(", ".join(f"{angle:g}°" for angle in axis["angles"]))),
+        Fact("scatter_before", _("Standard deviation, measured"), width(axis["scatter_before"])),
+        Fact("scatter_after", _("Standard deviation, optimised"), width(axis["scatter_after"])),
+        Fact("greatest_before", _("Greatest deviation, measured"), width(axis["greatest_before"])),
+        Fact("greatest_after", _("Greatest deviation, optimised"), width(axis["greatest_after"])),
+        Fact("angle_error", _("Angle error"), _degrees(axis["angle_error"])),
+        Fact("mean_error", _("Mean positioning error"), width(axis["mean_error"])),
+        *(
+            Fact(
+                name,
+                wording.name_words(name),
+                _degrees(each["value"]) if name[1] in "ABC" else deviation(each["value"]),
+                code=name,
+                note=_plus_minus(each["deviation"], "°" if name[1] in "ABC" else "µm"),
+            )
+            for name, each in axis["errors"].items()
+        ),
+    )
+    place = Table(
+        (
+            Column("what", _("Position of the axis"), 2.0),
+            *(Column(each, f"{each}, mm", 1.0, "right") for each in LETTERS),
+        ),
+        tuple(
+            (words(name), *(number(value, 4) for value in values))
+            for name, values in (
+                (_("before"), axis["position_before"]),
+                (_("correction in all axes"), axis["correction"]),
+                (_("after"), axis["position_after"]),
+            )
+            if values is not None
+        ),
+    )
+    about = Section(f"axis-{letter}", _("Axis {axis}").format(axis=letter), facts=facts, table=place)
+    if not axis["positions"]:
+        return (about,)
+    return (about, _diagrams(axis))
+
+
+def _diagrams(axis: Mapping[str, Any]) -> Section:
+    letter, tall = axis["axis"], greatest(axis)
+    names = [f"E{each}{letter}" for each in LETTERS]
+    rows = tuple(
+        (
+            number(each["angle"], 3),
+            words(wording.approach_word(each["approach"])),
+            *(deviation(v) for v in each["measured"]),
+            *(deviation(v) for v in each["optimised"]),
+        )
+        for each in axis["positions"]
+    )
+    columns = (
+        Column("angle", f"{letter}, °", 1.0, "right"),
+        Column("approach", _("from"), 1.0),
+        *(Column(f"{name}-measured", name, 1.0, "right") for name in names),
+        *(Column(f"{name}-optimised", _("{name} optimised").format(name=name), 1.2, "right") for name in names),
+    )
+    table = Table(columns, rows)
+    pictures = tuple(
+        Picture(
+            name,
+            name,
+            _("{name}: deviation in {letter} against {axis}, measured and optimised").format(
+                name=name, letter=direction, axis=letter
+            ),
+            diagram(axis, direction, height=tall),
+            WIDE,
+            TALL,
+            table,
+        )
+        for name, direction in zip(names, LETTERS, strict=True)
+    )
+    return Section(f"diagrams-{letter}", _("Deviations of {axis}").format(axis=letter), table=table, pictures=pictures)
+
+
+def _balls(balls: Sequence[Mapping[str, Any]]) -> Section:
+    columns = (
+        Column("number", _("Ball"), 1.0, "right"),
+        Column("radius", _("Radius, mm"), 1.0, "right"),
+        Column("deviation", _("Scatter of a touch"), 1.0, "right"),
+        Column("form", _("Form deviation"), 1.0, "right"),
+    )
+    rows = tuple(
+        (count(at), number(ball["radius"], 4), width(ball["deviation"]), width(ball["form"]))
+        for at, ball in enumerate(balls, start=1)
+    )
+    return Section("balls", _("Balls found from touches"), table=Table(columns, rows))
+
+
+def _settings(row: RunRow) -> Section:
+    run = row.run
+    facts = [
+        Fact(field, _SETTING_WORDS[field](), words(f"{run.given[field]:g}"), code=name)
+        for name, field in SETTINGS.items()
+        if isinstance(run.given.get(field), int | float)
+    ]
+    limits = {
+        "max_modification": ("maxModification", "mm"),
+        "max_modification_angle": ("maxModification", "°"),
+        "max_dev_cal_ball": ("maxDevCalBall", "mm"),
+    }
+    facts += [
+        Fact(field, name, words(f"{run.limits[field]:g} {unit}"))
+        for field, (name, unit) in limits.items()
+        if run.limits.get(field) is not None
+    ]
+    return Section("settings", _("Settings"), tuple(run.results["notes"][:40]), facts=tuple(facts))
+
+
+_SETTING_WORDS = {
+    "ball_radius": lambda: _("radius of the ball, mm"),
+    "clearance": lambda: _("clearance, mm"),
+    "retract_height": lambda: _("retract height, mm"),
+    "feed": lambda: _("feed, mm/min"),
+    "reference_angle": lambda: _("reference angle, °"),
+    "touches_per_ball": lambda: _("touches per ball"),
+    "backlash_angle": lambda: _("backlash angle, °"),
+}
+
+
+def _degrees(value: float | None) -> Value:
+    return words(None if value is None else wording.angle(value)) if value is not None else number(None)
+
+
+def _plus_minus(spread: float | None, unit: str) -> str:
+    if spread is None:
+        return ""
+    text = f"{spread:.5f} °" if unit == "°" else f"{spread * 1000:.2f} µm"
+    return _("standard deviation {s}").format(s=text)
