@@ -1,0 +1,144 @@
+"""Proposing a change of parameters with its evidence, approving it, rejecting it."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.audit.actions import record
+from app.characteristics.actions import CharacteristicChange, change_characteristic
+from app.db.events import publish
+from app.errors import Conflict, Invalid
+from app.people.callers import Caller
+from app.web.i18n import _
+from app.whatif import proposals
+from app.whatif.evidence import evidence_of
+from app.whatif.proposals import Row
+from app.whatif.queries import Answer
+from app.whatif.tables import ParameterProposal
+
+SETTINGS = ("weighting_factor", "zero_range", "averaging_limit", "factor")
+LONGEST_REASON = 1000
+
+
+def changes_of(answer: Answer) -> dict[str, float]:
+    """What the settings of a what-if change of the parameters in force."""
+    today = answer.past.standing.parameters
+    return {
+        name: getattr(answer.parameters, name)
+        for name in SETTINGS
+        if getattr(answer.parameters, name) != getattr(today, name)
+    }
+
+
+def propose(session: Session, answer: Answer, reason: str, caller: Caller) -> Row:
+    """Propose the settings of a what-if, with what was found kept as evidence.
+
+    Raises `Invalid` where they are today's; `Conflict` where the same is proposed already.
+    """
+    standing = answer.past.standing
+    caller.must("operator")
+    changes = changes_of(answer)
+    if not changes:
+        raise Invalid(
+            _("These are the settings in force; there is nothing to propose."),
+            _("Choose other settings: k, R33, R34 or the factor."),
+        )
+    for row in proposals.proposals(session, characteristic=standing.characteristic, status="open"):
+        if row.proposal.changes == changes:
+            raise Conflict(
+                _("{who} has proposed the same already: proposal {number}.").format(
+                    who=row.proposal.proposed_by, number=row.proposal.id
+                ),
+                _("An engineer can approve that one."),
+                proposal=row.proposal.id,
+            )
+    made = ParameterProposal(
+        machine_id=standing.machine.id,
+        characteristic_id=standing.characteristic.id,
+        from_version=standing.version.version,
+        changes=changes,
+        evidence=evidence_of(answer),
+        reason=reason,
+        proposed_by=caller.name,
+    )
+    session.add(made)
+    session.flush()
+    row = proposals.proposal(session, made.id)
+    before = {name: getattr(standing.parameters, name) for name in changes}
+    _note(session, row, "change proposed", caller, before, dict(changes), reason)
+    return row
+
+
+def approve(session: Session, number: int, reason: str, caller: Caller) -> Row:
+    """Put the change in force as a new version of the parameters; the proposer may do it, too, who is an engineer.
+
+    Raises `NotFound`; `NotAllowed` below an engineer; `Conflict` when it is decided already, or the parameters have changed
+    since it was proposed.
+    """
+    row = _open(session, number, caller)
+    proposal = row.proposal
+    if row.status == "outdated":
+        raise Conflict(
+            _(
+                "Since this was proposed the parameters have changed: version {now} is in force, it was for {then}."
+            ).format(now=row.version, then=proposal.from_version),
+            _("Replay again with the settings of now, and propose what comes out. This one can be rejected."),
+            parameters_version=row.version,
+        )
+    why = _("{reason} (proposal {number} of {who}: {proposed})").format(
+        reason=reason, number=proposal.id, who=proposal.proposed_by, proposed=proposal.reason
+    )
+    change = CharacteristicChange(
+        parameters=proposal.changes, parameters_version=proposal.from_version, reason=why[:LONGEST_REASON]
+    )
+    standing = change_characteristic(session, row.characteristic.key, change, caller.name)
+    return _decide(session, row, "approved", reason, caller, standing.version.version)
+
+
+def reject(session: Session, number: int, reason: str, caller: Caller) -> Row:
+    """Say no, and why. Raises `NotFound`; `NotAllowed` below an engineer; `Conflict` when it is decided already."""
+    return _decide(session, _open(session, number, caller), "rejected", reason, caller, None)
+
+
+def _open(session: Session, number: int, caller: Caller) -> Row:
+    """The proposal, held until the transaction ends."""
+    row = proposals.proposal(session, number)
+    caller.must("engineer")
+    session.execute(
+        select(ParameterProposal)
+        .where(ParameterProposal.id == number)
+        .with_for_update()
+        .execution_options(populate_existing=True)
+    )
+    row = proposals.proposal(session, number)
+    if row.proposal.status != "open":
+        raise Conflict(
+            _("{who} has decided about proposal {number} already: {status}.").format(
+                who=row.proposal.decided_by,
+                number=number,
+                status=_("approved") if row.proposal.status == "approved" else _("rejected"),
+            ),
+            _("Nothing was changed. Propose it again if need be."),
+            status_of_proposal=row.proposal.status,
+        )
+    return row
+
+
+def _decide(session: Session, row: Row, status: str, reason: str, caller: Caller, version: int | None) -> Row:
+    proposal = row.proposal
+    proposal.status, proposal.decided_at, proposal.decided_by = status, datetime.now(UTC), caller.name
+    proposal.decided_why, proposal.made_version = reason, version
+    session.flush()
+    after = {"status": status} | ({"parameters_version": version} if version is not None else {})
+    _note(session, row, f"proposal {status}", caller, {"status": "open"}, after, reason)
+    return proposals.proposal(session, proposal.id)
+
+
+def _note(
+    session: Session, row: Row, action: str, caller: Caller, before: dict[str, Any], after: dict[str, Any], reason: str
+) -> None:
+    key = row.characteristic.key
+    record(session, caller.name, action, f"characteristic/{key}", before, after | {"proposal": row.proposal.id}, reason)
+    publish(session, {"kind": "characteristic", "machine": row.machine.key, "characteristic": key})

@@ -1,0 +1,136 @@
+"""The what-if as its page asks it: an address that says everything, lengths in µm, today's value where a field is empty."""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any
+from urllib.parse import urlencode
+
+from app.core.parameters import Parameters
+from app.web.forms import parsed
+from app.web.i18n import _
+from app.whatif.schemas import MapIn, WhatIfIn
+from app.whatif.wording import short_um
+
+FIELDS = ("k", "r33", "r34", "factor", "delay", "effect", "last", "from", "to", "goal")
+NAMES = {
+    "k": "weighting_factor",
+    "r33": "zero_range",
+    "r34": "averaging_limit",
+    "from": "start",
+    "to": "end",
+    "goal": "criterion",
+}
+PERIODS = ("1000", "5000", "20000", "100000", "all")
+
+
+def typed_from(query: Mapping[str, str]) -> dict[str, str]:
+    """What was typed; 5000 readings unless something else was chosen."""
+    typed = {name: query.get(name, "").strip()[:40] for name in FIELDS}
+    typed["effect"] = typed["effect"] or "1"
+    typed["goal"] = typed["goal"] or "ppk"
+    if not typed["last"] and not typed["from"] and not typed["to"]:
+        typed["last"] = "5000"
+    return typed
+
+
+def asked(typed: Mapping[str, str]) -> WhatIfIn:
+    """The question. Raises `Invalid` with the fields of the API."""
+    return parsed(WhatIfIn, _common(typed) | {"weighting_factor": number(typed["k"]), "zero_range": mm(typed["r33"])})
+
+
+def around(typed: Mapping[str, str]) -> MapIn:
+    """The map of the same period, R34 and factor."""
+    return parsed(MapIn, _common(typed) | {"criterion": typed["goal"]})
+
+
+def _common(typed: Mapping[str, str]) -> dict[str, Any]:
+    effect, last = typed["effect"], typed["last"]
+    delay = number(typed["delay"])
+    return {
+        "averaging_limit": mm(typed["r34"]),
+        "factor": number(typed["factor"]),
+        "delay": int(delay) if isinstance(delay, float) and delay.is_integer() else delay,
+        "effect": effect if effect == "measured" else number(effect),
+        "last": 10**15
+        if last == "all"
+        else int(last)
+        if last.isascii() and last.isdigit() and len(last) < 16
+        else last,
+        "from": moment(typed["from"]),
+        "to": moment(typed["to"]),
+    }
+
+
+def number(text: str) -> float | str | None:
+    """A number with a decimal point or comma; what is none is left for the schema to refuse.
+
+    >>> number("2,5"), number("−1"), number(""), number("many")
+    (2.5, -1.0, None, 'many')
+    """
+    try:
+        return float(text.replace(",", ".").replace("\N{MINUS SIGN}", "-")) if text else None
+    except ValueError:
+        return text
+
+
+def mm(text: str) -> float | str | None:
+    """µm as they are typed, in mm.
+
+    >>> mm("2.7"), mm("")
+    (0.0027, None)
+    """
+    value = number(text)
+    return round(value / 1000, 9) if isinstance(value, float) and abs(value) < 1e12 else value
+
+
+def moment(text: str) -> str | None:
+    """A day or a moment of the browser's date field, as UTC where it says nothing else."""
+    if not text:
+        return None
+    try:
+        found = datetime.fromisoformat(text)
+    except ValueError:
+        return text
+    return (found if found.tzinfo else found.replace(tzinfo=UTC)).isoformat()
+
+
+def address(key: str, typed: Mapping[str, str], **changes: str) -> str:
+    """The page with something else chosen; what is usual is not said."""
+    usual = {"effect": "1", "goal": "ppk", "last": "5000"}
+    values = {name: value for name, value in {**typed, **changes}.items() if value and usual.get(name) != value}
+    return f"/characteristics/{key}/what-if" + (f"?{urlencode(values)}" if values else "")
+
+
+def figure_query(given: WhatIfIn) -> str:
+    """The same question for the figure."""
+    said = given.model_dump(mode="json", by_alias=True, exclude_none=True)
+    if said.get("effect") == 1:
+        del said["effect"]
+    return urlencode({name: f"{value:.9g}" if isinstance(value, float) else value for name, value in said.items()})
+
+
+def placeholders(today: Parameters, delay: int | None) -> dict[str, str]:
+    """What stands in an empty field: today's."""
+    return {
+        "k": f"{today.weighting_factor:.6g}",
+        "r33": short_um(today.zero_range),
+        "r34": short_um(today.averaging_limit),
+        "factor": f"{today.factor:.6g}",
+        "delay": str(delay or 0),
+    }
+
+
+def at_fields(errors: Mapping[str, str]) -> dict[str, str]:
+    """Errors at the fields of the page."""
+    names = {api: page for page, api in NAMES.items()}
+    return {names.get(field, field): message for field, message in errors.items()}
+
+
+def periods(chosen: str) -> list[tuple[str, str]]:
+    """How many readings may be chosen."""
+    offered = [
+        (count, _("All readings") if count == "all" else _("The last {count}").format(count=count)) for count in PERIODS
+    ]
+    if chosen and chosen not in PERIODS:
+        offered.append((chosen, _("The last {count}").format(count=chosen)))
+    return [("", _("By date")), *offered]

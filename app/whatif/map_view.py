@@ -1,0 +1,127 @@
+"""The map as the page draws it: rows of k, columns of R33, each cell a link that takes its setting. Pure."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from app.core.policy_map import Criterion, value_of
+from app.web.i18n import _
+from app.whatif import forms, grid, wording
+from app.whatif.queries import Answer, Cell, Map
+
+LEVELS = 8  # shades from the best to the worst
+
+
+class CellView(NamedTuple):
+    """One cell: where it leads, what it says, its shade (None: blank), and what it is."""
+
+    href: str | None
+    text: str
+    title: str
+    level: int | None
+    inside: bool
+    best: bool
+    today: bool
+    chosen: bool
+
+
+class MapView(NamedTuple):
+    """R33 of the columns in µm, then a row a k. region: in words."""
+
+    columns: list[str]
+    rows: list[tuple[str, list[CellView]]]
+    region: str
+    explained: str
+
+
+def view_of(made: Map, answer: Answer, typed: Mapping[str, str], key: str) -> MapView:
+    """Everything in words, shades by rank, so that one bad corner does not wash out the rest."""
+    values = [None if cell.figures is None else value_of(cell.figures, made.criterion) for cell in made.cells]
+    known = sorted({value for value in values if value is not None}, reverse=made.criterion is Criterion.PPK)
+    rank = {value: at * LEVELS // max(1, len(known)) for at, value in enumerate(known)}
+    wide = len(made.zero_ranges)
+    today, chosen = made.past.standing.parameters, answer.parameters
+    at_today = _at(made, today.weighting_factor, today.zero_range)
+    if abs(made.averaging_limit - today.averaging_limit) > 1e-9:
+        at_today = None
+    at_chosen = _at(made, chosen.weighting_factor, chosen.zero_range)
+    cells = [
+        _cell(
+            made,
+            at,
+            cell,
+            None if values[at] is None else rank[values[at]],  # type: ignore[index]
+            forms.address(key, typed, k=f"{cell.weighting_factor:.9g}", r33=f"{cell.zero_range * 1000:.9g}")
+            + "#replay",
+            today=at == at_today,
+            chosen=at == at_chosen,
+        )
+        for at, cell in enumerate(made.cells)
+    ]
+    return MapView(
+        [wording.short_um(r33) for r33 in made.zero_ranges],
+        [
+            (f"{k:.6g}", cells[row * wide : (row + 1) * wide])
+            for row, k in reversed(list(enumerate(made.weighting_factors)))
+        ],
+        _region(made),
+        wording.criterion_explained(made.criterion),
+    )
+
+
+def _at(made: Map, k: float, r33: float) -> int | None:
+    row, column = grid.place(made.weighting_factors, k), grid.place(made.zero_ranges, r33)
+    return None if row is None or column is None else row * len(made.zero_ranges) + column
+
+
+def _cell(made: Map, at: int, cell: Cell, level: int | None, href: str, *, today: bool, chosen: bool) -> CellView:
+    named = _("k {k}, R33 {r33}").format(
+        k=f"{cell.weighting_factor:.6g}", r33=wording.setting("zero_range", cell.zero_range)
+    )
+    if cell.figures is None:
+        return CellView(
+            None, "", f"{named}: {wording.out_of_order(cell.zero_range, made.averaging_limit)}", None,
+            False, False, today, chosen,
+        )  # fmt: skip
+    inside, best = made.region.inside[at], made.region.best == at
+    said = [
+        f"{name} {value[0]}"
+        for name, value in wording.rows([cell.figures])
+        if name in {_("Ppk"), _("Rejects"), _("Corrections"), _("Spread s")}
+    ]
+    marks = [
+        word
+        for word, holds in ((_("today"), today), (_("best"), best), (_("as good as the best"), inside and not best))
+        if holds
+    ]
+    title = f"{named}: {', '.join(said)}" + (f" ({', '.join(marks)})" if marks else "")
+    return CellView(href, wording.cell(cell.figures, made.criterion), title, level, inside, best, today, chosen)
+
+
+def _region(made: Map) -> str:
+    if made.region.best is None:
+        return _("No setting of this map has that number.")
+    best = made.cells[made.region.best]
+    assert best.figures is not None
+    inside = [cell for cell, holds in zip(made.cells, made.region.inside, strict=True) if holds]
+    ks, r33s = [cell.weighting_factor for cell in inside], [cell.zero_range for cell in inside]
+    said = _("Best is k {k} with R33 {r33}: {criterion} {value}, today {today}.").format(
+        k=f"{best.weighting_factor:.6g}",
+        r33=wording.setting("zero_range", best.zero_range),
+        criterion=wording.criterion(made.criterion),
+        value=wording.cell(best.figures, made.criterion),
+        today=wording.cell(made.today, made.criterion),
+    )
+    return (
+        said
+        + " "
+        + _(
+            "{count} settings are as good within what {readings} readings can tell: k {low_k} to {high_k}, R33 {low} to {high} µm."
+        ).format(
+            count=len(inside),
+            readings=made.today.inner,
+            low_k=f"{min(ks):.6g}",
+            high_k=f"{max(ks):.6g}",
+            low=wording.short_um(min(r33s)),
+            high=wording.short_um(max(r33s)),
+        )
+    )

@@ -1,0 +1,195 @@
+"""Pages: the what-if of a characteristic, the list of proposals, and one proposal with its evidence."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.characteristics import queries as characteristics
+from app.characteristics.queries import Standing
+from app.characteristics.wording import label
+from app.core.parameters import BY_NAME
+from app.core.policy_map import Criterion
+from app.errors import Conflict, InbandError, Invalid, TooManyRequests
+from app.proof import queries as proof
+from app.web.deps import Caller, Engineer, FormDep, Operator, SessionDep, Viewer, require
+from app.web.fields import LARGEST_ID
+from app.web.forms import by_field, parsed
+from app.web.templates import page
+from app.whatif import actions, asking, forms, grid, proposals, wording
+from app.whatif.map_view import view_of
+from app.whatif.queries import Answer, Map
+from app.whatif.schemas import DecisionIn, ProposalIn
+
+router = APIRouter(include_in_schema=False)
+ON_PAGE = 50
+Number = Annotated[int, Path(ge=1, le=LARGEST_ID)]
+Word = Annotated[str | None, Query(max_length=40)]
+
+
+@router.get("/characteristics/{characteristic}/what-if")
+def what_if_page(request: Request, session: SessionDep, caller: Viewer, characteristic: str) -> Response:
+    """Today's settings and others side by side, the map, and the form to propose them."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    return _what_if(request, session, caller, standing, forms.typed_from(request.query_params))
+
+
+def _what_if(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    standing: Standing,
+    typed: dict[str, str],
+    *,
+    reason: str = "",
+    refused: InbandError | None = None,
+) -> Response:
+    answer: Answer | None = None
+    made: Map | Invalid | None = None
+    status, problem, errors = 200, refused, forms.at_fields(by_field(refused)) if refused else {}
+    try:
+        given = forms.asked(typed)
+        answer, made = asking.both(session, standing, given, forms.around(typed))
+    except (Invalid, TooManyRequests) as error:
+        status, problem, errors = error.status, error, forms.at_fields(by_field(error))
+    key = standing.characteristic.key
+    criterion = Criterion(typed["goal"]) if typed["goal"] in set(Criterion) else Criterion.PPK
+    return page(
+        request,
+        "whatif/what_if.html",
+        status=refused.status if refused else status,
+        characteristic=standing.characteristic,
+        machine=standing.machine,
+        version=standing.version.version,
+        today=standing.parameters,
+        typed=typed,
+        periods=forms.periods(typed["last"]),
+        placeholders=forms.placeholders(standing.parameters, answer.past.delay if answer else None),
+        errors=errors,
+        problem=problem,
+        answer=answer,
+        changes=actions.changes_of(answer) if answer else {},
+        rows=wording.rows([answer.truly, answer.likeness.figures, answer.today, answer.other]) if answer else [],
+        cautions=wording.cautions(answer.past) if answer else [],
+        map=view_of(made, answer, typed, key) if answer and isinstance(made, Map) else None,
+        no_map=made if isinstance(made, Invalid) else None,
+        criteria=[(each.value, wording.criterion(each)) for each in Criterion],
+        criterion=criterion,
+        averaging_limits=[
+            (wording.short_um(r34), forms.address(key, typed, r34=wording.short_um(r34)) + "#map", _same(r34, answer))
+            for r34 in grid.averaging_limits(standing.parameters)
+        ],
+        link=lambda **changes: forms.address(key, typed, **changes),
+        figure_url=f"/api/v1/characteristics/{key}/figures/what-if?{forms.figure_query(given)}" if answer else None,
+        open_proposals=proposals.proposals(session, characteristic=standing.characteristic, status="open"),
+        reason=reason,
+        may_propose=caller.may("operator"),
+        wording=wording,
+        failing=proof.failing(),
+    )
+
+
+def _same(r34: float, answer: Answer | None) -> bool:
+    return answer is not None and abs(answer.parameters.averaging_limit - r34) < 1e-9
+
+
+@router.post("/characteristics/{characteristic}/what-if")
+def send_proposal(
+    request: Request, session: SessionDep, caller: Operator, characteristic: str, form: FormDep
+) -> Response:
+    """Propose what was replayed; the evidence is worked out anew from the same question."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    typed = forms.typed_from(form)
+    try:
+        said = forms.asked(typed).model_dump(by_alias=True, exclude_none=True)
+        given = parsed(ProposalIn, said | {"reason": form.get("reason", "").strip()})
+        row = actions.propose(session, asking.replayed(session, standing, given), given.reason, caller)
+    except (Invalid, Conflict, TooManyRequests) as error:
+        session.expire_all()
+        return _what_if(request, session, caller, standing, typed, reason=form.get("reason", ""), refused=error)
+    return RedirectResponse(f"/proposals/{row.proposal.id}?done=proposed", 303)
+
+
+@router.get("/proposals", dependencies=[require("viewer")])
+def proposals_page(
+    request: Request,
+    session: SessionDep,
+    status: Annotated[str | None, Query(max_length=20)] = None,
+    before: Annotated[int | None, Query(ge=1, le=LARGEST_ID)] = None,
+) -> Response:
+    """Proposals, newest first: those that wait, or all."""
+    chosen = status if status in proposals.STATUSES else "all" if status == "all" else "open"
+    rows = proposals.proposals(session, status=None if chosen == "all" else chosen, before=before, limit=ON_PAGE + 1)
+    older = f"/proposals?status={chosen}&before={rows[ON_PAGE - 1].proposal.id}" if len(rows) > ON_PAGE else None
+    return page(
+        request,
+        "whatif/proposals.html",
+        rows=rows[:ON_PAGE],
+        chosen=chosen,
+        statuses=[*proposals.STATUSES, "all"],
+        older=older,
+        newest=f"/proposals?status={chosen}" if before else None,
+        wording=wording,
+        label=label,
+        numbers=BY_NAME,
+    )
+
+
+@router.get("/proposals/{number}")
+def proposal_page(request: Request, session: SessionDep, caller: Viewer, number: Number, done: Word = None) -> Response:
+    """One proposal: what it changes, what the replay found, who decides."""
+    return _proposal(request, session, caller, number, done=done)
+
+
+@router.post("/proposals/{number}")
+def send_decision(request: Request, session: SessionDep, caller: Engineer, number: Number, form: FormDep) -> Response:
+    """Approve or reject it, with a reason."""
+    verb = form.get("do", "")
+    try:
+        reason = parsed(DecisionIn, {"reason": form.get("reason", "").strip()}).reason
+        (actions.approve if verb == "approve" else actions.reject)(session, number, reason, caller)
+    except (Invalid, Conflict) as error:
+        session.expire_all()
+        return _proposal(request, session, caller, number, typed=form, error=error)
+    return RedirectResponse(f"/proposals/{number}?done={'approved' if verb == 'approve' else 'rejected'}", 303)
+
+
+def _proposal(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    number: int,
+    *,
+    done: str | None = None,
+    typed: Mapping[str, Any] | None = None,
+    error: InbandError | None = None,
+) -> Response:
+    row = proposals.proposal(session, number)
+    evidence = row.proposal.evidence
+    return page(
+        request,
+        "whatif/proposal.html",
+        status=error.status if error else 200,
+        row=row,
+        proposal=row.proposal,
+        evidence=evidence,
+        differences=[
+            (
+                BY_NAME[name].r,
+                label(name),
+                wording.setting(name, before),
+                wording.setting(name, row.proposal.changes[name]),
+            )
+            for name, before in evidence["today"]["settings"].items()
+            if name in row.proposal.changes
+        ],
+        rows=wording.rows_of([evidence[name] for name in ("truly", "today", "other")]),
+        done=wording.done(done) if done else None,
+        typed=typed or {},
+        errors=by_field(error) if error else {},
+        problem=error,
+        may_decide=caller.may("engineer"),
+        wording=wording,
+    )

@@ -1,0 +1,84 @@
+"""Proposals of parameter changes as they stand. Never writes."""
+
+from typing import Any, NamedTuple
+
+from sqlalchemy import Select, case, select
+from sqlalchemy.orm import Session
+
+from app.characteristics.tables import Characteristic
+from app.errors import NotFound
+from app.machines.tables import Machine
+from app.readings.tables import Stream
+from app.web.i18n import _
+from app.whatif.tables import ParameterProposal
+
+STATUSES = ("open", "approved", "rejected", "outdated")
+
+
+class Row(NamedTuple):
+    """A proposal, where it belongs, the version in force now, and its status: an open one of an older version is outdated."""
+
+    proposal: ParameterProposal
+    characteristic: Characteristic
+    machine: Machine
+    version: int
+    status: str
+
+
+_status = case(
+    (
+        (ParameterProposal.status == "open") & (ParameterProposal.from_version != Stream.parameters_version),
+        "outdated",
+    ),
+    else_=ParameterProposal.status,
+)
+_ROWS: Select[Any] = (
+    select(ParameterProposal, Characteristic, Machine, Stream.parameters_version, _status)
+    .join(
+        Characteristic,
+        (Characteristic.machine_id == ParameterProposal.machine_id)
+        & (Characteristic.id == ParameterProposal.characteristic_id),
+    )
+    .join(Machine, Machine.id == ParameterProposal.machine_id)
+    .join(
+        Stream,
+        (Stream.machine_id == ParameterProposal.machine_id)
+        & (Stream.characteristic_id == ParameterProposal.characteristic_id),
+    )
+)
+
+
+def proposals(
+    session: Session,
+    *,
+    characteristic: Characteristic | None = None,
+    machine_id: int | None = None,
+    status: str | None = None,
+    before: int | None = None,
+    limit: int = 100,
+) -> list[Row]:
+    """Newest first: of one characteristic, of one machine, of all; with one status or any."""
+    query = _ROWS.order_by(ParameterProposal.id.desc()).limit(limit)
+    if characteristic is not None:
+        query = query.where(
+            ParameterProposal.machine_id == characteristic.machine_id,
+            ParameterProposal.characteristic_id == characteristic.id,
+        )
+    if machine_id is not None:
+        query = query.where(ParameterProposal.machine_id == machine_id)
+    if status is not None:
+        query = query.where(_status == status)
+    if before is not None:
+        query = query.where(ParameterProposal.id < before)
+    return [Row(*row) for row in session.execute(query)]
+
+
+def proposal(session: Session, number: int) -> Row:
+    """One of them. Raises `NotFound`."""
+    row = session.execute(_ROWS.where(ParameterProposal.id == number)).one_or_none()
+    if row is None:
+        raise NotFound(
+            _("There is no proposal {number}.").format(number=number),
+            _("GET /api/v1/proposals lists them."),
+        )
+    return Row(*row)
