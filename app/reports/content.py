@@ -200,7 +200,10 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A characteristic and a period. `zone` names the time zone in which moments are read."""
+    """A characteristic and a period. `zone` names the time zone in which moments are read.
+
+    warnings: what stands above everything else.
+    """
 
     key: str
     name: str
@@ -211,6 +214,7 @@ class Report:
     made_at: Value
     head: tuple[Fact, ...]
     sections: tuple[Section, ...]
+    warnings: tuple[str, ...] = ()
 
     def words(self, value: Value) -> str:
         """A value as people read it."""

@@ -105,6 +105,7 @@ class ReportOut(BaseModel):
                 "period": "2026-11-16 06:31:04 – 2026-11-21 16:04:14, readings 476 to 1475",
                 "timezone": "Europe/Belgrade",
                 "made_at": "2026-11-21T15:05:00+00:00",
+                "warnings": [],
                 "head": [],
                 "sections": [
                     {
@@ -140,6 +141,7 @@ class ReportOut(BaseModel):
     period: str
     timezone: str
     made_at: datetime
+    warnings: list[str] = Field(description="What stands above everything else.")
     head: list[FactOut]
     sections: list[SectionOut]
 
@@ -155,6 +157,7 @@ class ReportOut(BaseModel):
             period=report.period,
             timezone=report.zone,
             made_at=report.made_at.moment,
+            warnings=list(report.warnings),
             head=[FactOut.of_fact(fact, report) for fact in report.head],
             sections=[SectionOut.of(section, report) for section in report.sections],
         )

@@ -29,6 +29,8 @@ def csv_of(report: Report) -> bytes:
     def sentence(section: str, kind: str, number: int, said: str) -> None:
         writer.writerow((section, number, kind, "", defused(said), "", defused(said)))
 
+    for number, said in enumerate(report.warnings, start=1):
+        sentence("head", "warning", number, said)
     for fact in report.head:
         line("head", "", fact.key, fact.name, fact.value)
     sentence("head", "name", 1, report.name)

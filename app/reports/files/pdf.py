@@ -139,6 +139,7 @@ def _head(report: Report, width: float) -> list[Flowable]:
     return [
         Paragraph(markup(report.name), TITLE),
         Paragraph(markup(report.period), TEXT),
+        *(Paragraph(f"▲ {markup(said)}", WARNING) for said in report.warnings),
         Spacer(0, 6),
         _facts(report, report.head, width, 2),
     ]

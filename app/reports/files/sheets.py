@@ -116,7 +116,9 @@ class _Writing:
         sheet.write_string(1, 0, report.period, self.quiet)
         made = _("Made at {at}; times are those of {zone}.").format(at=report.words(report.made_at), zone=report.zone)
         sheet.write_string(2, 0, made, self.quiet)
-        row = self.facts(sheet, 4, report.head, zone)
+        for at, said in enumerate(report.warnings, start=3):
+            sheet.write_string(at, 0, said, self.warning)
+        row = self.facts(sheet, 4 + len(report.warnings), report.head, zone)
         pictures: list[Picture] = []
         for section in report.sections:
             row = self.section(sheet, row + 1, section, zone, apart=apart)

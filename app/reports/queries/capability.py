@@ -5,7 +5,7 @@ from app.capability import wording
 from app.capability.queries import Study
 from app.core.spc.capability import Index
 from app.core.spc.refusal import Refused
-from app.reports.content import Fact, Section, count, number, width, words
+from app.reports.content import Fact, Section, count, deviation, number, width, words
 from app.reports.queries.frame import Frame
 from app.statistics import wording as statistics
 from app.web.i18n import _
@@ -50,15 +50,21 @@ def _indices(study: Study) -> list[Fact]:
     found = study.found
     assert not isinstance(found, Refused)
     named = (("cp", "Cp", found.cp), ("cpk", "Cpk", found.cpk), ("pp", "Pp", found.pp), ("ppk", "Ppk", found.ppk), ("cpm", "Cpm", found.cpm))  # fmt: skip
-    facts = [_index(key, name, index) for key, name, index in named if index is not None]
+    potential, overall = study.quote == "cpk", study.quote != "percentile"
+    quotable = {"cp": potential, "cpk": potential, "pp": overall, "ppk": overall}
+    facts = [
+        _index(key, name, index, quotable=quotable.get(key, True)) for key, name, index in named if index is not None
+    ]
     by_percentile = study.by_percentile
     if not isinstance(by_percentile, Refused):
-        facts.append(Fact("ppk_percentile", _("Ppk by percentiles"), number(by_percentile.ppk)))
+        note = _("not to be quoted here") if overall else ""
+        facts.append(Fact("ppk_percentile", _("Ppk by percentiles"), number(by_percentile.ppk), note=note))
     return facts
 
 
-def _index(key: str, name: str, index: Index) -> Fact:
-    return Fact(key, name, number(index.value), low=number(index.low), high=number(index.high))
+def _index(key: str, name: str, index: Index, *, quotable: bool = True) -> Fact:
+    note = "" if quotable else _("not to be quoted here")
+    return Fact(key, name, number(index.value), note=note, low=number(index.low), high=number(index.high))
 
 
 def _spread(study: Study) -> list[Fact]:
@@ -66,21 +72,28 @@ def _spread(study: Study) -> list[Fact]:
     assert not isinstance(found, Refused)
     facts = [
         Fact("readings", _("Readings"), count(found.readings)),
+        Fact("mean", _("Mean deviation"), deviation(found.mean, 2)),
         Fact("sigma_within", _("Sigma within"), width(found.within.value, 3)),
         Fact("sigma_overall", _("Sigma overall"), width(found.overall.value, 3)),
         Fact("outside", _("Counted out of tolerance"), count(study.outside)),
     ]
-    for key, name, fallout in (
-        ("ppm_observed", _("Counted, ppm"), study.fallout),
-        ("ppm_within", _("Expected by sigma within, ppm"), study.within),
-        ("ppm_overall", _("Expected by sigma overall, ppm"), study.overall),
+    for key, name, fallout, holds in (
+        ("ppm_observed", _("Counted, ppm"), study.fallout, True),
+        ("ppm_within", _("Expected by sigma within, ppm"), study.within, study.quote == "cpk"),
+        ("ppm_overall", _("Expected by sigma overall, ppm"), study.overall, study.normal),
     ):
         if fallout is not None:
-            facts.append(Fact(key, name, number(fallout.total, 1)))
+            note = "" if holds else _("not to be quoted here")
+            facts.append(Fact(key, name, number(fallout.total, 1), note=note))
     for test in (study.anderson, study.shapiro):
         if not isinstance(test, Refused):
             facts.append(Fact(test.test, wording.normality_name(test.test), number(test.statistic, 4)))
             facts.append(Fact(f"{test.test}_p", _("p, normal distribution"), number(test.p_value, 4)))
+    for key, name, sequences in (
+        ("excluded", _("Left out: excluded"), study.excluded),
+        ("faults", _("Left out: probe faults"), study.faults),
+    ):
+        facts.append(Fact(key, name, count(len(sequences)), note=wording.named(sequences) if sequences else ""))
     return facts
 
 

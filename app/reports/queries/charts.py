@@ -76,8 +76,3 @@ def _data(found: Chart) -> Table:
         for point in found.points
     ]
     return Table(columns, (*blocks, *points))
-
-
-def control(frame: Frame) -> Section | None:
-    """The control chart by the frozen baseline, and its signals."""
-    return None

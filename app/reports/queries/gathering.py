@@ -8,9 +8,11 @@ from sqlalchemy.orm import Session
 
 from app.characteristics.queries import Standing
 from app.errors import InbandError
+from app.proof import queries as proof
+from app.proof import wording as proof_wording
 from app.reports.asking import SectionName, Wishes
 from app.reports.content import Fact, Report, Section, count, deviation, moment, size, width, words
-from app.reports.queries import capability, charts, loop, numbers, record
+from app.reports.queries import capability, charts, control, loop, numbers, record
 from app.reports.queries.frame import Frame
 from app.web.i18n import _
 
@@ -18,7 +20,7 @@ GATHERED: dict[SectionName, Callable[[Frame], Section | None]] = {
     SectionName.NUMBERS: numbers.numbers,
     SectionName.CAPABILITY: capability.capability,
     SectionName.CHART: charts.chart,
-    SectionName.CONTROL: charts.control,
+    SectionName.CONTROL: control.control,
     SectionName.WEAR: loop.wear,
     SectionName.CORRECTIONS: loop.corrections,
     SectionName.ALARMS: record.alarms,
@@ -46,7 +48,14 @@ def report_of(session: Session, standing: Standing, wishes: Wishes, now: datetim
         made_at=moment(now),
         head=tuple(_head(frame)),
         sections=tuple(section for section in sections if section is not None),
+        warnings=_proof(),
     )
+
+
+def _proof() -> tuple[str, ...]:
+    """What stands above everything else when the engine does not compute what was published. Never waits."""
+    failing = proof.failing()
+    return (proof_wording.warning(len(failing)),) if failing else ()
 
 
 def title_of(name: SectionName) -> str:

@@ -1,0 +1,292 @@
+"""The control charts as their page shows them – by the frozen baseline, never by the readings of the report – and their signals."""
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from app.control import charts, signals_queries, wording
+from app.control import queries as controls
+from app.control import signals_wording as signals
+from app.control.figures import control_figure
+from app.control.signals_queries import SignalRow
+from app.control.tables import Baseline
+from app.control.view import View
+from app.core.spc.quantity import Quantity
+from app.core.spc.refusal import Floats
+from app.core.spc.rules import RuleName
+from app.core.spc.shewhart import ENOUGH_READINGS, Chart
+from app.reports.content import (
+    Column,
+    Fact,
+    Picture,
+    Section,
+    Table,
+    Value,
+    count,
+    deviation,
+    moment,
+    width,
+    words,
+)
+from app.reports.queries.frame import Frame
+from app.web.i18n import _
+
+MOST_ROWS = 100
+MOST_POINTS = 10_000  # of a chart, in numbers
+MOST_SIGNALS = 1_000  # kept ones that are looked through for what was said of a run
+WIDE = (940, 330)
+SPREAD = (Chart.MOVING_RANGE, Chart.RANGES, Chart.DEVIATIONS)
+
+
+def control(frame: Frame) -> Section | None:
+    """The charts by the frozen baseline, and their signals; nothing where there are no readings."""
+    if not frame.window.count:
+        return None
+    title, session, standing = _("Control chart and signals"), frame.session, frame.standing
+    baseline = controls.baseline_in_force(session, standing.characteristic)
+    if baseline is None:
+        why = _(
+            "No baseline is in force, so there are no limits and no signals: nothing is judged by its own readings."
+        )
+        return Section("control", title, warnings=(why,))
+    kinds = [kind for kind in charts.kinds(baseline) if kind not in charts.REMEMBERING]
+    views = [charts.view(session, standing, baseline, frame.window, kind) for kind in kinds]
+    on_record = signals_queries.signals(
+        session,
+        characteristic=standing.characteristic,
+        first=frame.window.first,
+        through=frame.window.last,
+        limit=MOST_SIGNALS,
+    )
+    rows = list(_rows(views, on_record))
+    return Section(
+        "control",
+        title,
+        sentences=(_judged_by(baseline), *_left_out(views[0])),
+        warnings=_warnings(frame, baseline),
+        facts=(*_of_baseline(baseline), *(fact for view in views for fact in _of_view(view)), *_kept(on_record)),
+        table=_table(rows) if rows else None,
+        pictures=tuple(_picture(frame, baseline, view) for view in views if len(view.points)),
+    )
+
+
+def _judged_by(baseline: Baseline) -> str:
+    return _("Judged by baseline {version}, frozen by {who}: {reason}").format(
+        version=baseline.version, who=baseline.actor, reason=baseline.reason
+    )
+
+
+def _left_out(main: View) -> tuple[str, ...]:
+    said = []
+    if main.settling:
+        said.append(_("{n} readings set the level of their edge and are judged by nothing.").format(n=main.settling))
+    if main.waiting:
+        said.append(_("{n} readings are of a subgroup that is not complete yet.").format(n=main.waiting))
+    return tuple(said)
+
+
+def _warnings(frame: Frame, baseline: Baseline) -> tuple[str, ...]:
+    said = []
+    if baseline.readings < ENOUGH_READINGS:
+        said.append(_("The baseline is provisional: it was made of {n} readings.").format(n=baseline.readings))
+    if frame.window.first <= baseline.last_sequence:
+        said.append(
+            _("Some of these readings are those that the baseline was made of: they cannot contradict it much.")
+        )
+    return tuple(said)
+
+
+def _of_baseline(baseline: Baseline) -> list[Fact]:
+    facts = [
+        Fact("baseline", _("Baseline, version"), count(baseline.version)),
+        Fact("baseline_at", _("Frozen at"), moment(baseline.at)),
+        Fact("baseline_period", _("Its period"), words(wording.period(baseline))),
+        Fact("quantity", _("What is charted"), words(wording.quantity(Quantity(baseline.quantity)))),
+        Fact("charts", _("Charts"), words(wording.baseline_chart(baseline.chart))),
+        Fact("baseline_readings", _("Readings it was made of"), count(baseline.readings)),
+        Fact("baseline_centre", _("Centre of single values"), deviation(baseline.centre, 3)),
+        Fact("baseline_sigma", _("Sigma of a single value"), width(baseline.sigma, 3)),
+    ]
+    if baseline.grouping is not None:
+        facts.insert(5, Fact("grouping", _("Subgroups"), words(wording.grouping(baseline))))
+    return facts
+
+
+def _of_view(view: View) -> list[Fact]:
+    """Points, limits and signals of one chart."""
+    name, key = wording.chart_name(view.kind), view.kind.value
+    as_value = width if view.kind in SPREAD else deviation
+
+    def limit(values: float | Floats | None) -> tuple[Value, str]:
+        if values is None or not np.size(values):
+            return as_value(None), ""
+        several = np.ptp(values) > 0
+        note = _("of the newest point: limits follow the size of the subgroups") if several else ""
+        return as_value(float(np.ravel(values)[-1]), 3), note
+
+    signal_count = sum(len(runs) for runs in view.signals.runs.values()) if view.signals else 0
+    facts = [Fact(f"{key}_points", _("{chart}: points").format(chart=name), count(len(view)))]
+    for end, title, values in (
+        ("upper", _("{chart}: upper control limit"), view.upper),
+        ("centre", _("{chart}: centre"), view.centre),
+        ("lower", _("{chart}: lower control limit"), view.lower),
+    ):
+        value, note = limit(values)
+        facts.append(Fact(f"{key}_{end}", title.format(chart=name), value, note=note))
+    return [*facts, Fact(f"{key}_signals", _("{chart}: signals").format(chart=name), count(signal_count))]
+
+
+def _kept(on_record: list[SignalRow]) -> list[Fact]:
+    """What is on record of these readings, whichever chart found it and whatever became of it."""
+    states = [row.state for row in on_record]
+    note = _("and older ones") if len(states) == MOST_SIGNALS else ""
+    return [
+        Fact("kept", _("Signals on record"), count(len(states)), note=note),
+        Fact("kept_open", _("of these not explained yet"), count(states.count("open"))),
+        Fact("kept_withdrawn", _("of these withdrawn"), count(states.count("withdrawn"))),
+    ]
+
+
+class _Row(NamedTuple):
+    """One signal: what was found, and where it is on record what was said of it."""
+
+    chart: Chart
+    told: Mapping[str, object]
+    kept: SignalRow | None
+
+
+def _rows(views: list[View], on_record: list[SignalRow]) -> Iterator[_Row]:
+    """Signals of the charts, each with the one on record that it is; then those on record of charts that are not shown here."""
+    used: set[int] = set()
+    for view in views:
+        for run in view.signals or ():
+            first, last = int(view.first[run.start]), int(view.last[run.end])
+            told = {
+                "chart": view.kind.value,
+                "rule": run.rule.value,
+                "side": run.side,
+                "first": first,
+                "last": last,
+                "points": run.points,
+            }
+            same = next(
+                (
+                    row
+                    for row in on_record
+                    if (row.signal.chart, row.signal.rule, row.signal.side) == (view.kind, run.rule, run.side)
+                    and row.signal.first_sequence <= last
+                    and row.signal.last_sequence >= first
+                ),
+                None,
+            )
+            if same is not None:
+                used.add(same.signal.id)
+            yield _Row(view.kind, told, same)
+    for row in on_record:
+        if row.signal.id not in used:
+            yield _Row(Chart(row.signal.chart), signals.told(row.signal), row)
+
+
+def _table(rows: list[_Row]) -> Table:
+    """Newest first."""
+    rows.sort(key=lambda row: (row.told["last"], row.told["first"]), reverse=True)
+    return Table(
+        (
+            Column("chart", _("Chart"), 1.2),
+            Column("rule", _("Rule"), 1.3),
+            Column("first", _("From reading"), 0.8, "right"),
+            Column("last", _("To reading"), 0.8, "right"),
+            Column("points", _("Points"), 0.6, "right"),
+            Column("what", _("What they do"), 2.4),
+            Column("number", _("On record as"), 0.8, "right"),
+            Column("state", _("State"), 0.9),
+            Column("cause", _("What it was"), 1.6),
+            Column("comment", _("Comment"), 1.6),
+            Column("by", _("By whom"), 1.0),
+        ),
+        tuple(
+            (
+                words(wording.chart_name(row.chart)),
+                words(signals.rule(row.chart, RuleName(str(row.told["rule"])))),
+                count(int(str(row.told["first"]))),
+                count(int(str(row.told["last"]))),
+                count(int(str(row.told["points"]))),
+                words(signals.what(row.told)),
+                *_said(row.kept),
+            )
+            for row in rows[:MOST_ROWS]
+        ),
+        more=max(0, len(rows) - MOST_ROWS),
+    )
+
+
+def _said(kept: SignalRow | None) -> tuple[Value, Value, Value, Value, Value]:
+    """What is on record of it; nothing of signals from before the rules looked."""
+    if kept is None:
+        return count(None), words(""), words(""), words(""), words("")
+    signal, alarm = kept.signal, kept.alarm
+    answered = alarm is not None and alarm.acknowledged_at is not None and signal.explained_at is None
+    comment = alarm.comment if answered and alarm else signal.comment
+    who = alarm.acknowledged_by if answered and alarm else signal.explained_by
+    cause = signals.cause(signal.cause) if signal.cause else ""
+    return count(signal.id), words(signals.state(kept.state)), words(cause), words(comment), words(who)
+
+
+def _picture(frame: Frame, baseline: Baseline, view: View) -> Picture:
+    name = wording.chart_name(view.kind)
+    figure = control_figure(
+        view, key=frame.standing.characteristic.key, marked=charts.marked_by(baseline), width=WIDE[0]
+    )
+    says = _("{chart} of readings {first} to {last}, with centre and limits of baseline {version}.").format(
+        chart=name, first=int(view.first[0]), last=int(view.last[-1]), version=baseline.version
+    )
+    return Picture(f"control-{view.kind.value}", name, says, figure, *WIDE, data=_data(view))
+
+
+def _data(view: View) -> Table:
+    """The points in numbers with the limits of each; the newest of very many."""
+    as_value = width if view.kind in SPREAD else deviation
+    cut = max(0, len(view) - MOST_POINTS)
+
+    def column(values: float | Floats | None) -> list[float | None]:
+        if values is None:
+            return [None] * (len(view) - cut)
+        spread_out: list[float | None] = np.broadcast_to(np.asarray(values), len(view))[cut:].tolist()
+        return spread_out
+
+    columns = (
+        Column("reading", _("Reading")),
+        Column("value", wording.chart_name(view.kind)),
+        Column("lower", _("Lower control limit")),
+        Column("centre", _("Centre")),
+        Column("upper", _("Upper control limit")),
+        Column("signal", _("Signal")),
+    )
+    signalled = np.zeros(len(view), np.bool_)
+    for run in view.signals or ():
+        signalled[run.start : run.end + 1] = True
+    rows = zip(
+        view.last[cut:].tolist(),
+        view.points[cut:].tolist(),
+        column(view.lower),
+        column(view.centre),
+        column(view.upper),
+        signalled[cut:].tolist(),
+        strict=True,
+    )
+    return Table(
+        columns,
+        tuple(
+            (
+                count(last),
+                as_value(value, 3),
+                as_value(lower, 3),
+                as_value(centre, 3),
+                as_value(upper, 3),
+                words(_("yes") if signal else ""),
+            )
+            for last, value, lower, centre, upper, signal in rows
+        ),
+        more=cut,
+    )
