@@ -67,7 +67,7 @@ def test_english_with_two_axes() -> None:
     assert a.errors == {"EY0A": 0.005, "EZ0A": -0.002, "EB0A": 0.0011, "EC0A": 0.0004}
     assert a.vectors["correction"] == (0.0, 0.005, -0.002)
     assert (a.numbers["scatter_before"], a.numbers["scatter_after"]) == (0.0071, 0.0016)
-    assert a.angles == (-30, 0, 30, 60, 90)
+    assert a.angles == (-30.0, 0.0, 30.0, 60.0, 90.0)
     assert c.numbers["backlash"] == 0.0018
     assert made.parameters == ["Q149 = 0.0005", 'QS146 = "0.00410000 -0.0023000 0.00060000 -0.0002000"']
     assert made.incidence == 0

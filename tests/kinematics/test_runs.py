@@ -136,7 +136,7 @@ class TestLimits:
 
     def test_confirmed_at_once_by_a_person_but_not_by_a_machine(self, shop: Shop) -> None:
         plan(shop, max_modification=0.012)
-        run = {"machine": shop.machine, "axes": [axis()], "confirm": "New head"}
+        run: dict[str, Any] = {"machine": shop.machine, "axes": [axis()], "confirm": "New head"}
         assert shop.call("POST", RUNS, 201, **run)["status"] == "confirmed"
         assert shop.call("POST", RUNS, 201, client=shop.machine_client, **run)["status"] == "to_confirm"
 
@@ -189,14 +189,14 @@ class TestKinematics:
 
 class TestDoor:
     def test_a_key_is_taken_once(self, shop: Shop) -> None:
-        run = {"machine": shop.machine, "axes": [axis()], "key": "452:1"}
+        run: dict[str, Any] = {"machine": shop.machine, "axes": [axis()], "key": "452:1"}
         first = shop.call("POST", RUNS, 201, **run)
         assert shop.call("POST", RUNS, 200, **run) == first
         assert shop.call("POST", RUNS, 409, **run | {"axes": [axis(seed=3)]})["run"] == first["run"]
 
     def test_machines_push_their_own_runs_only(self, shop: Shop, server: Server) -> None:
         other = Shop(server)
-        run = {"machine": shop.machine, "axes": [axis()]}
+        run: dict[str, Any] = {"machine": shop.machine, "axes": [axis()]}
         made = shop.call("POST", RUNS, 201, client=shop.machine_client, **run)
         shop.call("POST", RUNS, 403, client=other.machine_client, **run)
         shop.call("GET", f"{RUNS}/{made['run']}", 403, client=other.machine_client)
