@@ -30,7 +30,7 @@ lint: $(VENV)/installed-dev
 	@$(BIN)/lint-imports > $(VENV)/lint-imports.txt || { cat $(VENV)/lint-imports.txt; exit 1; }
 
 bench: $(VENV)/installed-dev
-	@for each in single batch chart memory spc; do $(BIN)/python -m bench.$$each; done
+	@for each in single batch chart memory spc history replay; do $(BIN)/python -m bench.$$each; done
 
 messages: $(VENV)/installed
 	@$(BIN)/pybabel -q extract -F pyproject.toml --project Inband -o frontend/locale/inband.pot .
