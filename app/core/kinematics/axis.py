@@ -8,6 +8,11 @@ t = (EX0C, EY0C, 0) is where the axis stands beside its nominal place, w = (EA0C
 domain's model: s, how far the ball lies from its nominal centre (left out with ``ball_known``), and the backlash b where
 every angle is approached from both sides (a = +1 in the positive direction, -1 in the negative: the axis lags behind).
 A and B follow by cyclic exchange of X, Y, Z. Linear least squares over all positions; lengths in mm, angles in degrees.
+
+So a table carries the ball round. Where a head turns, the ball stays, and the control, which takes the axis for nominal,
+shows it at P = p0 + s - d(φ): where the tip truly is further by d, the machine stands back by d. What is found has the
+same sign for both: t and w are from where the control believes the axis to where it is, so the kinematics gets t and w
+added. Angles count by the right hand about +X, +Y, +Z; ``reversed`` for an axis that counts against it, as many tables do.
 """
 
 from collections.abc import Sequence
@@ -36,6 +41,7 @@ FEWEST = 3
 NARROWEST_ARC = 60.0  # degrees; on less, where the axis stands and where the ball lies can hardly be told apart
 WORST_CONDITION = 1e6
 SMALLEST_RADIUS = 1.0  # mm; a ball (nearly) on the axis does not move when it turns
+ELSEWHERE, ELSEWHERE_SHARE = 10.0, 0.5  # mm and of the radius: further off, the positions are not of this axis and ball
 
 
 class AxisFault(StrEnum):
@@ -44,16 +50,28 @@ class AxisFault(StrEnum):
     TOO_FEW = "too_few_positions"
     ONE_SIDED_ARC = "one_sided_arc"
     ON_AXIS = "ball_on_axis"
+    ELSEWHERE = "elsewhere"
     RANK = "rank"
+
+
+class Carried(StrEnum):
+    """What the axis turns: the table with the ball on it, or the head with the probe while the ball stays."""
+
+    TABLE = "table"
+    HEAD = "head"
 
 
 @dataclass
 class NoAxis(Exception):
-    """These positions determine no axis. got: positions, arc (degrees), radius (mm) or condition; needed: at least."""
+    """These positions determine no axis. got: positions, arc (degrees), radius, distance (mm) or condition; needed: at least.
+
+    fits: what the positions would fit, were they sent as that: `reversed`, `head` or `table`; empty: nothing that is known.
+    """
 
     fault: AxisFault
     got: float
     needed: float
+    fits: str = ""
 
 
 class Position(NamedTuple):
@@ -129,13 +147,20 @@ def arc_of(angles: Sequence[float]) -> float:
 
 
 def estimate(
-    axis: AxisName, positions: Sequence[Position], ball: Sequence[float] | None = None, *, ball_known: bool = False
+    axis: AxisName,
+    positions: Sequence[Position],
+    ball: Sequence[float] | None = None,
+    *,
+    ball_known: bool = False,
+    carries: Carried = Carried.TABLE,
+    reversed_: bool = False,
 ) -> AxisErrors:
     """The position errors of an axis.
 
     ball: nominal centre p0 at the angle 0, from where the axis should be; the mean of the centres turned back if nobody
-    says it. ball_known: it lies there exactly, as the printed model takes it. Raises `NoAxis` for fewer than three
-    angles, an arc below 60°, or a ball on the axis.
+    says it. ball_known: it lies there exactly, as the printed model takes it. carries: what the axis turns. reversed_: its
+    angles count against the right hand. Raises `NoAxis` for fewer than three angles, an arc below 60°, a ball on the axis,
+    or centres that lie nowhere near.
 
     >>> seen = [Position(φ, tuple(rotation("C", φ) @ (100, 0, 50) + (1 - c, -s, 0))) for φ, c, s in
     ...         [(0, 1, 0), (90, 0, 1), (180, -1, 0), (270, 0, -1)]]
@@ -150,16 +175,13 @@ def estimate(
     arc = arc_of(angles)
     if arc < NARROWEST_ARC:
         raise NoAxis(AxisFault.ONE_SIDED_ARC, arc, NARROWEST_ARC)
-    order = _order(axis)
-    turns = np.array([_about_third(angle) for angle in angles])
+    order, sense, head = _order(axis), -1 if reversed_ else 1, carries is Carried.HEAD
+    turns = np.array([_about_third(sense * angle) for angle in angles])
     seen = np.array([each.centre for each in positions], dtype=np.float64)[:, order]
-    nominal = np.einsum("nji,nj->ni", turns, seen).mean(axis=0) if ball is None else np.array(ball, float)[order]
-    if hypot(nominal[0], nominal[1]) < SMALLEST_RADIUS:
-        raise NoAxis(AxisFault.ON_AXIS, hypot(nominal[0], nominal[1]), SMALLEST_RADIUS)
-    approaches = np.array([each.approach for each in positions], dtype=np.float64)
+    nominal, deviations = _near(seen, turns, None if ball is None else np.array(ball, float)[order], head=head)
+    approaches = sense * np.array([each.approach for each in positions], dtype=np.float64)
     both = bool((approaches > 0).any() and (approaches < 0).any())
-    deviations = seen - turns @ nominal
-    columns = _columns(turns, nominal, approaches if both else None, ball_known=ball_known)
+    columns = _columns(turns, nominal, approaches if both else None, ball_known=ball_known, head=head)
     solved, spread, condition, noise, freedom = _solve(columns, deviations.ravel())
     residuals = deviations - (columns @ solved).reshape(-1, 3)
     values = [Estimate(float(v) + 0.0, float(s)) for v, s in zip(solved, spread, strict=True)]
@@ -169,11 +191,13 @@ def estimate(
         by_letter = dict(zip(order, values[-3:], strict=True))
         shift = (by_letter[0], by_letter[1], by_letter[2])
     leaning = np.array([solved[3], -solved[2]]) * nominal[2]  # where the axis stands at the height of the ball
-    centre = nominal[:2] - solved[:2] - leaning + (0 if ball_known else solved[-3:-1])
+    centre = nominal[:2] - solved[:2] - leaning + (0 if ball_known or head else solved[-3:-1])
     radius = hypot(float(centre[0]), float(centre[1]))
-    tangents = np.cross([0.0, 0.0, 1.0], turns @ nominal)
+    if radius < SMALLEST_RADIUS:
+        raise NoAxis(AxisFault.ON_AXIS, radius, SMALLEST_RADIUS)
+    tangents = np.cross([0.0, 0.0, -1.0 if head else 1.0], turns @ nominal)
     lengths = np.linalg.norm(tangents, axis=1)
-    turning = np.degrees((residuals * tangents).sum(axis=1) / lengths**2)
+    turning = sense * np.degrees((residuals * tangents).sum(axis=1) / lengths**2)
     before, after = np.linalg.norm(deviations, axis=1), np.linalg.norm(residuals, axis=1)
     return AxisErrors(
         axis=axis,
@@ -197,6 +221,26 @@ def estimate(
     )
 
 
+def _near(seen: Floats, turns: Floats, ball: Floats | None, *, head: bool) -> tuple[Floats, Floats]:
+    """The nominal ball and the deviations from it. Raises `NoAxis` for a ball on the axis, or centres of something else."""
+    back = turns.transpose(0, 2, 1)
+    still = np.broadcast_to(np.eye(3), turns.shape)
+    found = {}
+    for name, way in (("table", turns), ("reversed", back), ("head", still)):
+        nominal = np.einsum("nji,nj->ni", way, seen).mean(axis=0) if ball is None else ball
+        deviations = seen - way @ nominal
+        far = _rms(np.linalg.norm(deviations, axis=1))
+        found[name] = (nominal, deviations, far, max(ELSEWHERE, ELSEWHERE_SHARE * hypot(nominal[0], nominal[1])))
+    nominal, deviations, far, most = found["head" if head else "table"]
+    if far > most:
+        fits = [name for name, (_nominal, _off, away, permitted) in found.items() if away < permitted]
+        raise NoAxis(AxisFault.ELSEWHERE, far, most, fits[0] if fits else "")
+    radius = hypot(nominal[0], nominal[1])
+    if radius < SMALLEST_RADIUS:
+        raise NoAxis(AxisFault.ON_AXIS, radius, SMALLEST_RADIUS)
+    return nominal, deviations
+
+
 def _order(axis: AxisName) -> list[int]:
     """Which of X, Y, Z stand first, second and third when the axis is taken for the third: the cyclic exchange."""
     third = AXES.index(axis)
@@ -208,15 +252,17 @@ def _about_third(angle: float) -> Floats:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _columns(turns: Floats, ball: Floats, approaches: Floats | None, *, ball_known: bool) -> Floats:
+def _columns(turns: Floats, ball: Floats, approaches: Floats | None, *, ball_known: bool, head: bool) -> Floats:
     """The design: three rows for each position; columns t1, t2, w1, w2, then b and s where they are looked for."""
     eye, turned = np.eye(3), turns @ ball
     columns = [eye[:, k] - turns[:, :, k] for k in (0, 1)]
     columns += [np.cross(eye[k], turned) - turns @ np.cross(eye[k], ball) for k in (0, 1)]
     if approaches is not None:
         columns.append(-approaches[:, None] / 2 * np.cross(eye[2], turned))
+    if head:
+        columns = [-each for each in columns]
     if not ball_known:
-        columns += [turns[:, :, k] for k in range(3)]
+        columns += [np.broadcast_to(eye[:, k], turned.shape) if head else turns[:, :, k] for k in range(3)]
     return np.stack(columns, axis=-1).reshape(-1, len(columns))
 
 
