@@ -13,7 +13,7 @@ from zoneinfo import ZoneInfo
 from app.web.i18n import _
 from app.web.numbers import MINUS, NO_BREAK_SPACE, NOTHING, signed
 
-Kind = Literal["text", "count", "deviation", "width", "size", "number", "share", "moment"]
+Kind = Literal["text", "count", "deviation", "width", "size", "number", "probability", "share", "moment"]
 LONGEST = 500  # letters of a text in a cell
 UNITS: dict[Kind, str] = {"deviation": "µm", "width": "µm", "size": "mm", "share": "%"}
 
@@ -22,7 +22,8 @@ UNITS: dict[Kind, str] = {"deviation": "µm", "width": "µm", "size": "mm", "sha
 class Value:
     """One value. Lengths are kept in mm, shares of 1, moments as ISO 8601 in UTC; None where there is none.
 
-    deviation: in µm with its sign; width: in µm without one; size: in mm; number: without a unit.
+    deviation: in µm with its sign; width: in µm without one; size: in mm; number: without a unit; probability: one, too,
+    of which a very small one is never shown as none.
     """
 
     kind: Kind
@@ -53,7 +54,7 @@ class Value:
 
         >>> Value("deviation", -0.0061).words(ZoneInfo("UTC")), Value("share", 0.99996).words(ZoneInfo("UTC"))
         ('−6.1\xa0µm', '99.9\xa0%')
-        >>> Value("number", 0.00001, 4).words(ZoneInfo("UTC"))
+        >>> Value("probability", 0.00001, 4).words(ZoneInfo("UTC"))
         '<\xa00.0001'
         """
         if self.value is None or self.value == "":
@@ -72,7 +73,8 @@ class Value:
                 text = signed(number, self.decimals)
             case _:
                 text = f"{number:.{self.decimals}f}".replace("-", MINUS)
-                if number > 0 and not float(f"{number:.{self.decimals}f}"):  # a small p is not none
+                small = number >= 0 if self.kind == "probability" else number > 0
+                if small and not float(f"{number:.{self.decimals}f}"):
                     text = f"<{NO_BREAK_SPACE}{10**-self.decimals:.{self.decimals}f}"
         return f"{text}{NO_BREAK_SPACE}{self.unit}" if self.unit else text
 
@@ -105,6 +107,11 @@ def size(length: float | None, decimals: int = 4) -> Value:
 def number(value: float | None, decimals: int = 3) -> Value:
     """A number without a unit."""
     return Value("number", _finite(value), decimals)
+
+
+def probability(value: float | None) -> Value:
+    """A p-value."""
+    return Value("probability", _finite(value), 4)
 
 
 def share(value: float | None) -> Value:

@@ -13,6 +13,7 @@ from app.reports.drawing.axes import Axis, axis_of, position, spread
 from app.reports.drawing.marks import Anchor, Area, Box, Drawing, Group, Line, Mark, Place, Words, symbol
 
 INK, QUIET = "#1d2328", "#5a646c"
+LEGEND_GAP = 24  # between two entries, pixels
 LETTER = 0.54  # of its size that a letter is wide, about
 DASHES = {"dot": (1.5, 3.0), "dash": (7.0, 4.0), "dashdot": (7.0, 3.0, 1.5, 3.0), "longdash": (12.0, 5.0)}
 ANCHORS: dict[str, Anchor] = {"left": "start", "right": "end", "center": "middle"}
@@ -219,6 +220,9 @@ class _Plot:
         size = float((described.get("font") or {}).get("size") or 12)
         traces = [trace for trace in self.traces if trace.get("showlegend", True) and trace.get("name")]
         x, y = self.box.left, self.box.top - 10
+        room = sum(24 + len(str(trace["name"])) * size * LETTER + LEGEND_GAP for trace in traces) - LEGEND_GAP
+        if x + room > self.drawing.width:  # one row: begun further left, and as small as that takes
+            x, size = 8.0, size * min(1.0, (self.drawing.width - 16) / room)
         marks: list[Mark] = []
         for trace in sorted(traces, key=lambda trace: trace.get("legendrank", 1000)):
             line, marker = trace.get("line") or {}, trace.get("marker") or {}
@@ -249,7 +253,7 @@ class _Plot:
                     (None, 1),
                 )
             marks.append(Words((x + 24, y), str(trace["name"]), size, QUIET))
-            x += 24 + len(str(trace["name"])) * size * LETTER + 22
+            x += 24 + len(str(trace["name"])) * size * LETTER + LEGEND_GAP
         return marks
 
 

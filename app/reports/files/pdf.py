@@ -126,6 +126,7 @@ TITLE = _style("title", 19, 23, fontName=BOLD)
 HEADING = _style("heading", 12.5, 16, fontName=BOLD, spaceBefore=14, spaceAfter=4, keepWithNext=1)
 TEXT = _style("text", 8.5, 11.5, textColor=QUIET, spaceAfter=2)
 WARNING = _style("warning", 8.5, 11.5, textColor=ATTENTION, fontName=BOLD, spaceAfter=2)
+CAPTION = _style("caption", 9, 12, fontName=BOLD, spaceBefore=8)
 CELL = _style("cell", 7, 8.8)
 NUMBER = _style("number", 7, 8.8, alignment=TA_RIGHT)
 HEAD, HEAD_RIGHT = (
@@ -156,24 +157,25 @@ def _section(report: Report, section: Section, width: float) -> list[Flowable]:
         pair = [[_facts(report, section.facts, width * SIDE, 1), _chart(beside, room)]]
         begin.append(Grid(pair, colWidths=[width * SIDE + 10, room], style=_BESIDE))
     elif section.facts:
-        story.append(_facts(report, section.facts, width, 2))
-    for picture in section.pictures:
-        if picture is not beside:
-            story += [Spacer(0, 4), _chart(picture, width)]
+        begin.append(_facts(report, section.facts, width, 2))
+    wide = [picture for picture in section.pictures if picture is not beside]
+    for picture in wide:
+        named = [Paragraph(markup(picture.title), CAPTION)] if len(wide) > 1 else [Spacer(0, 4)]
+        story.append(KeepTogether([*named, _chart(picture, width)]))
     table = section.table
     if table is not None and table.rows:
         story += [Spacer(0, 5), _table(report, table, width)]
     if table is not None and table.more:
         story.append(Paragraph(markup(_("… and {n} older ones.").format(n=table.more)), TEXT))
-    # A heading stands with what it is the heading of.
-    return [KeepTogether(begin), *story] if beside is not None else [CondPageBreak(_least(section)), *begin, *story]
+    # A heading stands with what it is the heading of; names and values are read downward, so they are not parted either.
+    return [KeepTogether(begin), *story] if section.facts else [CondPageBreak(_least(section, width)), *begin, *story]
 
 
-def _least(section: Section) -> float:
+def _least(section: Section, width: float) -> float:
     """How much room there must be below a heading for it to stand there, points."""
     lines = len(section.sentences) + 1.3 * len(section.warnings)
-    if section.pictures and not section.facts:
-        return 90 + 14 * lines + max(picture.height * 0.55 for picture in section.pictures)
+    if section.pictures:
+        return 44 + 14 * lines + max(picture.height / picture.width for picture in section.pictures) * width
     return 110 + 14 * lines
 
 
@@ -224,11 +226,28 @@ def _facts(report: Report, facts: Sequence[Fact], width: float, columns: int) ->
     return LongTable(rows, colWidths=widths, style=TableStyle([*rules, *padding]), hAlign="LEFT")
 
 
+def _widths(report: Report, table: Table, width: float) -> list[float]:
+    """By the shares of the columns, but none narrower than its longest word: numbers are not parted from their units."""
+    columns = [table.columns[at] for at in table.filled]
+    shares = sum(column.share for column in columns)
+    least = []
+    for column, at in zip(columns, table.filled, strict=True):
+        said = [report.words(row[at]) for row in table.rows]
+        longest = max((width_of(word, 7) for text in said for word in text.split(" ")), default=0.0)
+        heading = max(width_of(word, 7, bold=True) for word in column.name.split(" "))
+        least.append(min(max(longest, heading) + 7.5, width * 0.3))
+    if sum(least) >= width:
+        return [width * each / sum(least) for each in least]
+    # What is beyond the least is given by the shares, to those that would get less than it first.
+    wanted = [max(width * column.share / shares, low) for column, low in zip(columns, least, strict=True)]
+    over, spare = sum(wanted) - width, [want - low for want, low in zip(wanted, least, strict=True)]
+    return [want - over * room / sum(spare) if over > 0 else want for want, room in zip(wanted, spare, strict=True)]
+
+
 def _table(report: Report, table: Table, width: float) -> Flowable:
     """Its heading stands on every page; a row is never parted."""
     columns = [table.columns[at] for at in table.filled]
-    shares = sum(column.share for column in columns)
-    widths = [width * column.share / shares for column in columns]
+    widths = _widths(report, table, width)
     heading = [Paragraph(markup(column.name), HEAD_RIGHT if column.aligned == "right" else HEAD) for column in columns]
     rows = [
         [
@@ -244,7 +263,7 @@ def _table(report: Report, table: Table, width: float) -> Flowable:
         ("VALIGN", (0, 0), (-1, -1), "TOP"),
         ("TOPPADDING", (0, 0), (-1, -1), 1.8),
         ("BOTTOMPADDING", (0, 0), (-1, -1), 2.2),
-        ("LEFTPADDING", (0, 0), (-1, -1), 2.5),
-        ("RIGHTPADDING", (0, 0), (-1, -1), 2.5),
+        ("LEFTPADDING", (0, 0), (-1, -1), 4),
+        ("RIGHTPADDING", (0, 0), (-1, -1), 3),
     ])  # fmt: skip
     return LongTable([heading, *rows], colWidths=widths, repeatRows=1, style=style, hAlign="LEFT")

@@ -5,7 +5,7 @@ from app.capability import wording
 from app.capability.queries import Study
 from app.core.spc.capability import Index
 from app.core.spc.refusal import Refused
-from app.reports.content import Fact, Section, count, deviation, number, width, words
+from app.reports.content import Fact, Section, count, deviation, number, probability, width, words
 from app.reports.queries.frame import Frame
 from app.statistics import wording as statistics
 from app.web.i18n import _
@@ -88,7 +88,7 @@ def _spread(study: Study) -> list[Fact]:
     for test in (study.anderson, study.shapiro):
         if not isinstance(test, Refused):
             facts.append(Fact(test.test, wording.normality_name(test.test), number(test.statistic, 4)))
-            facts.append(Fact(f"{test.test}_p", _("p, normal distribution"), number(test.p_value, 4)))
+            facts.append(Fact(f"{test.test}_p", _("p, normal distribution"), probability(test.p_value)))
     for key, name, sequences in (
         ("excluded", _("Left out: excluded"), study.excluded),
         ("faults", _("Left out: probe faults"), study.faults),

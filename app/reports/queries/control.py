@@ -194,7 +194,7 @@ def _table(rows: list[_Row]) -> Table:
     return Table(
         (
             Column("chart", _("Chart"), 1.2),
-            Column("rule", _("Rule"), 1.3),
+            Column("rule", _("Rule"), 1.9),
             Column("first", _("From reading"), 0.8, "right"),
             Column("last", _("To reading"), 0.8, "right"),
             Column("points", _("Points"), 0.6, "right"),

@@ -187,7 +187,7 @@ def decisions(frame: Frame) -> Section | None:
             Column("reading", _("Reading"), 0.8, "right"),
             Column("measured_at", _("Measured at"), 1.2),
             Column("part", _("Part"), 1.3),
-            Column("measured", _("Size"), 1.0, "right"),
+            Column("measured", _("Size"), 1.2, "right"),
             Column("deviation", _("Deviation"), 0.8, "right"),
             Column("zone", _("Zone"), 0.8),
             Column("correction", _("Correction"), 0.9, "right"),
