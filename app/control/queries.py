@@ -24,6 +24,8 @@ from app.web.i18n import _
 
 LOOK_BACK = 100_000
 """Readings before the window that are looked through for what its first points need: the beginning of the edge, of the subgroup."""
+LOOK_AHEAD = 1_000
+"""Readings after the window that tell whether its last subgroup, by pause or part, ends in it; by size, so many."""
 
 
 def baseline_in_force(session: Session, characteristic: Characteristic) -> Baseline | None:
@@ -116,7 +118,12 @@ def charted(session: Session, standing: Standing, baseline: Baseline, window: Wi
 
 def read_back(session: Session, standing: Standing, baseline: Baseline, window: Window) -> Read:
     """The readings of the window, and those before it without which its first point would be another one."""
-    return read(session, standing, baseline, Window(_earliest(baseline, window), window.last, window.newest))
+    return read(session, standing, baseline, _to_read(baseline, window))
+
+
+def _to_read(plan: Plan, window: Window) -> Window:
+    ahead = 0 if plan.grouping is None else plan.group_size or LOOK_AHEAD
+    return Window(_earliest(plan, window), min(window.newest, window.last + ahead), window.newest)
 
 
 def _earliest(plan: Plan, window: Window) -> int:
@@ -141,21 +148,21 @@ def series_of(baseline: Baseline, made: Read) -> Series:
 
 
 def points_of(baseline: Baseline, made: Read, window: Window) -> Charted:
-    """Readings as points; those whose last reading lies in the window."""
+    """Readings as points; those whose last reading lies in the window. made: what `read_back` gives for it."""
     series = series_of(baseline, made)
     kept = np.isin(made.series.sequence, series.sequence, assume_unique=True)
-    inside = made.series.sequence >= window.first
+    inside = (made.series.sequence >= window.first) & (made.series.sequence <= window.last)
     settling = int((inside & ~kept).sum()) if baseline.quantity == Quantity.WEAR_RESIDUALS else 0
     shown = Read(series, made.measured_at[kept], made.labels[kept], made.unknown, made.taken_out)
     if baseline.grouping is None:
         return _singly(baseline, made, shown, window, settling)
-    number, waiting = groups_of(baseline, shown, window.newest)
+    number, waiting = groups_of(baseline, shown, _to_read(baseline, window))
     complete = number >= 0
     starts = np.flatnonzero(np.diff(number[complete], prepend=-1))
     lasts = np.append(starts[1:], complete.sum())[: len(starts)] - 1
     sequence, at = series.sequence[complete], shown.measured_at[complete]
     # A subgroup that began before what was read is not whole, unless it begins exactly there.
-    points = sequence[lasts] >= window.first if len(lasts) else np.zeros(0, np.bool_)
+    points = (sequence[lasts] >= window.first) & (sequence[lasts] <= window.last)
     groups = None
     if len(starts):
         whole = subgroups(series.values[complete], lasts - starts + 1)
@@ -163,6 +170,7 @@ def points_of(baseline: Baseline, made: Read, window: Window) -> Charted:
     starts, lasts = starts[points], lasts[points]
     begins = np.add.reduceat(series.begins[complete].astype(np.int64), starts) > 0 if len(starts) else points
     chart = shewhart.means(judged_by(baseline), groups) if groups is not None and len(starts) else None
+    wanted = series.sequence <= window.last
     return Charted(
         baseline,
         chart,
@@ -172,12 +180,18 @@ def points_of(baseline: Baseline, made: Read, window: Window) -> Charted:
         at[lasts],
         lasts - starts + 1,
         begins,
-        series,
-        shown.measured_at,
-        made,
+        series.only(wanted),
+        shown.measured_at[wanted],
+        _through(made, window.last),
         waiting,
         settling,
     )
+
+
+def _through(made: Read, last: int) -> Read:
+    """Without what was read of the time after the window."""
+    wanted = made.series.sequence <= last
+    return Read(made.series.only(wanted), made.measured_at[wanted], made.labels[wanted], made.unknown, made.taken_out)
 
 
 def _singly(baseline: Baseline, made: Read, shown: Read, window: Window, settling: int) -> Charted:

@@ -138,12 +138,12 @@ def _labels(session: Session, standing: Standing, window: Window, sequence: Whol
     return ids[np.searchsorted(np.array(starts, np.int64), sequence, side="right")]
 
 
-def groups_of(plan: Plan, made: Read, newest: int) -> tuple[Whole, int]:
+def groups_of(plan: Plan, made: Read, window: Window) -> tuple[Whole, int]:
     """To which subgroup each value belongs (numbers that grow), -1 for those of the last one that is not complete.
 
     Subgroups of n readings are counted from the first reading of the baseline's period, and anew from the first one after
     it; so the same readings make the same subgroup whichever of them are looked at. What was excluded makes its subgroup
-    smaller. The second number: how many readings the incomplete subgroup has.
+    smaller. window: what was read, to its end. The second number: how many readings the newest subgroup has so far.
     """
     sequence = made.series.sequence
     if not len(sequence):
@@ -154,15 +154,17 @@ def groups_of(plan: Plan, made: Read, newest: int) -> tuple[Whole, int]:
         start = np.where(after, plan.last_sequence + 1, plan.first_sequence)
         block = (sequence - start) // size
         ends = start + (block + 1) * size - 1
-        complete = ends <= np.where(after, newest, plan.last_sequence)
+        complete = ends <= np.where(after, window.last, min(window.last, plan.last_sequence))
     else:
         complete = np.ones(len(sequence), np.bool_)
         block = _parted(plan, made)
-        complete[(block == block[-1]) & after] = False  # it may still grow
+        if after[-1] or window.last < plan.last_sequence:
+            complete[(block == block[-1]) & (after == after[-1])] = False  # it may still grow
     changes = np.ones(len(sequence), np.bool_)
     changes[1:] = (np.diff(block) != 0) | (np.diff(after.astype(np.int8)) != 0)
     number = np.cumsum(changes) - 1
-    waiting = int((~complete & (number == number[-1])).sum())
+    grows = window.last == window.newest and after[-1]
+    waiting = int((~complete & (number == number[-1])).sum()) if grows else 0
     return np.where(complete, number, -1), waiting
 
 

@@ -209,13 +209,14 @@ class _Look:
         new = [rows[key] for key in added]
         self.session.add_all(new)
         self.session.flush()
-        alarming = [
-            rows[key]
-            for key in added
-            if self.watched.rules[key[0]][key[1]].do is Do.ALARM and found[key].last > self.heard
-        ]
+        alarming = [rows[key] for key in added if self._alarms(key, found[key])]
         grown = [row for row in changed if row.alarm is not None]
         return _Kept([row.id for row in (*new, *changed, *gone)], alarming, grown)
+
+    def _alarms(self, key: Key, run: Found) -> bool:
+        """Not of readings that were there before the rule, the baseline, or the look before this one."""
+        setting = self.watched.rules[key[0]][key[1]]
+        return setting.do is Do.ALARM and run.last > max(self.heard, setting.since)
 
     def _matched(self, before: list[Signal], found: dict[Key, Found]) -> dict[Key, Signal]:
         """The signals that these runs are: those that begin there, else the first that shares readings with it."""
