@@ -16,7 +16,8 @@ from app.db.events import publish
 from app.errors import Conflict
 from app.formats.values import Unreadable, moment
 from app.kinematics import queries, wording
-from app.kinematics.evaluation import Evaluated, Limits, evaluate
+from app.kinematics.evaluation import evaluate
+from app.kinematics.outcome import Evaluated, Limits
 from app.kinematics.queries import RunRow
 from app.kinematics.schemas import PlanIn, RunIn
 from app.kinematics.tables import KinematicsBackup, KinematicsDecision, KinematicsPlan, KinematicsRun

@@ -15,6 +15,7 @@ Status = Literal["refused", "to_confirm", "confirmed", "measured", "entered"]
 
 AXIS: dict[str, JsonValue] = {
     "axis": "C",
+    "carries": "table",
     "errors": {
         "EX0C": {"value": 0.0123, "deviation": 0.0008},
         "EY0C": {"value": -0.0081, "deviation": 0.0008},
@@ -107,7 +108,14 @@ class AxisOut(BaseModel):
     """One rotary axis, with everything that the control's protocol has."""
 
     axis: AxisName
-    errors: Annotated[dict[str, EstimateOut], Field(description="EX0C EY0C EA0C EB0C of C; cyclic for A and B.")]
+    carries: Annotated[str | None, Field(description="table or head; none where the control has reckoned it.")] = None
+    errors: Annotated[
+        dict[str, EstimateOut],
+        Field(
+            description="EX0C EY0C EA0C EB0C of C; cyclic for A and B. From where the control believes the axis to where it "
+            "is: what has to be added to its kinematics."
+        ),
+    ]
     backlash: EstimateOut | None
     scatter_before: Annotated[float | None, Field(description="Q141 to Q143: rms of the deviations.")]
     scatter_after: Annotated[float | None, Field(description="Q144 to Q146: rms of what the errors leave.")]

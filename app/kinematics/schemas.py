@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import ConfigDict, Field, JsonValue, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.core.kinematics.axis import AxisName
+from app.core.kinematics.axis import AxisName, Carried
 from app.core.parameters import LARGEST_LENGTH
 from app.kinematics.values import UNITS
 from app.web.fields import Body, LatelyOrNow, Reason, Slug, Text200
@@ -83,8 +83,32 @@ class AxisIn(Body):
             strict=True, description="The ball lies exactly there; else how far it lies beside is estimated as well."
         ),
     ] = False
+    carries: Annotated[
+        Carried,
+        Field(
+            description="table: the axis turns the table with the ball on it. head: it turns the head with the probe, the ball "
+            "stays, and the centres are those that the control shows."
+        ),
+    ] = Carried.TABLE
+    reversed: Annotated[
+        bool,
+        Field(strict=True, description="Its angles count against the right hand about +X, +Y, +Z, as many tables do."),
+    ] = False
     incidence: Annotated[Angle | None, Field(description="Q413, Q417, Q421.")] = None
     position: Annotated[Point | None, Field(description="Where the kinematics has the axis now, X Y Z, mm.")] = None
+    seen_from: Annotated[
+        Literal["axis", "machine"],
+        Field(
+            description="axis: centres, touches and ball count from where the axis should stand. machine: they are in the "
+            "same coordinates as `position`, which is needed then."
+        ),
+    ] = "axis"
+
+    @model_validator(mode="after")
+    def _place_is_said(self) -> Self:
+        if self.seen_from == "machine" and self.position is None:
+            raise PydanticCustomError("position", _("say position: where the kinematics has the axis now"))
+        return self
 
 
 class ShiftIn(Body):

@@ -35,6 +35,13 @@ def written(name: str, value: float | None) -> str:
     return mm(value) if name.startswith("radius") else um(value)
 
 
+def entered(name: str, value: float | None) -> str:
+    """A position error as it is entered on the control: mm or degrees, with its sign."""
+    if value is None or UNITS.get(name) == "°":
+        return angle(value)
+    return f"{signed(value, 4)}{NO_BREAK_SPACE}mm"
+
+
 def limit(name: str, value: float) -> str:
     """A limit of a value, both sides at once."""
     return f"±{value:g}{NO_BREAK_SPACE}°" if UNITS.get(name) == "°" else um_limit(value)
@@ -84,12 +91,24 @@ def no_axis(axis: str, fault: NoAxis) -> str:
         AxisFault.ON_AXIS: _(
             "the ball lies {got} mm from axis {axis} and hardly moves when it turns; {needed} mm are needed"
         ),
+        AxisFault.ELSEWHERE: _(
+            "the centres lie {got} mm from where axis {axis} would bring the ball, {needed} mm at most could be an error"
+        ),
         AxisFault.RANK: _("the positions of axis {axis} do not tell all errors apart (condition {got})"),
     }[fault.fault].format(**values)
 
 
 def what_axis_needs(fault: NoAxis) -> str:
     """What to do about it."""
+    if fault.fault is AxisFault.ELSEWHERE:
+        return {
+            "reversed": _("They fit an axis that counts the other way round: set `reversed`."),
+            "head": _("They fit a ball that stays while the head turns: set `carries` to head."),
+            "table": _("They fit a ball that turns with the table: set `carries` to table, or leave `reversed` out."),
+        }.get(
+            fault.fits,
+            _("Check angles, nominal ball and the coordinates: `seen_from` machine takes them from `position`."),
+        )
     if fault.fault is AxisFault.ON_AXIS:
         return _("Clamp the ball further out on the table.")
     return _("Measure at three angles or more, over as wide an arc as the axis permits.")
