@@ -1,5 +1,6 @@
 """What the pages ask before a run is confirmed or entered, or a kinematics is put back."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from app.core.kinematics.axis import ERRORS
@@ -7,7 +8,7 @@ from app.errors import Conflict, NotFound
 from app.kinematics import wording
 from app.kinematics.queries import RunRow
 from app.kinematics.tables import KinematicsBackup
-from app.kinematics.values import errors_of
+from app.kinematics.values import UNITS, errors_of
 from app.web.fields import Reason
 from app.web.i18n import _
 from app.web.validation import checked
@@ -40,7 +41,7 @@ def about_run(row: RunRow, what: str) -> Question:
             raise Conflict(*wording.cannot_enter(row))
         values = errors_of(row.run.results)
         follows = [
-            "{}: {}".format(axis, ", ".join(f"{n} {wording.written(n, values[n])}" for n in names if n in values))
+            "{}: {}".format(axis, ", ".join(f"{n} {wording.entered(n, values[n])}" for n in names if n in values))
             for axis, names in ERRORS.items()
             if any(n in values for n in names)
         ]
@@ -51,18 +52,26 @@ def about_run(row: RunRow, what: str) -> Question:
             follows,
             [_("Monthly check"), _("Drift"), _("Head changed"), _("After a collision")],
         )
-    raise NotFound(_("There is nothing at this address."), _("Go back to the rotary axes."))
+    raise nothing_here()
 
 
-def about_backup(old: KinematicsBackup) -> Question:
-    """Asks before a kinematics is put back."""
-    said = ", ".join(f"{name} {wording.written(name, value)}" for name, value in old.errors.items())
+def about_backup(old: KinematicsBackup, now: Mapping[str, float]) -> Question:
+    """Asks before a kinematics is put back; now: what is entered at present with that head."""
+    differing = [name for name in UNITS if old.errors.get(name, 0.0) != now.get(name, 0.0)]
+    follows = [
+        _("{name}: {now} becomes {then}").format(
+            name=name,
+            now=wording.entered(name, now.get(name, 0.0)),
+            then=wording.entered(name, old.errors.get(name, 0.0)),
+        )
+        for name in differing
+    ] or [_("Its values are those that are in effect.")]
     return Question(
         _("Put back kinematics {n}?").format(n=old.version),
         _("It is put back"),
         [
-            _("Entered so far it has {what}.").format(what=said or _("nothing")),
-            _("Put it back on the control as well (cycle 450)."),
+            *follows,
+            _("Put it back on the control as well (cycle 450): nothing is sent to it from here."),
             _("That becomes a new version; nothing is lost."),
         ],
         [_("Worse than before"), _("Old head is in again"), _("Entered by mistake")],
@@ -71,4 +80,22 @@ def about_backup(old: KinematicsBackup) -> Question:
 
 def reason(text: str) -> str:
     """Why, as people chose or typed it. Raises `Invalid`."""
-    return checked(Reason, text, "reason")
+    return str(checked(Reason, text, "reason"))
+
+
+def nothing_here() -> NotFound:
+    """For addresses that no page is at."""
+    return NotFound(_("There is nothing at this address."), _("Go back to the rotary axes."))
+
+
+def done(what: str, number: int | None) -> str | None:
+    """What has just been done, in words."""
+    text = {
+        "taken": _("Run {n} is stored."),
+        "again": _("Run {n} was stored before; nothing happened now."),
+        "confirm": _("Run {n} is confirmed: it may be entered on the control."),
+        "enter": _("Run {n} is entered. The kinematics before and after is backed up."),
+        "restore": _("The kinematics is put back; it is version {n} now."),
+        "plan": _("The limits are set; they hold from the next run on."),
+    }.get(what)
+    return None if text is None else text.format(n=number or "")

@@ -1,17 +1,32 @@
-"""What people type about rotary axes: a protocol sent as a file, parameters or positions pasted, limits one a line."""
+"""What people type about rotary axes: a protocol, parameters, ball centres or touches in a grid, limits one a line."""
 
 from collections.abc import Mapping
-from typing import Any
+from datetime import UTC
+from typing import Any, NamedTuple
+from zoneinfo import ZoneInfo
 
 from app.errors import FieldError, Invalid
+from app.formats.values import Unreadable, moment, zone_named
 from app.kinematics.tables import KinematicsPlan
 from app.web.forms import length
 from app.web.i18n import _
 
 NUMBERS = ("ball_radius", "max_modification", "max_modification_angle", "max_dev_cal_ball")
-MOST_LINES = 2_000
+WAYS = ("protocol", "pasted", "positions", "shift")
+COLUMNS = ("axis", "angle", "from", "x", "y", "z")
+TEXTS = ("program", "tool", "kinematics", "mode", "head")
+SETTINGS = ("ball_radius", "tip_radius", "clearance", "retract_height", "feed", "reference_angle", "backlash_angle")
+LINES, MOST_LINES, MOST_PASTED = 12, 120, 2_000
 FEWEST_TOUCHES = 4
-SIGNS = {"+": "positive", "-": "negative", "\N{MINUS SIGN}": "negative"}
+SIGNS = {"": None, "+": "positive", "-": "negative", "\N{MINUS SIGN}": "negative"}
+
+
+class Line(NamedTuple):
+    """A line of the grid or of what was pasted; where: the field of the form that it stands in."""
+
+    where: str
+    number: int
+    cells: list[str]
 
 
 def decoded(content: bytes) -> str:
@@ -24,56 +39,176 @@ def decoded(content: bytes) -> str:
         return content.decode("cp1252", errors="replace").replace("\0", "")
 
 
-def run(form: Mapping[str, str], machine: str, protocol: str) -> dict[str, Any]:
-    """The form of a run as the API's fields. Raises `Invalid` for a line that is no position."""
-    made: dict[str, Any] = {
-        "machine": machine,
-        "head": form.get("head"),
-        "measured_at": form.get("measured_at"),
-        "protocol": protocol or None,
-        "pasted": form.get("pasted", "").strip() or None,
-    }
-    if form.get("positions", "").strip():
-        made["axes"] = [_axis(form)]
-    if not (made["protocol"] or made["pasted"] or "axes" in made):
-        wrong = _("choose the protocol of the control, or paste parameters or positions")
-        raise Invalid(f"file: {wrong}.", errors=[FieldError("file", wrong)])
+def way(form: Mapping[str, str]) -> str:
+    """How the run is entered."""
+    return form["as"] if form.get("as") in WAYS else WAYS[0]
+
+
+def run(form: Mapping[str, str], confirm: str | None = None) -> dict[str, Any]:
+    """The form of a run as the API's fields. Raises `Invalid` for what is missing, and for lines that are no position."""
+    made: dict[str, Any] = {"machine": form.get("machine"), "confirm": confirm, "measured_at": _moment(form)}
+    made |= {name: form.get(name, "").strip() for name in TEXTS}
+    made |= {name: length(form.get(name)) for name in SETTINGS}
+    touches = form.get("touches_per_ball", "").strip()
+    made["touches_per_ball"] = int(touches) if touches.isascii() and touches.isdigit() else touches
+    match way(form):
+        case "positions":
+            made["axes"] = _axes(form)
+        case "shift":
+            nominal, found = _points(form, "nominal"), _points(form, "found")
+            made["shift"] = {"nominal": nominal[0] if nominal else []}
+            made["shift"] |= {"centre": found[0]} if len(found) == 1 else {"touches": found}
+        case kind:
+            made[kind] = form.get(kind, "").strip()
+            if not made[kind]:
+                wrong = _("choose the file of the protocol, or paste its text")
+                wrong = wrong if kind == "protocol" else _("paste the result parameters")
+                raise Invalid(f"{kind}: {wrong}.", errors=[FieldError(kind, wrong)])
     return made
 
 
-def _axis(form: Mapping[str, str]) -> dict[str, Any]:
-    """Lines of `angle X Y Z`, with + or - behind the angle for where the axis came from.
+def _moment(form: Mapping[str, str]) -> str | None:
+    """When it was measured, by the clock of who types."""
+    typed, zone = form.get("measured_at", "").strip(), ZoneInfo("UTC")
+    if not typed:
+        return None
+    try:
+        if form.get("timezone"):
+            zone = zone_named(form["timezone"])
+        return moment(typed, zone).astimezone(UTC).isoformat()
+    except Unreadable as error:
+        raise Invalid(f"measured_at: {error}.", errors=[FieldError("measured_at", str(error))]) from None
 
-    Of an angle that stands on four lines or more, the lines are touches of the ball; else its centre.
+
+# --- positions
+
+
+def lines_of(form: Mapping[str, str]) -> list[Line]:
+    """What was typed into the grid and pasted below it; empty lines left out."""
+    lines = [
+        Line(f"g_{row}", row + 1, [form.get(f"{column}_{row}", "").strip() for column in COLUMNS])
+        for row in range(MOST_LINES)
+    ]
+    for number, text in enumerate(form.get("positions", "").splitlines()[:MOST_PASTED], 1):
+        lines.append(Line("positions", number, _cells(text)))
+    return [line for line in lines if any(line.cells)]
+
+
+def _cells(text: str) -> list[str]:
+    """A pasted line: [axis] angle [+ or -] X Y Z, between blanks, tabs or semicolons; the axis and the sign may be left out."""
+    words = text.replace(";", " ").split()
+    axis = words.pop(0).upper() if words and words[0].upper() in ("A", "B", "C") else ""
+    came = words.pop(1) if len(words) == 5 and words[1] in SIGNS else ""
+    if len(words) == 3:  # the angle as above
+        words.insert(0, "")
+    return [axis, *words[:1], came, *words[1:]] if words else [axis] if axis else []
+
+
+def _axes(form: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Axis, angle and sign of a line stand for those below that leave them out.
+
+    Of an angle that stands on four lines or more, the lines are touches of the ball; else each is its centre.
     """
-    seen: dict[tuple[float, str | None], list[list[float]]] = {}
-    lines = [(n, line) for n, line in enumerate(form["positions"].splitlines(), 1) if line.strip()]
-    for number, line in lines[: MOST_LINES + 1]:
-        words = line.replace(";", " ").split()
-        approach = SIGNS.get(words[1]) if len(words) == 5 else None
-        values = [length(word) for word in ([words[0], *words[2:]] if approach else words)]
-        if len(values) != 4 or not all(isinstance(each, float) for each in values) or number > MOST_LINES:
-            wrong = _("line {line}: an angle and X, Y, Z are needed, not “{text}”").format(
-                line=number, text=line.strip()[:60]
-            )
-            raise Invalid(f"positions: {wrong}.", errors=[FieldError("positions", wrong)])
-        angle, *point = [each for each in values if isinstance(each, float)]
-        seen.setdefault((angle, approach), []).append(point)
-    positions = []
-    for (angle, approach), points in seen.items():
+    axis, angle, came = "C", None, None
+    seen: dict[str, dict[tuple[float, str | None], list[list[float]]]] = {}
+    for line in lines_of(form):
+        cells = line.cells
+        values = [length(cell) for cell in (cells[1], *cells[3:])] if len(cells) == len(COLUMNS) else []
+        if len(values) != 4 or cells[0].upper() not in ("", "A", "B", "C") or cells[2] not in SIGNS:
+            raise _no_position(line)
+        if cells[0]:
+            axis = cells[0].upper()
+        if values[0] is not None:
+            angle, came = values[0], SIGNS[cells[2]]
+        point = [value for value in values[1:] if isinstance(value, float)]
+        if not isinstance(angle, float) or len(point) != 3:
+            raise _no_position(line)
+        seen.setdefault(axis, {}).setdefault((angle, came), []).append(point)
+    if not seen:
+        wrong = _("type the positions: a line for each angle, or for each touch")
+        raise Invalid(f"positions: {wrong}.", errors=[FieldError("positions", wrong)])
+    balls, places = _by_axis(form, "ball"), _by_axis(form, "position")
+    return [_axis(axis, positions, form, balls, places) for axis, positions in seen.items()]
+
+
+def _axis(
+    axis: str,
+    seen: Mapping[tuple[float, str | None], list[list[float]]],
+    form: Mapping[str, str],
+    balls: Mapping[str, list[float]],
+    places: Mapping[str, list[float]],
+) -> dict[str, Any]:
+    positions: list[dict[str, Any]] = []
+    for (angle, came), points in seen.items():
         if len(points) >= FEWEST_TOUCHES:
-            positions.append({"angle": angle, "approach": approach, "touches": points})
+            positions.append({"angle": angle, "approach": came, "touches": points})
         else:
-            positions += [{"angle": angle, "approach": approach, "centre": point} for point in points]
-    ball = [length(word) for word in form.get("ball", "").replace(";", " ").split()]
-    return {"axis": form.get("axis", ""), "positions": positions, "ball": ball or None}
+            positions += [{"angle": angle, "approach": came, "centre": point} for point in points]
+    ball = balls.get(axis) or balls.get("")
+    known = form.get("ball_known") == "true" and ball is not None
+    made: dict[str, Any] = {"axis": axis, "positions": positions, "ball": ball, "ball_known": known}
+    made |= {"carries": form.get("carries") or "table", "reversed": axis in form.get("reversed", "").upper()}
+    return made | {"seen_from": form.get("seen_from") or "axis", "position": places.get(axis) or places.get("")}
+
+
+def _by_axis(form: Mapping[str, str], field: str) -> dict[str, list[float]]:
+    """Places: X Y Z for every axis, or a letter before them and one of them after another."""
+    made: dict[str, list[float]] = {}
+    for part in form.get(field, "").replace("\n", ";").split(";"):
+        words = part.split()
+        axis = words.pop(0).upper() if words and words[0].upper() in ("A", "B", "C") else ""
+        point = [value for value in map(length, words) if isinstance(value, float)]
+        if not words and not axis:
+            continue
+        if len(point) != 3 or len(words) != 3:
+            wrong = _("X, Y and Z are needed, such as 180 0 40, not “{text}”").format(text=part.strip()[:60])
+            raise Invalid(f"{field}: {wrong}.", errors=[FieldError(field, wrong)])
+        made[axis] = point
+    return made
+
+
+def _no_position(line: Line) -> Invalid:
+    """What a line lacks, at the place where it was typed."""
+    text = " ".join(cell for cell in line.cells if cell)[:60]
+    wrong = _("line {line}: an axis (A, B, C), an angle, + or −, and X, Y, Z are read, not “{text}”").format(
+        line=line.number, text=text
+    )
+    return Invalid(f"positions: {wrong}.", errors=[FieldError("positions", wrong), FieldError(line.where, wrong)])
+
+
+def _points(form: Mapping[str, str], field: str) -> list[list[float]]:
+    made = []
+    for number, text in enumerate(form.get(field, "").splitlines(), 1):
+        words = text.replace(";", " ").split()
+        point = [value for value in map(length, words) if isinstance(value, float)]
+        if not words:
+            continue
+        if len(point) != 3 or len(words) != 3:
+            wrong = _("line {line}: X, Y and Z are needed, not “{text}”").format(line=number, text=text.strip()[:60])
+            raise Invalid(f"{field}: {wrong}.", errors=[FieldError(field, wrong)])
+        made.append(point)
+    if not made:
+        wrong = _("X, Y and Z are needed, such as 0 0 0")
+        raise Invalid(f"{field}: {wrong}.", errors=[FieldError(field, wrong)])
+    return made
+
+
+def shown_lines(form: Mapping[str, str]) -> int:
+    """How many lines the grid has: as many as were asked for, and all that hold anything."""
+    asked = form.get("lines", "").strip()
+    wanted = int(asked) if asked.isascii() and asked.isdigit() and len(asked) < 6 else LINES
+    filled = [row for row in range(MOST_LINES) if any(form.get(f"{column}_{row}", "").strip() for column in COLUMNS)]
+    return max(min(wanted, MOST_LINES), (filled or [0])[-1] + 1, 4)
+
+
+# --- limits
 
 
 def plan(form: Mapping[str, str]) -> dict[str, Any]:
     """The form of the limits as the API's fields. Raises `Invalid` that names the line."""
     return {
         **{name: length(form.get(name)) for name in NUMBERS},
-        "reference_head": form.get("reference_head"),
+        "reference_head": form.get("reference_head", "").strip(),
         "limits": {name: length(value) for name, value in _pairs(form, "limits")},
         "characteristics": dict(_pairs(form, "characteristics")),
         "reason": form.get("reason"),
@@ -104,12 +239,13 @@ def filled_in(plan: KinematicsPlan) -> dict[str, str]:
     return begun
 
 
-def at_fields(error: Invalid) -> dict[str, str]:
+def at_fields(error: Invalid, form: Mapping[str, str]) -> dict[str, str]:
     """What is wrong, by the field of the form: what lies within a list stands with the list."""
     found: dict[str, str] = {}
     for field, message in error.errors:
         top = field.partition("[")[0].partition(".")[0]
-        name = {"axes": "positions", "body": "file", "protocol": "file"}.get(top, top)
+        inner = "nominal" if "nominal" in field else "found"
+        name = {"axes": "positions", "body": way(form), "results": "pasted", "shift": inner}.get(top, top)
         said = message[:1].upper() + message[1:]
-        found[name] = f"{found[name]}. {said}" if name in found else said
+        found[name] = f"{found[name]}. {said}" if name in found and said not in found[name] else said
     return found

@@ -229,7 +229,7 @@ _SETTING_WORDS = {
 
 
 def _degrees(value: float | None) -> Value:
-    return words(None if value is None else wording.angle(value)) if value is not None else number(None)
+    return number(None) if value is None else words(wording.angle(value))
 
 
 def _plus_minus(spread: float | None, unit: str) -> str:

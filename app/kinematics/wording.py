@@ -15,8 +15,9 @@ from app.web.numbers import MINUS, NO_BREAK_SPACE, NOTHING, mm, signed, um, um_l
 
 if TYPE_CHECKING:
     from app.kinematics.drift import Drift
+    from app.kinematics.outcome import Evaluated
     from app.kinematics.queries import RunRow
-    from app.kinematics.tables import KinematicsRun
+    from app.kinematics.tables import KinematicsBackup, KinematicsRun
 
 
 def angle(value: float | None, decimals: int = 4) -> str:
@@ -141,7 +142,10 @@ def not_understood(line: Unread) -> str:
 
 def sentence(run: KinematicsRun) -> str:
     """How a run came out, in one sentence."""
-    reason = run.reason
+    return _said(run.reason, run.results)
+
+
+def _said(reason: Mapping[str, Any], results: Mapping[str, Any]) -> str:
     if reason["code"] == "max_dev_cal_ball":
         text = _(
             "The ball measured {measured}, it was calibrated as {calibrated}: further off than {limit} (maxDevCalBall). The run "
@@ -154,7 +158,7 @@ def sentence(run: KinematicsRun) -> str:
         name = reason["name"]
         text = _("{name} = {value} is a larger change than the {limit} that are permitted (maxModification).")
         return text.format(name=name, value=written(name, reason["value"]), limit=limit(name, reason["limit"]))
-    axes = run.results.get("axes") or []
+    axes = results.get("axes") or []
     parts = [
         _("{axis}: scatter {before} → {after}").format(
             axis=axis["axis"], before=um_plain(axis["scatter_before"]), after=um_plain(axis["scatter_after"])
@@ -167,6 +171,11 @@ def sentence(run: KinematicsRun) -> str:
     if axes:
         return _("Position errors of {axes}.").format(axes=", ".join(axis["axis"] for axis in axes))
     return _("The ball alone: offset of the machine.")
+
+
+def sentence_of(found: Evaluated) -> str:
+    """What a run that is not kept yet says."""
+    return _said(found.reason, found.results)
 
 
 def um_plain(length: float | None) -> str:
@@ -206,8 +215,15 @@ def approach_word(approach: int) -> str:
 
 def alarm_sentence(data: Mapping[str, Any]) -> str:
     """What the alarm about a drift says."""
-    name = str(data.get("location"))
-    return _("{what} ({name}) has drifted to {value}, beyond its limit {limit}; run {run}.").format(
+    name = str(data.get("name") or data.get("location"))
+    head = str(data.get("head") or "")
+    text = _("{what} ({name}, head {head}) has drifted to {value}, beyond its limit {limit}; run {run}.") if head else _(
+        "{what} ({name}) has drifted to {value}, beyond its limit {limit}; run {run}."
+    )
+    return text.format(
+        head=head,
+        #
+    _("{what} ({name}) has drifted to {value}, beyond its limit {limit}; run {run}.").format(
         what=name_words(name)[:1].upper() + name_words(name)[1:],
         name=name,
         value=written(name, data.get("value")),
@@ -231,6 +247,15 @@ def trend_sentence(drift: Drift) -> str:
     if drift.trend.moves:
         return _("{slope} {unit} a day, with 95 % certainty {low} to {high}: it drifts.").format(**values)
     return _("{slope} {unit} a day, with 95 % certainty {low} to {high}: no trend to be seen.").format(**values)
+
+
+def a_day(drift: Drift) -> str:
+    """The slope of the trend."""
+    if drift.trend is None:
+        return NOTHING
+    if UNITS.get(drift.name) == "°":
+        return angle(drift.trend.slope, 5)
+    return um(drift.trend.slope, 2)
 
 
 def cannot_confirm(row: RunRow) -> tuple[str, str]:

@@ -1,0 +1,100 @@
+"""Pages: a run typed in, pasted, or sent as the control's protocol. It can be looked at before it is kept."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy.orm import Session
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import UploadFile
+from starlette.responses import RedirectResponse
+
+from app.errors import FieldError, Invalid, NotFound
+from app.kinematics import actions, forms, queries, wording
+from app.kinematics.evaluation import evaluate
+from app.kinematics.outcome import Evaluated
+from app.kinematics.schemas import MOST_PROTOCOL, RunIn
+from app.machines.queries import machine_named, machines
+from app.web.deps import Caller, Operator, SessionDep, require, texts
+from app.web.forms import parsed
+from app.web.i18n import _
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+Word = Annotated[str, Query(max_length=64)]
+EXAMPLE = {
+    "as": "pasted",
+    "pasted": 'Q143 = 0.0134\nQ146 = 0.0021\nQ147 = 0.0012\nQ148 = -0.0004\nQ149 = 0.0003\n'
+    'QS146 = "0.01234567 -0.0123456 0.00123456 -0.0012345"',
+}  # fmt: skip
+
+
+@router.get("/kinematics/new", dependencies=[require("operator")])
+def new_page(
+    request: Request, session: SessionDep, machine: Word = "", head: Word = "", way: Word = "", example: Word = ""
+) -> Response:
+    """The form for a run; with the string that the manual prints, if that is wished for."""
+    begun = {"machine": machine, "head": head, "as": way} | (EXAMPLE if example else {})
+    return _form(request, session, begun)
+
+
+def _form(
+    request: Request,
+    session: Session,
+    form: Mapping[str, str],
+    error: Invalid | NotFound | None = None,
+    found: Evaluated | None = None,
+) -> Response:
+    errors = forms.at_fields(error, form) if isinstance(error, Invalid) else {}
+    if isinstance(error, NotFound):
+        errors["machine"] = error.detail
+    return page(
+        request,
+        "kinematics/new.html",
+        status=error.status if error else 200,
+        form=form,
+        way=forms.way(form),
+        lines=forms.shown_lines(form),
+        columns=forms.COLUMNS,
+        errors=errors,
+        error=error,
+        found=found,
+        wording=wording,
+        machines=machines(session, limit=100_000),
+    )
+
+
+@router.post("/kinematics/new")
+async def send(request: Request, session: SessionDep, caller: Operator) -> Response:
+    """`do`: look at it, draw the grid anew, or keep it. Whatever comes of it, all that was typed is still there."""
+    sent = await request.form()
+    form = texts(sent)
+    file = sent.get("file")
+    if isinstance(file, UploadFile) and file.filename:
+        form |= {"protocol": forms.decoded(await file.read(4 * MOST_PROTOCOL)), "file_name": file.filename[:200]}
+        form["as"] = "protocol"
+    return await run_in_threadpool(_send, request, session, caller, form)
+
+
+def _send(request: Request, session: Session, caller: Caller, form: dict[str, str]) -> Response:
+    if form.get("do") == "grid":
+        return _form(request, session, form)
+    try:
+        given = _given(form)
+        machine = machine_named(session, given.machine)
+        if form.get("do") == "look":
+            limits = actions.limits_of(queries.plan(session, machine.id))
+            return _form(request, session, form, found=evaluate(given, limits))
+        with session.begin_nested():
+            taken = actions.take(session, machine, given, caller)
+    except (Invalid, NotFound) as error:
+        return _form(request, session, form, error)
+    return RedirectResponse(f"/kinematics/runs/{taken.row.run.id}?done={'again' if taken.again else 'taken'}", 303)
+
+
+def _given(form: Mapping[str, str]) -> RunIn:
+    fields: dict[str, Any] = forms.run(form)
+    if not fields["machine"]:
+        wrong = _("choose the machine")
+        raise Invalid(f"machine: {wrong}.", errors=[FieldError("machine", wrong)])
+    return parsed(RunIn, fields)

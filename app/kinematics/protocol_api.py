@@ -1,0 +1,49 @@
+"""JSON routes: the protocol of a run, and its files."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+from fastapi import Path, Query, Response
+
+from app.kinematics import queries
+from app.kinematics.protocol import protocol_of
+from app.reports.asking import Format, Paper
+from app.reports.content import Report
+from app.reports.files import MEDIA_TYPES, file_name, file_of
+from app.reports.schemas import ReportOut
+from app.web.api import api_router, problems
+from app.web.deps import AnyCaller, Caller, SessionDep
+
+router = api_router("kinematics")
+RunNumber = Annotated[int, Path(description="Number of the run.", examples=[118])]
+FILE: dict[int | str, dict[str, Any]] = {200: {"content": {kind: {} for kind in MEDIA_TYPES.values()}}}
+
+
+def _protocol(session: SessionDep, caller: Caller, run: int) -> Report:
+    row = queries.run(session, run)
+    caller.must_at(row.machine.id, "viewer")
+    return protocol_of(row, datetime.now(UTC))
+
+
+@router.get("/kinematics/runs/{run}/protocol.json", responses=problems(404))
+def get_kinematics_protocol(session: SessionDep, caller: AnyCaller, run: RunNumber) -> ReportOut:
+    """Everything that the control's own protocol has: head, settings, and per axis angles, scatter, errors, places."""
+    return ReportOut.of(_protocol(session, caller, run))
+
+
+@router.get("/kinematics/runs/{run}/protocol.{form}", responses=problems(404) | FILE, response_model=None)
+def get_kinematics_protocol_file(
+    session: SessionDep,
+    caller: AnyCaller,
+    run: RunNumber,
+    form: Annotated[Format, Path(description="How it is written.", examples=["pdf"])],
+    paper: Annotated[Paper, Query(description="Of the PDF.")] = Paper.A4,
+) -> Response:
+    """The same as a file, with its diagrams: to print, to work on, or to read by a program."""
+    report = _protocol(session, caller, run)
+    headers = {
+        "Content-Disposition": f'attachment; filename="{file_name(report, form)}"',
+        "Cache-Control": "no-store",
+        "X-Content-Type-Options": "nosniff",
+    }
+    return Response(file_of(report, form, paper), media_type=MEDIA_TYPES[form], headers=headers)
