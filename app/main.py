@@ -31,6 +31,9 @@ from app.forms import pages as form_pages
 from app.gauges import api as gauges
 from app.gauges import pages as gauge_pages
 from app.kinematics import api as kinematics
+from app.kinematics import new_pages as new_run_pages
+from app.kinematics import pages as kinematics_pages
+from app.kinematics import protocol_api as kinematics_protocol
 from app.machines import api as machines
 from app.offsets import api as offsets
 from app.offsets import chores as offset_chores
@@ -73,6 +76,8 @@ from app.web.openapi import document
 from app.web.problems import add_problem_handlers
 from app.web.security import SecurityHeaders
 from app.web.templates import assets
+from app.whatif import api as what_if
+from app.whatif import pages as what_if_pages
 from app.zeros import api as zeros
 
 # Each part of the shop floor brings its JSON routes (api) and its pages.
@@ -91,6 +96,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     report_jobs.router,
     control.router,
     rules_api.router,
+    what_if.router,
     signals_api.router,
     readings.push,
     readings.router,
@@ -98,6 +104,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     offsets.router,
     calibration.router,
     gauges.router,
+    kinematics_protocol.router,
     kinematics.router,
     edges_api.router,
     forms.router,
@@ -115,6 +122,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     characteristic_pages.router,
     control_pages.router,
     rules_pages.router,
+    what_if_pages.router,
     signals_pages.router,
     capability_pages.router,
     alarm_pages.router,
@@ -125,6 +133,8 @@ ROUTERS: tuple[APIRouter, ...] = (
     calibration_pages.router,
     gauge_pages.router,
     form_pages.router,
+    new_run_pages.router,
+    kinematics_pages.router,
     sign_in_pages.router,
     setup_pages.router,
     import_pages.router,

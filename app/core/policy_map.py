@@ -23,10 +23,14 @@ class Criterion(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """Where a map is best: `best` is the index of the best cell, None where no cell has the number; `inside` those as good."""
+    """Where a map is best: the index of the best cell, None where no cell has the number, and which are as good.
+
+    calmest: of those as good the one that corrects least. What cannot be told from the best is not worth correcting for.
+    """
 
     best: int | None
     inside: tuple[bool, ...]
+    calmest: int | None = None
 
 
 def value_of(figures: Figures, criterion: Criterion) -> float | None:
@@ -63,17 +67,16 @@ def in_order(parameters: Parameters) -> bool:
     return limits.zero_range < limits.averaging <= limits.tolerance
 
 
-def best_region(cells: Sequence[Figures | None], criterion: Criterion, most_rejects: int | None = None) -> Region:
+def best_region(cells: Sequence[Figures | None], criterion: Criterion, today: Figures | None = None) -> Region:
     """The best cell, and those that cannot be told from it: no worse by two standard errors of the best, or by 2 %.
 
     Standard errors: of a count its root; of s, s / sqrt(2 n); of Ppk, Bissell's (1990, Appl. Stat. 39, 331). Cells share the
-    same parts, so they are told apart better than that: the region is rather too wide. `most_rejects`: cells with more
-    rejects are no choice, so that the fewest corrections are not those of a loop that sleeps.
+    same parts, so they are told apart better than that: the region is rather too wide. `today`: where the fewest corrections
+    are looked for, cells that reject more or have a worse Ppk than today's are no choice: those are of a loop that sleeps.
     """
+    bound = today if criterion is Criterion.CORRECTIONS else None
     values = [
-        None
-        if cell is None or (most_rejects is not None and cell.rejects > most_rejects)
-        else value_of(cell, criterion)
+        None if cell is None or (bound is not None and _worse(cell, bound)) else value_of(cell, criterion)
         for cell in cells
     ]
     known = [(value, at) for at, value in enumerate(values) if value is not None]
@@ -83,8 +86,25 @@ def best_region(cells: Sequence[Figures | None], criterion: Criterion, most_reje
     value, best = min(known, key=lambda each: sign * each[0])
     figures = cells[best]
     assert figures is not None
-    room = max(SIGMAS * _error(figures, criterion, value), NEAR * abs(value)) + 1e-12
-    return Region(best, tuple(each is not None and sign * (each - value) <= room for each in values))
+    room = _room(figures, criterion, value)
+    inside = tuple(each is not None and sign * (each - value) <= room for each in values)
+    calmest = min(
+        (at for at, holds in enumerate(inside) if holds),
+        key=lambda at: (cells[at].corrections, sign * (values[at] or 0.0)),  # type: ignore[union-attr]
+    )
+    return Region(best, inside, calmest)
+
+
+def _worse(cell: Figures, today: Figures) -> bool:
+    if cell.rejects > today.rejects:
+        return True
+    if cell.ppk is None or today.ppk is None:
+        return False
+    return cell.ppk < today.ppk - _room(today, Criterion.PPK, today.ppk)
+
+
+def _room(figures: Figures, criterion: Criterion, value: float) -> float:
+    return max(SIGMAS * _error(figures, criterion, value), NEAR * abs(value)) + 1e-12
 
 
 def _error(figures: Figures, criterion: Criterion, value: float) -> float:

@@ -1,4 +1,4 @@
-"""Proposing a change of parameters with its evidence, approving it, rejecting it."""
+"""The life of a proposed change of parameters: proposed with its evidence, then approved, rejected or withdrawn."""
 
 from datetime import UTC, datetime
 from typing import Any
@@ -7,9 +7,11 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.audit.actions import record
+from app.characteristics import queries as characteristics
 from app.characteristics.actions import CharacteristicChange, change_characteristic
 from app.db.events import publish
-from app.errors import Conflict, Invalid
+from app.errors import Conflict, Invalid, NotAllowed
+from app.machines import queries as machines
 from app.people.callers import Caller
 from app.web.i18n import _
 from app.whatif import proposals
@@ -35,15 +37,29 @@ def changes_of(answer: Answer) -> dict[str, float]:
 def propose(session: Session, answer: Answer, reason: str, caller: Caller) -> Row:
     """Propose the settings of a what-if, with what was found kept as evidence.
 
-    Raises `Invalid` where they are today's; `Conflict` where the same is proposed already.
+    Raises `Invalid` where they are today's; `Conflict` where the same is proposed already, or the parameters have changed
+    while it was replayed.
     """
-    standing = answer.past.standing
     caller.must("operator")
+    standing = answer.past.standing
     changes = changes_of(answer)
     if not changes:
         raise Invalid(
             _("These are the settings in force; there is nothing to propose."),
             _("Choose other settings: k, R33, R34 or the factor."),
+        )
+    evidence, before = evidence_of(answer), {name: getattr(standing.parameters, name) for name in changes}
+    machines.lock_machines(session, [standing.machine.id])  # of two who propose the same at once one is first
+    replayed = standing.version.version
+    session.expire_all()
+    standing = characteristics.characteristic_named(session, standing.characteristic.key)
+    if standing.version.version != replayed:
+        raise Conflict(
+            _("While this was replayed the parameters have changed: version {now} is in force.").format(
+                now=standing.version.version
+            ),
+            _("Replay again with the settings of now, and propose what comes out."),
+            parameters_version=standing.version.version,
         )
     for row in proposals.proposals(session, characteristic=standing.characteristic, status="open"):
         if row.proposal.changes == changes:
@@ -59,14 +75,13 @@ def propose(session: Session, answer: Answer, reason: str, caller: Caller) -> Ro
         characteristic_id=standing.characteristic.id,
         from_version=standing.version.version,
         changes=changes,
-        evidence=evidence_of(answer),
+        evidence=evidence,
         reason=reason,
         proposed_by=caller.name,
     )
     session.add(made)
     session.flush()
     row = proposals.proposal(session, made.id)
-    before = {name: getattr(standing.parameters, name) for name in changes}
     _note(session, row, "change proposed", caller, before, dict(changes), reason)
     return row
 
@@ -77,7 +92,8 @@ def approve(session: Session, number: int, reason: str, caller: Caller) -> Row:
     Raises `NotFound`; `NotAllowed` below an engineer; `Conflict` when it is decided already, or the parameters have changed
     since it was proposed.
     """
-    row = _open(session, number, caller)
+    caller.must("engineer")
+    row = _open(session, number)
     proposal = row.proposal
     if row.status == "outdated":
         raise Conflict(
@@ -99,13 +115,29 @@ def approve(session: Session, number: int, reason: str, caller: Caller) -> Row:
 
 def reject(session: Session, number: int, reason: str, caller: Caller) -> Row:
     """Say no, and why. Raises `NotFound`; `NotAllowed` below an engineer; `Conflict` when it is decided already."""
-    return _decide(session, _open(session, number, caller), "rejected", reason, caller, None)
-
-
-def _open(session: Session, number: int, caller: Caller) -> Row:
-    """The proposal, held until the transaction ends."""
-    row = proposals.proposal(session, number)
     caller.must("engineer")
+    return _decide(session, _open(session, number), "rejected", reason, caller, None)
+
+
+def withdraw(session: Session, number: int, reason: str, caller: Caller) -> Row:
+    """Take back what one has proposed oneself.
+
+    Raises `NotFound`; `NotAllowed` for anybody else, who may reject it as an engineer; `Conflict` when it is decided already.
+    """
+    caller.must("operator")
+    row = _open(session, number)
+    if row.proposal.proposed_by != caller.name:
+        raise NotAllowed(
+            _("{who} has proposed this, and nobody else can withdraw it.").format(who=row.proposal.proposed_by),
+            _("An engineer can reject it."),
+        )
+    return _decide(session, row, "withdrawn", reason, caller, None)
+
+
+def _open(session: Session, number: int) -> Row:
+    """The proposal and its machine, held until the transaction ends."""
+    row = proposals.proposal(session, number)
+    machines.lock_machines(session, [row.machine.id])
     session.execute(
         select(ParameterProposal)
         .where(ParameterProposal.id == number)
@@ -118,12 +150,16 @@ def _open(session: Session, number: int, caller: Caller) -> Row:
             _("{who} has decided about proposal {number} already: {status}.").format(
                 who=row.proposal.decided_by,
                 number=number,
-                status=_("approved") if row.proposal.status == "approved" else _("rejected"),
+                status=_decided(row.proposal.status),
             ),
             _("Nothing was changed. Propose it again if need be."),
             status_of_proposal=row.proposal.status,
         )
     return row
+
+
+def _decided(status: str) -> str:
+    return {"approved": _("approved"), "rejected": _("rejected"), "withdrawn": _("withdrawn")}[status]
 
 
 def _decide(session: Session, row: Row, status: str, reason: str, caller: Caller, version: int | None) -> Row:

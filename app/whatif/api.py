@@ -25,12 +25,13 @@ from app.whatif.schemas import (
     WhatIfOut,
 )
 
-router = api_router("whatif")
+router = api_router("what-if")
 
 CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 Number = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the proposal.", examples=[1])]
 Status = Annotated[
-    Literal["open", "approved", "rejected", "outdated"] | None, Query(description="Only those with this status.")
+    Literal["open", "outdated", "approved", "rejected", "withdrawn"] | None,
+    Query(description="Only those with this status."),
 ]
 Before = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="Cursor: the `next` of the page before.")]
 FIGURE: dict[int | str, dict[str, Any]] = {
@@ -172,3 +173,9 @@ def approve_proposal(session: SessionDep, caller: Engineer, number: Number, deci
 def reject_proposal(session: SessionDep, caller: Engineer, number: Number, decision: DecisionIn) -> ProposalOut:
     """Say no, and why."""
     return ProposalOut.of(actions.reject(session, number, decision.reason, caller))
+
+
+@router.post("/proposals/{number}/withdraw", responses=problems(404, 409))
+def withdraw_proposal(session: SessionDep, caller: Operator, number: Number, decision: DecisionIn) -> ProposalOut:
+    """Take back what one has proposed oneself."""
+    return ProposalOut.of(actions.withdraw(session, number, decision.reason, caller))

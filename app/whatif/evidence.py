@@ -80,5 +80,6 @@ def cell_of(made: Map, at: int, cell: Cell) -> dict[str, Any]:
         "figures": None if figures is None else figures_of(figures),
         "inside": made.region.inside[at],
         "best": made.region.best == at,
+        "calmest": made.region.calmest == at,
         "reason": None if figures is not None else wording.out_of_order(cell.zero_range, made.averaging_limit),
     }

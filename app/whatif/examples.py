@@ -74,6 +74,7 @@ EXAMPLE_MAP: dict[str, Any] = EXAMPLE_PERIOD | {
             "figures": EXAMPLE_BETTER,
             "inside": True,
             "best": True,
+            "calmest": True,
             "reason": None,
         }
     ],

@@ -101,6 +101,27 @@ def address(key: str, typed: Mapping[str, str], **changes: str) -> str:
     return f"/characteristics/{key}/what-if" + (f"?{urlencode(values)}" if values else "")
 
 
+def again(key: str, changes: Mapping[str, float], evidence: Mapping[str, Any]) -> str:
+    """The what-if that a proposal came from: the same settings on the same readings."""
+    typed = {
+        "k": f"{changes['weighting_factor']:.9g}" if "weighting_factor" in changes else "",
+        "r33": f"{changes['zero_range'] * 1000:.9g}" if "zero_range" in changes else "",
+        "r34": f"{changes['averaging_limit'] * 1000:.9g}" if "averaging_limit" in changes else "",
+        "factor": f"{changes['factor']:.9g}" if "factor" in changes else "",
+        "from": evidence["start"][:26].rstrip("Z") + "+00:00",
+        "to": evidence["end"][:26].rstrip("Z") + "+00:00",
+    }
+    return address(key, typed)
+
+
+def effects(chosen: str) -> list[tuple[str, str]]:
+    """The share of a correction that acts, to choose from."""
+    offered = [("1", _("in full")), ("measured", _("as measured"))]
+    if chosen not in {"1", "measured"}:
+        offered.append((chosen, _("by {share}").format(share=chosen)))
+    return offered
+
+
 def figure_query(given: WhatIfIn) -> str:
     """The same question for the figure."""
     said = given.model_dump(mode="json", by_alias=True, exclude_none=True)

@@ -1,6 +1,6 @@
 """The map as the page draws it: rows of k, columns of R33, each cell a link that takes its setting. Pure."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from app.core.policy_map import Criterion, value_of
@@ -12,7 +12,10 @@ LEVELS = 8  # shades from the best to the worst
 
 
 class CellView(NamedTuple):
-    """One cell: where it leads, what it says, its shade (None: blank), and what it is."""
+    """One cell: where it leads, what it says, its shade (None: blank), what it is, and where the best region ends at it.
+
+    edges: of the letters t, r, b, l those sides beyond which settings are worse.
+    """
 
     href: str | None
     text: str
@@ -20,8 +23,10 @@ class CellView(NamedTuple):
     level: int | None
     inside: bool
     best: bool
+    calmest: bool
     today: bool
     chosen: bool
+    edges: str
 
 
 class MapView(NamedTuple):
@@ -57,6 +62,7 @@ def view_of(made: Map, answer: Answer, typed: Mapping[str, str], key: str) -> Ma
         )
         for at, cell in enumerate(made.cells)
     ]
+    cells = [cell._replace(edges=_edges(made.region.inside, at, wide)) for at, cell in enumerate(cells)]
     return MapView(
         [wording.short_um(r33) for r33 in made.zero_ranges],
         [
@@ -73,6 +79,20 @@ def _at(made: Map, k: float, r33: float) -> int | None:
     return None if row is None or column is None else row * len(made.zero_ranges) + column
 
 
+def _edges(inside: Sequence[bool], at: int, wide: int) -> str:
+    """Sides of a cell at which the region ends; a row above is a larger k, as the page draws it."""
+    if not inside[at]:
+        return ""
+    column = at % wide
+    neighbours = {
+        "t": at + wide if at + wide < len(inside) else None,
+        "r": at + 1 if column + 1 < wide else None,
+        "b": at - wide if at >= wide else None,
+        "l": at - 1 if column else None,
+    }
+    return "".join(side for side, there in neighbours.items() if there is None or not inside[there])
+
+
 def _cell(made: Map, at: int, cell: Cell, level: int | None, href: str, *, today: bool, chosen: bool) -> CellView:
     named = _("k {k}, R33 {r33}").format(
         k=f"{cell.weighting_factor:.6g}", r33=wording.setting("zero_range", cell.zero_range)
@@ -80,9 +100,9 @@ def _cell(made: Map, at: int, cell: Cell, level: int | None, href: str, *, today
     if cell.figures is None:
         return CellView(
             None, "", f"{named}: {wording.out_of_order(cell.zero_range, made.averaging_limit)}", None,
-            False, False, today, chosen,
+            False, False, False, today, chosen, "",
         )  # fmt: skip
-    inside, best = made.region.inside[at], made.region.best == at
+    inside, best, calmest = made.region.inside[at], made.region.best == at, made.region.calmest == at
     said = [
         f"{name} {value[0]}"
         for name, value in wording.rows([cell.figures])
@@ -90,38 +110,56 @@ def _cell(made: Map, at: int, cell: Cell, level: int | None, href: str, *, today
     ]
     marks = [
         word
-        for word, holds in ((_("today"), today), (_("best"), best), (_("as good as the best"), inside and not best))
+        for word, holds in (
+            (_("today"), today),
+            (_("best"), best),
+            (_("as good as the best"), inside and not best),
+            (_("corrects least of these"), calmest),
+        )
         if holds
     ]
     title = f"{named}: {', '.join(said)}" + (f" ({', '.join(marks)})" if marks else "")
-    return CellView(href, wording.cell(cell.figures, made.criterion), title, level, inside, best, today, chosen)
+    text = wording.cell(cell.figures, made.criterion)
+    return CellView(href, text, title, level, inside, best, calmest, today, chosen, "")
 
 
 def _region(made: Map) -> str:
-    if made.region.best is None:
-        return _("No setting of this map has that number.")
-    best = made.cells[made.region.best]
+    if made.region.best is None or made.region.calmest is None:
+        return _("No setting of this map is a choice by this goal.")
+    best, calmest = made.cells[made.region.best], made.cells[made.region.calmest]
     assert best.figures is not None
+    assert calmest.figures is not None
     inside = [cell for cell, holds in zip(made.cells, made.region.inside, strict=True) if holds]
     ks, r33s = [cell.weighting_factor for cell in inside], [cell.zero_range for cell in inside]
-    said = _("Best is k {k} with R33 {r33}: {criterion} {value}, today {today}.").format(
-        k=f"{best.weighting_factor:.6g}",
-        r33=wording.setting("zero_range", best.zero_range),
-        criterion=wording.criterion(made.criterion),
-        value=wording.cell(best.figures, made.criterion),
-        today=wording.cell(made.today, made.criterion),
-    )
-    return (
-        said
-        + " "
-        + _(
-            "{count} settings are as good within what {readings} readings can tell: k {low_k} to {high_k}, R33 {low} to {high} µm."
-        ).format(
-            count=len(inside),
-            readings=made.today.inner,
-            low_k=f"{min(ks):.6g}",
-            high_k=f"{max(ks):.6g}",
-            low=wording.short_um(min(r33s)),
-            high=wording.short_um(max(r33s)),
+    said = [
+        _("Best is k {k} with R33 {r33}: {criterion} {value}, today {today}.").format(
+            k=f"{best.weighting_factor:.6g}",
+            r33=wording.setting("zero_range", best.zero_range),
+            criterion=wording.criterion(made.criterion),
+            value=wording.cell(best.figures, made.criterion),
+            today=wording.cell(made.today, made.criterion),
         )
-    )
+    ]
+    if len(inside) > 1:
+        said.append(
+            _(
+                "{count} settings are as good within what {readings} readings can tell: k {low_k} to {high_k}, R33 {low} to {high} µm."
+            ).format(
+                count=len(inside),
+                readings=made.today.inner,
+                low_k=f"{min(ks):.6g}",
+                high_k=f"{max(ks):.6g}",
+                low=wording.short_um(min(r33s)),
+                high=wording.short_um(max(r33s)),
+            )
+        )
+    if made.region.calmest != made.region.best:
+        said.append(
+            _("Of these k {k} with R33 {r33} corrects least: {count} times, today {today} times.").format(
+                k=f"{calmest.weighting_factor:.6g}",
+                r33=wording.setting("zero_range", calmest.zero_range),
+                count=calmest.figures.corrections,
+                today=made.today.corrections,
+            )
+        )
+    return " ".join(said)

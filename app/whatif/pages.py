@@ -1,6 +1,7 @@
 """Pages: the what-if of a characteristic, the list of proposals, and one proposal with its evidence."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
@@ -14,11 +15,14 @@ from app.core.parameters import BY_NAME
 from app.core.policy_map import Criterion
 from app.errors import Conflict, InbandError, Invalid, TooManyRequests
 from app.proof import queries as proof
-from app.web.deps import Caller, Engineer, FormDep, Operator, SessionDep, Viewer, require
+from app.proof import wording as proof_wording
+from app.web.deps import Caller, FormDep, Operator, SessionDep, Viewer, require
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed
+from app.web.i18n import _
 from app.web.templates import page
 from app.whatif import actions, asking, forms, grid, proposals, wording
+from app.whatif.evidence import effect_of, period_of
 from app.whatif.map_view import view_of
 from app.whatif.queries import Answer, Map
 from app.whatif.schemas import DecisionIn, ProposalIn
@@ -26,6 +30,11 @@ from app.whatif.schemas import DecisionIn, ProposalIn
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 50
 Number = Annotated[int, Path(ge=1, le=LARGEST_ID)]
+VERBS = {
+    "approve": (actions.approve, "approved"),
+    "reject": (actions.reject, "rejected"),
+    "withdraw": (actions.withdraw, "withdrawn"),
+}
 Word = Annotated[str | None, Query(max_length=40)]
 
 
@@ -54,7 +63,8 @@ def _what_if(
         answer, made = asking.both(session, standing, given, forms.around(typed))
     except (Invalid, TooManyRequests) as error:
         status, problem, errors = error.status, error, forms.at_fields(by_field(error))
-    key = standing.characteristic.key
+    changes = differences(asdict(answer.past.standing.parameters), actions.changes_of(answer)) if answer else []
+    key, failing = standing.characteristic.key, proof.failing()
     criterion = Criterion(typed["goal"]) if typed["goal"] in set(Criterion) else Criterion.PPK
     return page(
         request,
@@ -70,8 +80,13 @@ def _what_if(
         errors=errors,
         problem=problem,
         answer=answer,
-        changes=actions.changes_of(answer) if answer else {},
-        rows=wording.rows([answer.truly, answer.likeness.figures, answer.today, answer.other]) if answer else [],
+        changes=changes,
+        rows=wording.rows([answer.truly, answer.today, *([answer.other] if changes else [])]) if answer else [],
+        gained=wording.gained(answer.today, answer.other) if answer else [],
+        measured=effect_of(answer.effect) if answer else None,
+        assumed=wording.assumed(answer.settings.effect, answer.delay) if answer else "",
+        period=period_of(answer.past) if answer else None,
+        effects=forms.effects(typed["effect"]),
         cautions=wording.cautions(answer.past) if answer else [],
         map=view_of(made, answer, typed, key) if answer and isinstance(made, Map) else None,
         no_map=made if isinstance(made, Invalid) else None,
@@ -87,8 +102,17 @@ def _what_if(
         reason=reason,
         may_propose=caller.may("operator"),
         wording=wording,
-        failing=proof.failing(),
+        proof_failing=failing,
+        proof_warning=proof_wording.warning(len(failing)),
     )
+
+
+def differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[tuple[str | None, str, str, str]]:
+    """R number, name, before and after of each parameter that changes."""
+    return [
+        (BY_NAME[name].r, label(name), wording.setting(name, before[name]), wording.setting(name, value))
+        for name, value in after.items()
+    ]
 
 
 def _same(r34: float, answer: Answer | None) -> bool:
@@ -107,7 +131,8 @@ def send_proposal(
         given = parsed(ProposalIn, said | {"reason": form.get("reason", "").strip()})
         row = actions.propose(session, asking.replayed(session, standing, given), given.reason, caller)
     except (Invalid, Conflict, TooManyRequests) as error:
-        session.expire_all()
+        session.rollback()  # lets the machine go, and begins with what is in force now
+        standing = characteristics.characteristic_named(session, characteristic)
         return _what_if(request, session, caller, standing, typed, reason=form.get("reason", ""), refused=error)
     return RedirectResponse(f"/proposals/{row.proposal.id}?done=proposed", 303)
 
@@ -132,8 +157,7 @@ def proposals_page(
         older=older,
         newest=f"/proposals?status={chosen}" if before else None,
         wording=wording,
-        label=label,
-        numbers=BY_NAME,
+        changes=lambda row: differences(row.proposal.evidence["today"]["settings"], row.proposal.changes),
     )
 
 
@@ -144,16 +168,19 @@ def proposal_page(request: Request, session: SessionDep, caller: Viewer, number:
 
 
 @router.post("/proposals/{number}")
-def send_decision(request: Request, session: SessionDep, caller: Engineer, number: Number, form: FormDep) -> Response:
-    """Approve or reject it, with a reason."""
+def send_decision(request: Request, session: SessionDep, caller: Operator, number: Number, form: FormDep) -> Response:
+    """Approve it, reject it or withdraw it, with a reason."""
     verb = form.get("do", "")
+    if verb not in VERBS:
+        raise Invalid(_("Say what to do: approve, reject or withdraw."))
+    act, becomes = VERBS[verb]
     try:
         reason = parsed(DecisionIn, {"reason": form.get("reason", "").strip()}).reason
-        (actions.approve if verb == "approve" else actions.reject)(session, number, reason, caller)
+        act(session, number, reason, caller)
     except (Invalid, Conflict) as error:
-        session.expire_all()
+        session.rollback()
         return _proposal(request, session, caller, number, typed=form, error=error)
-    return RedirectResponse(f"/proposals/{number}?done={'approved' if verb == 'approve' else 'rejected'}", 303)
+    return RedirectResponse(f"/proposals/{number}?done={becomes}", 303)
 
 
 def _proposal(
@@ -168,6 +195,7 @@ def _proposal(
 ) -> Response:
     row = proposals.proposal(session, number)
     evidence = row.proposal.evidence
+    truly, today, other = (wording.stored(evidence[name]) for name in ("truly", "today", "other"))
     return page(
         request,
         "whatif/proposal.html",
@@ -175,21 +203,16 @@ def _proposal(
         row=row,
         proposal=row.proposal,
         evidence=evidence,
-        differences=[
-            (
-                BY_NAME[name].r,
-                label(name),
-                wording.setting(name, before),
-                wording.setting(name, row.proposal.changes[name]),
-            )
-            for name, before in evidence["today"]["settings"].items()
-            if name in row.proposal.changes
-        ],
-        rows=wording.rows_of([evidence[name] for name in ("truly", "today", "other")]),
+        differences=differences(evidence["today"]["settings"], row.proposal.changes),
+        rows=wording.rows([truly, today, other]),
+        gained=wording.gained(today, other),
+        assumed=wording.assumed(evidence["effect"], evidence["delay"]),
+        replay_again=forms.again(row.characteristic.key, row.proposal.changes, evidence),
         done=wording.done(done) if done else None,
         typed=typed or {},
         errors=by_field(error) if error else {},
         problem=error,
         may_decide=caller.may("engineer"),
+        may_withdraw=caller.may("operator") and row.proposal.proposed_by == caller.name,
         wording=wording,
     )

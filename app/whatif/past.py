@@ -21,6 +21,7 @@ from app.core.closed_loop import Mark, Way
 from app.core.compensation import Code
 from app.core.parameters import Parameters
 from app.core.replay import LONGEST_DELAY, Lane, Policy, parts_of, rebuilt
+from app.core.zones import Zone
 from app.errors import Invalid
 from app.offsets.tables import ToolEvent
 from app.statistics import queries as statistics
@@ -45,6 +46,7 @@ COLUMNS = (
     "zone",
     "code",
 )
+FAULT = list(Zone).index(Zone.PROBE_FAULT)
 CODE = {code: place for place, code in enumerate(Code)}
 
 Values = NDArray[np.float64]
@@ -108,6 +110,17 @@ class Past:
             usable[np.minimum(after + late, count - 1)] = False
         gaps = np.concatenate((np.zeros(min(1, count), np.bool_), ~usable[:-1]))
         return usable, (begins | gaps)[usable]
+
+    def named(self) -> dict[str, list[int]]:
+        """Readings that count for nothing, and those that count for neither mean nor spread, by their numbers.
+
+        excluded: somebody took them out; faults: of the probe; worn: in the wear zone, which is an operator's business.
+        """
+        history = self.history
+        fault, kept = history["zone"] == FAULT, ~history.excluded
+        worn = (np.abs(np.rint(history["deviation"] * 1e6)) >= self.standing.parameters.limits.wear) & ~fault
+        groups = {"excluded": history.excluded, "faults": fault & kept, "worn": worn & kept}
+        return {name: history["sequence"][which].tolist() for name, which in groups.items()}
 
     @property
     def versions(self) -> list[int]:

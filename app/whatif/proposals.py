@@ -12,7 +12,7 @@ from app.readings.tables import Stream
 from app.web.i18n import _
 from app.whatif.tables import ParameterProposal
 
-STATUSES = ("open", "approved", "rejected", "outdated")
+STATUSES = ("open", "outdated", "approved", "rejected", "withdrawn")
 
 
 class Row(NamedTuple):

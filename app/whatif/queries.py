@@ -192,11 +192,7 @@ def map_of(
     made = [
         Cell(parameters.weighting_factor, parameters.zero_range, figures.get(at)) for at, parameters in enumerate(grid)
     ]
-    region = best_region(
-        [cell.figures for cell in made],
-        criterion,
-        of_today.rejects if criterion is Criterion.CORRECTIONS else None,
-    )
+    region = best_region([cell.figures for cell in made], criterion, of_today)
     return Map(past, weighting_factors, zero_ranges, base.averaging_limit, delay, criterion, made, of_today, region)
 
 

@@ -98,7 +98,7 @@ class ProposalIn(WhatIfIn):
 
 
 class DecisionIn(Body):
-    """Why it is approved or rejected."""
+    """Why it is approved, rejected or withdrawn."""
 
     model_config = ConfigDict(json_schema_extra={"example": {"reason": "Agreed with the shop floor"}})
 
@@ -198,6 +198,7 @@ class CellOut(BaseModel):
     figures: FiguresOut | None = Field(description="null where R33 < R34 does not hold.")
     inside: bool = Field(description="As good as the best: within two standard errors of it, or 2 %.")
     best: bool
+    calmest: bool = Field(description="Of those as good as the best the one that corrects least.")
     reason: str | None = Field(description="Why there are no figures.")
 
 
@@ -235,7 +236,7 @@ class ProposalOut(BaseModel):
     id: int
     characteristic: str
     machine: str
-    status: Literal["open", "approved", "rejected", "outdated"] = Field(
+    status: Literal["open", "outdated", "approved", "rejected", "withdrawn"] = Field(
         description="outdated: open, but the parameters have changed since."
     )
     from_version: int = Field(description="The version it changes.")

@@ -19,7 +19,7 @@ class ParameterProposal(Base):
     __tablename__ = "parameter_proposal"
     __table_args__ = (
         ForeignKeyConstraint(["machine_id", "characteristic_id"], ["characteristic.machine_id", "characteristic.id"]),
-        CheckConstraint("status IN ('open', 'approved', 'rejected')", name="status"),
+        CheckConstraint("status IN ('open', 'approved', 'rejected', 'withdrawn')", name="status"),
         Index("parameter_proposal_characteristic_idx", "machine_id", "characteristic_id", "id"),
         Index("parameter_proposal_open_idx", "id", postgresql_where=text("status = 'open'")),
     )

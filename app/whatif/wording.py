@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
+from app.capability.wording import named
 from app.core.policy_map import Criterion
 from app.core.replay import Figures
 from app.core.spc.refusal import Reason, Refused
 from app.web.i18n import _, ngettext
-from app.web.numbers import NO_BREAK_SPACE, NOTHING, um
+from app.web.numbers import NO_BREAK_SPACE, NOTHING, signed, um
 
 if TYPE_CHECKING:
     from app.core.effect import Effect
@@ -66,6 +68,28 @@ def percent(share: float | None) -> str:
     return NOTHING if share is None else f"{100 * share:.0f}{NO_BREAK_SPACE}%"
 
 
+def assumed(share: float, delay: int) -> str:
+    """What the replay assumes of corrections."""
+    acts = (
+        _("Assumed here: a correction acts in full")
+        if share == 1
+        else _("Assumed here: of a correction {share} act").format(share=percent(share))
+    )
+    after = ngettext(
+        "after %(num)d more part with the old offset.", "after %(num)d more parts with the old offset.", delay
+    ) % {"num": delay}
+    return f"{acts}, {after}" if delay else _("{acts}, from the next part on.").format(acts=acts)
+
+
+def moment(text: str) -> datetime:
+    """A moment of `evidence.period_of`.
+
+    >>> moment("2026-11-21T08:15:02.120000Z").isoformat()
+    '2026-11-21T08:15:02+00:00'
+    """
+    return datetime.fromisoformat(text[:19] + "+00:00")
+
+
 def effect(found: Effect) -> str:
     """What corrections do on this machine."""
     said = _(
@@ -117,6 +141,7 @@ def cautions(past: Past) -> list[str]:
             )
             % {"num": past.unknown}
         )
+    found += left_out(past)
     if past.others:
         found.append(
             _("The tool is corrected by {others} as well; they are replayed with it, set as they were.").format(
@@ -138,6 +163,18 @@ def cautions(past: Past) -> list[str]:
     if parameters.mode.value == "approval":
         found.append(_("Corrections wait for a person here; in the replay they are released at once."))
     return found
+
+
+def left_out(past: Past) -> list[str]:
+    """Readings that count for nothing, or for less than the others, by their numbers."""
+    said = {
+        "excluded": _("Left out, as somebody has excluded them: readings {which}."),
+        "faults": _("Left out, as probe faults: readings {which}."),
+        "worn": _(
+            "In the wear zone, where a person decides: readings {which}. They count as rejects; mean, spread and Ppk are without them."
+        ),
+    }
+    return [said[name].format(which=named(numbers)) for name, numbers in past.named().items() if numbers]
 
 
 def out_of_order(zero_range: float, averaging_limit: float) -> str:
@@ -163,7 +200,9 @@ def criterion_explained(which: Criterion) -> str:
         Criterion.PPK: _("The larger Ppk the better."),
         Criterion.REJECTS: _("The fewer parts out of tolerance the better."),
         Criterion.SPREAD: _("The smaller the standard deviation of the parts the better."),
-        Criterion.CORRECTIONS: _("The fewer corrections the better, among settings that reject no more than today's."),
+        Criterion.CORRECTIONS: _(
+            "The fewer corrections the better, among settings that reject no more than today's and have no worse Ppk."
+        ),
     }[which]
 
 
@@ -175,9 +214,20 @@ def cell(figures: Figures, which: Criterion) -> str:
         case Criterion.SPREAD:
             return NOTHING if figures.spread is None else f"{figures.spread * 1000:.2f}"
         case Criterion.REJECTS:
-            return str(figures.rejects)
+            return counted(figures.rejects)
         case Criterion.CORRECTIONS:
-            return str(figures.corrections)
+            return counted(figures.corrections)
+
+
+def counted(count: int) -> str:
+    """A count in four signs at most, so that it fits a cell.
+
+    >>> counted(9999), counted(12_600), counted(1_250_000)
+    ('9999', '13k', '1.2M')
+    """
+    if count < 10_000:
+        return str(count)
+    return f"{count / 1000:.0f}k" if count < 999_500 else f"{count / 1_000_000:.1f}M"
 
 
 def setting(name: str, value: float) -> str:
@@ -191,9 +241,9 @@ def setting(name: str, value: float) -> str:
     return f"{value:+.6g}".replace("-", "−") if name == "factor" else f"{value:.6g}"
 
 
-def rows_of(stored: list[dict[str, Any]]) -> list[tuple[str, list[str]]]:
-    """The table of figures that were kept as evidence."""
-    return rows([Figures(**{name: each.get(name, 0) for name in Figures._fields}) for each in stored])
+def stored(kept: Mapping[str, Any]) -> Figures:
+    """Figures that were kept as evidence."""
+    return Figures(**{name: kept.get(name, 0) for name in Figures._fields})
 
 
 def rows(answer_figures: Sequence[Figures]) -> list[tuple[str, list[str]]]:
@@ -207,15 +257,48 @@ def rows(answer_figures: Sequence[Figures]) -> list[tuple[str, list[str]]]:
 
     return [
         line(_("Corrections"), lambda f: f.corrections),
-        line(_("Mean size of a correction"), lambda f: plain_um(f.mean_size)),
+        line(_("Mean size of one"), lambda f: plain_um(f.mean_size)),
         line(_("Rejects"), lambda f: f.rejects),
         line(_("Ppk"), lambda f: number(f.ppk)),
         line(_("Spread s"), lambda f: plain_um(f.spread, 2)),
         line(_("Mean deviation"), lambda f: um(f.mean, 2)),
         line(_("Largest deviation"), lambda f: plain_um(f.largest)),
-        line(_("Alarms: oversize, undersize"), lambda f: f"{f.oversize}, {f.undersize}"),
-        line(_("Alarms: tool worn, probe fault"), lambda f: f"{f.worn}, {f.faults}"),
+        line(_("Alarms"), lambda f: f.alarms),
+        line(_("oversize, undersize"), lambda f: f"{f.oversize}, {f.undersize}"),
+        line(_("tool worn, probe fault"), lambda f: f"{f.worn}, {f.faults}"),
         line(_("Corrections held"), lambda f: f.held),
+    ]
+
+
+def gained(today: Figures, other: Figures) -> list[tuple[str, bool | None]]:
+    """For each line of `rows` what the other settings change, and whether that is better; empty where nothing can be said."""
+
+    def share(a: float | None, b: float | None, *, more_is_better: bool = False) -> tuple[str, bool | None]:
+        if a is None or b is None or not a or a == b:
+            return ("=" if a == b and a is not None else "", None)
+        change = round(100 * (b - a) / a)
+        return f"{signed(change, 0)}{NO_BREAK_SPACE}%", (b > a) == more_is_better
+
+    def difference(a: float | None, b: float | None, decimals: int, *, more_is_better: bool) -> tuple[str, bool | None]:
+        if a is None or b is None:
+            return "", None
+        if round(a, decimals) == round(b, decimals):
+            return "=", None
+        return signed(b - a, decimals), (b > a) == more_is_better
+
+    nothing: tuple[str, bool | None] = ("", None)
+    return [
+        share(today.corrections, other.corrections),
+        nothing,
+        difference(today.rejects, other.rejects, 0, more_is_better=False),
+        difference(today.ppk, other.ppk, 2, more_is_better=True),
+        share(today.spread, other.spread),
+        nothing,
+        nothing,
+        difference(today.alarms, other.alarms, 0, more_is_better=False),
+        nothing,
+        nothing,
+        nothing,
     ]
 
 
@@ -225,6 +308,7 @@ def done(what: str) -> str | None:
         "proposed": _("The change is proposed. An engineer can approve it here."),
         "approved": _("The change is in force as a new version of the parameters."),
         "rejected": _("The proposal is rejected."),
+        "withdrawn": _("The proposal is withdrawn."),
     }.get(what)
 
 
@@ -234,5 +318,6 @@ def status(which: str) -> str:
         "open": _("Awaits approval"),
         "approved": _("Approved"),
         "rejected": _("Rejected"),
+        "withdrawn": _("Withdrawn"),
         "outdated": _("Outdated"),
     }.get(which, which)

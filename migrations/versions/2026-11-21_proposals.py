@@ -31,7 +31,8 @@ def upgrade() -> None:
             decided_why TEXT,
             made_version INTEGER,
             CONSTRAINT parameter_proposal_pkey PRIMARY KEY (id),
-            CONSTRAINT parameter_proposal_status_check CHECK (status IN ('open', 'approved', 'rejected')),
+            CONSTRAINT parameter_proposal_status_check CHECK
+                (status IN ('open', 'approved', 'rejected', 'withdrawn')),
             CONSTRAINT parameter_proposal_machine_id_characteristic_id_fkey FOREIGN KEY(machine_id, characteristic_id)
                 REFERENCES characteristic (machine_id, id)
         )

@@ -16,10 +16,25 @@ def test_the_best_region_holds_what_cannot_be_told_from_the_best() -> None:
     assert (found.best, found.inside) == (0, (True, True, False, False, False))
     few = best_region([cell(rejects=4), cell(rejects=7), cell(rejects=9)], Criterion.REJECTS)
     assert few.inside == (True, True, False)
-    # The fewest corrections of those that reject no more than now.
-    lazy = [cell(corrections=0, rejects=50), cell(corrections=30, rejects=2), cell(corrections=60, rejects=1)]
-    assert best_region(lazy, Criterion.CORRECTIONS, most_rejects=2).best == 1
     assert best_region([None], Criterion.PPK).best is None
+
+
+def test_the_fewest_corrections_are_not_those_of_a_loop_that_sleeps() -> None:
+    today = cell(corrections=80, rejects=2, ppk=1.5)
+    cells = [
+        cell(corrections=0, rejects=50, ppk=0.7),
+        cell(corrections=5, rejects=2, ppk=1.2),
+        cell(corrections=30, rejects=2, ppk=1.49),
+        cell(corrections=60, rejects=1, ppk=1.6),
+    ]
+    assert best_region(cells, Criterion.CORRECTIONS, today).best == 2
+    assert best_region(cells, Criterion.CORRECTIONS).best == 0
+
+
+def test_of_settings_as_good_as_the_best_one_corrects_least() -> None:
+    cells = [cell(ppk=1.5, corrections=900), cell(ppk=1.49, corrections=90), cell(ppk=1.0, corrections=9)]
+    found = best_region(cells, Criterion.PPK)
+    assert (found.best, found.calmest) == (0, 1)
 
 
 def test_settings_out_of_order_are_told() -> None:
