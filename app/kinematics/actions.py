@@ -13,7 +13,7 @@ from app.alarms import actions as alarms
 from app.audit.actions import record as audit
 from app.core.zones import nanometres
 from app.db.events import publish
-from app.errors import Conflict
+from app.errors import Conflict, FieldError, Invalid
 from app.formats.values import Unreadable, moment
 from app.kinematics import queries, wording
 from app.kinematics.evaluation import evaluate
@@ -21,7 +21,7 @@ from app.kinematics.outcome import Evaluated, Limits
 from app.kinematics.queries import RunRow
 from app.kinematics.schemas import PlanIn, RunIn
 from app.kinematics.tables import KinematicsBackup, KinematicsDecision, KinematicsPlan, KinematicsRun
-from app.kinematics.values import AXIS_OF, as_reading, errors_of, values_of
+from app.kinematics.values import AXIS_OF, as_reading, errors_of, to_enter, values_of
 from app.machines.queries import lock_machines
 from app.machines.tables import Machine
 from app.people.callers import Caller
@@ -62,12 +62,14 @@ def take(session: Session, machine: Machine, given: RunIn, caller: Caller) -> Ta
     limits = limits_of(plan)
     found = evaluate(given, limits)
     head = given.head or ""
+    said = given.measured_at or _said_time(found)
+    in_effect, version = queries.state_at(session, machine.id, head, said)
     made = KinematicsRun(
         machine_id=machine.id,
         id=queries.next_run(session),
         form=found.form,
         head=head,
-        measured_at=given.measured_at or _said_time(found) or datetime.now(UTC),
+        measured_at=said or datetime.now(UTC),
         actor=caller.name,
         key=given.key,
         given=sent,
@@ -75,8 +77,8 @@ def take(session: Session, machine: Machine, given: RunIn, caller: Caller) -> Ta
         outcome=found.outcome,
         reason=found.reason,
         results=found.results | {"head": found.head},
-        in_effect=queries.in_effect(session, machine.id, head),
-        version=queries.version_of(session, machine.id, head),
+        in_effect=in_effect,
+        version=version,
     )
     session.add(made)
     session.flush()
@@ -114,18 +116,24 @@ def _said_time(found: Evaluated) -> datetime | None:
 
 
 def _watch(session: Session, machine: Machine, plan: KinematicsPlan, made: KinematicsRun) -> list[dict[str, Any]]:
-    """Hold the values against their limits: raise the alarm, or end it."""
+    """Hold the values against their limits: raise the alarm, or end it. What came in late says nothing of today."""
     values, changes = values_of(made.results), []
+    if not queries.is_latest(session, made):
+        return []
     for name, limit in plan.limits.items():
         if name not in values:
             continue
-        about = {"memory": "kinematics", "location": name}
         if nanometres(abs(values[name])) > nanometres(limit):
-            data = about | {"value": values[name], "limit": limit, "run": made.id}
+            data = _place(name, made.head) | {"value": values[name], "limit": limit, "run": made.id}
             changes.append(alarms.news(machine.key, alarms.raise_for_place(session, machine.id, DRIFT, data)))
         else:
             changes += _settle(session, machine, name, made)
     return changes
+
+
+def _place(name: str, head: str) -> dict[str, Any]:
+    """What an alarm is about: a value, of one head."""
+    return {"memory": "kinematics", "location": f"{name} {head}".rstrip(), "name": name, "head": head}
 
 
 def _settle(session: Session, machine: Machine, name: str, run: KinematicsRun, actor: str = "") -> list[dict[str, Any]]:
@@ -133,7 +141,7 @@ def _settle(session: Session, machine: Machine, name: str, run: KinematicsRun, a
         session,
         machine.id,
         DRIFT,
-        {"memory": "kinematics", "location": name},
+        _place(name, run.head),
         actor or run.actor,
         _("Run {number}").format(number=run.id),
         {"code": "kinematics_run", "number": run.id},
@@ -163,68 +171,108 @@ def confirm(session: Session, number: int, reason: str, caller: Caller) -> RunRo
     return queries.run(session, number)
 
 
-def enter(session: Session, number: int, reason: str, caller: Caller) -> RunRow:
+def enter(
+    session: Session, number: int, reason: str, caller: Caller, *, offsets: bool = False, at: datetime | None = None
+) -> RunRow:
     """The position errors of the run have been entered on the control: the kinematics before and after are kept.
 
-    Raises `NotFound`; `Conflict` when it is refused, waits to be confirmed, was entered, or was overtaken.
+    offsets: Q147 to Q149 as well; of a run of the ball alone they are always meant. at: when it was done, if not now.
+    Raises `NotFound`; `Invalid` for a time that cannot be; `Conflict` when the run is refused, waits to be confirmed, was
+    entered, or was overtaken.
     """
     lock_machines(session, [queries.run(session, number).machine.id])
     row = queries.run(session, number)
     if row.status == "to_confirm" or not row.may_be_entered:
         raise Conflict(*wording.cannot_enter(row), run_status=row.status)
     run, machine = row.run, row.machine
-    before = queries.in_effect(session, machine.id, run.head)
-    after = before | {
-        name: round(before.get(name, 0.0) + value, 9) + 0.0 for name, value in errors_of(run.results).items()
-    }
-    version = queries.next_version(session, machine.id)
-    if run.version == 0:  # the kinematics that the machine came with has no back-up yet
-        began = _("As it was before run {number}").format(number=number)
-        _keep(session, machine, KinematicsBackup(version=version, head=run.head, reason=began, errors=before), caller)
-        version += 1
-    _keep(
-        session,
-        machine,
-        KinematicsBackup(version=version, head=run.head, reason=reason, errors=after, run=number),
-        caller,
-    )
+    if at is not None:
+        _could_be(session, run, at)
+    before, version = queries.state_at(session, machine.id, run.head, None)
+    entered = to_enter(run.results, offsets=offsets)
+    after = before | {name: round(before.get(name, 0.0) + value, 9) + 0.0 for name, value in entered.items()}
+    if version == 0:  # the kinematics that the machine came with has no back-up yet
+        words = _("As it was before run {number}").format(number=number)
+        _keep(session, machine, KinematicsBackup(head=run.head, reason=words, errors=before), caller, at)
+    made = KinematicsBackup(head=run.head, reason=reason, errors=after, run=number)
+    _keep(session, machine, made, caller, at)
     _decide(session, run, "entered", reason, caller)
-    axes = {AXIS_OF[name] for name in errors_of(run.results)}
     changes = [news(machine, run)]
+    axes = {AXIS_OF.get(name) for name in entered}
     for name in queries.plan(session, machine.id).limits:
-        if name.startswith("E") and AXIS_OF[name] in axes:
+        if name in entered or (name in AXIS_OF and name.startswith("E") and AXIS_OF[name] in axes):
             changes += _settle(session, machine, name, run, caller.name)
-    audit(session, caller.name, "kinematics changed", f"kinematics/{machine.key}/{version}", before, after, reason)
+    audit(session, caller.name, "kinematics changed", f"kinematics/{machine.key}/{made.version}", before, after, reason)
     publish(session, *changes)
     return queries.run(session, number)
 
 
-def restore(session: Session, machine: Machine, version: int, reason: str, caller: Caller) -> KinematicsBackup:
-    """Put a kinematics back that was in effect before; that is a new version. Raises `NotFound`; `Conflict` if it is in effect."""
+def _could_be(session: Session, run: KinematicsRun, at: datetime) -> None:
+    """Raises `Invalid` for an entry before its run, before the one before it, ahead, or unknown to a run after it."""
+    kept = queries.course(session, run.machine_id, run.head)
+    later = queries.first_after(session, run.machine_id, run.head, at)
+    wrong = None
+    if at < run.measured_at:
+        wrong = _("run {number} was measured later").format(number=run.id)
+    elif at > datetime.now(UTC):
+        wrong = _("that is still to come")
+    elif kept and at < kept[-1].at:
+        wrong = _("the kinematics was changed later, by version {version}").format(version=kept[-1].version)
+    elif later is not None:
+        wrong = _("run {number} was measured after that, and came in as if nothing had been entered").format(
+            number=later.id
+        )
+    if wrong is not None:
+        raise Invalid(f"at: {wrong}.", _("Leave it out if it was just now."), errors=[FieldError("at", wrong)])
+
+
+def undo(session: Session, number: int, reason: str, caller: Caller) -> RunRow:
+    """Take back what was entered because of a run: the kinematics before it is put back, as a new version.
+
+    Raises `NotFound`; `Conflict` when it was not entered, was undone, or something entered later stands on it.
+    """
+    lock_machines(session, [queries.run(session, number).machine.id])
+    row = queries.run(session, number)
+    path = queries.in_force(queries.course(session, row.machine.id, row.run.head))
+    at = next((place for place, each in enumerate(path) if each.run == number), None)
+    if at is None:
+        raise Conflict(*wording.cannot_undo(row), run_status=row.status)
+    if at != len(path) - 1:
+        later = [each.run for each in path[at + 1 :] if each.run is not None]
+        raise Conflict(*wording.stands_below(row, later, path[at - 1].version), later=later)
+    restore(session, row.machine, path[at - 1].version, reason, caller)
+    publish(session, news(row.machine, row.run))
+    return queries.run(session, number)
+
+
+def restore(
+    session: Session, machine: Machine, version: int, reason: str, caller: Caller, *, instead_of: int | None = None
+) -> KinematicsBackup:
+    """Put a kinematics back that was in effect before; that is a new version.
+
+    instead_of: the version that was seen in effect. Raises `NotFound`; `Conflict` if it is in effect, or another than
+    was seen.
+    """
     lock_machines(session, [machine.id])
     old = queries.backup(session, machine, version)
-    before = queries.in_effect(session, machine.id, old.head)
-    if queries.version_of(session, machine.id, old.head) == version:
-        raise Conflict(
-            _("The kinematics of back-up {version} is in effect.").format(version=version),
-            _("There is nothing to put back."),
-        )
-    made = KinematicsBackup(
-        version=queries.next_version(session, machine.id),
-        head=old.head,
-        reason=reason,
-        errors=dict(old.errors),
-        restores=version,
-    )
+    now = queries.course(session, machine.id, old.head)[-1]
+    if queries.alike(now.errors, old.errors):
+        raise Conflict(*wording.is_in_effect(old, now), version=now.version)
+    if instead_of is not None and instead_of != now.version:
+        raise Conflict(*wording.changed_meanwhile(instead_of, now), version=now.version)
+    made = KinematicsBackup(head=old.head, reason=reason, errors=dict(old.errors), restores=version)
     _keep(session, machine, made, caller)
     subject = f"kinematics/{machine.key}/{made.version}"
-    audit(session, caller.name, "kinematics put back", subject, before, made.errors, reason)
+    audit(session, caller.name, "kinematics put back", subject, dict(now.errors), made.errors, reason)
     publish(session, {"kind": "kinematics", "machine": machine.key})
     return made
 
 
-def _keep(session: Session, machine: Machine, made: KinematicsBackup, caller: Caller) -> None:
+def _keep(
+    session: Session, machine: Machine, made: KinematicsBackup, caller: Caller, at: datetime | None = None
+) -> None:
     made.machine_id, made.actor = machine.id, caller.name
+    made.version = queries.next_version(session, machine.id)
+    made.at = at or datetime.now(UTC)
     session.add(made)
     session.flush()
 

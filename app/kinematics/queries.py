@@ -1,6 +1,8 @@
 """Runs, what became of them, and the kinematics in effect. Never writes."""
 
 from collections.abc import Mapping, Sequence
+from datetime import datetime
+from math import isclose
 from typing import Any, NamedTuple
 
 from sqlalchemy import func, select, tuple_
@@ -8,24 +10,28 @@ from sqlalchemy.orm import Session
 
 from app.errors import FieldError, Invalid, NotFound
 from app.kinematics.tables import KinematicsBackup, KinematicsDecision, KinematicsPlan, KinematicsRun
+from app.kinematics.values import to_enter
 from app.machines.tables import Machine
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL
 from app.web.i18n import _
 
 MOST_FOR_DRIFT = 500
+SAME = 1e-9  # mm and degrees
 
 
 class RunRow(NamedTuple):
     """A run with its machine and what was decided of it.
 
     status: `refused`; `to_confirm` (its change is larger than permitted); `confirmed`; `measured`; `entered`.
-    overtaken: the kinematics has been changed since it was measured, so it says nothing about what is to be entered.
+    overtaken: the kinematics is not the one it was measured on, so it says nothing about what is to be entered.
+    undone: it was entered, and the kinematics in effect is without it again.
     """
 
     run: KinematicsRun
     machine: Machine
     decisions: Mapping[str, KinematicsDecision]
     overtaken: bool
+    undone: bool = False
 
     @property
     def status(self) -> str:
@@ -40,7 +46,7 @@ class RunRow(NamedTuple):
     @property
     def may_be_entered(self) -> bool:
         """Whether its errors could be entered on the control now, confirmed or not."""
-        return self.status not in {"refused", "entered"} and not self.overtaken and bool(self.run.results["axes"])
+        return self.status not in {"refused", "entered"} and not self.overtaken and bool(to_enter(self.run.results))
 
 
 def run(session: Session, number: int) -> RunRow:
@@ -105,11 +111,16 @@ def _rows(session: Session, found: Sequence[tuple[KinematicsRun, Machine]]) -> l
         for each in session.scalars(select(KinematicsDecision).where(places.in_(keys))):
             decided.setdefault(each.run, {})[each.what] = each
     heads = {(run.machine_id, run.head) for run, _machine in found}
-    versions = {(machine_id, head): version_of(session, machine_id, head) for machine_id, head in heads}
-    return [
-        RunRow(run, machine, decided.get(run.id, {}), versions[run.machine_id, run.head] != run.version)
-        for run, machine in found
-    ]
+    courses = {place: course(session, *place) for place in heads}
+    return [_row(run, machine, decided.get(run.id, {}), courses[run.machine_id, run.head]) for run, machine in found]
+
+
+def _row(
+    run: KinematicsRun, machine: Machine, decisions: Mapping[str, KinematicsDecision], kept: list[KinematicsBackup]
+) -> RunRow:
+    now = kept[-1].errors if kept else {}
+    path = {version.run for version in in_force(kept)}
+    return RunRow(run, machine, decisions, not alike(now, run.in_effect), "entered" in decisions and run.id not in path)
 
 
 def of_machine(session: Session, machine_id: int) -> list[KinematicsRun]:
@@ -123,12 +134,61 @@ def of_machine(session: Session, machine_id: int) -> list[KinematicsRun]:
     return list(reversed(session.scalars(newest).all()))
 
 
+def is_latest(session: Session, run: KinematicsRun) -> bool:
+    """Whether no run that counts was measured later with this head."""
+    later = select(KinematicsRun.id).where(
+        KinematicsRun.machine_id == run.machine_id,
+        KinematicsRun.head == run.head,
+        KinematicsRun.outcome != "refused",
+        tuple_(KinematicsRun.measured_at, KinematicsRun.id) > (run.measured_at, run.id),
+    )
+    return session.scalars(later.limit(1)).one_or_none() is None
+
+
+def first_after(session: Session, machine_id: int, head: str, at: datetime) -> KinematicsRun | None:
+    """The first run that counts which was measured with this head after a moment."""
+    later = select(KinematicsRun).where(
+        KinematicsRun.machine_id == machine_id,
+        KinematicsRun.head == head,
+        KinematicsRun.outcome != "refused",
+        KinematicsRun.measured_at > at,
+    )
+    return session.scalars(later.order_by(KinematicsRun.measured_at, KinematicsRun.id).limit(1)).one_or_none()
+
+
 def next_run(session: Session) -> int:
     """A number for a run."""
     return int(session.scalar(select(func.nextval("kinematics_run_id"))) or 0)
 
 
 # --- the kinematics
+
+
+def alike(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
+    """Whether two kinematics hold the same values; what is not named is 0."""
+    return all(isclose(one.get(name, 0.0), other.get(name, 0.0), abs_tol=SAME) for name in {*one, *other})
+
+
+def course(session: Session, machine_id: int, head: str) -> list[KinematicsBackup]:
+    """Every kinematics that was in effect with one head, oldest first."""
+    wanted = select(KinematicsBackup).where(KinematicsBackup.machine_id == machine_id, KinematicsBackup.head == head)
+    return list(session.scalars(wanted.order_by(KinematicsBackup.version)))
+
+
+def in_force(kept: Sequence[KinematicsBackup]) -> list[KinematicsBackup]:
+    """The versions that the last of them is made of: what was put back leads on from there, what was undone is not in it."""
+    paths: dict[int, list[KinematicsBackup]] = {}
+    path: list[KinematicsBackup] = []
+    for each in kept:
+        path = paths[each.restores] if each.restores in paths else [*path, each]
+        paths[each.version] = path
+    return path
+
+
+def state_at(session: Session, machine_id: int, head: str, at: datetime | None) -> tuple[dict[str, float], int]:
+    """What had been entered with this head at a moment (None: now), by name of the error, and the version; 0: nothing."""
+    kept = [each for each in course(session, machine_id, head) if at is None or each.at <= at]
+    return (dict(kept[-1].errors), kept[-1].version) if kept else ({}, 0)
 
 
 def version_of(session: Session, machine_id: int, head: str) -> int:

@@ -65,6 +65,14 @@ def errors_of(results: Mapping[str, Any]) -> dict[str, float]:
     return {name: value for name, value in values_of(results).items() if name in AXIS_OF and name.startswith("E")}
 
 
+def to_enter(results: Mapping[str, Any], *, offsets: bool = False) -> dict[str, float]:
+    """What a run asks to enter: its position errors; those of the ball (Q147 to Q149) where they are wanted, or are all there is."""
+    errors = errors_of(results)
+    if errors and not offsets:
+        return errors
+    return errors | {name: value for name, value in values_of(results).items() if name in OFFSETS}
+
+
 def as_reading(name: str, value: float) -> float:
     """A value as a length in mm, which readings are: an angle as what it comes to over one metre.
 
