@@ -18,6 +18,7 @@ from app.core.spc.refusal import Floats
 from app.core.spc.rules import RULES, RuleName, signals_of_cusum
 from app.core.spc.spread import Estimator, subgroups, summary
 from app.core.uncertainty import position_uncertainty
+from app.proof import geometry
 
 Given = dict[str, Any]
 Got = dict[str, Any]
@@ -290,5 +291,9 @@ ENGINE: dict[str, Callable[[Given], Got]] = {
     "linearity": straight,
     "bias": biased,
     "type_one": first_type,
+    "circle_fit": geometry.circle,
+    "line_fit": geometry.line,
+    "plane_fit": geometry.plane,
+    "printed_straightness": geometry.printed_straightness,
 }
 """By kind of example."""

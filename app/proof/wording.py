@@ -21,6 +21,7 @@ def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
         "capability": (_("Capability and normality"), ("capability", "percentile", "anderson_darling", "shapiro_wilk")),
         "in_time": (_("Behaviour in time"), ("variance_in_time", "scatter_in_time", "following")),
         "gauge": (_("Gauge studies"), ("gauge_ranges", "gauge_anova", "linearity", "bias", "type_one")),
+        "geometry": (_("Geometry"), ("circle_fit", "line_fit", "plane_fit", "printed_straightness")),
     }
 
 

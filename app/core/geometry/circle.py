@@ -18,6 +18,7 @@ from app.core.geometry.points import STRAIGHT, Degenerate, Floats, Reason, exten
 LEAST_ARC = 30.0  # degrees: on a shorter arc the centre is thirty times less certain than a touch
 LARGEST = 1e4  # radii per extent of the points: as good as straight
 STEPS = 200
+ROUNDING = 1e-15  # of a distance: near the least sum of squares only the gradient still tells which way it is
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -192,8 +193,8 @@ def _refined(centre: Floats, points: Floats) -> Floats:
             hessian = gauss
         step = np.linalg.lstsq(hessian + damping * np.eye(2), gradient, rcond=None)[0]
         tried = _squares(centre + step, points)
-        if tried <= square:
-            centre, square, damping = centre + step, tried, damping / 10 if damping > 1e-12 else 0.0
+        if tried <= square + ROUNDING * sqrt(len(points) * square):
+            centre, square, damping = centre + step, min(tried, square), damping / 10 if damping > 1e-12 else 0.0
             if np.abs(step).max() <= 1e-16 * max(1.0, float(np.abs(centre).max())):
                 break
         elif np.abs(step).max() <= 1e-13 * max(1.0, float(np.abs(centre).max())):
