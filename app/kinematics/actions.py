@@ -215,7 +215,7 @@ def _could_be(session: Session, run: KinematicsRun, at: datetime) -> None:
         wrong = _("run {number} was measured later").format(number=run.id)
     elif at > datetime.now(UTC):
         wrong = _("that is still to come")
-    elif kept and at < kept[-1].at:
+    elif kept and at < kept[-1].since:
         wrong = _("the kinematics was changed later, by version {version}").format(version=kept[-1].version)
     elif later is not None:
         wrong = _("run {number} was measured after that, and came in as if nothing had been entered").format(
@@ -272,7 +272,8 @@ def _keep(
 ) -> None:
     made.machine_id, made.actor = machine.id, caller.name
     made.version = queries.next_version(session, machine.id)
-    made.at = at or datetime.now(UTC)
+    made.at = datetime.now(UTC)
+    made.since = at or queries.last_measured(session, machine.id, made.head) or made.at
     session.add(made)
     session.flush()
 

@@ -82,6 +82,7 @@ RUN: dict[str, JsonValue] = {
         "max_dev_cal_ball": 0.01,
     },
     "overtaken": False,
+    "undone": False,
     "confirmed": None,
     "entered": None,
     "given": {"ball_radius": 12.5},
@@ -183,7 +184,8 @@ class RunOut(BaseModel):
     balls: Annotated[list[dict[str, float | None]], Field(description="Every ball that was found from touches.")]
     not_understood: Annotated[list[str], Field(description="What of the protocol or the text was not understood.")]
     limits: dict[str, float | None]
-    overtaken: Annotated[bool, Field(description="The kinematics has been changed since it was measured.")]
+    overtaken: Annotated[bool, Field(description="The kinematics is not the one it was measured on.")]
+    undone: Annotated[bool, Field(description="It was entered, and the kinematics in effect is without it again.")]
     confirmed: DecidedOut | None
     entered: DecidedOut | None
     given: Annotated[dict[str, Any], Field(description="As it was sent.")]
@@ -210,6 +212,7 @@ def run_out(row: RunRow) -> RunOut:
         not_understood=results["notes"],
         limits=run.limits,
         overtaken=row.overtaken,
+        undone=row.undone,
         confirmed=_decided(row, "confirmed"),
         entered=_decided(row, "entered"),
         given=run.given,

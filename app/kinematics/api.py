@@ -16,8 +16,8 @@ from app.kinematics.drift_answers import (
     changes_out,
     machine_out,
 )
-from app.kinematics.schemas import PlanIn, ReasonIn, RunIn
-from app.kinematics.values import UNITS, errors_of
+from app.kinematics.schemas import EnterIn, PlanIn, ReasonIn, RestoreIn, RunIn
+from app.kinematics.values import UNITS, to_enter
 from app.machines.queries import machine_named
 from app.machines.tables import Machine
 from app.web.api import api_router, problems
@@ -98,12 +98,21 @@ def confirm_kinematics_run(session: SessionDep, caller: Operator, run: RunNumber
 
 
 @router.post("/kinematics/runs/{run}/enter", responses=problems(404, 409))
-def enter_kinematics_run(session: SessionDep, caller: Operator, run: RunNumber, given: ReasonIn) -> RunOut:
+def enter_kinematics_run(session: SessionDep, caller: Operator, run: RunNumber, given: EnterIn) -> RunOut:
     """Its position errors have been entered on the control. The kinematics before and after is backed up.
 
     409 for a run that was refused, has to be confirmed, was entered already, or was measured on another kinematics.
     """
-    return run_out(actions.enter(session, run, given.reason, caller))
+    return run_out(actions.enter(session, run, given.reason, caller, offsets=given.offsets, at=given.at))
+
+
+@router.post("/kinematics/runs/{run}/undo", responses=problems(404, 409))
+def undo_kinematics_run(session: SessionDep, caller: Engineer, run: RunNumber, given: ReasonIn) -> RunOut:
+    """Take back what was entered because of it: the kinematics before it is put back, as a new version.
+
+    409 where it was not entered, was undone, or others were entered on top of it; says which.
+    """
+    return run_out(actions.undo(session, run, given.reason, caller))
 
 
 @router.post("/kinematics/runs/{run}/recompute", responses=problems(404))
@@ -130,7 +139,7 @@ def compare_kinematics_runs(session: SessionDep, caller: AnyCaller, run: RunNumb
         machine=before.machine.key,
         before=before.run.id,
         after=after.run.id,
-        changes=changes_out(changes, errors_of(after.run.results)),
+        changes=changes_out(changes, to_enter(after.run.results, offsets=True)),
     )
 
 
@@ -230,8 +239,8 @@ def list_kinematics_backups(
 
 @router.post("/machines/{machine}/kinematics/backups/{version}/restore", status_code=201, responses=problems(404, 409))
 def restore_kinematics(
-    session: SessionDep, caller: Engineer, machine: MachineKey, version: Version, given: ReasonIn
+    session: SessionDep, caller: Engineer, machine: MachineKey, version: Version, given: RestoreIn
 ) -> BackupOut:
-    """Put this kinematics back; that is a new version. 409 when it is in effect."""
+    """Put this kinematics back; that is a new version. 409 when it is in effect, or another than was seen."""
     found = machine_named(session, machine)
-    return backup_out(actions.restore(session, found, version, given.reason, caller))
+    return backup_out(actions.restore(session, found, version, given.reason, caller, instead_of=given.instead_of))

@@ -15,6 +15,7 @@ BACKUP: dict[str, JsonValue] = {
     "version": 3,
     "head": None,
     "at": "2026-11-21T07:02:11Z",
+    "since": "2026-11-21T06:42:10Z",
     "by": "ana",
     "reason": "Monthly check",
     "errors": {"EX0C": 0.0123, "EY0C": -0.0081, "EA0C": 0.0021, "EB0C": -0.0013},
@@ -55,7 +56,8 @@ class BackupOut(BaseModel):
 
     version: int
     head: str | None
-    at: datetime
+    at: Annotated[datetime, Field(description="When it was told.")]
+    since: Annotated[datetime, Field(description="Runs measured from then on were measured on it.")]
     by: str
     reason: str
     errors: dict[str, float]
@@ -102,6 +104,7 @@ def backup_out(row: KinematicsBackup) -> BackupOut:
         version=row.version,
         head=row.head or None,
         at=row.at,
+        since=row.since,
         by=row.actor,
         reason=row.reason,
         errors=row.errors,

@@ -156,6 +156,14 @@ def first_after(session: Session, machine_id: int, head: str, at: datetime) -> K
     return session.scalars(later.order_by(KinematicsRun.measured_at, KinematicsRun.id).limit(1)).one_or_none()
 
 
+def last_measured(session: Session, machine_id: int, head: str) -> datetime | None:
+    """When the last run that counts was measured with this head."""
+    wanted = select(func.max(KinematicsRun.measured_at)).where(
+        KinematicsRun.machine_id == machine_id, KinematicsRun.head == head, KinematicsRun.outcome != "refused"
+    )
+    return session.scalar(wanted)
+
+
 def next_run(session: Session) -> int:
     """A number for a run."""
     return int(session.scalar(select(func.nextval("kinematics_run_id"))) or 0)
@@ -180,14 +188,14 @@ def in_force(kept: Sequence[KinematicsBackup]) -> list[KinematicsBackup]:
     paths: dict[int, list[KinematicsBackup]] = {}
     path: list[KinematicsBackup] = []
     for each in kept:
-        path = paths[each.restores] if each.restores in paths else [*path, each]
+        path = paths.get(each.restores or 0, [*path, each])
         paths[each.version] = path
     return path
 
 
 def state_at(session: Session, machine_id: int, head: str, at: datetime | None) -> tuple[dict[str, float], int]:
     """What had been entered with this head at a moment (None: now), by name of the error, and the version; 0: nothing."""
-    kept = [each for each in course(session, machine_id, head) if at is None or each.at <= at]
+    kept = [each for each in course(session, machine_id, head) if at is None or each.since <= at]
     return (dict(kept[-1].errors), kept[-1].version) if kept else ({}, 0)
 
 

@@ -8,7 +8,7 @@ from pydantic_core import PydanticCustomError
 from app.core.kinematics.axis import AxisName, Carried
 from app.core.parameters import LARGEST_LENGTH
 from app.kinematics.values import UNITS
-from app.web.fields import Body, LatelyOrNow, Reason, Slug, Text200
+from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Reason, Slug, Text200
 from app.web.i18n import _
 
 Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
@@ -189,6 +189,37 @@ class ReasonIn(Body):
     model_config = ConfigDict(json_schema_extra={"example": {"reason": "After the collision of Tuesday"}})
 
     reason: Reason
+
+
+class EnterIn(Body):
+    """The values of a run have been entered on the control."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"reason": "Monthly check"}})
+
+    reason: Reason
+    offsets: Annotated[
+        bool,
+        Field(
+            strict=True, description="Q147 to Q149 as well, which the control leaves to be entered in its parameters."
+        ),
+    ] = False
+    at: Annotated[
+        LatelyOrNow | None, Field(description="When it was done, if runs measured before it are still to come in.")
+    ] = None
+
+
+class RestoreIn(Body):
+    """A kinematics is put back."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"reason": "Worse than before", "instead_of": 3}})
+
+    reason: Reason
+    instead_of: Annotated[
+        int | None,
+        Field(
+            strict=True, ge=1, le=LARGEST_SERIAL, description="The version seen in effect: 409 if it is not any more."
+        ),
+    ] = None
 
 
 class PlanIn(Body):

@@ -66,7 +66,8 @@ class KinematicsBackup(Base):
     """The kinematics of a machine (with one of its heads) as it was from one moment on, as cycle 450 keeps it. Append-only.
 
     errors: what has been entered so far, summed up by name. run: the run that led to it; restores: the version that was
-    put back.
+    put back. since: runs measured from then on were measured on it; if nobody has said when it was entered, that is when
+    the last run was measured that was known by then.
     """
 
     __tablename__ = "kinematics_backup"
@@ -75,6 +76,7 @@ class KinematicsBackup(Base):
     version: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     head: Mapped[str] = mapped_column(server_default="")
     at: Mapped[datetime] = mapped_column(server_default=func.now())
+    since: Mapped[datetime]
     actor: Mapped[str]
     reason: Mapped[str]
     errors: Mapped[dict[str, Any]]

@@ -61,6 +61,7 @@ CREATE TABLE kinematics_backup (
     version INTEGER NOT NULL,
     head TEXT DEFAULT '' NOT NULL,
     at timestamptz DEFAULT now() NOT NULL,
+    since timestamptz NOT NULL,
     actor TEXT NOT NULL,
     reason TEXT NOT NULL,
     errors JSONB NOT NULL,
