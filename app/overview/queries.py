@@ -17,6 +17,7 @@ from app.overview.ranking import Told
 from app.plant import queries as plant
 from app.plant.queries import Row
 from app.plant.state import State
+from app.readings.tables import Reading, Stream
 
 SHIFT = timedelta(hours=8)
 LOOKED_BACK = timedelta(days=7)  # over which the alarms of a shift are counted
@@ -51,7 +52,7 @@ def ranking(
     groups = plant.plant(session, machine=machine)
     only = groups[0].machine.id if machine is not None else None
     capable = capability.capability_by_characteristic(session, only)
-    raised = _raised(session, only, now)
+    raised, first = _raised(session, only, now), _first_measured(session, only)
     open_signals = signals.open_signals_by_characteristic(session, only)
     found: list[Ranked] = []
     for group in groups:
@@ -59,7 +60,7 @@ def ranking(
             number = row.characteristic.id
             index = capable[number]
             outlook = row.outlook
-            since = max(row.characteristic.created_at, now - LOOKED_BACK)
+            since = max(first.get(number, now), now - LOOKED_BACK)
             told = Told(
                 state=row.state,
                 alarms=len(row.alarms),
@@ -87,12 +88,32 @@ def _order(ranked: Ranked, by: By) -> tuple[float, ...]:
 
 
 def _raised(session: Session, machine_id: int | None, now: datetime) -> Counter[int]:
-    """How many alarms were raised lately, by characteristic."""
+    """How many alarms parts gave lately, by characteristic: by when they were measured, for readings may come late."""
     query = (
         select(Alarm.characteristic_id, func.count().label("raised"))
+        .outerjoin(
+            Reading,
+            (Reading.machine_id == Alarm.machine_id)
+            & (Reading.characteristic_id == Alarm.characteristic_id)
+            & (Reading.sequence == Alarm.sequence),
+        )
         .where(Alarm.characteristic_id.is_not(None), Alarm.raised_at > now - LOOKED_BACK)
+        .where(func.coalesce(Reading.measured_at, Alarm.raised_at) > now - LOOKED_BACK)
         .group_by(Alarm.characteristic_id)
     )
     if machine_id is not None:
         query = query.where(Alarm.machine_id == machine_id)
     return Counter({row.characteristic_id: row.raised for row in session.execute(query) if row.characteristic_id})
+
+
+def _first_measured(session: Session, machine_id: int | None) -> dict[int, datetime]:
+    """When the first reading of each characteristic was measured."""
+    query = select(Reading.characteristic_id, Reading.measured_at).join(
+        Stream,
+        (Stream.machine_id == Reading.machine_id)
+        & (Stream.characteristic_id == Reading.characteristic_id)
+        & (Reading.sequence == 1),
+    )
+    if machine_id is not None:
+        query = query.where(Stream.machine_id == machine_id)
+    return {row.characteristic_id: row.measured_at for row in session.execute(query)}

@@ -26,7 +26,7 @@ class RankedOut(BaseModel):
     parts_left: float | None = Field(description="Parts until wear comes to the first limit, as foretold.")
     signals: list[int] = Field(description="Numbers of the open signals.")
     alarms: int = Field(description="Active alarms.")
-    alarms_per_shift: float = Field(description="Alarms raised per 8 hours, over the last 7 days.")
+    alarms_per_shift: float = Field(description="Alarms that parts gave per 8 hours, over the last 7 days.")
 
 
 class Overview(BaseModel):

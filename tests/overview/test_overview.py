@@ -1,5 +1,6 @@
 """The ranking of the whole plant, over REST."""
 
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
@@ -47,6 +48,17 @@ def test_the_part_that_is_out_of_tolerance_comes_first_and_says_why(shop: Shop) 
     assert calm == [[], []]
     assert found[1]["reasons"][0]["text"] == "Oversize"
     assert found[1]["alarms_per_shift"] == pytest.approx(1.0)
+
+
+def test_the_alarm_load_is_that_of_the_days_in_which_the_parts_were_measured(server: Server) -> None:
+    shop = Shop(server)
+    now = datetime.now(UTC)
+    for days in (30, 20, 10, 2, 1):  # a machine hands in what it kept while it was offline
+        shop.read(9.0, measured_at=(now - timedelta(days=days)).isoformat())
+        alarm = shop.alarms()[0]["id"]
+        shop.acknowledge(alarm, "keep_cutting")
+    (item,) = ranked(shop)
+    assert item["alarms_per_shift"] == pytest.approx(2 / 21, abs=1e-3)
 
 
 def test_ppk_is_told_of_what_counts(shop: Shop) -> None:
