@@ -11,10 +11,12 @@ from app.capability.pictures import interval
 from app.capability.queries import USUAL
 from app.characteristics import queries as characteristics
 from app.core.spc.refusal import Refused
+from app.gauges import queries as gauges
+from app.gauges import wording as gauge_wording
 from app.proof import queries as proof
 from app.proof import wording as proof_wording
 from app.statistics import wording as statistics
-from app.web.deps import SessionDep, require
+from app.web.deps import AnyCaller, SessionDep, require
 from app.web.i18n import _
 from app.web.templates import page
 
@@ -23,7 +25,9 @@ RUNS = ("125", "500", "1000", "5000", "all")
 
 
 @router.get("/characteristics/{characteristic}/capability", dependencies=[require("viewer")])
-def capability_page(request: Request, session: SessionDep, characteristic: str, choice: AskedDep) -> Response:
+def capability_page(
+    request: Request, session: SessionDep, caller: AnyCaller, characteristic: str, choice: AskedDep
+) -> Response:
     """Indices with intervals and what they are worth, spread and shape, behaviour in time, the tool without corrections."""
     standing = characteristics.characteristic_named(session, characteristic)
     study = judged(session, standing, choice)
@@ -38,6 +42,7 @@ def capability_page(request: Request, session: SessionDep, characteristic: str, 
         address = f"/api/v1/characteristics/{standing.characteristic.key}/figures/capability"
         return f"{address}?{urlencode(now | {'picture': picture})}"
 
+    place = {"machine_id": standing.machine.id, "characteristic_id": standing.characteristic.id}
     timed = choice.start is not None or choice.end is not None
     failing = proof.failing()
     return page(
@@ -65,6 +70,10 @@ def capability_page(request: Request, session: SessionDep, characteristic: str, 
         refused=lambda value: isinstance(value, Refused),
         wording=wording,
         words=statistics,
+        gauge_studies=gauges.studies(session, **place, limit=3),
+        about_zero_range=gauges.latest_advice(session, standing),
+        gauge_wording=gauge_wording,
+        may_enter=caller.may("operator"),
         proof_failing=failing,
         proof_warning=proof_wording.warning(len(failing)),
     )

@@ -40,11 +40,19 @@ def list_page(
     session: SessionDep,
     caller: Viewer,
     machine: Annotated[str, Query(max_length=64)] = "",
+    characteristic: Annotated[str, Query(max_length=64)] = "",
     before: Before = None,
 ) -> Response:
-    """Every study with its verdict, newest first."""
-    chosen = machines.find_machine(session, machine)
-    rows = queries.studies(session, machine_id=chosen.id if chosen else None, before=before, limit=ON_PAGE + 1)
+    """Every study with its verdict, newest first; of a machine, or of a characteristic with what they say about its R33."""
+    standing = characteristics.characteristic_named(session, characteristic) if characteristic else None
+    chosen = standing.machine if standing else machines.find_machine(session, machine)
+    rows = queries.studies(
+        session,
+        machine_id=chosen.id if chosen else None,
+        characteristic_id=standing.characteristic.id if standing else None,
+        before=before,
+        limit=ON_PAGE + 1,
+    )
     return page(
         request,
         "gauges/list.html",
@@ -52,7 +60,10 @@ def list_page(
         older=rows[ON_PAGE - 1].study.id if len(rows) > ON_PAGE else None,
         before=before,
         machine=chosen,
+        standing=standing,
+        about=queries.latest_advice(session, standing) if standing else None,
         machines=machines.machines(session, limit=100_000),
+        may_change=caller.may("engineer"),
         may_enter=caller.may("operator"),
         wording=wording,
         **_failing(),

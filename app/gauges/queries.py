@@ -24,6 +24,7 @@ from app.web.fields import LARGEST_ID
 from app.web.i18n import _
 
 LOOKED_BACK = 400  # readings from which the scatter from part to part is told
+LOOKED_AT = 10  # newest studies among which one is looked for that speaks of R33
 MOST_TAKEN = 1_000  # readings that a study may be made of
 
 
@@ -160,6 +161,18 @@ def advice(session: Session, found: StudyRow) -> Advice | Refused | None:
     except Refused as refused:
         return refused
     return Advice(standing, made, sigma, repeats, looked_back)
+
+
+def latest_advice(session: Session, standing: Standing) -> tuple[StudyRow, Advice] | None:
+    """The newest study for a characteristic that says something about its R33, with what it says; None of none."""
+    wanted = studies(
+        session, machine_id=standing.machine.id, characteristic_id=standing.characteristic.id, limit=LOOKED_AT
+    )
+    for row in wanted:
+        found = advice(session, row)
+        if isinstance(found, Advice):
+            return row, found
+    return None
 
 
 def taken(session: Session, standing: Standing, first: int, through: int, take: str) -> list[tuple[int, list[float]]]:

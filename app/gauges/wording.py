@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from math import isnan
 from typing import Any, NamedTuple
 
-from app.core.spc.gauge.crossed import Line, Study
+from app.core.spc.gauge.crossed import POOLED_ABOVE, Line, Study
 from app.core.spc.gauge.linearity import Linearity
 from app.core.spc.gauge.single import Bias, TypeOne
 from app.core.spc.refusal import Refused
@@ -57,6 +57,15 @@ def um(length: float, decimals: int = 2) -> str:
 def share(value: float) -> str:
     """A percentage."""
     return "–" if isnan(value) else f"{value:.1f}\N{NARROW NO-BREAK SPACE}%"
+
+
+def p_value(p: float, equal: str = "") -> str:
+    """A probability as one reads it.
+
+    >>> p_value(0.0004), p_value(0.974), p_value(0.974, "= ")
+    ('< 0.001', '0.974', '= 0.974')
+    """
+    return "< 0.001" if p < 0.001 else f"{equal}{p:.3f}"
 
 
 def verdicts(found: Evaluated, tolerance: float | None) -> list[Verdict]:
@@ -144,7 +153,7 @@ def _linearity(found: Linearity) -> list[Verdict]:
             _("{slope} µm per mm").format(slope=signed(found.slope.value * 1000, 3)),
             _("errs by size") if moves else _("errs alike at all sizes"),
             "waiting" if moves else "steady",
-            _("slope of the bias, p = {p}").format(p=f"{found.slope.p_value:.3f}"),
+            _("slope of the bias, p {p}").format(p=p_value(found.slope.p_value, "= ")),
         ),
         Verdict(
             _("Average bias"),
@@ -175,10 +184,15 @@ def pooling(found: Study) -> str:
     if isnan(tested[0].p_value):
         return ""
     if found.pooled:
-        return _("The interaction (p = {p}, above 0.25) counts as repeatability.").format(p=f"{tested[0].p_value:.3f}")
-    return _("The interaction (p = {p}) counts by itself: operators differ by part.").format(
-        p=f"{tested[0].p_value:.3f}"
-    )
+        words = _(
+            "The interaction is not seen (p = {p}, above the {limit} of AIAG): it is pooled with repeatability, and parts and operators are tested against both together."
+        )
+    else:
+        words = _(
+            "The interaction counts by itself (p {p}, not above the {limit} of AIAG): operators differ by part. Parts and operators are tested against it."
+        )
+    p = tested[0].p_value
+    return words.format(p=p_value(p, "" if found.pooled else "= "), limit=POOLED_ABOVE)
 
 
 def refusal(refused: Refused) -> str:
@@ -218,6 +232,16 @@ def advice(found: Advice) -> list[str]:
     if s.fits is False:
         said.append(_("That is not below R34: first the probe or the process must scatter less, or R34 be raised."))
     return said
+
+
+def compared(found: Advice) -> str:
+    """What the suggestion means beside the value in force."""
+    suggested, now = (round(each * 1e6) for each in (found.suggestion.zero_range, found.standing.parameters.zero_range))
+    if suggested > now:
+        return _("R33 is too small: chance alone reaches beyond it, so the loop corrects scatter and adds to it.")
+    if suggested < now:
+        return _("R33 is larger than chance asks for: deviations within it that are real are not corrected at once.")
+    return _("R33 is as large as chance asks for.")
 
 
 def reason(number: int, found: Advice) -> str:
