@@ -50,7 +50,9 @@ class Shop:
             parameters=PARAMETERS | parameters,
         )
 
-    def call(self, method: str, path: str, status: int = 200, client: httpx.Client | None = None, **body: Any) -> Any:
+    def call(
+        self, method: str, path: str, /, status: int = 200, client: httpx.Client | None = None, **body: Any
+    ) -> Any:
         """One request; the JSON of the answer."""
         answer = (client or self.admin).request(method, f"/api/v1{path}", json=body or None)
         assert answer.status_code == status, f"{method} {path}: {answer.status_code} {answer.text}"

@@ -82,6 +82,8 @@ def _kept(machine: Machine, given: AlignmentIn) -> Values:
     for name in NEEDS.values():
         if name != needed:
             kept.pop(name, None)
+    if not kept["tip"] or needed != "touches":
+        kept.pop("tip")
     if given.work_offset is not None:
         offset = offset_of(machine.control, given.work_offset)
         if offset is None:
@@ -143,7 +145,7 @@ def _solved(kind: str, method: str, kept: Values) -> Values:
 
 def _points(method: str, given: Values) -> Values:
     touches = [
-        core.Touch(tuple(each["nominal"]), tuple(each["normal"]), tuple(each["measured"]))
+        core.Touch.by_tip(tuple(each["nominal"]), tuple(each["normal"]), tuple(each["measured"]), given.get("tip", 0.0))
         if "measured" in each
         else core.Touch.off_by(tuple(each["nominal"]), tuple(each["normal"]), each["deviation"])
         for each in given["touches"]

@@ -75,7 +75,9 @@ class TouchIn(Body):
     deviation: Annotated[
         Length | None, Field(description="Actual less nominal along the normal; or say `measured`.")
     ] = None
-    measured: Annotated[Vector | None, Field(description="The point that was touched.")] = None
+    measured: Annotated[
+        Vector | None, Field(description="The point that was touched; where the tip's centre stood if `tip` is said.")
+    ] = None
 
     @model_validator(mode="before")
     @classmethod
@@ -150,6 +152,16 @@ class AlignmentIn(Body):
     name: Annotated[Text200 | None, Field(description="What was aligned: part, pallet, set-up.")] = None
     part: Annotated[Text200 | None, Field(max_length=128, description="Serial number.")] = None
     touches: Annotated[list[TouchIn] | None, Field(max_length=MOST_TOUCHES, description="Of the kind `points`.")] = None
+    tip: Annotated[
+        float,
+        Field(
+            strict=True,
+            ge=0,
+            le=1000,
+            allow_inf_nan=False,
+            description="Of the kind `points`: its diameter, where `measured` is where its centre stood; 0 for the surface itself.",
+        ),
+    ] = 0.0
     side: Annotated[
         list[SidePointIn] | None, Field(min_length=2, max_length=2, description="Of the kind `two_points`.")
     ] = None

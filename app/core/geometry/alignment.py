@@ -54,6 +54,17 @@ class Touch(NamedTuple):
         x, y, z = (r + deviation * n / length for r, n in zip(nominal, normal, strict=True))
         return cls(nominal, normal, (x, y, z))
 
+    @classmethod
+    def by_tip(cls, nominal: Vector, normal: Vector, centre: Vector, tip: float) -> "Touch":
+        """A touch of which is known where the centre of the tip stood; tip: its diameter.
+
+        The centre lies half a tip before the face however the part is turned, so the face is taken half a tip further out.
+
+        >>> Touch.by_tip((100.0, 40.0, 0.0), (0.0, 0.0, 1.0), (100.0, 40.0, 3.1), 6.0).nominal
+        (100.0, 40.0, 3.0)
+        """
+        return cls(cls.off_by(nominal, normal, tip / 2).measured, normal, centre)
+
 
 class Advice(NamedTuple):
     """One more touch that would help most. gain: by what factor the least certain motion becomes more certain by it."""

@@ -38,6 +38,21 @@ def touched(faces: list[Face], motion: Floats, noise: list[float] | None = None)
     return found
 
 
+class TestTip:
+    def test_centres_of_the_tip_say_the_same_as_points_on_the_faces(self) -> None:
+        """A tip of 6 mm stands 3 mm before each face of the turned part, along the normal that the face then has."""
+        motion = frame(from_angles(0.4, -0.7, 5.0), [2.0, -1.0, 0.5])
+        surface, centres = [], []
+        for nominal, normal in MORE:
+            point = applied(motion, np.array([nominal], dtype=float))[0]
+            surface.append(Touch(nominal, normal, tuple(point)))
+            centre = point + 3.0 * motion[:3, :3] @ np.array(normal, dtype=float)
+            centres.append(Touch.by_tip(nominal, normal, tuple(centre), 6.0))
+        for found in (align(surface), align(centres)):
+            assert found.motion == pytest.approx(motion, abs=1e-9)
+            assert found.rms == pytest.approx(0, abs=1e-9)
+
+
 class TestPrinted:
     def test_the_formulas_by_hand(self) -> None:
         """Points 1–3 at (0, 0), (100, 0), (0, 50) with 0.01, 0.03, 0.02: c = 10 µm, lambda = 10 µm/50 mm,
