@@ -42,6 +42,8 @@ TAGS = {
     "what-if": "Stored readings replayed with other settings, side by side and as a map, and the changes proposed from them.",
     "gauges": "Gauge studies: type 1, bias, linearity, repeatability and reproducibility, and what they say about R33.",
     "kinematics": "Rotary axes by the preset compensation (cycle 452): runs, what to enter, drift, back-ups.",
+    "work zeros": "Work zero and size from the touches of an edge finder, as program text, and whether the fixture shifts.",
+    "alignments": "Where a part lies, from six touches or more: the frame, how well it is known, pallets composed with parts.",
     "programs": "Program text of the controls: read, written, and fetched where a machine has no network.",
     "alarms": "What needs a person, and what that person did about it.",
     "machines": "The machines that push readings.",
