@@ -30,7 +30,7 @@ class Frozen(NamedTuple):
 
 
 def freeze(session: Session, standing: Standing, given: BaselineIn, caller: Caller) -> Frozen:
-    """From now on readings are judged by this period. Raises `Invalid`; `Conflict` for a key that was used otherwise."""
+    """From now on readings are judged by this period. Raises `Invalid`; `Conflict`: another was meanwhile, or by this key."""
     _lock(session, standing)
     if given.key is not None:
         before = session.scalars(
@@ -42,6 +42,12 @@ def freeze(session: Session, standing: Standing, given: BaselineIn, caller: Call
         ).one_or_none()
         if before is not None:
             return _sent_before(before, given)
+    newest = queries.newest_version(session, standing.characteristic)
+    if given.seen_version is not None and given.seen_version != newest:
+        raise Conflict(
+            _("Somebody else has frozen baseline {version} meanwhile.").format(version=newest),
+            _("Look at it; freeze yours if it is still to take its place."),
+        )
     baseline = draft_of(session, standing, given).baseline
     baseline.key, baseline.reason = given.key, given.reason
     return Frozen(_keep(session, standing, baseline, caller))
@@ -104,9 +110,8 @@ def _lock(session: Session, standing: Standing) -> None:
 
 
 def _keep(session: Session, standing: Standing, baseline: Baseline, caller: Caller) -> Baseline:
-    newest = next(iter(queries.baselines(session, standing.characteristic, limit=1)), None)
     before = queries.baseline_in_force(session, standing.characteristic)
-    baseline.version = 1 if newest is None else newest.version + 1
+    baseline.version = 1 + queries.newest_version(session, standing.characteristic)
     baseline.actor = caller.name
     session.add(baseline)
     session.flush()

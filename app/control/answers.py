@@ -5,7 +5,17 @@ from typing import Any
 import numpy as np
 
 from app.control.drafting import Draft
-from app.control.schemas import BaselineOut, CautionOut, ControlOut, DraftAnswer, DraftOut, PointsOut, SignalOut
+from app.control.schemas import (
+    BaselineOut,
+    CautionOut,
+    ControlOut,
+    DraftAnswer,
+    DraftOut,
+    LeftOutOut,
+    PointsOut,
+    SignalOut,
+)
+from app.control.series import LeftOut
 from app.control.tables import Baseline
 from app.control.view import View
 from app.core.spc.refusal import Floats
@@ -13,7 +23,7 @@ from app.core.spc.rules import RULES
 from app.core.spc.shewhart import ENOUGH_READINGS
 from app.statistics import wording as statistics
 
-MOST_POINTS, MOST_SIGNALS = 10_000, 1_000
+MOST_POINTS, MOST_SIGNALS, MOST_LEFT_OUT = 10_000, 1_000, 1_000
 _RENAMED = {"freedom": "degrees_of_freedom", "slope": "wear_per_reading", "slope_error": "wear_error"}
 
 
@@ -32,7 +42,7 @@ def _numbers(baseline: Baseline, key: str) -> dict[str, Any]:
 def draft_out(draft: Draft, key: str) -> DraftAnswer:
     """What would be frozen."""
     cautions = [CautionOut(code=code, text=text) for code, text in draft.said]
-    return DraftAnswer(**_numbers(draft.baseline, key), left_out=draft.left_out, cautions=cautions)
+    return DraftAnswer(**_numbers(draft.baseline, key), left_out=left_out(draft.left_out), cautions=cautions)
 
 
 def baseline_out(baseline: Baseline, key: str, in_force: int | None) -> BaselineOut:
@@ -50,6 +60,15 @@ def baseline_out(baseline: Baseline, key: str, in_force: int | None) -> Baseline
     )
     frozen = {name: getattr(baseline, name) for name in names}
     return BaselineOut(**_numbers(baseline, key), **frozen, in_force=baseline.version == in_force)
+
+
+def left_out(found: LeftOut | None) -> LeftOutOut:
+    """Readings that count for nothing."""
+    if found is None:
+        return LeftOutOut(excluded=[], by_baseline=[], faults=[], unknown=[], count=0)
+    kinds = ("excluded", "by_baseline", "faults", "unknown")
+    numbers = {name: getattr(found, name)[-MOST_LEFT_OUT:].tolist() for name in kinds}
+    return LeftOutOut(**numbers, count=len(found))
 
 
 def signals_out(view: View, most: int) -> list[SignalOut]:
@@ -88,6 +107,7 @@ def control_out(view: View, key: str, baseline: Baseline | None) -> ControlOut:
         count=len(view),
         waiting=view.waiting,
         settling=view.settling,
+        left_out=left_out(view.left_out),
         points=PointsOut(
             first=view.first[cut].tolist(),
             last=view.last[cut].tolist(),

@@ -65,6 +65,18 @@ def view(
             _("Choose one of its charts, or freeze a baseline for this one."),
             errors=[FieldError("chart", wrong)],
         )
+    made = _drawn(session, standing, baseline, window, kind, watched)
+    return replace(made, left_out=made.left_out and made.left_out.within(window.first, window.last))
+
+
+def _drawn(
+    session: Session,
+    standing: Standing,
+    baseline: Baseline,
+    window: Window,
+    kind: Chart,
+    watched: Iterable[RuleName] | None,
+) -> View:
     if kind in REMEMBERING:
         return _remembering(session, standing, baseline, window, kind)
     if kind is Chart.MOVING_RANGE:
@@ -105,8 +117,8 @@ def marked_by(baseline: Baseline) -> Marked:
 def unjudged(session: Session, standing: Standing, window: Window) -> View:
     """Deviations as they are, for a characteristic without a baseline."""
     plain = Baseline(quantity=Quantity.DEVIATION.value, excluded=[], first_sequence=1, last_sequence=0, factor=-1.0)
-    series = read(session, standing, plain, window).series
-    return of_series(series, Quantity.DEVIATION)
+    made = read(session, standing, plain, window)
+    return replace(of_series(made.series, Quantity.DEVIATION), left_out=made.left_out)
 
 
 def of_series(series: Series, which: Quantity) -> View:
@@ -126,6 +138,7 @@ def _view(points: Charted, kind: Chart, chart: ControlChart | None, kept: NDArra
         points.begins[kept],
         waiting=points.waiting,
         settling=points.settling,
+        left_out=points.read.left_out,
     )
     if chart is None:
         return made
@@ -151,6 +164,7 @@ def _moving_ranges(points: Charted, window: Window) -> View:
         np.zeros(0),
         series.begins[kept],
         settling=_settling(points, window),
+        left_out=points.read.left_out,
     )
     if not kept.any():
         return empty
@@ -193,6 +207,7 @@ def _remembering(session: Session, standing: Standing, baseline: Baseline, windo
         np.zeros(0),
         series.begins[shown],
         settling=_settling(points, window),
+        left_out=points.read.left_out,
     )
     if not shown.any():
         return made

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 from app.characteristics.queries import Standing
 from app.control import queries, wording
 from app.control.schemas import PeriodIn
-from app.control.series import Read, read
+from app.control.series import LeftOut, Read, read
 from app.control.tables import Baseline
 from app.control.wording import Caution
 from app.core.spc import quantity, shewhart
@@ -34,7 +34,7 @@ class Draft:
     """A baseline that is not stored. left_out: readings of its period that count for nothing."""
 
     baseline: Baseline
-    left_out: int
+    left_out: LeftOut
     cautions: list[tuple[Caution, int]]
 
     @property
@@ -65,7 +65,7 @@ def draft_of(session: Session, standing: Standing, given: PeriodIn) -> Draft:
             _("Choose a longer period, or leave out less of it."),
             errors=[FieldError("last_sequence", wrong)],
         ) from None
-    return Draft(baseline, made.taken_out + made.unknown, _cautions(session, standing, baseline, made, line, window))
+    return Draft(baseline, made.left_out, _cautions(session, standing, baseline, made, line, window))
 
 
 def _check(given: PeriodIn, newest: int) -> None:
@@ -193,8 +193,8 @@ def _cautions(
         corrections = statistics.numbers_of(session, standing.characteristic, window).corrections
         if corrections:
             found.append((Caution.CORRECTED, corrections))
-    if made.unknown:
-        found.append((Caution.UNKNOWN, made.unknown))
+    if len(made.left_out.unknown):
+        found.append((Caution.UNKNOWN, len(made.left_out.unknown)))
     return found
 
 

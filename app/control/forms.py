@@ -7,7 +7,7 @@ from typing import Any
 from app.calibration.forms import whole
 from app.control.schemas import PeriodIn
 from app.core.spc.quantity import Quantity
-from app.errors import FieldError, Invalid
+from app.errors import FieldError, InbandError, Invalid
 from app.web.forms import by_field, length
 from app.web.i18n import _
 
@@ -57,7 +57,7 @@ def runs(text: str) -> list[dict[str, Any]]:
     return made
 
 
-def at_fields(error: Invalid) -> dict[str, str]:
+def at_fields(error: InbandError) -> dict[str, str]:
     """What is wrong, by the field of the form: all runs stand in one field."""
     errors: dict[str, str] = {}
     for name, message in by_field(error).items():

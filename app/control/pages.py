@@ -22,7 +22,7 @@ from app.control.view import View
 from app.core.spc.quantity import Quantity
 from app.core.spc.rules import RuleName
 from app.core.spc.shewhart import Chart
-from app.errors import InbandError, Invalid
+from app.errors import Conflict, InbandError, Invalid
 from app.proof import queries as proof
 from app.proof import wording as proof_wording
 from app.statistics import queries as statistics
@@ -196,18 +196,18 @@ def _freeze(
     standing: Standing,
     choice: Choice,
     form: Mapping[str, str],
-    error: Invalid | None = None,
+    error: Invalid | Conflict | None = None,
 ) -> Response:
     key = standing.characteristic.key
     suits = suited(session, standing)
     draft: Draft | None = None
     asked = bool(form.get("first_sequence") or form.get("last_sequence"))
     typed = forms.begun(None) | {"quantity": suits.value, "chart": "individuals", "ewma_exact": "true"} | dict(form)
-    if asked and error is None:
+    if asked:
         try:
             draft = draft_of(session, standing, parsed(PeriodIn, forms.period(typed)))
         except Invalid as wrong:
-            error = wrong
+            error = error or wrong
     return page(
         request,
         "control/freeze.html",
@@ -217,6 +217,7 @@ def _freeze(
         parameters=standing.parameters,
         choice=choice,
         draft=draft,
+        seen_version=queries.newest_version(session, standing.characteristic),
         suits=suits,
         typed=typed,
         fields=forms.FIELDS,
@@ -255,9 +256,11 @@ def freeze(
     standing = characteristics.characteristic_named(session, characteristic)
     try:
         with session.begin_nested():
-            given = parsed(BaselineIn, forms.period(form) | {"reason": form.get("reason")})
-            actions.freeze(session, standing, given, caller)
-    except Invalid as error:
+            seen = form.get("seen_version", "")
+            seen_version = int(seen) if seen.isdecimal() and len(seen) < 10 else None
+            more = {"reason": form.get("reason"), "seen_version": seen_version}
+            actions.freeze(session, standing, parsed(BaselineIn, forms.period(form) | more), caller)
+    except (Invalid, Conflict) as error:
         return _freeze(request, session, standing, choice, form, error)
     return RedirectResponse(f"/characteristics/{standing.characteristic.key}/control", 303)
 

@@ -34,6 +34,12 @@ def baseline_in_force(session: Session, characteristic: Characteristic) -> Basel
     return None if newest is None or newest.retired_at is not None else newest
 
 
+def newest_version(session: Session, characteristic: Characteristic) -> int:
+    """The newest baseline, in force or not; 0 if there was none."""
+    newest = session.scalars(_of(characteristic).order_by(Baseline.version.desc()).limit(1)).one_or_none()
+    return 0 if newest is None else newest.version
+
+
 def baselines(
     session: Session, characteristic: Characteristic, *, before: int | None = None, limit: int = 1000
 ) -> Sequence[Baseline]:
@@ -153,7 +159,7 @@ def points_of(baseline: Baseline, made: Read, window: Window) -> Charted:
     kept = np.isin(made.series.sequence, series.sequence, assume_unique=True)
     inside = (made.series.sequence >= window.first) & (made.series.sequence <= window.last)
     settling = int((inside & ~kept).sum()) if baseline.quantity == Quantity.WEAR_RESIDUALS else 0
-    shown = Read(series, made.measured_at[kept], made.labels[kept], made.unknown, made.taken_out)
+    shown = Read(series, made.measured_at[kept], made.labels[kept], made.left_out)
     if baseline.grouping is None:
         return _singly(baseline, made, shown, window, settling)
     number, waiting = groups_of(baseline, shown, _to_read(baseline, window))
@@ -191,7 +197,8 @@ def points_of(baseline: Baseline, made: Read, window: Window) -> Charted:
 def _through(made: Read, last: int) -> Read:
     """Without what was read of the time after the window."""
     wanted = made.series.sequence <= last
-    return Read(made.series.only(wanted), made.measured_at[wanted], made.labels[wanted], made.unknown, made.taken_out)
+    left_out = made.left_out.within(1, last)
+    return Read(made.series.only(wanted), made.measured_at[wanted], made.labels[wanted], left_out)
 
 
 def _singly(baseline: Baseline, made: Read, shown: Read, window: Window, settling: int) -> Charted:

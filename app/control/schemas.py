@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field
 
 from app.core.spc.quantity import Quantity
-from app.web.fields import LARGEST_ID, Body, Reason
+from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Body, Reason
 
 ChartName = Literal["individuals", "xbar_r", "xbar_s"]
 Grouping = Literal["consecutive", "pause", "part"]
@@ -76,7 +76,10 @@ class BaselineIn(PeriodIn):
     )
 
     reason: Reason
-    key: str | None = Field(None, min_length=1, max_length=128)
+    key: str | None = Field(None, min_length=1, max_length=128, description="Your own, so that it is frozen once.")
+    seen_version: Annotated[int, Field(strict=True, ge=0, le=LARGEST_SERIAL)] | None = Field(
+        None, description="The newest version you have seen, 0 for none: 409 if there is a newer one meanwhile."
+    )
 
 
 class WhyIn(Body):
@@ -132,13 +135,24 @@ FROZEN: dict[str, Any] = EXAMPLE | {
     "retired_by": None,
     "retired_why": None,
 }
+LEFT_OUT: dict[str, Any] = {"excluded": [], "by_baseline": [640, 641], "faults": [], "unknown": [], "count": 2}
 CAUTION = {"code": "provisional", "text": "Fewer than 100 readings: the limits are provisional."}
+
+
+class LeftOutOut(Body):
+    """Readings that count for nothing, by their sequences: the newest 1000 of each kind."""
+
+    excluded: list[int] = Field(description="Excluded from all statistics.")
+    by_baseline: list[int] = Field(description="Left out of its own period by the baseline.")
+    faults: list[int] = Field(description="Faults of the probe: R36 was reached.")
+    unknown: list[int] = Field(description="Nobody knows with which corrections their part was cut.")
+    count: int = Field(description="All of them.")
 
 
 class DraftOut(Body):
     """What a baseline of this period would be; nothing is stored."""
 
-    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE | {"left_out": 2, "cautions": [CAUTION]}})
+    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE | {"left_out": LEFT_OUT, "cautions": [CAUTION]}})
 
     characteristic: str
     chart: ChartName
@@ -178,9 +192,9 @@ class DraftOut(Body):
 class DraftAnswer(DraftOut):
     """The draft with what is to be known before it is frozen."""
 
-    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE | {"left_out": 2, "cautions": [CAUTION]}})
+    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE | {"left_out": LEFT_OUT, "cautions": [CAUTION]}})
 
-    left_out: int = Field(description="Readings of the period that count for nothing: excluded, probe faults, unknown.")
+    left_out: LeftOutOut = Field(description="Readings of the period that count for nothing.")
     cautions: list[CautionOut]
 
 
@@ -240,6 +254,7 @@ class ControlOut(Body):
                 "count": 3,
                 "waiting": 0,
                 "settling": 0,
+                "left_out": LEFT_OUT,
                 "points": {
                     "first": [810, 811, 812],
                     "last": [810, 811, 812],
@@ -276,6 +291,7 @@ class ControlOut(Body):
     count: int = Field(description="Points; more than are listed if there are very many.")
     waiting: int = Field(description="Readings of the last subgroup, which is not complete and no point yet.")
     settling: int = Field(description="Readings that set the level of an edge and are judged by nothing.")
+    left_out: LeftOutOut
     points: PointsOut
     signal_count: int
     signals: list[SignalOut] = Field(description="Newest first, at most 1000.")

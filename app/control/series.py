@@ -1,8 +1,8 @@
 """From stored readings to the series that is charted, and its subgroups. Never writes.
 
-Readings taken out of the statistics are left out, and with them what a baseline excludes within its own period. Of the
-rebuilt quantities so are probe faults, which are no measurement of a part, and readings that do not say with which
-corrections their part was cut.
+Readings taken out of the statistics are left out, and with them what a baseline excludes within its own period, and probe
+faults, which are no measurement of a part. Of the rebuilt quantities so are readings that do not say with which corrections
+their part was cut.
 """
 
 from collections.abc import Sequence
@@ -44,44 +44,61 @@ class Plan(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class LeftOut:
+    """Readings that count for nothing, by their sequences, each once.
+
+    excluded: from all statistics. by_baseline: from its own period. faults: of the probe (R36). unknown: nobody knows with
+    which corrections their part was cut.
+    """
+
+    excluded: Whole
+    by_baseline: Whole
+    faults: Whole
+    unknown: Whole
+
+    def within(self, first: int, last: int) -> "LeftOut":
+        """Those of a window."""
+        each = (self.excluded, self.by_baseline, self.faults, self.unknown)
+        return LeftOut(*(numbers[(numbers >= first) & (numbers <= last)] for numbers in each))
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.excluded) + len(self.by_baseline) + len(self.faults) + len(self.unknown)
+
+
+@dataclass(frozen=True, slots=True)
 class Read:
     """Readings as a series: D, or w where a rebuilt quantity is wanted. mm; moments in UTC.
 
-    labels: a number for the part that each reading names, 0 where it names none. unknown: readings left out because
-    nobody knows with which corrections they were cut. taken_out: readings that were excluded, or are probe faults.
+    labels: a number for the part that each reading names, 0 where it names none.
     """
 
     series: Series
     measured_at: Moments
     labels: Whole
-    unknown: int
-    taken_out: int
+    left_out: LeftOut
 
 
 def read(session: Session, standing: Standing, plan: Plan, window: Window) -> Read:
     """The readings of the window as the plan's quantity is made of."""
     rebuilt = plan.quantity != Quantity.DEVIATION
-    columns = ["deviation", "measured", "measured_at", "received_at"]
+    columns = ["deviation", "measured", "measured_at", "received_at", "zone"]
     history = statistics.history_of(
-        session, standing.characteristic, window, [*columns, "compensated", "zone"] if rebuilt else columns
+        session, standing.characteristic, window, [*columns, "compensated"] if rebuilt else columns
     )
-    sequence, deviation = history["sequence"], history["deviation"]
-    keep = ~(history.excluded | excluded_by(plan, sequence))
-    unknown = 0
-    values = deviation
+    sequence, values = history["sequence"], history["deviation"]
+    by_plan = excluded_by(plan, sequence) & ~history.excluded
+    faults = (history["zone"] == FAULT) & ~history.excluded & ~by_plan
+    keep = ~(history.excluded | by_plan | faults)
+    unknown = np.zeros_like(keep)
     if rebuilt:
-        keep &= history["zone"] != FAULT
-        known = ~np.isnan(history["compensated"])
-        unknown = int((keep & ~known).sum())
-        values = wear.wear(deviation, history["compensated"], plan.factor)
-    taken_out = int((~keep).sum())
-    if rebuilt:
-        keep &= known
-    begins = _begins(session, standing, history["received_at"], history["measured"] - deviation)
+        unknown = np.isnan(history["compensated"]) & keep
+        keep &= ~unknown
+        values = wear.wear(values, history["compensated"], plan.factor)
+    begins = _begins(session, standing, history["received_at"], history["measured"] - history["deviation"])
     labels = _labels(session, standing, window, sequence) if plan.grouping == "part" else np.zeros_like(sequence)
-    return Read(
-        Series(sequence, values, begins).only(keep), history["measured_at"][keep], labels[keep], unknown, taken_out
-    )
+    left_out = LeftOut(sequence[history.excluded], sequence[by_plan], sequence[faults], sequence[unknown])
+    return Read(Series(sequence, values, begins).only(keep), history["measured_at"][keep], labels[keep], left_out)
 
 
 def excluded_by(plan: Plan, sequence: Whole) -> NDArray[np.bool_]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from app.control.series import LeftOut
 from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Floats
 from app.core.spc.rules import Signals
@@ -19,6 +20,7 @@ class View:
     """One chart of a window; mm. below: the lower sum of a CUSUM, whose points are the upper one.
 
     centre, lower, upper: single numbers, or one for each point; None without a baseline. begins: comes first of a tool.
+    left_out: readings of the window that count for nothing.
     """
 
     kind: Chart
@@ -35,6 +37,7 @@ class View:
     signals: Signals | None = None
     waiting: int = 0
     settling: int = 0
+    left_out: LeftOut | None = None
 
     def __len__(self) -> int:
         """How many points there are."""

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from enum import StrEnum
 
+from app.control.series import LeftOut
 from app.control.tables import Baseline
 from app.core.spc.quantity import Quantity
 from app.core.spc.shewhart import Chart
@@ -158,6 +159,36 @@ def readings(first: int, last: int) -> str:
         if first == last
         else _("readings {first} to {last}").format(first=first, last=last)
     )
+
+
+def left_out(found: LeftOut | None) -> list[str]:
+    """Readings that count for nothing, named, and why."""
+    if found is None:
+        return []
+    said = [
+        (found.excluded, _("excluded from the statistics: {which}")),
+        (found.by_baseline, _("left out by the baseline: {which}")),
+        (found.faults, _("probe faults (R36): {which}")),
+        (found.unknown, _("cut with corrections that nobody knows: {which}")),
+    ]
+    return [text.format(which=named(numbers.tolist())) for numbers, text in said if len(numbers)]
+
+
+def named(numbers: Sequence[int], most: int = 6) -> str:
+    """Numbers as runs; of many the first ones.
+
+    >>> named([3, 4, 5, 9]), named(range(1, 40, 2), 3)
+    ('3 – 5, 9', '1, 3, 5 and 17 more')
+    """
+    runs: list[tuple[int, int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][1] + 1:
+            runs[-1] = (runs[-1][0], number)
+        else:
+            runs.append((number, number))
+    text = ", ".join(str(low) if low == high else f"{low} – {high}" for low, high in runs[:most])
+    rest = sum(high - low + 1 for low, high in runs[most:])
+    return _("{some} and {n} more").format(some=text, n=rest) if rest else text
 
 
 def period(baseline: Baseline) -> str:

@@ -233,10 +233,20 @@ class TestLeftOut:
         pushed(shop, [0, 1] * 10 + [500] + [0, 1] * 10 + [900])
         shop.call("POST", f"/readings/{shop.characteristic}/21/exclude", reason="False trigger")
         answer = preview(shop, last_sequence=42, excluded=[{"first": 42, "last": 42, "reason": "Chip"}])
-        assert answer["left_out"] == 2
+        assert answer["left_out"] == {"excluded": [21], "by_baseline": [42], "faults": [], "unknown": [], "count": 2}
         assert (answer["readings"], answer["centre"]) == (40, pytest.approx(0.0005))
         frozen(shop, 1, 42, excluded=[{"first": 42, "last": 42, "reason": "Chip"}])
         assert control(shop, last="all")["points"]["last"] == [*range(1, 21), *range(22, 42)]
+
+    @pytest.mark.parametrize("quantity", ["deviation", "without_corrections", "differences"])
+    def test_probe_faults_are_no_parts_and_are_named(self, shop: Shop, quantity: str) -> None:
+        pushed(shop, [0, 1] * 10 + [1500] + [0, 1] * 10 + [-1000, 2, 0.5])
+        made = frozen(shop, 1, 41, quantity=quantity)
+        assert made["sigma"] < 0.002, "1500 µm would be seen"
+        shown = control(shop, last=24)
+        assert shown["left_out"] == {"excluded": [], "by_baseline": [], "faults": [21, 42], "unknown": [], "count": 2}
+        assert not {21, 42} & set(shown["points"]["last"])
+        assert control(shop, first=22, through=30)["left_out"]["count"] == 0
 
     def test_cautions(self, shop: Shop) -> None:
         rng = Random(5)
