@@ -16,6 +16,7 @@ import pytest
 from app.main import create_app
 from app.settings import Settings
 from tests.conftest import Server
+from tests.control.line import Line
 from tests.readings.record import counts
 from tests.shop import PARAMETERS, Shop
 
@@ -28,6 +29,25 @@ FULL_READING = READING | {
     "correction_in_effect": 0,
 }
 WHY = {"reason": "Compared with a micrometer"}
+WHAT_IF = {"averaging_limit": 0.006, "factor": -1.0, "delay": 1, "effect": 1.0, "last": 1000}
+PERIOD: dict[str, Any] = {
+    "chart": "xbar_s",
+    "quantity": "deviation",
+    "first_sequence": 1,
+    "last_sequence": 60,
+    "grouping": "pause",
+    "group_size": 3,
+    "group_pause": 2.5,
+    "ewma_lambda": 0.2,
+    "ewma_width": 3.0,
+    "ewma_exact": True,
+    "cusum_k": 0.5,
+    "cusum_h": 5.0,
+    "cusum_headstart": 2.5,
+    "average_span": 5,
+    "settle": 20,
+    "excluded": [{"first": 3, "last": 4, "reason": "Chip on the stylus"}],
+}
 BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/machines": {"key": "mill-bad", "name": "Mill", "control": "heidenhain"},
     "PATCH /api/v1/machines/{machine}": {"name": "Lathe", "control": "fanuc", "corrections_expire_after": 8.0},
@@ -118,6 +138,57 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/corrections/{machine}/{number}/rejected": WHY | {"although_fetched": False},
     "POST /api/v1/corrections/{machine}/{number}/approve": WHY,
     "POST /api/v1/corrections/{machine}/{number}/release": WHY,
+    "POST /api/v1/characteristics/{characteristic}/baselines": PERIOD | WHY | {"key": "bad-input", "seen_version": 1},
+    "POST /api/v1/characteristics/{characteristic}/baselines/preview": PERIOD,
+    "POST /api/v1/characteristics/{characteristic}/baselines/{version}/retire": WHY,
+    "POST /api/v1/characteristics/{characteristic}/baselines/{version}/put-in-force": WHY,
+    "PUT /api/v1/characteristics/{characteristic}/rules": {
+        "rules": {"main": {"nelson_1": "alarm"}, "ewma": {"nelson_1": "watch"}},
+        "look_back": True,
+        "seen_version": 0,
+    }
+    | WHY,
+    "POST /api/v1/signals/{signal}/comment": {"cause": "material", "comment": "New batch, harder by 20 HB"},
+    "POST /api/v1/characteristics/{characteristic}/what-if": WHAT_IF | {"weighting_factor": 3.0, "zero_range": 0.002},
+    "POST /api/v1/characteristics/{characteristic}/what-if/map": WHAT_IF
+    | {"weighting_factors": [1.0, 2.0], "zero_ranges": [0.001, 0.002], "criterion": "ppk"},
+    "POST /api/v1/characteristics/{characteristic}/proposals": WHAT_IF | {"zero_range": 0.0015} | WHY,
+    "POST /api/v1/proposals/{proposal}/approve": WHY,
+    "POST /api/v1/proposals/{proposal}/reject": WHY,
+    "POST /api/v1/proposals/{proposal}/withdraw": WHY,
+    "POST /api/v1/work-zeros": {
+        "machine": "{machine}",
+        "kind": "pocket",
+        "tip": 6.0,
+        "work_offset": "G54",
+        "fixture": "vice",
+        "touches": [{"x": -53.0, "approach": "-X"}, {"x": 47.0, "approach": "+X"}],
+        "z_touched": -150.0,
+        "feeler": 0.1,
+        "tool_length": 98.0,
+        "key": "bad-zero",
+    },
+    "POST /api/v1/work-zeros/{number}/recompute": {"tip": 5.998, "repeatability": 0.001, "leave_out": []} | WHY,
+    "PUT /api/v1/work-zeros/fixtures/{machine}/{fixture}": {
+        "basis": "frozen",
+        "reference": 1,
+        "warning": 0.01,
+        "alarm": 0.03,
+        "characteristics": {},
+    }
+    | WHY,
+    "POST /api/v1/alignments": {
+        "machine": "{machine}",
+        "kind": "two_points",
+        "side": [{"nominal": [0, 0], "measured": [0, 0.1]}, {"nominal": [100, 0], "measured": [100, 0.3]}],
+        "repeatability": 0.002,
+        "work_offset": "G54",
+        "base": [0.0, 0.0, 0.0],
+        "table": {"axis": "C", "centre": [0.0, 0.0], "position": 90.0, "clockwise": True},
+        "key": "bad-alignment",
+    },
+    "POST /api/v1/alignments/pallets": {"pallet": 1, "part": 2, "name": "pallet 4", "key": "bad-pallet"},
+    "POST /api/v1/alignments/{number}/recompute": {"method": "small", "leave_out": []} | WHY,
     "POST /api/v1/programs/read": {"control": "sinumerik", "text": "N10 R33=0.001"},
     "POST /api/v1/machines/{machine}/corrections/fetched": {"numbers": [1], "form": "turning"},
     "POST /api/v1/machines/{machine}/corrections/applied": {"numbers": [1]},
@@ -293,23 +364,40 @@ class Place:
         name = f"person-{shop.machine}"
         server.person(name, "viewer")
         person = next(each for each in shop.call("GET", "/people?limit=1000")["items"] if each["name"] == name)
+        line = Line(shop)
+        line.push([9.0])
+        line.look()
+        proposals = f"/characteristics/{shop.characteristic}/proposals"
+        proposal = shop.call("POST", proposals, 201, zero_range=0.003, reason="Fewer corrections")
         self.values: dict[str, Any] = {
             "machine": shop.machine,
             "characteristic": shop.characteristic,
             "sequence": 1,
             "tool": 3,
             "location": 5,
+            "fixture": "vice",
             "number": 1,
             "alarm": held["alarms"][0]["id"],
+            "signal": line.signals()[0]["id"],
+            "version": 1,
             "pair": pairs[0]["id"],
+            "proposal": proposal["id"],
             "person": next(person[name] for name in ("id", "name", "key") if name in person),
             "key": shop.call("POST", f"/machines/{shop.machine}/keys", 201, name="second")["id"],
         }
-        self.numbers = {"approve": awaiting, "release": held["correction"]["number"]}
+        zero = BODIES["POST /api/v1/work-zeros"] | {"machine": shop.machine, "key": None}
+        side = BODIES["POST /api/v1/alignments"] | {"machine": shop.machine, "key": None}
+        made = {
+            path: shop.call("POST", path, 201, **body) for path, body in (("/work-zeros", zero), ("/alignments", side))
+        }
+        self.numbers = {"approve": awaiting, "release": held["correction"]["number"]} | {
+            f"/api/v1{path}/{{number}}/recompute": each["id"] for path, each in made.items()
+        }
 
     def url(self, operation: Operation, **other: Any) -> str:
         values = dict(self.values)
-        values["number"] = self.numbers.get(operation.path.rpartition("/")[2], values["number"])
+        verb = operation.path.rpartition("/")[2]
+        values["number"] = self.numbers.get(operation.path) or self.numbers.get(verb, values["number"])
         if operation.path == "/api/v1/keys/{key}":
             values["key"] = self.shop.call("POST", "/keys", 201, name="third", role="viewer")["id"]
         return operation.path.format(**(values | other))
@@ -405,7 +493,9 @@ def test_bad_fields(operation: Operation, place: Place) -> None:
     assert counts(place.dsn) == before
 
 
-@pytest.mark.parametrize("operation", [each for each in WITH_BODY if "characteristics" in each.path], ids=named)
+@pytest.mark.parametrize(
+    "operation", [each for each in WITH_BODY if "parameters" in BODIES.get(each.name, ())], ids=named
+)
 def test_bad_parameters(operation: Operation, place: Place) -> None:
     before = counts(place.dsn)
     body = place.body(operation)
@@ -523,6 +613,8 @@ def test_bad_queries(operation: Operation, place: Place) -> None:
                 bad += ["0", "1001"]
             if kind.get("type") == "number":
                 bad.remove("1.5")
+                if kind.get("minimum", 0) <= -1:
+                    bad.remove("-1")
             query = "&".join(f"{key}={value}" for key, value in needed.items() if key != name)
             for value in bad:
                 if operation.path == "/api/v1/events" and not strict:

@@ -13,6 +13,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.main import ROUTERS
 from tests.conftest import Server
+from tests.control.line import Line
 from tests.shop import Person, Shop
 
 SIZES = {"desk": (1280, 800), "large": (1920, 1080), "panel": (800, 1280)}
@@ -29,6 +30,30 @@ PAGES = {
         "/characteristics/{characteristic}?first=2&through=5&before=5",
     ],
     "/characteristics/{characteristic}/readings/{sequence}": ["/characteristics/{characteristic}/readings/3"],
+    "/characteristics/{characteristic}/control": [
+        "/characteristics/{characteristic}/control",
+        "/characteristics/{characteristic}-watched/control?last=200",
+        "/characteristics/{characteristic}-watched/control?last=all&chart=cusum&baseline=1",
+        "/characteristics/{characteristic}-empty/control",
+    ],
+    "/characteristics/{characteristic}/control/freeze": [
+        "/characteristics/{characteristic}-empty/control/freeze",
+        "/characteristics/{characteristic}-watched/control/freeze?last=200",
+        "/characteristics/{characteristic}-watched/control/freeze?first_sequence=1&last_sequence=60&excluded=7%20chip",
+    ],
+    "/characteristics/{characteristic}/rules": [
+        "/characteristics/{characteristic}/rules",
+        "/characteristics/{characteristic}-watched/rules?set=nelson&last=200",
+    ],
+    "/characteristics/{characteristic}/signals": ["/characteristics/{characteristic}-watched/signals?state=open"],
+    "/signals/{number}": ["/signals/{signal}"],
+    "/characteristics/{characteristic}/what-if": [
+        "/characteristics/{characteristic}/what-if",
+        "/characteristics/{characteristic}/what-if?k=3&r33=2.5&goal=corrections#replay",
+        "/characteristics/{characteristic}-watched/what-if?r34=6",
+    ],
+    "/proposals": ["/proposals", "/proposals?status=all"],
+    "/proposals/{number}": ["/proposals/{proposal}"],
     "/alarms": ["/alarms", "/alarms?machine={machine}"],
     "/alarms/history": ["/alarms/history"],
     "/alarms/{number}": ["/alarms/{alarm}", "/alarms/{alarm}?action=keep_cutting"],
@@ -130,6 +155,16 @@ def shop(server: Server) -> Shop:
     for difference in (0.002, 0.0025, 0.0022, 0.0024, 0.0045):
         pair: dict[str, Any] = {"machine_value": 40.0 + difference, "external_value": 40.0, "instrument": "CMM, hall C"}
         made.call("POST", f"/machines/{made.machine}/averages/6/pairs", 201, **pair)
+    line = Line(made, "watched")
+    line.push([9.0, 0.0, -7.0])
+    line.look()
+    made.call(
+        "POST",
+        f"/characteristics/{made.characteristic}/proposals",
+        201,
+        zero_range=0.002,
+        reason="Half as many corrections",
+    )
     made.call(
         "PATCH",
         f"/characteristics/{made.characteristic}-empty",
@@ -154,7 +189,14 @@ def sized(request: pytest.FixtureRequest, page: Page) -> Page:
 
 def addresses(shop: Shop) -> list[str]:
     alarm = shop.alarms()[0]["id"]
-    values: dict[str, Any] = {"machine": shop.machine, "characteristic": shop.characteristic, "alarm": alarm}
+    signal = shop.call("GET", f"/signals?machine={shop.machine}")["items"][0]["id"]
+    values: dict[str, Any] = {
+        "machine": shop.machine,
+        "characteristic": shop.characteristic,
+        "alarm": alarm,
+        "proposal": shop.call("GET", f"/characteristics/{shop.characteristic}/proposals")["items"][0]["id"],
+        "signal": signal,
+    }
     return [address.format(**values) for opened in PAGES.values() for address in opened]
 
 
