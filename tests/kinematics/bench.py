@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.core.kinematics.simulated import positions
+from tests.shop import Shop
 
 ANGLES = (-90.0, -30.0, 30.0, 90.0, 135.0, 180.0)
 BALL = (180.0, 0.0, 40.0)
@@ -47,3 +48,21 @@ def touched(errors: Sequence[float] = TRUE, radius: float = RADIUS) -> dict[str,
 
 def protocol(language: str) -> str:
     return (PROTOCOLS / f"{language}.html").read_text(encoding="utf-8")
+
+
+RUNS = "/kinematics/runs"
+
+
+def take(shop: Shop, status: int = 201, **run: Any) -> Any:
+    """Send a run of the shop's machine."""
+    return shop.call("POST", RUNS, status, machine=shop.machine, **run)
+
+
+def plan(shop: Shop, **wanted: Any) -> Any:
+    """Set what its runs are held against."""
+    return shop.call("PUT", f"/machines/{shop.machine}/kinematics", **({"reason": "acceptance"} | wanted))
+
+
+def enter(shop: Shop, run: Any, status: int = 200, **more: Any) -> Any:
+    """Its values have been entered on the control."""
+    return shop.call("POST", f"{RUNS}/{run['run']}/enter", status, **({"reason": "Monthly check"} | more))

@@ -1,28 +1,12 @@
-"""Runs in their four forms, limits of the control, entering and putting back, on a running server."""
+"""Runs in their four forms, limits of the control, and the door, on a running server."""
 
 from typing import Any
 
 import pytest
 
-from app.readings.actions import push_waiting
 from tests.conftest import Server
-from tests.kinematics.bench import NAMES, RADIUS, TRUE, axis, protocol, touched
+from tests.kinematics.bench import NAMES, RADIUS, RUNS, TRUE, axis, plan, protocol, take, touched
 from tests.shop import Shop
-
-RUNS = "/kinematics/runs"
-
-
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
-def take(shop: Shop, status: int = 201, **run: Any) -> Any:
-    return shop.call("POST", RUNS, status, machine=shop.machine, **run)
-
-
-def plan(shop: Shop, **wanted: Any) -> Any:
-    return shop.call("PUT", f"/machines/{shop.machine}/kinematics", **({"reason": "acceptance"} | wanted))
 
 
 def errors_of(run: Any) -> list[float]:
@@ -147,46 +131,6 @@ class TestLimits:
         assert "EA0C" in run["reason"]["text"]
 
 
-class TestKinematics:
-    def test_entered_backed_up_and_put_back(self, shop: Shop) -> None:
-        first = take(shop, axes=[axis()])
-        shop.call("POST", f"{RUNS}/{first['run']}/enter", reason="Monthly check")
-        second = take(shop, axes=[axis((0.002, 0.0, 0.0, 0.0))])
-        shop.call("POST", f"{RUNS}/{second['run']}/enter", reason="Warm now")
-        backups = shop.call("GET", f"/machines/{shop.machine}/kinematics/backups")["items"]
-        assert [(each["version"], each["run"]) for each in backups] == [
-            (1, None), (2, first["run"]), (3, second["run"]),
-        ]  # fmt: skip
-        assert backups[0]["errors"] == {}
-        assert backups[1]["errors"]["EX0C"] == pytest.approx(0.0123, abs=0.001)
-        assert backups[2]["errors"]["EX0C"] == pytest.approx(0.0143, abs=0.001)
-        restored = shop.call(
-            "POST", f"/machines/{shop.machine}/kinematics/backups/2/restore", 201, reason="Worse than before"
-        )
-        assert (restored["version"], restored["restores"], restored["errors"]) == (4, 2, backups[1]["errors"])
-        path = f"/machines/{shop.machine}/kinematics/backups"
-        assert "in effect" in shop.call("POST", f"{path}/4/restore", 409, reason="again")["detail"]
-        shop.call("POST", f"{path}/9/restore", 404, reason="none")
-        actions = [
-            each["action"] for each in shop.call("GET", "/audit?limit=1000")["items"] if shop.machine in each["subject"]
-        ]
-        assert {"kinematics changed", "kinematics put back"} <= set(actions)
-
-    def test_of_two_who_enter_one_is_told(self, shop: Shop) -> None:
-        one, two = take(shop, axes=[axis()]), take(shop, axes=[axis(seed=2)])
-        shop.call("POST", f"{RUNS}/{two['run']}/enter", reason="mine")
-        assert "already" in shop.call("POST", f"{RUNS}/{two['run']}/enter", 409, reason="mine")["detail"]
-        assert "changed since" in shop.call("POST", f"{RUNS}/{one['run']}/enter", 409, reason="mine")["detail"]
-        assert shop.call("GET", f"{RUNS}/{one['run']}")["overtaken"] is True
-
-    def test_heads_have_kinematics_of_their_own(self, shop: Shop) -> None:
-        one = take(shop, axes=[axis()], head="Fork 1")
-        two = take(shop, axes=[axis((0.02, 0, 0, 0))], head="Fork 2")
-        shop.call("POST", f"{RUNS}/{one['run']}/enter", reason="x")
-        assert shop.call("POST", f"{RUNS}/{two['run']}/enter", reason="x")["status"] == "entered"
-        assert len(shop.call("GET", f"{RUNS}?machine={shop.machine}&head=Fork 1")["items"]) == 1
-
-
 class TestDoor:
     def test_a_key_is_taken_once(self, shop: Shop) -> None:
         run: dict[str, Any] = {"machine": shop.machine, "axes": [axis()], "key": "452:1"}
@@ -209,77 +153,3 @@ class TestDoor:
         second = shop.call("GET", f"{RUNS}?machine={shop.machine}&limit=2&after={first['next']}")
         assert [each["run"] for each in first["items"] + second["items"]] == made
         assert second["next"] is None
-
-
-class TestDrift:
-    def series(self, shop: Shop, *errors: float) -> list[Any]:
-        return [
-            take(shop, axes=[axis((e, 0, 0, 0), seed=n)], measured_at=f"2026-10-{n + 1:02}T06:00:00Z")
-            for n, e in enumerate(errors)
-        ]
-
-    def test_a_trend_an_alarm_and_its_end(self, shop: Shop) -> None:
-        plan(shop, limits={"EX0C": 0.01})
-        self.series(shop, 0.001, 0.003, 0.006, 0.008, 0.011)
-        (alarm,) = shop.alarms()
-        assert alarm["kind"] == "kinematics_drift"
-        assert "EX0C" in alarm["text"]
-        state = shop.call("GET", f"/machines/{shop.machine}/kinematics")
-        found = next(each for each in state["drift"] if each["name"] == "EX0C")
-        assert found["beyond"] is True
-        assert found["slope_per_day"] == pytest.approx(0.0025, abs=0.0005)
-        assert found["slope_low"] > 0
-        figure = shop.call("GET", f"/machines/{shop.machine}/kinematics/drift-figure?value=EX0C")
-        assert figure["data"][-1]["marker"]["symbol"][-1] == "triangle-up"
-        last = shop.call("GET", f"{RUNS}?machine={shop.machine}")["items"][-1]
-        shop.call("POST", f"{RUNS}/{last['run']}/enter", reason="Monthly")
-        assert shop.alarms() == []
-        take(shop, axes=[axis((0.001, 0, 0, 0))], measured_at="2026-10-07T06:00:00Z")
-        found = shop.call("GET", f"/machines/{shop.machine}/kinematics")["drift"][0]
-        assert found["name"] == "EX0C"
-        assert found["true"] == pytest.approx(0.012, abs=0.002)  # what was entered is no movement of the axis
-        assert found["last"] == pytest.approx(0.001, abs=0.001)
-
-    def test_two_runs_side_by_side(self, shop: Shop) -> None:
-        old, new = self.series(shop, 0.001, 0.011)
-        for a, b in ((old, new), (new, old)):
-            found = shop.call("GET", f"{RUNS}/{a['run']}/comparison?with={b['run']}")
-            assert (found["before"], found["after"]) == (old["run"], new["run"])
-        x = next(each for each in found["changes"] if each["name"] == "EX0C")
-        assert x["difference"] == pytest.approx(0.01, abs=0.0015)
-        assert x["moved"] is True
-        assert x["enter"] == new["axes"][0]["errors"]["EX0C"]["value"]
-        y = next(each for each in found["changes"] if each["name"] == "EY0C")
-        assert abs(y["difference"]) < 0.001
-        figure = shop.call("GET", f"{RUNS}/{old['run']}/comparison-figure?with={new['run']}&theme=dark")
-        assert len(figure["layout"]["annotations"]) == 4
-        other = Shop(shop.server)
-        foreign = take(other, axes=[axis()])
-        shop.call("GET", f"{RUNS}/{old['run']}/comparison?with={foreign['run']}", 422)
-
-    def test_values_become_readings(self, shop: Shop) -> None:
-        shop.add(
-            f"{shop.machine}-ex0c",
-            target=0.0,
-            tolerance_width=0.02,
-            tool_memory=0,
-            average_memory=0,
-            mode="measure_only",
-        )
-        plan(shop, characteristics={"EX0C": f"{shop.machine}-ex0c"})
-        run = take(shop, axes=[axis()])
-        with shop.server.database.begin() as session:
-            push_waiting(session)
-        readings = shop.call("GET", f"/readings?characteristic={shop.machine}-ex0c")["items"]
-        assert [each["key"] for each in readings] == [f"kinematics:{run['run']}:EX0C"]
-        assert readings[0]["measured"] == pytest.approx(run["axes"][0]["errors"]["EX0C"]["value"], abs=1e-9)
-        shop.call(
-            "PUT", f"/machines/{shop.machine}/kinematics", 422, reason="x", characteristics={"EX0C": "no-such-thing"}
-        )
-
-    def test_diagrams(self, shop: Shop) -> None:
-        run = take(shop, axes=[axis(both=True)])["run"]
-        figure = shop.call("GET", f"{RUNS}/{run}/figure?axis=C&letter=Y")
-        assert [trace["meta"] for trace in figure["data"]] == ["measured", "measured", "optimised", "optimised"]
-        assert figure["layout"]["yaxis"]["title"]["text"] == "EYC, µm"
-        shop.call("GET", f"{RUNS}/{run}/figure?axis=A&letter=Y", 422)

@@ -1,0 +1,83 @@
+"""Drift over the runs: trend, limits, alarm, two runs side by side, values that become readings; heads among them."""
+
+from typing import Any
+
+import pytest
+
+from app.readings.actions import push_waiting
+from tests.kinematics.bench import RUNS, axis, plan, take
+from tests.shop import Shop
+
+
+class TestDrift:
+    def series(self, shop: Shop, *errors: float) -> list[Any]:
+        return [
+            take(shop, axes=[axis((e, 0, 0, 0), seed=n)], measured_at=f"2026-10-{n + 1:02}T06:00:00Z")
+            for n, e in enumerate(errors)
+        ]
+
+    def test_a_trend_an_alarm_and_its_end(self, shop: Shop) -> None:
+        plan(shop, limits={"EX0C": 0.01})
+        self.series(shop, 0.001, 0.003, 0.006, 0.008, 0.011)
+        (alarm,) = shop.alarms()
+        assert alarm["kind"] == "kinematics_drift"
+        assert "EX0C" in alarm["text"]
+        state = shop.call("GET", f"/machines/{shop.machine}/kinematics")
+        found = next(each for each in state["drift"] if each["name"] == "EX0C")
+        assert found["beyond"] is True
+        assert found["slope_per_day"] == pytest.approx(0.0025, abs=0.0005)
+        assert found["slope_low"] > 0
+        figure = shop.call("GET", f"/machines/{shop.machine}/kinematics/drift-figure?value=EX0C")
+        assert figure["data"][-1]["marker"]["symbol"][-1] == "triangle-up"
+        last = shop.call("GET", f"{RUNS}?machine={shop.machine}")["items"][-1]
+        shop.call("POST", f"{RUNS}/{last['run']}/enter", reason="Monthly")
+        assert shop.alarms() == []
+        take(shop, axes=[axis((0.001, 0, 0, 0))], measured_at="2026-10-07T06:00:00Z")
+        found = shop.call("GET", f"/machines/{shop.machine}/kinematics")["drift"][0]
+        assert found["name"] == "EX0C"
+        assert found["true"] == pytest.approx(0.012, abs=0.002)  # what was entered is no movement of the axis
+        assert found["last"] == pytest.approx(0.001, abs=0.001)
+
+    def test_two_runs_side_by_side(self, shop: Shop) -> None:
+        old, new = self.series(shop, 0.001, 0.011)
+        for a, b in ((old, new), (new, old)):
+            found = shop.call("GET", f"{RUNS}/{a['run']}/comparison?with={b['run']}")
+            assert (found["before"], found["after"]) == (old["run"], new["run"])
+        x = next(each for each in found["changes"] if each["name"] == "EX0C")
+        assert x["difference"] == pytest.approx(0.01, abs=0.0015)
+        assert x["moved"] is True
+        assert x["enter"] == new["axes"][0]["errors"]["EX0C"]["value"]
+        y = next(each for each in found["changes"] if each["name"] == "EY0C")
+        assert abs(y["difference"]) < 0.001
+        figure = shop.call("GET", f"{RUNS}/{old['run']}/comparison-figure?with={new['run']}&theme=dark")
+        assert len(figure["layout"]["annotations"]) == 4
+        other = Shop(shop.server)
+        foreign = take(other, axes=[axis()])
+        shop.call("GET", f"{RUNS}/{old['run']}/comparison?with={foreign['run']}", 422)
+
+    def test_values_become_readings(self, shop: Shop) -> None:
+        shop.add(
+            f"{shop.machine}-ex0c",
+            target=0.0,
+            tolerance_width=0.02,
+            tool_memory=0,
+            average_memory=0,
+            mode="measure_only",
+        )
+        plan(shop, characteristics={"EX0C": f"{shop.machine}-ex0c"})
+        run = take(shop, axes=[axis()])
+        with shop.server.database.begin() as session:
+            push_waiting(session)
+        readings = shop.call("GET", f"/readings?characteristic={shop.machine}-ex0c")["items"]
+        assert [each["key"] for each in readings] == [f"kinematics:{run['run']}:EX0C"]
+        assert readings[0]["measured"] == pytest.approx(run["axes"][0]["errors"]["EX0C"]["value"], abs=1e-9)
+        shop.call(
+            "PUT", f"/machines/{shop.machine}/kinematics", 422, reason="x", characteristics={"EX0C": "no-such-thing"}
+        )
+
+    def test_diagrams(self, shop: Shop) -> None:
+        run = take(shop, axes=[axis(both=True)])["run"]
+        figure = shop.call("GET", f"{RUNS}/{run}/figure?axis=C&letter=Y")
+        assert [trace["meta"] for trace in figure["data"]] == ["measured", "measured", "optimised", "optimised"]
+        assert figure["layout"]["yaxis"]["title"]["text"] == "EYC, µm"
+        shop.call("GET", f"{RUNS}/{run}/figure?axis=A&letter=Y", 422)
