@@ -17,6 +17,7 @@ from app.main import create_app
 from app.settings import Settings
 from tests.conftest import Server
 from tests.control.line import Line
+from tests.kinematics.bench import axis
 from tests.readings.record import counts
 from tests.shop import PARAMETERS, Shop
 
@@ -189,6 +190,30 @@ BODIES: dict[str, dict[str, Any]] = {
     },
     "POST /api/v1/alignments/pallets": {"pallet": 1, "part": 2, "name": "pallet 4", "key": "bad-pallet"},
     "POST /api/v1/alignments/{number}/recompute": {"method": "small", "leave_out": []} | WHY,
+    "POST /api/v1/kinematics/runs": {
+        "machine": "{machine}",
+        "measured_at": "2026-11-21T06:42:10Z",
+        "key": "bad-run",
+        "head": "Fork 1",
+        "program": "452.h",
+        "ball_radius": 12.5,
+        "axes": [axis()],
+        "confirm": "New head",
+    },
+    "POST /api/v1/kinematics/runs/{run}/confirm": WHY,
+    "POST /api/v1/kinematics/runs/{run}/enter": WHY | {"offsets": True},
+    "POST /api/v1/kinematics/runs/{run}/undo": WHY,
+    "PUT /api/v1/machines/{machine}/kinematics": {
+        "ball_radius": 12.5,
+        "max_modification": 0.05,
+        "max_modification_angle": 0.01,
+        "max_dev_cal_ball": 0.01,
+        "reference_head": "Fork 1",
+        "limits": {"EX0C": 0.01},
+        "characteristics": {},
+    }
+    | WHY,
+    "POST /api/v1/machines/{machine}/kinematics/backups/{version}/restore": WHY | {"instead_of": 2},
     "POST /api/v1/programs/read": {"control": "sinumerik", "text": "N10 R33=0.001"},
     "POST /api/v1/machines/{machine}/corrections/fetched": {"numbers": [1], "form": "turning"},
     "POST /api/v1/machines/{machine}/corrections/applied": {"numbers": [1]},
@@ -382,6 +407,7 @@ class Place:
             "version": 1,
             "pair": pairs[0]["id"],
             "proposal": proposal["id"],
+            "form": "csv",
             "person": next(person[name] for name in ("id", "name", "key") if name in person),
             "key": shop.call("POST", f"/machines/{shop.machine}/keys", 201, name="second")["id"],
         }
@@ -390,6 +416,14 @@ class Place:
         made = {
             path: shop.call("POST", path, 201, **body) for path, body in (("/work-zeros", zero), ("/alignments", side))
         }
+        plan = "PUT /api/v1/machines/{machine}/kinematics"
+        shop.call("PUT", f"/machines/{shop.machine}/kinematics", **BODIES[plan])
+        first = shop.call("POST", "/kinematics/runs", 201, machine=shop.machine, axes=[axis()])["run"]
+        shop.call("POST", f"/kinematics/runs/{first}/enter", reason="As it was")
+        larger = shop.call("POST", "/kinematics/runs", 201, machine=shop.machine, axes=[axis((0.1, 0, 0, 0))])["run"]
+        second = shop.call("POST", "/kinematics/runs", 201, machine=shop.machine, axes=[axis()])["run"]
+        self.values["run"] = first
+        self.runs = {"confirm": larger, "enter": second}
         self.numbers = {"approve": awaiting, "release": held["correction"]["number"]} | {
             f"/api/v1{path}/{{number}}/recompute": each["id"] for path, each in made.items()
         }
@@ -398,6 +432,7 @@ class Place:
         values = dict(self.values)
         verb = operation.path.rpartition("/")[2]
         values["number"] = self.numbers.get(operation.path) or self.numbers.get(verb, values["number"])
+        values["run"] = self.runs.get(verb, values["run"])
         if operation.path == "/api/v1/keys/{key}":
             values["key"] = self.shop.call("POST", "/keys", 201, name="third", role="viewer")["id"]
         return operation.path.format(**(values | other))
