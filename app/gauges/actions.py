@@ -40,7 +40,7 @@ def add_study(
     settings, rows = _settings(given, standing, source), [_row(row.model_dump()) for row in given.rows]
     before = None if given.key is None else queries.by_key(session, machine, given.key)
     if before is not None:
-        if (before.study.kind, before.settings, before.revision.rows) == (given.kind, settings, rows):
+        if _same(before, given.kind, settings, rows):
             return Made(before, again=True)
         raise Conflict(
             _("Gauge study {number} was sent with the key {key} already, and with other values.").format(
@@ -76,8 +76,25 @@ def take_study(session: Session, standing: Standing, given: FromReadingsIn, call
     fields["each"] = "touch" if given.take == "touches" else "reading"
     named = {"machine": standing.machine.key, "characteristic": standing.characteristic.key, "rows": rows}
     study = parsed(StudyIn, fields | named)
-    source = {"first": given.first, "through": given.through, "take": given.take}
+    source = source_of(session, standing, given.first, given.through, given.take)
     return add_study(session, standing.machine, study, caller, source)
+
+
+def source_of(session: Session, standing: Standing, first: int, through: int, take: str) -> dict[str, Any]:
+    """From which readings values are taken, and which of them were left out."""
+    missing = queries.left_out(session, standing, first, through)
+    return {"first": first, "through": through, "take": take} | ({"left_out": missing} if missing else {})
+
+
+def _same(before: StudyRow, kind: str, settings: dict[str, Any], rows: list[dict[str, Any]]) -> bool:
+    """Whether this is what was sent before. Of readings it is the same question, whatever became of them since."""
+    asked = ("first", "through", "take")
+    old, new = before.settings, settings
+    if "source" in old and "source" in new:
+        same = [old["source"][name] for name in asked] == [new["source"][name] for name in asked]
+        old, new = ({k: v for k, v in each.items() if k != "source"} for each in (old, new))
+        return same and (before.study.kind, old) == (kind, new)
+    return (before.study.kind, old, before.revision.rows) == (kind, new, rows)
 
 
 def rows_from_readings(

@@ -91,6 +91,7 @@ class CrossedOut(BaseModel):
     components: list[ComponentOut]
     ndc: int = Field(description="Number of distinct categories.")
     pooled: bool = Field(description="The interaction is counted as repeatability (p above 0.25).")
+    zeroed: list[str] = Field(description="Components whose estimated variance was negative and counts as 0.")
     table: list[LineOut] = Field(description="Of the analysis of variance; empty for average and range.")
 
 
@@ -239,6 +240,7 @@ def _crossed(found: Evaluated, tolerance: float | None) -> list[CrossedOut]:
             ],
             ndc=each.ndc,
             pooled=each.pooled,
+            zeroed=["reproducibility" if name == "appraiser" else name for name in each.zeroed],
             table=[
                 LineOut(
                     source=line.source,

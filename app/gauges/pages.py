@@ -106,7 +106,7 @@ def send_new(request: Request, session: SessionDep, caller: Operator, form: Form
             named = {"machine": typed.get("machine"), "characteristic": typed.get("characteristic")}
             given = parsed(StudyIn, forms.settings_of(typed) | named | fields)
             machine = machines.machine_named(session, given.machine)
-            source = _source(typed, given.characteristic)
+            source = _source(session, kind, typed, given)
             made = actions.add_study(session, machine, given, caller, source)
     except InbandError as error:
         if not error.errors and error.status != NotFound.status:
@@ -140,13 +140,22 @@ def _from_readings(session: Session, kind: str, typed: dict[str, str]) -> tuple[
     return typed | fields | {"machine": standing.machine.key, "each": each, "from": f"{first}-{through}-{take}"}, grid
 
 
-def _source(typed: Mapping[str, str], characteristic: str | None) -> dict[str, Any] | None:
-    """What the grid was filled from, if it was filled from readings."""
+def _source(session: Session, kind: str, typed: Mapping[str, str], given: StudyIn) -> dict[str, Any] | None:
+    """From which readings the grid was filled, if it was, and still holds what they say."""
     first, _dash, rest = typed.get("from", "").partition("-")
     through, _dash, take = rest.partition("-")
-    if characteristic and first.isdigit() and through.isdigit() and take in {"readings", "touches"} and len(rest) < 40:
-        return {"first": int(first), "through": int(through), "take": take}
-    return None
+    if not given.characteristic or take not in {"readings", "touches"} or len(typed["from"]) > 60:
+        return None
+    standing = characteristics.characteristic_named(session, given.characteristic)
+    try:
+        asked = forms.whole({"first": first}, "first"), forms.whole({"through": through}, "through")
+        rows = actions.rows_from_readings(session, standing, kind, *asked, take)
+    except Invalid:
+        return None
+    said = [[round(value, 9) for value in row["values"]] for row in rows]
+    if said != [[round(value, 9) for value in row.values] for row in given.rows]:
+        return None  # somebody has typed over it
+    return actions.source_of(session, standing, *asked, take)
 
 
 def _grid_or_none(kind: str, typed: Mapping[str, str]) -> Grid | None:

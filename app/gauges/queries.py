@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from sqlalchemy import Select, and_, func, select
+from sqlalchemy import ColumnElement, Select, and_, func, or_, select
 from sqlalchemy.orm import Session
 
 from app.capability.queries import scatter_of_parts
@@ -14,6 +14,7 @@ from app.characteristics.queries import Standing
 from app.characteristics.tables import Characteristic
 from app.core.spc.gauge.zero_range import Suggestion, suggest
 from app.core.spc.refusal import Refused
+from app.core.zones import Zone
 from app.errors import FieldError, Invalid, NotFound
 from app.gauges.evaluating import Evaluated, evaluate
 from app.gauges.tables import GaugeStudy, GaugeStudyRevision
@@ -175,8 +176,36 @@ def latest_advice(session: Session, standing: Standing) -> tuple[StudyRow, Advic
     return None
 
 
+def _between(standing: Standing, first: int, through: int) -> tuple[ColumnElement[bool], ...]:
+    return (
+        Reading.machine_id == standing.machine.id,
+        Reading.characteristic_id == standing.characteristic.id,
+        Reading.sequence.between(first, through),
+    )
+
+
+def _useless() -> ColumnElement[bool]:
+    """Readings that somebody excluded, and probe faults: they tell of no gauge, as they tell of no process."""
+    excluded = (
+        select(Exclusion.sequence)
+        .where(
+            Exclusion.machine_id == Reading.machine_id,
+            Exclusion.characteristic_id == Reading.characteristic_id,
+            Exclusion.sequence == Reading.sequence,
+        )
+        .exists()
+    )
+    return or_(excluded, Reading.zone == Zone.PROBE_FAULT)
+
+
+def left_out(session: Session, standing: Standing, first: int, through: int) -> list[int]:
+    """Which of these readings a study takes no value from: excluded ones, and probe faults."""
+    wanted = select(Reading.sequence).where(*_between(standing, first, through), _useless()).order_by(Reading.sequence)
+    return list(session.scalars(wanted.limit(MOST_TAKEN)))
+
+
 def taken(session: Session, standing: Standing, first: int, through: int, take: str) -> list[tuple[int, list[float]]]:
-    """What each of these readings measured, or the repeats at its first point, by sequence; excluded ones left out.
+    """What each of these readings measured, or the repeats at its first point, by sequence; see `left_out`.
 
     Raises `Invalid` where there are none, or more than 1000.
     """
@@ -187,18 +216,7 @@ def taken(session: Session, standing: Standing, first: int, through: int, take: 
     if min(through, newest) - first >= MOST_TAKEN:
         wrong = _("is too far from the first: a study takes {most} readings at most").format(most=MOST_TAKEN)
         raise Invalid(f"through: {wrong}.", _("Name fewer readings."), errors=[FieldError("through", wrong)])
-    here = (
-        Reading.machine_id == standing.machine.id,
-        Reading.characteristic_id == standing.characteristic.id,
-        Reading.sequence.between(first, through),
-        ~select(Exclusion.sequence)
-        .where(
-            Exclusion.machine_id == Reading.machine_id,
-            Exclusion.characteristic_id == Reading.characteristic_id,
-            Exclusion.sequence == Reading.sequence,
-        )
-        .exists(),
-    )
+    here = (*_between(standing, first, through), ~_useless())
     made: list[tuple[int, list[float]]]
     if take == "readings":
         rows = session.execute(select(Reading.sequence, Reading.measured).where(*here).order_by(Reading.sequence))
@@ -222,7 +240,7 @@ def taken(session: Session, standing: Standing, first: int, through: int, take: 
         wrong = (
             _("none of these readings came as touches")
             if take == "touches"
-            else _("all of these readings are excluded")
+            else _("all of these readings are excluded, or probe faults")
         )
         raise Invalid(f"first: {wrong}.", _("Name other readings."), errors=[FieldError("first", wrong)])
     return made

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from math import isnan
 from typing import Any, NamedTuple
 
+from app.capability import wording as capabilities
 from app.core.spc.gauge.crossed import POOLED_ABOVE, Line, Study
 from app.core.spc.gauge.linearity import Linearity
 from app.core.spc.gauge.single import Bias, TypeOne
@@ -195,6 +196,16 @@ def pooling(found: Study) -> str:
     return words.format(p=p_value(p, "" if found.pooled else "= "), limit=POOLED_ABOVE)
 
 
+def zeroed(found: Study) -> str:
+    """Which components came out negative; empty if none did."""
+    names = {"part": _("Parts"), "appraiser": _("Reproducibility"), "interaction": _("Interaction")}
+    if not found.zeroed:
+        return ""
+    return _("{names}: the estimated variance was negative and counts as 0, as is usual.").format(
+        names=", ".join(names[each] for each in found.zeroed)
+    )
+
+
 def refusal(refused: Refused) -> str:
     """Why a study says nothing."""
     return statistics.refusal(refused)
@@ -256,7 +267,11 @@ def taken_from(source: Mapping[str, Any], characteristic: str | None) -> str:
         if source["take"] == "touches"
         else _("readings {first} to {through} of {characteristic}")
     )
-    return words.format(first=source["first"], through=source["through"], characteristic=characteristic or "–")
+    said = words.format(first=source["first"], through=source["through"], characteristic=characteristic or "–")
+    missing = source.get("left_out")
+    if missing:
+        said += _(", without {readings}: excluded, or probe faults").format(readings=capabilities.named(missing))
+    return said
 
 
 def values(count: int) -> str:

@@ -45,7 +45,8 @@ class Study:
     """Standard deviations: equipment (repeatability), appraiser (reproducibility), interaction, both together (GRR), part, total.
 
     percent: of the total variation; percent_tolerance: 6 sigma as a share of the tolerance. The percentages do not add up
-    to 100, their squares do. ndc: number of distinct categories.
+    to 100, their squares do. ndc: number of distinct categories. zeroed: components (`part`, `appraiser`, `interaction`)
+    whose estimated variance was negative and counts as 0: the data hold less of it than chance alone would bring.
     """
 
     method: Method
@@ -61,6 +62,7 @@ class Study:
     ndc: int
     table: tuple[Line, ...]
     pooled: bool
+    zeroed: tuple[str, ...] = ()
 
     def percent(self, component: float) -> float:
         """A component as a percentage of the total variation."""
@@ -110,9 +112,12 @@ def by_anova(readings: ArrayLike, *, pooled_above: float = POOLED_ABOVE) -> Stud
     error, freedom_error = (repeats + both, freedom_repeats + freedom_both) if pooled else (both, freedom_both)
     repeatability = error / freedom_error if pooled else repeats / freedom_repeats
     against = error / freedom_error
-    variance_part = max(0.0, (part / (p - 1) - against) / (o * t))
-    variance_operator = max(0.0, (operator / (o - 1) - against) / (p * t)) if o > 1 else 0.0
-    variance_both = 0.0 if pooled else max(0.0, (against - repeatability) / t)
+    variances = {
+        "part": (part / (p - 1) - against) / (o * t),
+        "appraiser": (operator / (o - 1) - against) / (p * t) if o > 1 else 0.0,
+        "interaction": 0.0 if pooled else (against - repeatability) / t,
+    }
+    sigmas = {name: sqrt(max(0.0, variance)) for name, variance in variances.items()}
 
     table = [Line("part", p - 1, part, part / (p - 1), *_tested(part, p - 1, error, freedom_error))]
     if o > 1:
@@ -125,10 +130,11 @@ def by_anova(readings: ArrayLike, *, pooled_above: float = POOLED_ABOVE) -> Stud
         Method.ANOVA,
         (p, o, t),
         sqrt(repeatability),
-        sqrt(variance_operator),
-        None if pooled else sqrt(variance_both),
-        sqrt(variance_part),
+        sigmas["appraiser"],
+        None if pooled else sigmas["interaction"],
+        sigmas["part"],
         tuple(table),
+        tuple(name for name, variance in variances.items() if variance < 0),
     )
 
 
@@ -150,9 +156,10 @@ def by_average_and_range(readings: ArrayLike) -> Study:
     if not equipment > 0:
         raise Refused(Reason.NO_VARIATION)
     between = float(np.ptp(x.mean(axis=(0, 2)))) / d2_star(o, 1) if o > 1 else 0.0
-    appraiser = sqrt(max(0.0, between**2 - equipment**2 / (p * t)))
+    left = between**2 - equipment**2 / (p * t)
     part = float(np.ptp(x.mean(axis=(1, 2)))) / d2_star(p, 1)
-    return _study(Method.AVERAGE_RANGE, (p, o, t), equipment, appraiser, None, part, ())
+    zeroed = ("appraiser",) if o > 1 and left < 0 else ()
+    return _study(Method.AVERAGE_RANGE, (p, o, t), equipment, sqrt(max(0.0, left)), None, part, (), zeroed)
 
 
 def _tested(squares: float, freedom: int, error: float, freedom_error: int) -> tuple[float, float]:
@@ -171,6 +178,7 @@ def _study(
     interaction: float | None,
     part: float,
     table: tuple[Line, ...],
+    zeroed: tuple[str, ...],
 ) -> Study:
     grr = sqrt(equipment**2 + appraiser**2 + (interaction or 0.0) ** 2)
     return Study(
@@ -185,4 +193,5 @@ def _study(
         ndc=int(CATEGORIES * part / grr) if grr > 0 else 0,
         table=table,
         pooled=interaction is None and method is Method.ANOVA,
+        zeroed=zeroed,
     )
