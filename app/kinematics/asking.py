@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from app.core.kinematics.axis import ERRORS
+from app.core.kinematics.results import OFFSETS
 from app.errors import Conflict, NotFound
 from app.kinematics import wording
 from app.kinematics.queries import RunRow
 from app.kinematics.tables import KinematicsBackup
-from app.kinematics.values import UNITS, errors_of
+from app.kinematics.values import UNITS, errors_of, to_enter
 from app.web.fields import Reason
 from app.web.i18n import _
 from app.web.validation import checked
@@ -22,6 +23,9 @@ class Question:
     button: str
     follows: list[str]
     reasons: list[str]
+    offsets: bool = False  # Q147 to Q149 can be entered as well
+    when: bool = False  # it may have been done earlier
+    seen: int | None = None  # the version that was in effect when it was asked
 
 
 def about_run(row: RunRow, what: str) -> Question:
@@ -39,24 +43,40 @@ def about_run(row: RunRow, what: str) -> Question:
     if what == "enter":
         if row.status == "to_confirm" or not row.may_be_entered:
             raise Conflict(*wording.cannot_enter(row))
-        values = errors_of(row.run.results)
+        values = to_enter(row.run.results)
+        groups = [*ERRORS.values(), tuple(OFFSETS)]
         follows = [
-            "{}: {}".format(axis, ", ".join(f"{n} {wording.entered(n, values[n])}" for n in names if n in values))
-            for axis, names in ERRORS.items()
-            if any(n in values for n in names)
+            ", ".join(f"{name} {wording.entered(name, values[name])}" for name in names if name in values)
+            for names in groups
+            if any(name in values for name in names)
         ]
         follows.append(_("The kinematics before and after is backed up, so that it can be put back."))
+        follows.append(_("Nothing is sent to the control from here: this says that somebody has entered it there."))
         return Question(
             _("Entered on the control?"),
             _("It is entered"),
             follows,
             [_("Monthly check"), _("Drift"), _("Head changed"), _("After a collision")],
+            offsets=bool(errors_of(row.run.results)) and any((row.run.results["offsets"] or {}).values()),
+            when=True,
+        )
+    if what == "undo":
+        if row.status != "entered":
+            raise Conflict(*wording.cannot_undo(row))
+        return Question(
+            _("Take back what was entered of run {n}?").format(n=number),
+            _("It is taken back"),
+            [
+                _("The kinematics before it is put back, as a new version; nothing is lost."),
+                _("Put it back on the control as well (cycle 450): nothing is sent to it from here."),
+            ],
+            [_("Worse than before"), _("Entered by mistake"), _("Never entered on the control")],
         )
     raise nothing_here()
 
 
-def about_backup(old: KinematicsBackup, now: Mapping[str, float]) -> Question:
-    """Asks before a kinematics is put back; now: what is entered at present with that head."""
+def about_backup(old: KinematicsBackup, now: Mapping[str, float], version: int) -> Question:
+    """Asks before a kinematics is put back; now, version: what is entered at present with that head."""
     differing = [name for name in UNITS if old.errors.get(name, 0.0) != now.get(name, 0.0)]
     follows = [
         _("{name}: {now} becomes {then}").format(
@@ -75,12 +95,18 @@ def about_backup(old: KinematicsBackup, now: Mapping[str, float]) -> Question:
             _("That becomes a new version; nothing is lost."),
         ],
         [_("Worse than before"), _("Old head is in again"), _("Entered by mistake")],
+        seen=version,
     )
 
 
 def reason(text: str) -> str:
     """Why, as people chose or typed it. Raises `Invalid`."""
     return str(checked(Reason, text, "reason"))
+
+
+def seen(text: str | None) -> int | None:
+    """The version that was in effect when it was asked; what is no number was not sent by our page."""
+    return int(text) if text and text.isascii() and text.isdigit() and len(text) < 10 else None
 
 
 def nothing_here() -> NotFound:
@@ -95,6 +121,7 @@ def done(what: str, number: int | None) -> str | None:
         "again": _("Run {n} was stored before; nothing happened now."),
         "confirm": _("Run {n} is confirmed: it may be entered on the control."),
         "enter": _("Run {n} is entered. The kinematics before and after is backed up."),
+        "undo": _("What was entered of run {n} is taken back: the kinematics before it is in effect again."),
         "restore": _("The kinematics is put back; it is version {n} now."),
         "plan": _("The limits are set; they hold from the next run on."),
     }.get(what)

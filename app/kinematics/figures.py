@@ -7,18 +7,20 @@ well. Angles become what they come to over one metre, so that all position error
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from datetime import timedelta
 from math import isfinite
 from typing import Any
 
 from app.kinematics.drift import Compared, Drift
 from app.kinematics.values import UNITS, as_reading
-from app.kinematics.wording import approach_word, name_words, written
+from app.kinematics.wording import approach_word, difference, name_words
+from app.kinematics.wording import entered as told
 from app.web.i18n import _
 from app.web.theme import Palette, ThemeName, date_axis, layout, palette
 
 GREEN: dict[ThemeName, str] = {"light": "#1a7a3c", "dark": "#62c985"}
 LETTERS = "XYZ"
-SHAPES = {1: "triangle-right", -1: "triangle-left", 0: "circle"}
+SHAPES = {1: "triangle-up", -1: "triangle-down", 0: "circle"}
 ROOM = 1.25
 
 
@@ -31,7 +33,7 @@ def diagram(axis: Mapping[str, Any], letter: str, *, theme: ThemeName = "light",
     traces: list[dict[str, Any]] = []
     for kind, words, colour, dash in (
         ("measured", _("measured"), colours.stop, "solid"),
-        ("optimised", _("optimised"), GREEN[theme], "dot"),
+        ("optimised", _("optimised"), GREEN[theme], "dash"),
     ):
         for approach in sorted({each["approach"] for each in axis["positions"]}, reverse=True):
             chosen = sorted(
@@ -106,7 +108,9 @@ def comparison(
     before = [_um(each.name, each.change.before) for each in rows]
     after = [_um(each.name, each.change.after) for each in rows]
     tones = [_tone(each, colours) for each in rows]
-    spread = [2 * _um(each.name, each.change.deviation / 2**0.5) if each.change.deviation else 0.0 for each in rows]
+    spreads = [
+        [2 * _um(each.name, each.change.deviation / 2**0.5) if each.change.deviation else 0.0 for each in rows]
+    ] * 2
     largest = max([abs(v) + s for values in (before, after) for v, s in zip(values, spread, strict=True)] + [1.0])
     span = 2.4 * largest
     shapes, notes = [], []
@@ -134,19 +138,21 @@ def comparison(
                     "y": row,
                     "yref": "y",
                     "showarrow": False,
-                    "text": f"{_moved(each)} <b>{_('enter {value}').format(value=written(each.name, enter))}</b>",
-                    "font": {"size": 13, "color": colours.ink},
+                    "text": f"{_moved(each)}<b>{_('enter {value}').format(value=told(each.name, enter))}</b>",
+                    "font": {"size": 14, "color": colours.ink},
                     "align": "right",
                 }
             )
     return {
         "data": [
-            _ends(_("then"), before, spread, tones, "circle-open"),
-            _ends(_("now"), after, spread, tones, "diamond"),
+            _key(_("then"), "circle-open", colours),
+            _key(_("now"), "diamond", colours),
+            _ends(_("then"), before, spread, tones, "circle-open", colours),
+            _ends(_("now"), after, spread, tones, "diamond", colours),
         ],
         "layout": layout(
             theme,
-            margin={"l": 190, "t": 34, "r": 12, "b": 46},
+            margin={"l": 196, "t": 34, "r": 12, "b": 46},
             showlegend=True,
             legend=_legend(colours),
             xaxis={
@@ -162,6 +168,7 @@ def comparison(
                 "ticktext": names,
                 "range": [len(rows) - 0.4, -0.6],
                 "color": colours.ink,
+                "tickfont": {"size": 14},
             },
             shapes=shapes,
             annotations=notes,
@@ -169,15 +176,24 @@ def comparison(
     }
 
 
-def _ends(name: str, values: list[float], spread: list[float], tones: list[str], symbol: str) -> dict[str, Any]:
+def _key(name: str, symbol: str, colours: Palette) -> dict[str, Any]:
+    """A line of the legend: the points themselves have the colour of what they mean."""
+    marker = {"symbol": symbol, "size": 12, "color": colours.ink, "line": {"width": 2, "color": colours.ink}}
+    return {"type": "scatter", "mode": "markers", "name": name, "x": [None], "y": [None], "marker": marker}
+
+
+def _ends(
+    name: str, values: list[float], spread: list[float], tones: list[str], symbol: str, colours: Palette
+) -> dict[str, Any]:
     return {
+        "showlegend": False,
         "type": "scatter",
         "mode": "markers",
         "name": name,
         "meta": name,
         "x": values,
         "y": list(range(len(values))),
-        "error_x": {"type": "data", "array": spread, "color": tones[0], "thickness": 1.2, "width": 4},
+        "error_x": {"type": "data", "array": spread, "color": colours.quiet, "thickness": 1.2, "width": 4},
         "marker": {"symbol": symbol, "size": 13, "color": tones, "line": {"width": 2, "color": tones}},
         "hovertemplate": "%{x:+.1f} µm<extra>" + name + "</extra>",
         "cliponaxis": False,
@@ -190,8 +206,10 @@ def _tone(each: Compared, colours: Palette) -> str:
 
 def _moved(each: Compared) -> str:
     if each.change.moved is None:
-        return ""
-    return _("moved;") if each.change.moved else _("scatter;")
+        return f"{difference(each.name, each.change.difference)} · "
+    if not each.change.moved:
+        return _("within scatter · ")
+    return _("moved {by} · ").format(by=difference(each.name, each.change.difference))
 
 
 def _ticks(largest: float) -> list[float]:
@@ -258,7 +276,7 @@ def course(drift: Drift, *, theme: ThemeName = "light") -> dict[str, Any]:
         "layout": layout(
             theme,
             margin={"l": 74, "t": 12},
-            xaxis=date_axis(),
+            xaxis=date_axis() | _days(drift),
             yaxis={
                 "title": {"text": f"{drift.name}, {unit}", "standoff": 6},
                 "range": [low - room, high + room],
@@ -269,6 +287,14 @@ def course(drift: Drift, *, theme: ThemeName = "light") -> dict[str, Any]:
             },
         ),
     }
+
+
+def _days(drift: Drift) -> dict[str, Any]:
+    """Half a day before and after, where all runs are of one hour: else the axis would count seconds."""
+    first, last = min(point.at for point in drift.points), max(point.at for point in drift.points)
+    if last - first > timedelta(hours=1):
+        return {}
+    return {"range": [(first - timedelta(hours=12)).isoformat(), (last + timedelta(hours=12)).isoformat()]}
 
 
 def _steps(at: list[str], values: list[float], name: str, line: dict[str, Any]) -> dict[str, Any]:

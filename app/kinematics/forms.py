@@ -44,9 +44,9 @@ def way(form: Mapping[str, str]) -> str:
     return form["as"] if form.get("as") in WAYS else WAYS[0]
 
 
-def run(form: Mapping[str, str], confirm: str | None = None) -> dict[str, Any]:
+def run(form: Mapping[str, str]) -> dict[str, Any]:
     """The form of a run as the API's fields. Raises `Invalid` for what is missing, and for lines that are no position."""
-    made: dict[str, Any] = {"machine": form.get("machine"), "confirm": confirm, "measured_at": _moment(form)}
+    made: dict[str, Any] = {"machine": form.get("machine"), "measured_at": _moment(form, "measured_at")}
     made |= {name: form.get(name, "").strip() for name in TEXTS}
     made |= {name: length(form.get(name)) for name in SETTINGS}
     touches = form.get("touches_per_ball", "").strip()
@@ -67,9 +67,14 @@ def run(form: Mapping[str, str], confirm: str | None = None) -> dict[str, Any]:
     return made
 
 
-def _moment(form: Mapping[str, str]) -> str | None:
-    """When it was measured, by the clock of who types."""
-    typed, zone = form.get("measured_at", "").strip(), ZoneInfo("UTC")
+def entry(form: Mapping[str, str], reason: str) -> dict[str, Any]:
+    """That a run has been entered on the control, as the API's fields. Raises `Invalid` for what is no time."""
+    return {"reason": reason, "offsets": form.get("offsets") == "true", "at": _moment(form, "at")}
+
+
+def _moment(form: Mapping[str, str], field: str) -> str | None:
+    """When something was done, by the clock of who types."""
+    typed, zone = form.get(field, "").strip(), ZoneInfo("UTC")
     if not typed:
         return None
     try:
@@ -77,7 +82,7 @@ def _moment(form: Mapping[str, str]) -> str | None:
             zone = zone_named(form["timezone"])
         return moment(typed, zone).astimezone(UTC).isoformat()
     except Unreadable as error:
-        raise Invalid(f"measured_at: {error}.", errors=[FieldError("measured_at", str(error))]) from None
+        raise Invalid(f"{field}: {error}.", errors=[FieldError(field, str(error))]) from None
 
 
 # --- positions

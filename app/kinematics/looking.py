@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from math import isclose
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from sqlalchemy import exists, select
 from sqlalchemy.orm import Session
@@ -14,9 +14,12 @@ from app.kinematics.drift import Compared, Drift, Measured, compared
 from app.kinematics.drift import drifts as drifts_of
 from app.kinematics.queries import RunRow
 from app.kinematics.tables import KinematicsPlan, KinematicsRun
-from app.kinematics.values import errors_of
+from app.kinematics.values import UNITS
+from app.kinematics.values import to_enter as to_be_entered
 from app.machines.tables import Machine
 
+Item = TypeVar("Item")
+HORIZON = 365.0  # days; nobody foresees more
 SAME_PLACE = 0.0002  # mm; a protocol states places with four decimals
 
 
@@ -150,11 +153,12 @@ def drifts(session: Session, machine: Machine, head: str) -> list[Drift]:
 
 
 def days_left(drift: Drift) -> float | None:
-    """Days until a value that moves is beyond its limit, at the rate of its trend; None if it does not move there."""
+    """Days until a value that moves is beyond its limit, at the rate of its trend; None if that is over a year away."""
     if drift.limit is None or drift.trend is None or drift.last is None or not drift.trend.moves or drift.beyond:
         return None
     ahead = drift.limit - drift.last.value if drift.trend.slope > 0 else -drift.limit - drift.last.value
-    return ahead / drift.trend.slope
+    left = ahead / drift.trend.slope
+    return left if left <= HORIZON else None
 
 
 def first_to_see(drifts: Sequence[Drift]) -> str | None:
@@ -188,7 +192,12 @@ def changes(before: RunRow, after: RunRow) -> list[Compared]:
 
 def to_enter(row: RunRow) -> dict[str, float]:
     """What is to be entered on the control because of this run; nothing, if it was entered or overtaken."""
-    return errors_of(row.run.results) if row.may_be_entered else {}
+    return in_order(to_be_entered(row.run.results)) if row.may_be_entered else {}
+
+
+def in_order(values: Mapping[str, Item]) -> dict[str, Item]:
+    """Values in the order in which the control has them: results are kept as JSON, which sorts by letters."""
+    return {name: values[name] for name in UNITS if name in values}
 
 
 def same(kept: Mapping[str, Any], anew: Mapping[str, Any]) -> bool:

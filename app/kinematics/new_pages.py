@@ -10,10 +10,11 @@ from starlette.datastructures import UploadFile
 from starlette.responses import RedirectResponse
 
 from app.errors import FieldError, Invalid, NotFound
-from app.kinematics import actions, forms, queries, wording
+from app.kinematics import actions, forms, queries
 from app.kinematics.evaluation import evaluate
 from app.kinematics.outcome import Evaluated
 from app.kinematics.schemas import MOST_PROTOCOL, RunIn
+from app.kinematics.showing import COMMON
 from app.machines.queries import machine_named, machines
 from app.web.deps import Caller, Operator, SessionDep, require, texts
 from app.web.forms import parsed
@@ -59,7 +60,7 @@ def _form(
         errors=errors,
         error=error,
         found=found,
-        wording=wording,
+        **COMMON,
         machines=machines(session, limit=100_000),
     )
 

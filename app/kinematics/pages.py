@@ -12,7 +12,7 @@ from starlette.responses import RedirectResponse
 from app.errors import Conflict, Invalid
 from app.kinematics import actions, asking, forms, looking, queries
 from app.kinematics.protocol import protocol_of
-from app.kinematics.schemas import PlanIn
+from app.kinematics.schemas import EnterIn, PlanIn
 from app.kinematics.showing import COMMON, ON_PAGE, machine_url, others_of, shown_machine, shown_run
 from app.machines.queries import machine_named
 from app.reports.content import Picture
@@ -198,8 +198,12 @@ def decide(request: Request, session: SessionDep, caller: Operator, run: int, wh
         reason = asking.reason(words(form, "reason"))
         if what == "confirm":
             actions.confirm(session, run, reason, caller)
+        elif what == "undo":
+            caller.must("engineer")
+            actions.undo(session, run, reason, caller)
         elif what == "enter":
-            actions.enter(session, run, reason, caller)
+            given = parsed(EnterIn, forms.entry(form, reason))
+            actions.enter(session, run, reason, caller, offsets=given.offsets, at=given.at)
         else:
             raise asking.nothing_here()
     except Conflict as late:
@@ -225,7 +229,8 @@ def _ask_restore(
 ) -> Response:
     shown = machine_named(session, machine)
     old = queries.backup(session, shown, version)
-    question = asking.about_backup(old, queries.in_effect(session, shown.id, old.head))
+    now = queries.in_effect(session, shown.id, old.head)
+    question = asking.about_backup(old, now, queries.version_of(session, shown.id, old.head))
     back = machine_url(shown.key)
     return _ask(request, shown, question, f"{back}/backups/{version}", back, form, error)
 
@@ -237,7 +242,8 @@ def restore(
     """It is put back, as a new version."""
     shown = machine_named(session, machine)
     try:
-        made = actions.restore(session, shown, version, asking.reason(words(form, "reason")), caller)
+        reason = asking.reason(words(form, "reason"))
+        made = actions.restore(session, shown, version, reason, caller, instead_of=asking.seen(form.get("seen")))
     except Conflict as late:
         said = f"{late.detail} {late.what_to_do or ''}"
         return shown_machine(request, session, caller, machine, said=said, late=True)

@@ -4,9 +4,11 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
+from app.core.kinematics.results import OFFSETS, STRINGS
 from app.kinematics import wording
 from app.kinematics.answers import parameters_of
 from app.kinematics.figures import LETTERS, diagram, greatest
+from app.kinematics.looking import in_order, surer
 from app.kinematics.queries import RunRow
 from app.reports.content import (
     Column,
@@ -36,11 +38,12 @@ SETTINGS = {
     "Q432": "backlash_angle",
 }
 WIDE, TALL = 1040, 250
+MOST_NOTES = 40
 
 
 def protocol_of(row: RunRow, made_at: datetime) -> Report:
     """The protocol, with its diagrams as they stand on the page."""
-    run, results = row.run, row.run.results
+    run, results = row.run, surer(row.run.results)
     return Report(
         key=f"kinematics-{run.id}",
         name=_("Rotary axes, run {n}").format(n=run.id),
@@ -55,6 +58,7 @@ def protocol_of(row: RunRow, made_at: datetime) -> Report:
             *(section for axis in results["axes"] for section in _axis(axis)),
             *((_balls(results["balls"]),) if results["balls"] else ()),
             _settings(row),
+            *((_not_understood(results["notes"]),) if results["notes"] else ()),
         ),
     )
 
@@ -69,7 +73,7 @@ def _head(row: RunRow) -> tuple[Fact, ...]:
         Fact("kinematics", _("Active kinematics"), words(said.get("kinematics"))),
         Fact("mode", _("Mode"), words(said.get("mode"))),
         Fact("came", _("Came as"), words(wording.form_word(run.form))),
-        Fact("head", _("Head"), words(run.head)),
+        *((Fact("head", _("Head"), words(run.head)),) if run.head else ()),
         Fact("by", _("Sent by"), words(run.actor)),
     )
 
@@ -84,18 +88,24 @@ def _outcome(row: RunRow) -> Section:
         )
         for what, each in row.decisions.items()
     )
-    facts = [Fact(name, wording.name_words(name), width(value), code=name) for name, value in _scalars(run.results)]
+    parameters = parameters_of(run.results)
+    facts = [
+        Fact(name, _named(name), deviation(value) if name in OFFSETS else width(value), code=name)
+        for name, value in parameters.items()
+        if isinstance(value, float)
+    ]
     strings = [
-        Fact(name, _("position errors"), words(str(text)), code=name)
-        for name, text in parameters_of(run.results).items()
-        if name.startswith("QS")
+        Fact(name, _("Position errors of {axis}").format(axis=STRINGS[name]), words(text), code=name)
+        for name, text in parameters.items()
+        if isinstance(text, str)
     ]
     said = (wording.sentence(run),) if run.outcome == "measured" else ()
     return Section("outcome", _("Result"), said + decided, tuple(warned), tuple(facts + strings))
 
 
-def _scalars(results: Mapping[str, Any]) -> list[tuple[str, float]]:
-    return [(name, float(value)) for name, value in parameters_of(results).items() if not name.startswith("QS")]
+def _named(name: str) -> str:
+    said = wording.name_words(name)
+    return said[:1].upper() + said[1:]
 
 
 def _axis(axis: Mapping[str, Any]) -> tuple[Section, ...]:
@@ -118,12 +128,12 @@ def _axis(axis: Mapping[str, Any]) -> tuple[Section, ...]:
         *(
             Fact(
                 name,
-                wording.name_words(name),
+                _named(name),
                 _degrees(each["value"]) if name[1] in "ABC" else deviation(each["value"]),
                 code=name,
                 note=_plus_minus(each["deviation"], "°" if name[1] in "ABC" else "µm"),
             )
-            for name, each in axis["errors"].items()
+            for name, each in in_order(axis["errors"]).items()
         ),
     )
     place = Table(
@@ -200,9 +210,9 @@ def _balls(balls: Sequence[Mapping[str, Any]]) -> Section:
 def _settings(row: RunRow) -> Section:
     run = row.run
     facts = [
-        Fact(field, _SETTING_WORDS[field](), words(f"{run.given[field]:g}"), code=name)
+        Fact(field, _setting(field), words(f"{value:g}"), code=name)
         for name, field in SETTINGS.items()
-        if isinstance(run.given.get(field), int | float)
+        if isinstance(value := run.given.get(field) or run.limits.get(field), int | float)
     ]
     limits = {
         "max_modification": ("maxModification", "mm"),
@@ -214,18 +224,24 @@ def _settings(row: RunRow) -> Section:
         for field, (name, unit) in limits.items()
         if run.limits.get(field) is not None
     ]
-    return Section("settings", _("Settings"), tuple(run.results["notes"][:40]), facts=tuple(facts))
+    return Section("settings", _("Settings"), facts=tuple(facts))
 
 
-_SETTING_WORDS = {
-    "ball_radius": lambda: _("radius of the ball, mm"),
-    "clearance": lambda: _("clearance, mm"),
-    "retract_height": lambda: _("retract height, mm"),
-    "feed": lambda: _("feed, mm/min"),
-    "reference_angle": lambda: _("reference angle, °"),
-    "touches_per_ball": lambda: _("touches per ball"),
-    "backlash_angle": lambda: _("backlash angle, °"),
-}
+def _not_understood(notes: Sequence[str]) -> Section:
+    more = _("and {n} more").format(n=len(notes) - MOST_NOTES) if len(notes) > MOST_NOTES else None
+    return Section("notes", _("Not understood"), (*notes[:MOST_NOTES], *((more,) if more else ())))
+
+
+def _setting(field: str) -> str:
+    return {
+        "ball_radius": _("Radius of the ball, mm"),
+        "clearance": _("Clearance, mm"),
+        "retract_height": _("Retract height, mm"),
+        "feed": _("Feed, mm/min"),
+        "reference_angle": _("Reference angle, °"),
+        "touches_per_ball": _("Touches per ball"),
+        "backlash_angle": _("Backlash angle, °"),
+    }[field]
 
 
 def _degrees(value: float | None) -> Value:

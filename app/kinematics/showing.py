@@ -36,6 +36,7 @@ COMMON: dict[str, Any] = {
     "machine_url": machine_url,
     "compare_url": compare_url,
     "days_left": looking.days_left,
+    "in_order": looking.in_order,
 }
 
 
@@ -67,6 +68,7 @@ def shown_machine(
         value = looking.first_to_see(drifts)
     runs = queries.runs(session, shown.id, before=before, newest_first=True, limit=ON_PAGE + 1)
     kept = queries.backups(session, shown.id)
+    current = {each.head: each for each in kept}
     standard = row.heads.get(reference)
     return page(
         request,
@@ -85,7 +87,7 @@ def shown_machine(
         older=machine_url(machine, head=head, before=runs[ON_PAGE - 1].run.id) if len(runs) > ON_PAGE else None,
         newest=machine_url(machine, head=head) if before else None,
         backups=list(reversed(kept)),
-        in_effect={each.head: each.version for each in kept},
+        in_effect={each.version for each in kept if queries.alike(each.errors, current[each.head].errors)},
         form=forms.filled_in(row.plan) | dict(form or {}),
         errors=forms.at_fields(error, {}) if error else {},
         said=said,
@@ -110,7 +112,7 @@ def shown_run(
         run=row.run,
         results=looking.surer(row.run.results),
         stated=row.run.form == "protocol",
-        errors=errors_of(row.run.results),
+        errors=looking.in_order(errors_of(row.run.results)),
         entering=looking.to_enter(row),
         parameters=parameters_of(row.run.results),
         others=others,
@@ -118,6 +120,7 @@ def shown_run(
         said=said,
         late=late,
         may_take=caller.may("operator"),
+        may_undo=row.status == "entered" and caller.may("engineer"),
         **COMMON,
     )
 

@@ -43,6 +43,18 @@ def entered(name: str, value: float | None) -> str:
     return f"{signed(value, 4)}{NO_BREAK_SPACE}mm"
 
 
+def plainly(name: str, value: float | None) -> str:
+    """The same, without a sign where a value has none: scatter, greatest deviation, mean error."""
+    if name in MEASURED or name in OPTIMISED or name.partition(".")[0] in ("greatest", "mean_error"):
+        return um_plain(value)
+    return written(name, value)
+
+
+def difference(name: str, value: float | None) -> str:
+    """What lies between two values: in µm whatever it is of, or degrees."""
+    return angle(value) if UNITS.get(name) == "°" else um(value)
+
+
 def limit(name: str, value: float) -> str:
     """A limit of a value, both sides at once."""
     return f"±{value:g}{NO_BREAK_SPACE}°" if UNITS.get(name) == "°" else um_limit(value)
@@ -140,12 +152,9 @@ def not_understood(line: Unread) -> str:
 # --- what a run says
 
 
-def sentence(run: KinematicsRun) -> str:
+def sentence(run: KinematicsRun | Evaluated) -> str:
     """How a run came out, in one sentence."""
-    return _said(run.reason, run.results)
-
-
-def _said(reason: Mapping[str, Any], results: Mapping[str, Any]) -> str:
+    reason = run.reason
     if reason["code"] == "max_dev_cal_ball":
         text = _(
             "The ball measured {measured}, it was calibrated as {calibrated}: further off than {limit} (maxDevCalBall). The run "
@@ -158,7 +167,7 @@ def _said(reason: Mapping[str, Any], results: Mapping[str, Any]) -> str:
         name = reason["name"]
         text = _("{name} = {value} is a larger change than the {limit} that are permitted (maxModification).")
         return text.format(name=name, value=written(name, reason["value"]), limit=limit(name, reason["limit"]))
-    axes = results.get("axes") or []
+    axes = run.results.get("axes") or []
     parts = [
         _("{axis}: scatter {before} → {after}").format(
             axis=axis["axis"], before=um_plain(axis["scatter_before"]), after=um_plain(axis["scatter_after"])
@@ -171,11 +180,6 @@ def _said(reason: Mapping[str, Any], results: Mapping[str, Any]) -> str:
     if axes:
         return _("Position errors of {axes}.").format(axes=", ".join(axis["axis"] for axis in axes))
     return _("The ball alone: offset of the machine.")
-
-
-def sentence_of(found: Evaluated) -> str:
-    """What a run that is not kept yet says."""
-    return _said(found.reason, found.results)
 
 
 def um_plain(length: float | None) -> str:
