@@ -51,6 +51,7 @@ TAGS = {
     "statistics": "What a run of readings amounts to.",
     "control charts": "Baselines frozen on purpose, charts judged by them, run rules, and the signals that these gave.",
     "overview": "What needs attention first: every characteristic ranked, with the reasons.",
+    "reports": "What is handed over about a characteristic and a period: JSON, PDF, XLSX, CSV; of many at once in the background.",
     "wear": "True wear behind the corrections, how long an edge will do, and whether a loop runs after its own scatter.",
     "events": "What changes, as it changes.",
     "keys": "Keys by which machines and other programs call.",
