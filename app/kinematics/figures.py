@@ -108,9 +108,7 @@ def comparison(
     before = [_um(each.name, each.change.before) for each in rows]
     after = [_um(each.name, each.change.after) for each in rows]
     tones = [_tone(each, colours) for each in rows]
-    spreads = [
-        [2 * _um(each.name, each.change.deviation / 2**0.5) if each.change.deviation else 0.0 for each in rows]
-    ] * 2
+    spread = [2 * _um(each.name, each.change.deviation / 2**0.5) if each.change.deviation else 0.0 for each in rows]
     largest = max([abs(v) + s for values in (before, after) for v, s in zip(values, spread, strict=True)] + [1.0])
     span = 2.4 * largest
     shapes, notes = [], []
