@@ -16,7 +16,9 @@ from app.web.deps import AnyCaller, Caller, SessionDep
 
 router = api_router("kinematics")
 RunNumber = Annotated[int, Path(description="Number of the run.", examples=[118])]
-FILE: dict[int | str, dict[str, Any]] = {200: {"content": {kind: {} for kind in MEDIA_TYPES.values()}}}
+FILE: dict[int | str, dict[str, Any]] = {
+    200: {"content": {kind: {"example": "(the file)"} for kind in MEDIA_TYPES.values()}}
+}
 
 
 def _protocol(session: SessionDep, caller: Caller, run: int) -> Report:
@@ -31,7 +33,12 @@ def get_kinematics_protocol(session: SessionDep, caller: AnyCaller, run: RunNumb
     return ReportOut.of(_protocol(session, caller, run))
 
 
-@router.get("/kinematics/runs/{run}/protocol.{form}", responses=problems(404) | FILE, response_model=None)
+@router.get(
+    "/kinematics/runs/{run}/protocol.{form}",
+    responses=problems(404) | FILE,
+    response_model=None,
+    response_class=Response,
+)
 def get_kinematics_protocol_file(
     session: SessionDep,
     caller: AnyCaller,
