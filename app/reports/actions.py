@@ -21,6 +21,7 @@ from app.web.i18n import _
 MOST_AT_ONCE = 500  # characteristics
 MOST_WAITING = 20  # jobs
 KEPT_DAYS = 7
+KEPT_BYTES = 2_000_000_000  # of all files together
 
 
 def ask(session: Session, bundle: Bundle, caller: Caller) -> ReportJob:
@@ -87,11 +88,7 @@ def _keys(session: Session, bundle: Bundle) -> list[str]:
 def cancel(session: Session, number: int, caller: Caller) -> ReportJob:
     """End it, whoever works on it. Raises `Conflict` when it is finished, `NotAllowed` for those of others."""
     job = queries.job(session, number)
-    if job.asked_by != caller.name and not caller.may("engineer"):
-        raise NotAllowed(
-            _("These reports were asked for by {who}.").format(who=job.asked_by),
-            _("Whoever asked for them, or an engineer, may cancel them."),
-        )
+    _must_own(job, caller)
     ended = session.execute(
         update(ReportJob)
         .where(ReportJob.id == number, ReportJob.state.in_(OPEN))
@@ -179,8 +176,35 @@ def _change(number: int) -> dict[str, Any]:
 
 
 def drop_old(session: Session) -> None:
-    """Throw away what was finished a week ago."""
+    """Throw away what was finished a week ago, and the oldest files where all together are too large."""
     session.execute(delete(ReportJob).where(ReportJob.finished_at < func.now() - text(f"interval '{KEPT_DAYS} days'")))
+    together = func.sum(ReportJob.size).over(order_by=ReportJob.id.desc())
+    running = select(ReportJob.id, together.label("bytes")).where(ReportJob.size.is_not(None)).subquery()
+    session.execute(delete(ReportJob).where(ReportJob.id.in_(select(running.c.id).where(running.c.bytes > KEPT_BYTES))))
+
+
+def throw_away(session: Session, number: int, caller: Caller) -> None:
+    """Delete finished reports with their file. Raises `Conflict` while they are made, `NotAllowed` for those of others."""
+    job = queries.job(session, number)
+    _must_own(job, caller)
+    gone = session.scalar(
+        delete(ReportJob).where(ReportJob.id == number, ReportJob.state.not_in(OPEN)).returning(ReportJob.id)
+    )
+    if gone is None:
+        raise Conflict(
+            _("Reports {number} are not finished yet: {state}.").format(number=number, state=job.state),
+            _("Cancel them first."),
+        )
+    record(session, caller.name, "reports thrown away", f"reports/{number}")
+    publish(session, _change(number))
+
+
+def _must_own(job: ReportJob, caller: Caller) -> None:
+    if job.asked_by != caller.name and not caller.may("engineer"):
+        raise NotAllowed(
+            _("These reports were asked for by {who}.").format(who=job.asked_by),
+            _("Whoever asked for them, or an engineer, may cancel them and throw them away."),
+        )
 
 
 def places(parts: Sequence[ReportPart]) -> set[int]:

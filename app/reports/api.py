@@ -9,13 +9,13 @@ from fastapi import Depends, Path, Query, Response
 from app.characteristics import queries as characteristics
 from app.people.callers import Caller
 from app.reports import queries
-from app.reports.asking import Format, Paper, SectionName, Wishes, section_names
+from app.reports.asking import EVERYTHING, Format, Paper, SectionName, Wishes, section_names
 from app.reports.content import Report
 from app.reports.files import MEDIA_TYPES, file_name, file_of
 from app.reports.schemas import ReportOut
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, SessionDep
-from app.web.fields import LARGEST_ID, Moment
+from app.web.fields import Moment
 
 router = api_router("reports")
 
@@ -39,9 +39,10 @@ def asked(
         Moment | None, Query(alias="to", description="Measured at this moment or earlier.", examples=[None])
     ] = None,
     last: Annotated[
-        int | None,
+        str | None,
         Query(
-            ge=1, le=LARGEST_ID, description="Only of the last so many readings; without any period of the last 1000."
+            pattern=r"^([1-9][0-9]{0,17}|all)$",
+            description="Only of the last so many readings, or of `all`; without any period of the last 1000.",
         ),
     ] = None,
     section: Annotated[
@@ -53,7 +54,8 @@ def asked(
     ] = "UTC",
 ) -> Wishes:
     """What a report is to be made of."""
-    return Wishes(start, end, last, section_names(section), paper, timezone)
+    many = EVERYTHING if last == "all" else int(last) if last else None
+    return Wishes(start, end, many, section_names(section), paper, timezone)
 
 
 Asked = Annotated[Wishes, Depends(asked)]

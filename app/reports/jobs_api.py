@@ -69,6 +69,12 @@ def cancel_reports(session: SessionDep, caller: Viewer, number: Number) -> Repor
     return ReportsOut.of(actions.cancel(session, number, caller))
 
 
+@router.delete("/reports/{number}", status_code=204, responses=problems(404, 409))
+def throw_reports_away(session: SessionDep, caller: Viewer, number: Number) -> None:
+    """Delete finished reports with their file, before their time is over."""
+    actions.throw_away(session, number, caller)
+
+
 @router.get(
     "/reports/{number}/file",
     dependencies=[require("viewer")],

@@ -15,7 +15,7 @@ from app.proof import queries as proof
 from app.proof import wording as proof_wording
 from app.reports import actions, queries
 from app.reports.actions import KEPT_DAYS
-from app.reports.asking import Paper, SectionName, typed
+from app.reports.asking import EVERYTHING, Paper, SectionName, typed
 from app.reports.bundle import Bundle
 from app.reports.jobs_api import Number, reporter
 from app.web.deps import Caller, SessionDep, Viewer, texts
@@ -57,9 +57,9 @@ def _send(request: Request, session: Session, caller: Caller, form: FormData) ->
         form_of = fields.get("format", "pdf")
         if form_of not in FORMATS:
             raise Invalid(_("There is no such form of report."), _("Choose one of the list."))
-        actions.ask(session, Bundle(wishes, form_of, keys, (), current_language()), caller)  # type: ignore[arg-type]
+        with session.begin_nested():
+            actions.ask(session, Bundle(wishes, form_of, keys, (), current_language()), caller)  # type: ignore[arg-type]
     except InbandError as error:
-        session.rollback()
         return _page(request, session, caller, chosen=keys, given=fields, problem=error)
     reporter(request).wake()
     return RedirectResponse("/reports#jobs", 303)
@@ -69,11 +69,24 @@ def _send(request: Request, session: Session, caller: Caller, form: FormData) ->
 def send_cancellation(request: Request, session: SessionDep, caller: Viewer, number: Number) -> Response:
     """Cancel one."""
     try:
-        actions.cancel(session, number, caller)
+        with session.begin_nested():
+            actions.cancel(session, number, caller)
     except InbandError as error:
         if error.status == 404:
             raise
-        session.rollback()
+        return _page(request, session, caller, problem=error)
+    return RedirectResponse("/reports#jobs", 303)
+
+
+@router.post("/reports/{number}/throw-away")
+def send_to_the_bin(request: Request, session: SessionDep, caller: Viewer, number: Number) -> Response:
+    """Delete one that is finished."""
+    try:
+        with session.begin_nested():
+            actions.throw_away(session, number, caller)
+    except InbandError as error:
+        if error.status == 404:
+            raise
         return _page(request, session, caller, problem=error)
     return RedirectResponse("/reports#jobs", 303)
 
@@ -116,6 +129,7 @@ def _page(
             ("workbook", _("One XLSX with a sheet for each")),
         ],
         kept_days=KEPT_DAYS,
+        everything=EVERYTHING,
         proof_failing=failing,
         proof_warning=proof_wording.warning(len(failing)),
     )

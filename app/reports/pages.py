@@ -99,7 +99,7 @@ def _query(wishes: Wishes) -> str:
     named: dict[str, Any] = {
         "from": wishes.start.isoformat() if wishes.start else None,
         "to": wishes.end.isoformat() if wishes.end else None,
-        "last": wishes.last,
+        "last": "all" if wishes.last == EVERYTHING else wishes.last,
         "paper": None if wishes.paper is Paper.A4 else wishes.paper.value,
         "timezone": None if wishes.zone == "UTC" else wishes.zone,
     }
