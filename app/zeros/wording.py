@@ -29,9 +29,11 @@ def how(kind: str) -> str:
     """How it is touched, for the form."""
     return {
         "bore": _(
-            "Touch the wall at three places or more, spread around, at one height. X and Y are where the tip's centre stood."
+            "Touch the wall in opposite pairs: 1 and 2 give X, 3 and 4 give Y. Or at three places or more with X and Y of each."
         ),
-        "boss": _("Touch the boss from outside at three places or more, spread around, at one height."),
+        "boss": _(
+            "Touch the boss from outside in opposite pairs: 1 and 2 give X, 3 and 4 give Y. Or at three places or more with X and Y of each."
+        ),
         "pocket": _(
             "Touch opposite walls from within: 1 and 2 give X, 3 and 4 give Y. A second touch on one wall shows the rotation."
         ),
@@ -80,7 +82,9 @@ def unfit(problem: Unfit) -> tuple[str, str]:
         case Problem.NO_COORDINATE:
             return (
                 _("touch {at} does not say {axis}").format(at=at, axis=axis),
-                _("Where two touches lie on one side, every touch needs X and Y: the part may be turned."),
+                _(
+                    "Every touch needs X and Y where two lie on one side, since the part may be turned, and on a circle that is not touched in opposite pairs."
+                ),
             )
         case Problem.ONE_SIDE if problem.at:
             return (
@@ -142,6 +146,9 @@ def notice(which: str) -> str:
     return {
         Notice.ONE_SIDED.value: _(
             "The touches lie on one side of the circle: its centre is several times less certain than a touch."
+        ),
+        Notice.CHORDS.value: _(
+            "Touched in pairs: X and Y are right, the diameter only if the tip went through the middle. A third place beside them would show it."
         ),
         Notice.NOT_SQUARE.value: _("The sides of the corner are not at a right angle. X follows the side along X."),
     }.get(which, which)

@@ -62,6 +62,14 @@ class TestFound:
         assert (made["x"], made["y"], made["z"], made["length"], made["width"]) == (0.0, 2.0, -150.1, 100.0, 64.0)
         assert made["records"] == [53.0, -53.0, -33.0, 37.0]
 
+    def test_a_bore_touched_in_pairs(self, shop: Shop) -> None:
+        made = post(shop, kind="bore")  # what is touched from within is the same for the tip
+        assert (made["x"], made["y"], made["diameter"]) == (-306.01, -154.25, 100.004)
+        assert made["notices"][0]["code"] == "chords"
+        two = post(shop, kind="bore", touches=POCKET["touches"][:2])
+        assert (two["y"], two["diameter"]) == (None, 100.004)
+        assert "$P_UIFR[1,X,TR]=-306.01\n" in two["program"]
+
     def test_for_a_fanuc_as_g10(self, server: Server) -> None:
         other = Shop(server)
         other.call("PATCH", f"/machines/{other.machine}", control="fanuc")

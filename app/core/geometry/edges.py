@@ -206,6 +206,28 @@ def sides(kind: Kind) -> Solver:
     return solve
 
 
+def across(kind: Kind) -> Solver:
+    """Centre and diameter of a bore or boss from one pair of opposite touches, or two.
+
+    Each pair lies on a chord. Halfway along it is the centre whatever the chord; the longer one is nearer to the diameter.
+    """
+    of_pairs = sides(kind)
+
+    def solve(touches: Sequence[Touch], tip: float) -> tuple[Values, Floats]:
+        values, residuals = of_pairs(touches, tip)
+        return values | {"diameter": max(values[name] for name in ("length", "width") if name in values)}, residuals
+
+    return solve
+
+
+def is_paired(touches: Sequence[Touch]) -> bool:
+    """Whether a round part was touched in pairs across it: every touch from a side of its own, with fewer than a circle takes."""
+    approaches = [touch.approach for touch in touches]
+    if None in approaches or len(set(approaches)) < len(approaches):
+        return False
+    return len(touches) == 2 or any(touch.x is None or touch.y is None for touch in touches)
+
+
 def corner(touches: Sequence[Touch], tip: float) -> tuple[Values, Floats]:
     """Where the two sides of a corner meet. Each side with two touches has its own direction."""
     places = places_of(touches, range(len(touches)), needed=_sharing(touches))

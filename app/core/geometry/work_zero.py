@@ -7,7 +7,8 @@ which the tip was moved; with a along it, c the zero and h half the size, every 
 
 so centre = (X1 + X2)/2 and size = |X2 - X1| + tip inside, - tip outside. Two touches on one side show theta, by how much
 the part is turned; all of them together are solved by least squares. A bore or boss is the least-squares circle of its
-touches. Z zero = Z - feeler - tool length. Lengths mm, angles degrees, counter-clockwise seen from +Z.
+touches, or, touched in opposite pairs, the middle and length of these. Z zero = Z - feeler - tool length. Lengths mm,
+angles degrees, counter-clockwise seen from +Z.
 """
 
 from collections.abc import Sequence
@@ -28,8 +29,10 @@ from app.core.geometry.edges import (
     Touch,
     Unfit,
     Values,
+    across,
     check,
     corner,
+    is_paired,
     places_of,
     sides,
 )
@@ -54,6 +57,7 @@ class Notice(StrEnum):
 
     ONE_SIDED = "one_sided"  # touches on a short arc
     NOT_SQUARE = "not_square"  # the two sides of a corner are not at a right angle
+    CHORDS = "chords"  # a bore or boss touched in pairs: beside the middle they are shorter than the diameter
 
 
 @dataclass(frozen=True)
@@ -97,13 +101,14 @@ def find_zero(
     """
     if not (isfinite(tip) and tip >= 0):
         raise Unfit(Problem.SMALLER_THAN_TIP, needed=tip)
-    if kind.is_round:
+    paired = kind.is_round and is_paired(touches)
+    if kind.is_round and not paired:
         made = _round_zero(kind, touches, tip, repeatability)
     else:
         check(kind, touches)
-        solve = corner if kind is Kind.CORNER else sides(kind)
+        solve = corner if kind is Kind.CORNER else across(kind) if paired else sides(kind)
         values, residuals = solve(touches, tip)
-        _check_sizes(values, tip, outside=kind is Kind.WEB)
+        _check_sizes(values, tip, outside=not kind.inside)
         if abs(values.get("rotation", 0.0)) > MOST_TURNED or abs(values.get("squareness", 0.0)) > MOST_TURNED:
             raise Unfit(Problem.TURNED_TOO_FAR, have=values["rotation"], needed=MOST_TURNED)
         stated = _uncertainty(solve, touches, tip, values, repeatability)
@@ -113,7 +118,7 @@ def find_zero(
             **{name: _rounded(value) for name, value in values.items()},
             residuals=tuple(_rounded(each) for each in residuals),
             uncertainty=stated,
-            notices=(Notice.NOT_SQUARE,) if skew else (),
+            notices=(Notice.CHORDS,) if paired else (Notice.NOT_SQUARE,) if skew else (),
         )
     return made if height is None else replace(made, z=zero_in_z(height))
 

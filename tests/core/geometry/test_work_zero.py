@@ -47,6 +47,30 @@ class TestByHand:
         assert (zero.x, zero.y, zero.length, zero.width, zero.rotation) == (0.0, 2.0, 100.0, 64.0, None)
         assert max(map(abs, zero.residuals)) < 1e-12
 
+    def test_a_bore_and_a_boss_in_pairs(self) -> None:
+        """R15 = (R1+R2)/2, R16 = (R3+R4)/2, R17 = |R2-R1|; with a tip of 6 a bore is 6 larger, a boss 6 smaller.
+
+        By hand: the tip's centre at X 12 and 60, Y 7 and 55 of a bore: zero 36, 31, diameter 48 + 6. Moved outwards.
+        """
+        bore = [Touch(12.0, None, LEFT), Touch(60.0, None, RIGHT), Touch(None, 7.0, DOWN), Touch(None, 55.0, UP)]
+        zero = find_zero(Kind.BORE, bore, 6.0, repeatability=0.001)
+        assert (zero.x, zero.y, zero.diameter) == (36.0, 31.0, 54.0)
+        assert zero.notices == (Notice.CHORDS,)
+        assert zero.uncertainty["x"] == pytest.approx(0.002 / 2**0.5)
+        boss = [Touch(12.0, None, RIGHT), Touch(60.0, None, LEFT), Touch(None, 7.0, UP), Touch(None, 55.0, DOWN)]
+        zero = find_zero(Kind.BOSS, boss, 6.0)
+        assert (zero.x, zero.y, zero.diameter) == (36.0, 31.0, 42.0)
+        two = find_zero(Kind.BORE, bore[:2], 6.0)
+        assert (two.x, two.y, two.diameter, two.length) == (36.0, None, 54.0, 54.0)
+        two = find_zero(Kind.BOSS, [Touch(33, 5, LEFT), Touch(-13, 5, RIGHT)], 6.0)
+        assert (two.x, two.y, two.diameter) == (10.0, None, 40.0)
+
+    def test_a_chord_beside_the_middle_leaves_the_zero_right(self) -> None:
+        """The tip's path has a radius of 25; the pair in X runs 7 beside the middle: half a chord of 24."""
+        touches = [Touch(-24.0, None, LEFT), Touch(24.0, None, RIGHT), Touch(None, -18.0, DOWN), Touch(None, 32.0, UP)]
+        zero = find_zero(Kind.BORE, touches, 6.0)
+        assert (zero.x, zero.y, zero.diameter, zero.length, zero.width) == (0.0, 7.0, 56.0, 54.0, 56.0)
+
     def test_a_boss_of_four_touches(self) -> None:
         zero = find_zero(Kind.BOSS, [Touch(33, 5), Touch(-13, 5), Touch(10, 28), Touch(10, -18)], 6.0)
         assert (zero.x, zero.y) == (10.0, 5.0)
@@ -171,6 +195,10 @@ class TestRefused:
             (Kind.CORNER, [Touch(0, 0, UP), Touch(10, 30, UP), Touch(5, 9, RIGHT)], Problem.TURNED_TOO_FAR, ()),
             (Kind.BOSS, [Touch(3, 0), Touch(-3, 0), Touch(0, 3)], Problem.SMALLER_THAN_TIP, ()),
             (Kind.BORE, [Touch(9, 0, LEFT), Touch(-9, 0), Touch(0, 9)], Problem.WRONG_SIDE, (1,)),
+            (Kind.BORE, [Touch(9, None, LEFT), Touch(1, None, RIGHT)], Problem.WRONG_SIDE, (1, 2)),
+            (Kind.BOSS, [Touch(9, None, RIGHT), Touch(1, None, LEFT)], Problem.WRONG_SIDE, (1, 2)),
+            (Kind.BOSS, [Touch(0, None, RIGHT), Touch(5, None, LEFT)], Problem.SMALLER_THAN_TIP, ()),
+            (Kind.BORE, [Touch(1, None, LEFT), Touch(None, 1, UP)], Problem.ONE_SIDE, (1,)),
             (Kind.BORE, [Touch(9, None), Touch(-9, 0), Touch(0, 9)], Problem.NO_COORDINATE, (1,)),
         ],
     )
