@@ -20,6 +20,7 @@ from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed, words
 from app.web.i18n import _
 from app.web.templates import page
+from app.whatif import queries as what_if
 
 router = APIRouter(include_in_schema=False)
 Slug = Annotated[str | None, Query(max_length=64)]
@@ -58,6 +59,7 @@ def queue_page(
         picture=lambda each: band_picture(each.deviation, each.parameters, each.zone),
         address=queue_address,
         offered=asking.offered,
+        proposals=what_if.count_open(session),
     )
 
 

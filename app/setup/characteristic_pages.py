@@ -21,6 +21,8 @@ from app.setup import parameter_form
 from app.setup.frame import setup_page
 from app.web.deps import Caller, Engineer, FormDep, SessionDep, Viewer
 from app.web.forms import by_field, parsed
+from app.whatif import queries as what_if
+from app.whatif import wording
 
 router = APIRouter()
 LOOKED_BACK = 100  # readings from which a plausible jump is suggested
@@ -187,6 +189,10 @@ def _characteristic(
         warnings=actions.warnings_of(standing.parameters, standing.machine.zero_range_floor),
         history=history(queries.versions(session, characteristic)),
         program=programs.shown(standing),
+        proposals=[
+            (row, wording.proposed(row))
+            for row in what_if.proposals(session, characteristic=characteristic, status="open")
+        ],
         suggested_jump=_suggested_jump(session, standing),
         **_form(typed, errors or {}),
     )

@@ -42,28 +42,28 @@ FIGURE: dict[int | str, dict[str, Any]] = {
 }
 
 
-@router.post("/characteristics/{characteristic}/what-if", responses=problems(404, 429))
-def replay_readings(
-    session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, asked: WhatIfIn
-) -> WhatIfOut:
+@router.post(
+    "/characteristics/{characteristic}/what-if", responses=problems(404, 429), dependencies=[require("viewer")]
+)
+def replay_readings(session: SessionDep, characteristic: CharacteristicKey, asked: WhatIfIn) -> WhatIfOut:
     """Replay stored readings with other settings, side by side with today's; nothing is changed.
 
     The corrections in effect are taken out, the process without them is rebuilt, and the other policy is run in closed loop
     on it. `likeness` says how far the rebuilt loop is to be believed. At most a million readings; two replays at once.
     """
     standing = characteristics.characteristic_named(session, characteristic)
-    caller.must_at(standing.machine.id, "viewer")
     return WhatIfOut.of(asking.replayed(session, standing, asked))
 
 
-@router.post("/characteristics/{characteristic}/what-if/map", responses=problems(404, 429))
-def map_settings(session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, asked: MapIn) -> MapOut:
+@router.post(
+    "/characteristics/{characteristic}/what-if/map", responses=problems(404, 429), dependencies=[require("viewer")]
+)
+def map_settings(session: SessionDep, characteristic: CharacteristicKey, asked: MapIn) -> MapOut:
     """Replay a grid of k and R33, and say where it is best; cells where R33 < R34 does not hold are blank.
 
     At most 2500 settings, and 200 million decisions (settings times readings).
     """
     standing = characteristics.characteristic_named(session, characteristic)
-    caller.must_at(standing.machine.id, "viewer")
     return MapOut.of(asking.mapped(session, standing, asked))
 
 
@@ -75,9 +75,8 @@ def asked_for(
     ] = None,
     factor: Annotated[float | None, Query(ge=-1000, le=1000, description="Else today's.")] = None,
     delay: Annotated[int | None, Query(ge=0, le=LONGEST_DELAY, description="Parts; else as it was most often.")] = None,
-    effect: Annotated[
-        str, Query(pattern=r"^(measured|[0-4](\.[0-9]{1,9})?)$", description="The share of a correction that acts.")
-    ] = "1",
+    effect: Annotated[float, Query(ge=0.05, le=5, description="The share of a correction that acts.")] = 1.0,
+    measured: Annotated[bool, Query(description="As measured on these readings, whatever `effect` says.")] = False,
     last: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="The last so many readings.")] = None,
     start: Annotated[Moment | None, Query(alias="from", description="Measured at this moment or later.")] = None,
     end: Annotated[Moment | None, Query(alias="to", description="Measured at this moment or earlier.")] = None,
@@ -90,7 +89,7 @@ def asked_for(
             "averaging_limit": averaging_limit,
             "factor": factor,
             "delay": delay,
-            "effect": effect if effect == "measured" else max(0.05, float(effect)),
+            "effect": None if measured else effect,
             "last": last,
             "from": start,
             "to": end,
@@ -157,25 +156,25 @@ def list_proposals(
     return page_of([ProposalOut.of(row) for row in rows], limit, lambda row: row.id)
 
 
-@router.get("/proposals/{number}", responses=problems(404), dependencies=[require("viewer")])
-def get_proposal(session: SessionDep, number: Number) -> ProposalOut:
+@router.get("/proposals/{proposal}", responses=problems(404), dependencies=[require("viewer")])
+def get_proposal(session: SessionDep, proposal: Number) -> ProposalOut:
     """One proposal with its evidence."""
-    return ProposalOut.of(proposals.proposal(session, number))
+    return ProposalOut.of(proposals.proposal(session, proposal))
 
 
-@router.post("/proposals/{number}/approve", responses=problems(404, 409))
-def approve_proposal(session: SessionDep, caller: Engineer, number: Number, decision: DecisionIn) -> ProposalOut:
+@router.post("/proposals/{proposal}/approve", responses=problems(404, 409))
+def approve_proposal(session: SessionDep, caller: Engineer, proposal: Number, decision: DecisionIn) -> ProposalOut:
     """Put it in force as a new version of the parameters; 409 if they have changed since it was proposed."""
-    return ProposalOut.of(actions.approve(session, number, decision.reason, caller))
+    return ProposalOut.of(actions.approve(session, proposal, decision.reason, caller))
 
 
-@router.post("/proposals/{number}/reject", responses=problems(404, 409))
-def reject_proposal(session: SessionDep, caller: Engineer, number: Number, decision: DecisionIn) -> ProposalOut:
+@router.post("/proposals/{proposal}/reject", responses=problems(404, 409))
+def reject_proposal(session: SessionDep, caller: Engineer, proposal: Number, decision: DecisionIn) -> ProposalOut:
     """Say no, and why."""
-    return ProposalOut.of(actions.reject(session, number, decision.reason, caller))
+    return ProposalOut.of(actions.reject(session, proposal, decision.reason, caller))
 
 
-@router.post("/proposals/{number}/withdraw", responses=problems(404, 409))
-def withdraw_proposal(session: SessionDep, caller: Operator, number: Number, decision: DecisionIn) -> ProposalOut:
+@router.post("/proposals/{proposal}/withdraw", responses=problems(404, 409))
+def withdraw_proposal(session: SessionDep, caller: Operator, proposal: Number, decision: DecisionIn) -> ProposalOut:
     """Take back what one has proposed oneself."""
-    return ProposalOut.of(actions.withdraw(session, number, decision.reason, caller))
+    return ProposalOut.of(actions.withdraw(session, proposal, decision.reason, caller))

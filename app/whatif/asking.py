@@ -58,7 +58,7 @@ def both(session: Session, standing: Standing, given: WhatIfIn, around: MapIn) -
 def settings(past: Past, given: SettingsIn) -> Settings:
     """The settings asked for; a measured effect is measured. Raises `Invalid` where it cannot be."""
     effect = 1.0
-    if given.effect == "measured":
+    if given.effect is None:
         found = queries.effect_of(past)
         if isinstance(found, Refused):
             message = _("The effect of corrections cannot be told from these readings.")

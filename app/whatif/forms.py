@@ -50,7 +50,7 @@ def _common(typed: Mapping[str, str]) -> dict[str, Any]:
         "averaging_limit": mm(typed["r34"]),
         "factor": number(typed["factor"]),
         "delay": int(delay) if isinstance(delay, float) and delay.is_integer() else delay,
-        "effect": effect if effect == "measured" else number(effect),
+        "effect": None if effect == "measured" else number(effect),
         "last": 10**15
         if last == "all"
         else int(last)
@@ -125,7 +125,9 @@ def effects(chosen: str) -> list[tuple[str, str]]:
 def figure_query(given: WhatIfIn) -> str:
     """The same question for the figure."""
     said = given.model_dump(mode="json", by_alias=True, exclude_none=True)
-    if said.get("effect") == 1:
+    if given.effect is None:
+        said["measured"] = "true"
+    elif given.effect == 1:
         del said["effect"]
     return urlencode({name: f"{value:.9g}" if isinstance(value, float) else value for name, value in said.items()})
 

@@ -10,8 +10,6 @@ from starlette.responses import RedirectResponse
 
 from app.characteristics import queries as characteristics
 from app.characteristics.queries import Standing
-from app.characteristics.wording import label
-from app.core.parameters import BY_NAME
 from app.core.policy_map import Criterion
 from app.errors import Conflict, InbandError, Invalid, TooManyRequests
 from app.proof import queries as proof
@@ -63,7 +61,7 @@ def _what_if(
         answer, made = asking.both(session, standing, given, forms.around(typed))
     except (Invalid, TooManyRequests) as error:
         status, problem, errors = error.status, error, forms.at_fields(by_field(error))
-    changes = differences(asdict(answer.past.standing.parameters), actions.changes_of(answer)) if answer else []
+    changes = wording.changed(asdict(answer.past.standing.parameters), actions.changes_of(answer)) if answer else []
     key, failing = standing.characteristic.key, proof.failing()
     criterion = Criterion(typed["goal"]) if typed["goal"] in set(Criterion) else Criterion.PPK
     return page(
@@ -107,14 +105,6 @@ def _what_if(
     )
 
 
-def differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[tuple[str | None, str, str, str]]:
-    """R number, name, before and after of each parameter that changes."""
-    return [
-        (BY_NAME[name].r, label(name), wording.setting(name, before[name]), wording.setting(name, value))
-        for name, value in after.items()
-    ]
-
-
 def _same(r34: float, answer: Answer | None) -> bool:
     return answer is not None and abs(answer.parameters.averaging_limit - r34) < 1e-9
 
@@ -127,7 +117,7 @@ def send_proposal(
     standing = characteristics.characteristic_named(session, characteristic)
     typed = forms.typed_from(form)
     try:
-        said = forms.asked(typed).model_dump(by_alias=True, exclude_none=True)
+        said = forms.asked(typed).model_dump(by_alias=True)
         given = parsed(ProposalIn, said | {"reason": form.get("reason", "").strip()})
         row = actions.propose(session, asking.replayed(session, standing, given), given.reason, caller)
     except (Invalid, Conflict, TooManyRequests) as error:
@@ -157,7 +147,7 @@ def proposals_page(
         older=older,
         newest=f"/proposals?status={chosen}" if before else None,
         wording=wording,
-        changes=lambda row: differences(row.proposal.evidence["today"]["settings"], row.proposal.changes),
+        changes=wording.proposed,
     )
 
 
@@ -203,7 +193,7 @@ def _proposal(
         row=row,
         proposal=row.proposal,
         evidence=evidence,
-        differences=differences(evidence["today"]["settings"], row.proposal.changes),
+        differences=wording.proposed(row),
         rows=wording.rows([truly, today, other]),
         gained=wording.gained(today, other),
         assumed=wording.assumed(evidence["effect"], evidence["delay"]),

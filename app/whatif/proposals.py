@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from sqlalchemy import Select, case, select
+from sqlalchemy import Select, case, func, select
 from sqlalchemy.orm import Session
 
 from app.characteristics.tables import Characteristic
@@ -71,6 +71,12 @@ def proposals(
     if before is not None:
         query = query.where(ParameterProposal.id < before)
     return [Row(*row) for row in session.execute(query)]
+
+
+def count_open(session: Session) -> int:
+    """How many wait for an engineer."""
+    waiting = _ROWS.with_only_columns(func.count(), maintain_column_froms=True).where(_status == "open")
+    return session.scalar(waiting) or 0
 
 
 def proposal(session: Session, number: int) -> Row:

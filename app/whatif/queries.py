@@ -25,7 +25,10 @@ from app.offsets.tables import Correction
 from app.statistics.queries import Window
 from app.web.i18n import _
 from app.whatif.past import CODE, Past, past_of
+from app.whatif.proposals import count_open, proposals
 from app.whatif.turns import on_all_cores
+
+__all__ = ["USUAL", "Answer", "Map", "Settings", "count_open", "map_of", "proposals", "side_by_side"]
 
 USUAL = 5_000  # readings that are replayed unless somebody says otherwise
 MOST_CELLS = 2_500

@@ -14,7 +14,7 @@ from app.whatif.proposals import Row
 from app.whatif.queries import USUAL, Answer, Map
 
 LARGEST_LENGTH = 100_000.0
-Length = Annotated[float, Field(ge=0, le=LARGEST_LENGTH)]
+Length = Annotated[float, Field(ge=0, le=LARGEST_LENGTH, strict=True)]
 
 
 class PeriodIn(Body):
@@ -38,7 +38,12 @@ class SettingsIn(PeriodIn):
     averaging_limit: Annotated[Length | None, Field(description="R34.")] = None
     factor: Annotated[
         float | None,
-        Field(ge=-1000, le=1000, description="The factor that the loop believes in; the machine keeps its own."),
+        Field(
+            ge=-1000,
+            le=1000,
+            strict=True,
+            description="The factor that the loop believes in; the machine keeps its own.",
+        ),
     ] = None
     delay: Annotated[
         int | None,
@@ -50,8 +55,13 @@ class SettingsIn(PeriodIn):
         ),
     ] = None
     effect: Annotated[
-        Annotated[float, Field(ge=0.05, le=5)] | Literal["measured"],
-        Field(description="The share of a correction that acts: 1 is in full; `measured`: as these readings tell."),
+        float | None,
+        Field(
+            ge=0.05,
+            le=5,
+            strict=True,
+            description="The share of a correction that acts: 1 is in full; null: as measured on these readings.",
+        ),
     ] = 1.0
 
 
@@ -62,7 +72,7 @@ class WhatIfIn(SettingsIn):
         json_schema_extra={"example": {"zero_range": 0.0027, "weighting_factor": 3, "last": 5000}}
     )
 
-    weighting_factor: Annotated[float | None, Field(ge=1, le=1_000_000, description="k (R29).")] = None
+    weighting_factor: Annotated[float | None, Field(ge=1, le=1_000_000, strict=True, description="k (R29).")] = None
     zero_range: Annotated[Length | None, Field(description="R33.")] = None
 
 
@@ -76,7 +86,7 @@ class MapIn(SettingsIn):
     )
 
     weighting_factors: Annotated[
-        list[Annotated[float, Field(ge=1, le=1_000_000)]] | None,
+        list[Annotated[float, Field(ge=1, le=1_000_000, strict=True)]] | None,
         Field(min_length=1, max_length=200, description="Values of k, a row each."),
     ] = None
     zero_ranges: Annotated[

@@ -7,6 +7,8 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from app.capability.wording import named
+from app.characteristics.wording import label
+from app.core.parameters import BY_NAME
 from app.core.policy_map import Criterion
 from app.core.replay import Figures
 from app.core.spc.refusal import Reason, Refused
@@ -16,6 +18,7 @@ from app.web.numbers import NO_BREAK_SPACE, NOTHING, signed, um
 if TYPE_CHECKING:
     from app.core.effect import Effect
     from app.whatif.past import Past
+    from app.whatif.proposals import Row
     from app.whatif.queries import Likeness
 
 
@@ -239,6 +242,19 @@ def setting(name: str, value: float) -> str:
     if name in {"zero_range", "averaging_limit"}:
         return f"±{short_um(value)}{NO_BREAK_SPACE}µm"
     return f"{value:+.6g}".replace("-", "−") if name == "factor" else f"{value:.6g}"
+
+
+def changed(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[tuple[str | None, str, str, str]]:
+    """R number, name, before and after of each parameter that changes."""
+    return [
+        (BY_NAME[name].r, label(name), setting(name, before[name]), setting(name, value))
+        for name, value in after.items()
+    ]
+
+
+def proposed(row: Row) -> list[tuple[str | None, str, str, str]]:
+    """What a proposal changes."""
+    return changed(row.proposal.evidence["today"]["settings"], row.proposal.changes)
 
 
 def stored(kept: Mapping[str, Any]) -> Figures:
