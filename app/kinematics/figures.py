@@ -13,13 +13,14 @@ from typing import Any
 
 from app.kinematics.drift import Compared, Drift
 from app.kinematics.values import UNITS, as_reading
-from app.kinematics.wording import approach_word, difference, name_words
+from app.kinematics.wording import difference, name_words
 from app.kinematics.wording import entered as told
 from app.web.i18n import _
 from app.web.theme import Palette, ThemeName, date_axis, layout, palette
 
 GREEN: dict[ThemeName, str] = {"light": "#1a7a3c", "dark": "#62c985"}
 LETTERS = "XYZ"
+ARROWS = {1: "\N{UPWARDS ARROW}", -1: "\N{DOWNWARDS ARROW}"}  # the axis came from smaller angles, or from larger ones
 SHAPES = {1: "triangle-up", -1: "triangle-down", 0: "circle"}
 ROOM = 1.25
 
@@ -43,12 +44,12 @@ def diagram(axis: Mapping[str, Any], letter: str, *, theme: ThemeName = "light",
             )
             if not chosen:
                 continue
-            side = approach_word(approach)
+            side = ARROWS.get(approach)
             traces.append(
                 {
                     "type": "scatter",
                     "mode": "lines+markers",
-                    "name": f"{words}, {side}" if side else words,
+                    "name": f"{words} {side}" if side else words,
                     "meta": kind,
                     "x": [angle for angle, _value in chosen],
                     "y": [value * 1000 for _angle, value in chosen],

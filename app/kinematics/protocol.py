@@ -26,7 +26,7 @@ from app.reports.content import (
     width,
     words,
 )
-from app.web.i18n import _
+from app.web.i18n import _, ngettext
 
 SETTINGS = {
     "Q407": "ball_radius",
@@ -43,7 +43,7 @@ MOST_NOTES = 40
 
 def protocol_of(row: RunRow, made_at: datetime) -> Report:
     """The protocol, with its diagrams as they stand on the page."""
-    run, results = row.run, surer(row.run.results)
+    run, results, settings = row.run, surer(row.run.results), _settings(row)
     return Report(
         key=f"kinematics-{run.id}",
         name=_("Rotary axes, run {n}").format(n=run.id),
@@ -57,7 +57,7 @@ def protocol_of(row: RunRow, made_at: datetime) -> Report:
             _outcome(row),
             *(section for axis in results["axes"] for section in _axis(axis)),
             *((_balls(results["balls"]),) if results["balls"] else ()),
-            _settings(row),
+            *((settings,) if settings.facts else ()),
             *((_not_understood(results["notes"]),) if results["notes"] else ()),
         ),
     )
@@ -81,7 +81,9 @@ def _head(row: RunRow) -> tuple[Fact, ...]:
 def _outcome(row: RunRow) -> Section:
     run = row.run
     warned = [wording.sentence(run)] if run.outcome != "measured" else []
-    warned += [_("not understood: {n} lines").format(n=len(run.results["notes"]))] if run.results["notes"] else []
+    notes = len(run.results["notes"])
+    unread = ngettext("%(num)s line was not understood", "%(num)s lines were not understood", notes)
+    warned += [unread % {"num": notes}] if notes else []
     decided = tuple(
         _("{what} by {who} on {at}: {reason}").format(
             what=wording.status_word(what), who=each.actor, at=f"{each.at:%Y-%m-%d %H:%M} UTC", reason=each.reason

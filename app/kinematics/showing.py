@@ -87,7 +87,8 @@ def shown_machine(
         older=machine_url(machine, head=head, before=runs[ON_PAGE - 1].run.id) if len(runs) > ON_PAGE else None,
         newest=machine_url(machine, head=head) if before else None,
         backups=list(reversed(kept)),
-        in_effect={each.version for each in kept if queries.alike(each.errors, current[each.head].errors)},
+        in_effect={each.version for each in current.values()},
+        same={each.version for each in kept if queries.alike(each.errors, current[each.head].errors)},
         form=forms.filled_in(row.plan) | dict(form or {}),
         errors=forms.at_fields(error, {}) if error else {},
         said=said,
@@ -104,6 +105,8 @@ def shown_run(
     """The page of a run. late: somebody else was first."""
     row = queries.run(session, number)
     others = others_of(session, row)
+    standing = queries.in_force(queries.course(session, row.machine.id, row.run.head))
+    undoable = row.status == "entered" and bool(standing) and standing[-1].run == number
     return page(
         request,
         "kinematics/run.html",
@@ -120,7 +123,8 @@ def shown_run(
         said=said,
         late=late,
         may_take=caller.may("operator"),
-        may_undo=row.status == "entered" and caller.may("engineer"),
+        may_undo=undoable and caller.may("engineer"),
+        taken_back=row.status == "entered" and not undoable and not any(each.run == number for each in standing),
         **COMMON,
     )
 
