@@ -13,7 +13,10 @@ DELIMITERS = (";", "\t", ",", "|")
 ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "cp1250", "cp1251", "cp1252", "iso-8859-2", "iso-8859-5")
 SAMPLE = 64 * 1024
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
-_DANGEROUS = ("=", "+", "-", "@", "\t", "\r", "\n")
+# Full-width signs too, which some spreadsheets take for the plain ones. A sign behind another delimiter begins a cell where
+# the spreadsheet of another country parts the line there.
+_SIGNS = "=+@\N{FULLWIDTH EQUALS SIGN}\N{FULLWIDTH PLUS SIGN}\N{FULLWIDTH HYPHEN-MINUS}\N{FULLWIDTH COMMERCIAL AT}-"
+_DANGEROUS = re.compile(rf"^(?=\s*[{_SIGNS}]|[\t\r\n])|(?<=[;,\t|\r\n])(?=[{_SIGNS}])")
 
 
 class Unusable(ValueError):
@@ -122,5 +125,7 @@ def defused(text: str) -> str:
 
     >>> defused("=HYPERLINK(1)"), defused("SN-812")
     ("'=HYPERLINK(1)", 'SN-812')
+    >>> defused("chip;=1+1"), defused("40 h6; −3 µm, -2")
+    ("chip;'=1+1", '40 h6; −3 µm, -2')
     """
-    return f"'{text}" if text.startswith(_DANGEROUS) else text
+    return _DANGEROUS.sub("'", text)
