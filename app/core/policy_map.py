@@ -8,7 +8,7 @@ from math import sqrt
 from app.core.parameters import Parameters
 from app.core.replay import Figures
 
-NEAR = 0.02  # so much worse than the best is as good as the best
+NEAR = 0.05  # so much worse than the best is as good as the best
 SIGMAS = 2.0  # and so many standard errors
 
 
@@ -68,7 +68,7 @@ def in_order(parameters: Parameters) -> bool:
 
 
 def best_region(cells: Sequence[Figures | None], criterion: Criterion, today: Figures | None = None) -> Region:
-    """The best cell, and those that cannot be told from it: no worse by two standard errors of the best, or by 2 %.
+    """The best cell, and those that cannot be told from it: no worse by two standard errors of the best, or by 5 %.
 
     Standard errors: of a count its root; of s, s / sqrt(2 n); of Ppk, Bissell's (1990, Appl. Stat. 39, 331). Cells share the
     same parts, so they are told apart better than that: the region is rather too wide. `today`: where the fewest corrections

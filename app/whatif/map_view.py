@@ -143,7 +143,7 @@ def _region(made: Map) -> str:
     if len(inside) > 1:
         said.append(
             _(
-                "{count} settings are as good within what {readings} readings can tell: k {low_k} to {high_k}, R33 {low} to {high} µm."
+                "{count} settings are as good (within 5 %, or what {readings} readings can tell): k {low_k} to {high_k}, R33 {low} to {high} µm."
             ).format(
                 count=len(inside),
                 readings=made.today.inner,

@@ -206,7 +206,7 @@ class CellOut(BaseModel):
     weighting_factor: float
     zero_range: float
     figures: FiguresOut | None = Field(description="null where R33 < R34 does not hold.")
-    inside: bool = Field(description="As good as the best: within two standard errors of it, or 2 %.")
+    inside: bool = Field(description="As good as the best: within two standard errors of it, or 5 %.")
     best: bool
     calmest: bool = Field(description="Of those as good as the best the one that corrects least.")
     reason: str | None = Field(description="Why there are no figures.")
