@@ -15,6 +15,7 @@ from app.audit.actions import record as audit
 from app.core.geometry.elements import WrongSection
 from app.core.geometry.points import Degenerate
 from app.core.geometry.relations import DatumRefused
+from app.db.engine import Database
 from app.db.events import publish
 from app.errors import Conflict
 from app.forms import queries, wording
@@ -34,6 +35,24 @@ class Made(NamedTuple):
 
     row: FormRow
     again: bool = False
+
+
+def measure_and_push(database: Database, machine: Machine, given: FormIn, caller: Caller) -> Made:
+    """Measure, commit, and push the reading that the result becomes; where that cannot be now, a chore does it.
+
+    Raises what `measure` raises.
+    """
+    with database.begin() as session:
+        made = measure(session, machine, given, caller)
+        waits = made.row.measurement.characteristic_id is not None
+        number = made.row.measurement.id
+    if waits:
+        with database.begin() as session:
+            readings.push_waiting(session)
+    with database.begin() as session:
+        row = queries.form(session, number)
+        session.expunge_all()
+    return Made(row, made.again)
 
 
 def measure(session: Session, machine: Machine, given: FormIn, caller: Caller) -> Made:

@@ -2,8 +2,9 @@
 
 from typing import Annotated, Any, Literal
 
-from fastapi import Path, Query, Response
+from fastapi import Path, Query, Request, Response
 
+from app.db.engine import Database
 from app.forms import actions, figures, queries, wording
 from app.forms.answers import FormOut, form_out
 from app.forms.queries import FormRow
@@ -36,17 +37,20 @@ AGAIN: dict[int | str, dict[str, Any]] = {
 
 
 @router.post("/forms", status_code=201, responses=problems(404, 409) | AGAIN)
-def measure_form(session: SessionDep, caller: AnyCaller, given: FormIn, response: Response) -> FormOut:
+def measure_form(
+    request: Request, session: SessionDep, caller: AnyCaller, given: FormIn, response: Response
+) -> FormOut:
     """Evaluate form or position of a feature from its touches.
 
     Answers the deviation by every method that applies, the verdict, the uncertainty from the probe's repeatability, and
     names touches that do not belong. Touches that carry no result (on one line, at one place, on too short an arc) are
-    refused with the reason. With `characteristic` the result becomes a reading of it within a minute, so that control
-    charts, alarms and reports work on it.
+    refused with the reason. With `characteristic` the result becomes a reading of it, so that control charts, alarms and
+    reports work on it.
     """
     machine = machine_named(session, given.machine)
     caller.must_at(machine.id, "operator")
-    made = actions.measure(session, machine, given, caller)
+    database: Database = request.app.state.database
+    made = actions.measure_and_push(database, machine, given, caller)
     response.status_code = 200 if made.again else 201
     return _answer(session, made.row)
 

@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.core.geometry.relations import ENGINE
+from app.db.engine import Database
 from app.errors import FieldError, InbandError, Invalid, NotFound
 from app.forms import actions, queries, typed, wording
 from app.forms.schemas import FormIn
@@ -168,9 +169,9 @@ def _at_fields(error: InbandError) -> dict[str, str]:
 def measure(request: Request, session: SessionDep, caller: Operator, form: FormDep) -> Response:
     """Evaluate and keep what was typed; or show what is wrong with it, with everything still there."""
     try:
-        with session.begin_nested():
-            given = parsed(FormIn, typed.fields(form))
-            made = actions.measure(session, machine_named(session, given.machine), given, caller)
+        given = parsed(FormIn, typed.fields(form))
+        database: Database = request.app.state.database
+        made = actions.measure_and_push(database, machine_named(session, given.machine), given, caller)
     except (Invalid, NotFound) as error:
         return _new(request, session, form, error)
     return RedirectResponse(f"/forms/{made.row.measurement.id}", 303)

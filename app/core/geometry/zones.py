@@ -157,7 +157,9 @@ def minimum_zone_axis(points: ArrayLike) -> Cylinder:
                 point, direction, radius = moved, ahead, tried
             break
         point, direction, radius = moved, ahead, tried
-    return Cylinder(point, unit(direction), radius, bearing(_away(array, point, direction), None, radius))
+    # Where all bear it, no touch is nearer than the others: what counts as on the edge is a share of the radius.
+    on = bearing(_away(array, point, direction), None, radius, room=100 * BEARING * radius)
+    return Cylinder(point, unit(direction), radius, on)
 
 
 def _narrowed(residuals: Floats, slopes: Floats, width: float, reach: float) -> Floats:
@@ -222,9 +224,9 @@ def _away(points: Floats, point: Floats, direction: Floats) -> Floats:
     return found
 
 
-def bearing(values: Floats, low: float | None, high: float | None) -> tuple[int, ...]:
-    """Which values lie on either edge, next to nothing off it."""
-    room = max(BEARING * float(np.ptp(values)), NOTHING)
+def bearing(values: Floats, low: float | None, high: float | None, room: float = 0.0) -> tuple[int, ...]:
+    """Which values lie on either edge, next to nothing off it; `room` off it at least."""
+    room = max(BEARING * float(np.ptp(values)), NOTHING, room)
     on = np.zeros(len(values), dtype=bool)
     if low is not None:
         on |= values <= low + room
