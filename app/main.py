@@ -62,6 +62,7 @@ from app.reports import api as reports
 from app.reports import jobs_api as report_jobs
 from app.reports import jobs_pages as report_job_pages
 from app.reports import pages as report_pages
+from app.reports import points_api as report_points
 from app.reports.making import Reporter
 from app.rounds import Chore, Rounds
 from app.settings import Settings
@@ -94,6 +95,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     alignments.router,
     reports.router,
     report_jobs.router,
+    report_points.router,
     control.router,
     rules_api.router,
     what_if.router,

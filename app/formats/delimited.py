@@ -14,9 +14,10 @@ ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "cp1250", "cp1251", "cp1252", "iso-
 SAMPLE = 64 * 1024
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 # Full-width signs too, which some spreadsheets take for the plain ones. A sign behind another delimiter begins a cell where
-# the spreadsheet of another country parts the line there.
+# the spreadsheet of another country parts the line there; a plain number does no harm there.
 _SIGNS = "=+@\N{FULLWIDTH EQUALS SIGN}\N{FULLWIDTH PLUS SIGN}\N{FULLWIDTH HYPHEN-MINUS}\N{FULLWIDTH COMMERCIAL AT}-"
-_DANGEROUS = re.compile(rf"^(?=\s*[{_SIGNS}]|[\t\r\n])|(?<=[;,\t|\r\n])(?=[{_SIGNS}])")
+_NUMBER = r"[+-]\d+(\.\d+)?([eE][+-]?\d+)?([];,\t|\r\n]|$)"
+_DANGEROUS = re.compile(rf"^(?=\s*[{_SIGNS}]|[\t\r\n])|(?<=[;,\t|\r\n])(?=[{_SIGNS}])(?!{_NUMBER})")
 
 
 class Unusable(ValueError):

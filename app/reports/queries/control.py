@@ -78,7 +78,7 @@ def _judged_by(baseline: Baseline) -> str:
 
 
 def _left_out(main: View) -> tuple[str, ...]:
-    said = []
+    said = [f"{each[0].upper()}{each[1:]}." for each in wording.left_out(main.left_out)]
     if main.settling:
         said.append(_("{n} readings set the level of their edge and are judged by nothing.").format(n=main.settling))
     if main.waiting:
