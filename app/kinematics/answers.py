@@ -205,7 +205,7 @@ def run_out(row: RunRow) -> RunOut:
         received_at=run.received_at,
         by=run.actor,
         key=run.key,
-        axes=[AxisOut.model_validate(axis) for axis in results["axes"]],
+        axes=[axis_out(axis) for axis in results["axes"]],
         offsets=results["offsets"],
         parameters=parameters_of(results),
         balls=results["balls"],
@@ -217,6 +217,12 @@ def run_out(row: RunRow) -> RunOut:
         entered=_decided(row, "entered"),
         given=run.given,
     )
+
+
+def axis_out(axis: Mapping[str, Any]) -> AxisOut:
+    """An axis as it is answered, with its errors in the order of the result string."""
+    errors = {name: axis["errors"][name] for name in ERRORS[axis["axis"]] if name in axis["errors"]}
+    return AxisOut.model_validate({**axis, "errors": errors})
 
 
 def _decided(row: RunRow, what: str) -> DecidedOut | None:

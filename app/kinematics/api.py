@@ -6,7 +6,7 @@ from fastapi import Path, Query, Response
 
 from app.errors import FieldError, Invalid
 from app.kinematics import actions, figures, looking, queries
-from app.kinematics.answers import AxisOut, RecomputedOut, RunOut, run_out
+from app.kinematics.answers import RecomputedOut, RunOut, axis_out, run_out
 from app.kinematics.drift import drift
 from app.kinematics.drift_answers import (
     BackupOut,
@@ -124,7 +124,7 @@ def recompute_kinematics_run(session: SessionDep, caller: AnyCaller, run: RunNum
         run=run,
         same=looking.same(row.run.results, found.results),
         outcome=found.outcome,
-        axes=[AxisOut.model_validate(axis) for axis in found.results["axes"]],
+        axes=[axis_out(axis) for axis in found.results["axes"]],
         offsets=found.results["offsets"],
     )
 
