@@ -24,14 +24,14 @@ EXAMPLE_FIGURES: dict[str, Any] = {
 EXAMPLE_BETTER = EXAMPLE_FIGURES | {"rejects": 9, "corrections": 240, "spread": 0.00133, "ppk": 1.98}
 EXAMPLE_EFFECT: dict[str, Any] = {
     "value": 0.977,
-    "low": 0.936,
-    "high": 1.017,
+    "low": 0.905,
+    "high": 1.049,
     "corrections": 579,
     "readings": 2928,
     "typical": 0.00116,
     "scatter": 0.00081,
     "is_full": True,
-    "text": "On this machine a correction of 10 µm moves the part by 9.8 µm (9.4…10.2), by 579 corrections.",
+    "text": "On this machine a correction of 10 µm moves the part by 9.8 µm (9.1…10.5), by 579 corrections.",
 }
 EXAMPLE_PERIOD: dict[str, Any] = {
     "characteristic": "shaft-d40",

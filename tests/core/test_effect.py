@@ -37,16 +37,16 @@ def test_a_planted_effect_is_found_again(effect: float, delay: int) -> None:
         deviation, offset, begins = loop(effect, delay, seed)
         found.append(measured_effect(deviation, offset, -1.0, begins))
     assert np.mean([each.value for each in found]) == pytest.approx(effect, abs=0.03)
-    assert sum(each.low <= effect <= each.high for each in found) >= 9
-    assert max(each.high - each.low for each in found) < 0.2
+    assert sum(each.low <= effect <= each.high for each in found) >= 11
+    assert max(each.high - each.low for each in found) < 0.25
 
 
 def test_comparing_before_and_after_would_not_do() -> None:
     """What the module says of the simple ways: too much without the pipeline, for the loop follows scatter."""
-    deviation, offset, begins = loop(0.9, 0, 1)
+    deviation, offset, begins = loop(0.8, 0, 1)
     steps = np.flatnonzero((np.diff(offset) != 0) & ~begins[1:])
     simple = np.polyfit(np.diff(offset)[steps], np.diff(deviation)[steps], 1)[0]
-    assert simple > 1.0
+    assert simple > 0.9
     found = measured_effect(deviation, offset, -1.0, begins)
     assert found.high < 1.0
     assert not found.is_full
