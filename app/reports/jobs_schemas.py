@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field
 
 from app.reports.actions import KEPT_DAYS, MOST_AT_ONCE
-from app.reports.asking import EVERYTHING, Paper, SectionName, Wishes, section_names
+from app.reports.asking import Paper, SectionName, Wishes, section_names
 from app.reports.bundle import Bundle, BundleFormat
 from app.reports.tables import ReportJob
 from app.web.fields import LARGEST_ID, Body, Moment, Slug
@@ -39,9 +39,12 @@ class ReportsIn(Body):
     machines: Keys = Field(default=[], description="Keys of machines: all of their characteristics.")
     start: Moment | None = Field(default=None, alias="from", description="Measured at this moment or later.")
     end: Moment | None = Field(default=None, alias="to", description="Measured at this moment or earlier.")
-    last: Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID)] | Literal["all"] | None = Field(
+    last: int | None = Field(
         default=None,
-        description="Of each only the last so many readings, or `all`; without any period the last 1000.",
+        strict=True,
+        ge=1,
+        le=LARGEST_ID,
+        description="Of each only the last so many readings; without any period the last 1000. A very large number means all.",
     )
     sections: list[SectionName] = Field(
         default=[], max_length=len(SectionName), description="Only these sections; all of them where none is named."
@@ -52,8 +55,7 @@ class ReportsIn(Body):
 
     def bundle(self) -> Bundle:
         """What is to be made. Raises `Invalid`."""
-        last = EVERYTHING if self.last == "all" else self.last
-        wishes = Wishes(self.start, self.end, last, section_names(self.sections), self.paper, self.timezone)
+        wishes = Wishes(self.start, self.end, self.last, section_names(self.sections), self.paper, self.timezone)
         return Bundle(wishes, self.format, self.characteristics, self.machines, current_language())
 
 
