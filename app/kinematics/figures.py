@@ -111,7 +111,7 @@ def comparison(
     tones = [_tone(each, colours) for each in rows]
     spread = [2 * _um(each.name, each.change.deviation / 2**0.5) if each.change.deviation else 0.0 for each in rows]
     largest = max([abs(v) + s for values in (before, after) for v, s in zip(values, spread, strict=True)] + [1.0])
-    span = 2.4 * largest
+    span = 2.9 * largest  # room for the words at the right, on a narrow panel as well
     shapes, notes = [], []
     for row, each in enumerate(rows):
         shapes.append(
