@@ -6,6 +6,7 @@ rightly stands in `BODIES`, and a test fails while it is missing there.
 
 import json
 import re
+import time
 from collections.abc import Iterator
 from functools import cache
 from typing import Any, NamedTuple
@@ -149,6 +150,17 @@ BODIES: dict[str, dict[str, Any]] = {
         "seen_version": 0,
     }
     | WHY,
+    "POST /api/v1/reports": {
+        "characteristics": ["{characteristic}"],
+        "machines": [],
+        "from": "2026-11-01T00:00:00Z",
+        "to": "2099-01-01T00:00:00Z",
+        "last": 5,
+        "sections": ["numbers"],
+        "format": "csv",
+        "paper": "letter",
+        "timezone": "Europe/Belgrade",
+    },
     "POST /api/v1/signals/{signal}/comment": {"cause": "material", "comment": "New batch, harder by 20 HB"},
     "POST /api/v1/characteristics/{characteristic}/what-if": WHAT_IF | {"weighting_factor": 3.0, "zero_range": 0.002},
     "POST /api/v1/characteristics/{characteristic}/what-if/map": WHAT_IF
@@ -178,6 +190,21 @@ BODIES: dict[str, dict[str, Any]] = {
         "characteristics": {},
     }
     | WHY,
+    "POST /api/v1/forms": {
+        "machine": "{machine}",
+        "feature": "bore",
+        "kind": "coaxiality",
+        "method": "least_squares",
+        "sections": [{"height": 40, "touches": [[5.0, 0.0], [0.0, 5.0], [-5.0, 0.0]]}],
+        "datum": {"sections": [{"height": 0, "centre": [0, 0]}, {"height": 20, "centre": [0, 0.001]}]},
+        "tolerance": 0.01,
+        "repeatability": 0.001,
+        "tip_diameter": 4.0,
+        "side": "inside",
+        "part": "SN-1",
+        "key": "bad-form",
+    },
+    "POST /api/v1/forms/{number}/recompute": WHY,
     "POST /api/v1/alignments": {
         "machine": "{machine}",
         "kind": "two_points",
@@ -401,6 +428,7 @@ class Place:
             "tool": 3,
             "location": 5,
             "fixture": "vice",
+            "feature": "bore",
             "number": 1,
             "alarm": held["alarms"][0]["id"],
             "signal": line.signals()[0]["id"],
@@ -416,6 +444,7 @@ class Place:
         made = {
             path: shop.call("POST", path, 201, **body) for path, body in (("/work-zeros", zero), ("/alignments", side))
         }
+        form = shop.call("POST", "/forms", 201, **BODIES["POST /api/v1/forms"] | {"machine": shop.machine, "key": None})
         plan = "PUT /api/v1/machines/{machine}/kinematics"
         shop.call("PUT", f"/machines/{shop.machine}/kinematics", **BODIES[plan])
         first = shop.call("POST", "/kinematics/runs", 201, machine=shop.machine, axes=[axis()])["run"]
@@ -423,10 +452,17 @@ class Place:
         larger = shop.call("POST", "/kinematics/runs", 201, machine=shop.machine, axes=[axis((0.1, 0, 0, 0))])["run"]
         second = shop.call("POST", "/kinematics/runs", 201, machine=shop.machine, axes=[axis()])["run"]
         self.values["run"] = first
+        reports = shop.call("POST", "/reports", 201, machines=[shop.machine], sections=["numbers"], format="csv")["id"]
+        while shop.call("GET", f"/reports/{reports}")["state"] != "done":
+            time.sleep(0.05)
+        of_reports = ("", "/cancel", "/file")
         self.runs = {"confirm": larger, "enter": second}
         self.numbers = {"approve": awaiting, "release": held["correction"]["number"]} | {
             f"/api/v1{path}/{{number}}/recompute": each["id"] for path, each in made.items()
         }
+        of_form = ("/api/v1/forms/{number}", "/api/v1/forms/{number}/figure", "/api/v1/forms/{number}/recompute")
+        self.numbers |= dict.fromkeys(of_form, form["id"])
+        self.numbers |= {f"/api/v1/reports/{{number}}{what}": reports for what in of_reports}
 
     def url(self, operation: Operation, **other: Any) -> str:
         values = dict(self.values)
@@ -438,10 +474,12 @@ class Place:
         return operation.path.format(**(values | other))
 
     def body(self, operation: Operation) -> dict[str, Any]:
-        return {
-            name: value.format(**self.values) if isinstance(value, str) else value
-            for name, value in BODIES[operation.name].items()
-        }
+        def filled(value: Any) -> Any:
+            if isinstance(value, list):
+                return [filled(each) for each in value]
+            return value.format(**self.values) if isinstance(value, str) else value
+
+        return {name: filled(value) for name, value in BODIES[operation.name].items()}
 
     def send(self, operation: Operation, content: bytes | str, **headers: str) -> httpx.Response:
         return self.shop.admin.request(

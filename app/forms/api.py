@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from fastapi import Path, Query, Request, Response
 
 from app.db.engine import Database
+from app.errors import NotFound
 from app.forms import actions, figures, queries, wording
 from app.forms.answers import FormOut, form_out
 from app.forms.queries import FormRow
@@ -13,6 +14,7 @@ from app.machines.queries import machine_keys_by_id, machine_named
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, Caller, SessionDep
 from app.web.fields import Cursor, Limit, Page, Slug, page_of
+from app.web.i18n import _
 from app.web.theme import theme_from
 
 router = api_router("forms")
@@ -78,30 +80,30 @@ def list_forms(
     return page_of([form_out(row, became.get(row.measurement.id)) for row in rows], limit, lambda made: made.id)
 
 
-@router.get("/forms/{form}", responses=problems(404))
-def get_form_measurement(session: SessionDep, caller: AnyCaller, form: Number) -> FormOut:
+@router.get("/forms/{number}", responses=problems(404))
+def get_form_measurement(session: SessionDep, caller: AnyCaller, number: Number) -> FormOut:
     """One measurement with its touches and everything that was found."""
-    return _answer(session, _seen(session, caller, form))
+    return _answer(session, _seen(session, caller, number))
 
 
-@router.post("/forms/{form}/recompute", status_code=201, responses=problems(404))
-def recompute_form(session: SessionDep, caller: AnyCaller, form: Number, given: RecomputeIn) -> FormOut:
+@router.post("/forms/{number}/recompute", status_code=201, responses=problems(404))
+def recompute_form(session: SessionDep, caller: AnyCaller, number: Number, given: RecomputeIn) -> FormOut:
     """Evaluate the stored touches anew by the present code; what was found before stays on record."""
-    row = queries.form(session, form)
+    row = queries.form(session, number)
     caller.must_at(row.measurement.machine_id, "operator")
-    return _answer(session, actions.recompute(session, form, given.reason, caller))
+    return _answer(session, actions.recompute(session, number, given.reason, caller))
 
 
-@router.get("/forms/{form}/figure", responses=problems(404) | FIGURE)
+@router.get("/forms/{number}/figure", responses=problems(404) | FIGURE)
 def form_figure(
     session: SessionDep,
     caller: AnyCaller,
-    form: Number,
+    number: Number,
     section: Annotated[int, Query(ge=1, le=1000, description="Which section, for the picture of one.")] = 1,
     theme: Theme = None,
 ) -> dict[str, Any]:
     """The picture as a Plotly figure: section round, axis, map of a surface, or profile; deviations exaggerated."""
-    row = _seen(session, caller, form)
+    row = _seen(session, caller, number)
     made, found = row.measurement, row.evaluation
     return figures.figure(made.kind, made.given, found.result, made.tolerance, section=section, theme=theme_from(theme))
 
@@ -111,7 +113,7 @@ def form_trend_figure(
     session: SessionDep,
     caller: AnyCaller,
     machine: Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])],
-    feature: Annotated[str, Path(description="The key of the feature.", examples=["bore-d50-axis"], max_length=64)],
+    feature: Annotated[Slug, Path(description="The key of the feature.", examples=["bore-d50-axis"])],
     kind: Annotated[KindName | None, Query(description="Only of this kind.")] = None,
     theme: Theme = None,
 ) -> dict[str, Any]:
@@ -119,6 +121,11 @@ def form_trend_figure(
     shown = machine_named(session, machine)
     caller.must_at(shown.id, "viewer")
     rows = queries.trend(session, shown, feature, kind)
+    if not rows:
+        raise NotFound(
+            _("Of the feature {feature} no form was measured on this machine.").format(feature=repr(feature)),
+            _("GET /api/v1/forms lists what was measured."),
+        )
     return figures.trend(
         [
             figures.Mark(

@@ -44,6 +44,7 @@ TAGS = {
     "kinematics": "Rotary axes by the preset compensation (cycle 452): runs, what to enter, drift, back-ups.",
     "work zeros": "Work zero and size from the touches of an edge finder, as program text, and whether the fixture shifts.",
     "alignments": "Where a part lies, from six touches or more: the frame, how well it is known, pallets composed with parts.",
+    "forms": "Form and position of features from their touches: deviation, verdict, uncertainty, touches that do not belong.",
     "programs": "Program text of the controls: read, written, and fetched where a machine has no network.",
     "alarms": "What needs a person, and what that person did about it.",
     "machines": "The machines that push readings.",

@@ -14,6 +14,7 @@ from playwright.sync_api import Browser, Page, expect
 from app.main import ROUTERS
 from tests.conftest import Server
 from tests.control.line import Line
+from tests.forms.test_forms import BORE
 from tests.shop import Person, Shop
 
 SIZES = {"desk": (1280, 800), "large": (1920, 1080), "panel": (800, 1280)}
@@ -84,6 +85,10 @@ PAGES = {
         "/calibration/{machine}/averages/5/accept/1",
         "/calibration/{machine}/averages/6/suggestion/0",
     ],
+    "/forms": ["/forms"],
+    "/forms/new": ["/forms/new", "/forms/new?example=printed", "/forms/new?from={form}"],
+    "/forms/{form}": ["/forms/{form}", "/forms/{form}?section=2"],
+    "/forms/features/{machine}/{feature}": ["/forms/features/{machine}/bore-d56?kind=axis_straightness"],
     "/setup": ["/setup"],
     "/setup/characteristics": ["/setup/characteristics"],
     "/setup/characteristics/new": ["/setup/characteristics/new"],
@@ -155,6 +160,8 @@ def shop(server: Server) -> Shop:
     for difference in (0.002, 0.0025, 0.0022, 0.0024, 0.0045):
         pair: dict[str, Any] = {"machine_value": 40.0 + difference, "external_value": 40.0, "instrument": "CMM, hall C"}
         made.call("POST", f"/machines/{made.machine}/averages/6/pairs", 201, **pair)
+    bore = BORE | {"feature": "bore-d56", "machine": made.machine}
+    made.call("POST", "/forms", 201, **bore)
     line = Line(made, "watched")
     line.push([9.0, 0.0, -7.0])
     line.look()
@@ -196,6 +203,7 @@ def addresses(shop: Shop) -> list[str]:
         "alarm": alarm,
         "proposal": shop.call("GET", f"/characteristics/{shop.characteristic}/proposals")["items"][0]["id"],
         "signal": signal,
+        "form": shop.call("GET", f"/forms?machine={shop.machine}")["items"][0]["id"],
     }
     return [address.format(**values) for opened in PAGES.values() for address in opened]
 
