@@ -48,6 +48,11 @@ PAGES = {
     ],
     "/characteristics/{characteristic}/signals": ["/characteristics/{characteristic}-watched/signals?state=open"],
     "/signals/{number}": ["/signals/{signal}"],
+    "/characteristics/{characteristic}/report": [
+        "/characteristics/{characteristic}/report?last=all&timezone=Europe/Belgrade",
+        "/characteristics/{characteristic}-empty/report?section=numbers&section=capability",
+    ],
+    "/reports": ["/reports?characteristic={characteristic}"],
     "/characteristics/{characteristic}/what-if": [
         "/characteristics/{characteristic}/what-if",
         "/characteristics/{characteristic}/what-if?k=3&r33=2.5&goal=corrections#replay",
