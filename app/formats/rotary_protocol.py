@@ -12,6 +12,7 @@ from typing import NamedTuple
 from app.core.kinematics.axis import ERRORS, AxisName
 from app.core.kinematics.results import SCALARS, STRINGS
 from app.formats.markup import Row, rows_of
+from app.formats.rotary_stems import EARLIER, fits, meaning
 from app.formats.rotary_words import AXIS_KEYS, HEAD_KEYS, LABELS, OPTIMISED, WORTHLESS
 from app.formats.values import folded
 
@@ -25,6 +26,15 @@ _NUMBER = re.compile(r"(?<![\w.,])([+-]?\d{1,12}(?:[.,]\d{1,12})?)\s*(mm|um|µm|
 _COORDINATE = re.compile(r"\b([xyz])\s*[=:]?\s*([+-]?\d{1,12}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm)?", re.IGNORECASE)
 _DEVIATION = re.compile(r"\be([xyz])([abc])\b")
 _CLOCK = re.compile(r"\d{1,2}:\d{2}")
+_ALONE = re.compile(r"(?:dreh|rotary |rotacijska )?(?:achse|axis|os)")
+_LETTER = re.compile(r"\s*([abc])(?:[\s-]*(?:achse|axis|os))?\s*", re.IGNORECASE)
+_ERROR = re.compile(
+    r"\b(E[XYZABC]0[ABC])\b\s*[=:]?\s*([+-]?\d{1,6}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm|°|deg|grad)?(?![\w.,]*\w)",
+    re.IGNORECASE,
+)
+_CYCLE = re.compile(r"\b45[0-3]\b")
+_WORD_BEFORE_TIME = re.compile(r"\s*[,;]?\s*\b(?:uhrzeit|um|time|at|čas|cas|ura|ob)\b\s*:?\s*(?=\d)", re.IGNORECASE)
+VECTORS = frozenset({"correction", "before", "after"})
 _PARAMETER = re.compile(r"\b(QS?1[0-9]{2})\b", re.IGNORECASE)
 SIGNS = {"+": 1, "-": -1, "positiv": 1, "negativ": -1, "positive": 1, "negative": -1, "pozitivna": 1, "negativna": -1}
 Point = tuple[float, float, float]
@@ -81,6 +91,7 @@ def read_protocol(text: str) -> Protocol:
     made.unread += [Unread(line, "<") for line in broken]
     axis: AxisName | None = None
     columns: list[tuple[str, int]] = []
+    side_by_side: list[AxisName] = []
     for row in rows:
         label, values = _split(row)
         words = folded(label[:LONGEST_LABEL])
@@ -89,13 +100,24 @@ def read_protocol(text: str) -> Protocol:
             axis = _axis_of(named)
             made.axes.setdefault(axis, AxisProtocol())
             words = " ".join(_AXIS.sub(" ", words).split())
+        elif _ALONE.fullmatch(words) and len(values) == 1 and (letter := _LETTER.fullmatch(values[0])):
+            axis = _named(letter[1])
+            continue
+        if abreast := _abreast(row):
+            side_by_side, columns = abreast, []
+            continue
         if found := _columns(row):
             axis, columns = found
             continue
         if columns and axis is not None and _deviation(made, axis, columns, row):
             continue
         columns = []
-        if words in WORTHLESS and not values:
+        if not values and (words in WORTHLESS or _CYCLE.search(words)):
+            continue
+        if side_by_side and len(values) == len(side_by_side):
+            taken = [_take(made, each, words, label, [value]) for each, value in zip(side_by_side, values, strict=True)]
+            if not all(taken):
+                made.unread.append(Unread(row.line, row.text[:200]))
             continue
         if not _take(made, axis, words, label, values):
             made.unread.append(Unread(row.line, row.text[:200]))
@@ -117,8 +139,20 @@ def _split(row: Row) -> tuple[str, list[str]]:
 
 
 def _axis_of(found: re.Match[str]) -> AxisName:
-    letter = (found[1] or found[2]).upper()
-    return "A" if letter == "A" else "B" if letter == "B" else "C"
+    return _named(found[1] or found[2])
+
+
+def _named(letter: str) -> AxisName:
+    return "A" if letter in "aA" else "B" if letter in "bB" else "C"
+
+
+def _abreast(row: Row) -> list[AxisName]:
+    """The axes, if this row is the head of a table with a column for each."""
+    letters = [_LETTER.fullmatch(cell) for cell in row.cells]
+    named = [each for each in letters if each is not None]
+    if len(named) < 2 or len(named) < len(row.cells) - 1 or any(each is None for each in letters[1:]):
+        return []
+    return [_named(each[1]) for each in named]
 
 
 def _take(made: Protocol, axis: AxisName | None, words: str, label: str, values: Sequence[str]) -> bool:
@@ -131,27 +165,47 @@ def _take(made: Protocol, axis: AxisName | None, words: str, label: str, values:
             return True
     if not words:
         return not values  # the heading of an axis
-    bare = label.strip().upper()
-    for owner, names in ERRORS.items():
-        if bare in names and (numbers := numbers_in(said)):
-            made.axes.setdefault(owner, AxisProtocol()).errors[bare] = numbers[0]
+    if errors := _ERROR.findall(f"{label} {said}".replace("\N{MINUS SIGN}", "-")):
+        owners = {name: owner for owner, names in ERRORS.items() for name in names}
+        if all(name.upper() in owners for name, _value, _unit in errors):
+            for name, value, unit in errors:
+                kept = made.axes.setdefault(owners[name.upper()], AxisProtocol())
+                kept.errors[name.upper()] = numbers_in(f"{value} {unit}")[0]
             return True
+    key = _key(words, folded(label[:LONGEST_LABEL].replace("(", " ")))
+    if key is None:
+        return False
+    if key == "time":
+        if "created" not in made.head or _CLOCK.search(made.head["created"]) or not _CLOCK.search(said):
+            return False
+        made.head["created"] += f" {said[:20]}"
+        return True
+    if key in HEAD_KEYS:
+        if not said:
+            return False
+        made.head.setdefault(key, _WORD_BEFORE_TIME.sub(" ", said[:200]) if key == "created" else said[:200])
+        return True
+    return _number(made, axis, key, said, words)
+
+
+def _key(words: str, everything: str) -> str | None:
+    """What a label means: a known one, one that goes on, or by its words. everything: what stands in brackets too."""
     key = next((key for key, words_of in LABELS if words in words_of), None)
     if key is None:
         key = next((key for key, words_of in LABELS if any(words.startswith(f"{each} ") for each in words_of)), None)
     if key is None:
-        return False
-    if key == "scatter_before" and any(word in folded(label[:LONGEST_LABEL].replace("(", " ")) for word in OPTIMISED):
-        key = "scatter_after"
-    if key in HEAD_KEYS:
-        if not said:
-            return False
-        made.head.setdefault(key, said[:200])
-        return True
-    return _number(made, axis, key, said)
+        key = meaning(words)
+    if key in {"scatter", "scatter_before"}:
+        optimised = (
+            any(word in everything for word in OPTIMISED) or fits(everything, "=nach") or fits(everything, "after")
+        )
+        return (
+            "scatter_after" if optimised and not any(fits(everything, each) for each in EARLIER) else "scatter_before"
+        )
+    return key
 
 
-def _number(made: Protocol, axis: AxisName | None, key: str, said: str) -> bool:
+def _number(made: Protocol, axis: AxisName | None, key: str, said: str, words: str) -> bool:
     numbers = numbers_in(said)
     if key == "ball_radius":
         if not numbers:
@@ -163,12 +217,16 @@ def _number(made: Protocol, axis: AxisName | None, key: str, said: str) -> bool:
             made.incidence = numbers[0]
             return True
         return False
-    kept = made.axes[axis]
+    kept = made.axes.setdefault(axis, AxisProtocol())
     if key == "angles":
         kept.angles = tuple(numbers)
         return bool(numbers)
-    if key in {"correction", "before", "after"}:
+    if key in VECTORS:
+        letter = next((at for at, each in enumerate("xyz") if fits(words, f"={each}")), None)
         vector = _vector(said)
+        if vector is None and letter is not None and len(numbers) == 1:  # a row for each direction
+            vector = kept.vectors.get(key, (0.0, 0.0, 0.0))
+            vector = (*vector[:letter], numbers[0], *vector[letter + 1 :])  # type: ignore[assignment] # three again
         if vector is None:
             return False
         kept.vectors[key] = vector
@@ -176,8 +234,9 @@ def _number(made: Protocol, axis: AxisName | None, key: str, said: str) -> bool:
     assert key in AXIS_KEYS
     if not numbers:
         return False
-    kept.numbers[key] = numbers[0]
-    return True
+    if key == "scatter_before" and len(numbers) == 2:  # measured and optimised in one row
+        kept.numbers.setdefault("scatter_after", numbers[1])
+    return kept.numbers.setdefault(key, numbers[0]) == numbers[0]  # a second value for the same is not understood
 
 
 def numbers_in(text: str) -> list[float]:
@@ -235,9 +294,9 @@ def _deviation(made: Protocol, axis: AxisName, columns: Sequence[tuple[str, int]
     for (kind, at), cell in zip(columns, row.cells, strict=True):
         numbers = numbers_in(cell)
         if kind == "approach":
-            approach = SIGNS.get(folded(cell[:LONGEST_LABEL]) or cell.strip().replace("\N{MINUS SIGN}", "-"), 0) or SIGNS.get(
-                cell.strip(), 0
-            )
+            approach = SIGNS.get(
+                folded(cell[:LONGEST_LABEL]) or cell.strip().replace("\N{MINUS SIGN}", "-"), 0
+            ) or SIGNS.get(cell.strip(), 0)
         elif kind == "other":
             continue
         elif len(numbers) != 1:

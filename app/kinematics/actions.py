@@ -15,7 +15,7 @@ from app.core.zones import nanometres
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
 from app.formats.values import Unreadable, moment
-from app.kinematics import queries, wording
+from app.kinematics import queries, refusals, wording
 from app.kinematics.evaluation import evaluate
 from app.kinematics.outcome import Evaluated, Limits
 from app.kinematics.queries import RunRow
@@ -235,10 +235,10 @@ def undo(session: Session, number: int, reason: str, caller: Caller) -> RunRow:
     path = queries.in_force(queries.course(session, row.machine.id, row.run.head))
     at = next((place for place, each in enumerate(path) if each.run == number), None)
     if at is None:
-        raise Conflict(*wording.cannot_undo(row), run_status=row.status)
+        raise Conflict(*refusals.cannot_undo(row), run_status=row.status)
     if at != len(path) - 1:
         later = [each.run for each in path[at + 1 :] if each.run is not None]
-        raise Conflict(*wording.stands_below(row, later, path[at - 1].version), later=later)
+        raise Conflict(*refusals.stands_below(row, later, path[at - 1].version), later=later)
     restore(session, row.machine, path[at - 1].version, reason, caller)
     publish(session, news(row.machine, row.run))
     return queries.run(session, number)
@@ -256,9 +256,9 @@ def restore(
     old = queries.backup(session, machine, version)
     now = queries.course(session, machine.id, old.head)[-1]
     if queries.alike(now.errors, old.errors):
-        raise Conflict(*wording.is_in_effect(old, now), version=now.version)
+        raise Conflict(*refusals.is_in_effect(old, now), version=now.version)
     if instead_of is not None and instead_of != now.version:
-        raise Conflict(*wording.changed_meanwhile(instead_of, now), version=now.version)
+        raise Conflict(*refusals.changed_meanwhile(instead_of, now), version=now.version)
     made = KinematicsBackup(head=old.head, reason=reason, errors=dict(old.errors), restores=version)
     _keep(session, machine, made, caller)
     subject = f"kinematics/{machine.key}/{made.version}"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from app.core.kinematics.axis import ERRORS
 from app.core.kinematics.results import OFFSETS
 from app.errors import Conflict, NotFound
-from app.kinematics import wording
+from app.kinematics import refusals, wording
 from app.kinematics.queries import RunRow
 from app.kinematics.tables import KinematicsBackup
 from app.kinematics.values import UNITS, errors_of, to_enter
@@ -62,7 +62,7 @@ def about_run(row: RunRow, what: str) -> Question:
         )
     if what == "undo":
         if row.status != "entered":
-            raise Conflict(*wording.cannot_undo(row))
+            raise Conflict(*refusals.cannot_undo(row))
         return Question(
             _("Take back what was entered of run {n}?").format(n=number),
             _("It is taken back"),

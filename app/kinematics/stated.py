@@ -12,6 +12,7 @@ from app.kinematics.outcome import LETTERS, Evaluated, correction
 from app.web.i18n import _
 
 MOST_NOTES = 200
+SAME_PLACE = 0.0002  # mm; a protocol states places with four decimals
 
 
 def results_of(given: Mapping[str, float | str]) -> Results:
@@ -69,10 +70,11 @@ def _said_axis(
     axis: AxisName, errors: Mapping[str, float | None], before: float | None, after: float | None, said: AxisProtocol
 ) -> dict[str, Any]:
     numbers, vectors = said.numbers, said.vectors
-    place = vectors.get("correction")
+    moved = _moved(said)
+    place = vectors.get("correction", moved)
     known = {name: errors.get(name) for name in ERRORS[axis]}
     if place is not None:  # a protocol that says where the axis has to go, and not in the words of a string
-        for letter, value in zip(LETTERS, place, strict=True):
+        for letter, value in zip(LETTERS, moved or place, strict=True):
             name = f"E{letter}0{axis}"
             if name in known and known[name] is None:
                 known[name] = value
@@ -116,6 +118,17 @@ def _said_axis(
     }
 
 
+def _moved(said: AxisProtocol) -> tuple[float, float, float] | None:
+    """How far the kinematics has moved the axis, as its places before and after tell."""
+    if not {"before", "after"} <= set(said.vectors):
+        return None
+    x, y, z = (
+        round(after - before, 9) + 0.0
+        for before, after in zip(said.vectors["before"], said.vectors["after"], strict=True)
+    )
+    return x, y, z
+
+
 # --- the control's protocol
 
 
@@ -129,6 +142,10 @@ def of_protocol(text: str) -> Evaluated:
     ]
     if protocol.ball_radius is not None:
         made.head["ball_radius"] = f"{protocol.ball_radius:g}"
+    for axis, said in protocol.axes.items():
+        moved, asked = _moved(said), said.vectors.get("correction")
+        if moved and asked and max(abs(a - b) for a, b in zip(moved, asked, strict=True)) > SAME_PLACE:
+            made.results["notes"].append(wording.moved_otherwise(axis, moved, asked))
     _fill_in(made, read, protocol.axes)
     for axis in made.results["axes"]:
         if axis["incidence"] is None:

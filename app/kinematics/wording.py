@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from app.core.kinematics.axis import AxisFault, NoAxis
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from app.kinematics.drift import Drift
     from app.kinematics.outcome import Evaluated
     from app.kinematics.queries import RunRow
-    from app.kinematics.tables import KinematicsBackup, KinematicsRun
+    from app.kinematics.tables import KinematicsRun
 
 
 def angle(value: float | None, decimals: int = 4) -> str:
@@ -149,6 +149,13 @@ def not_understood(line: Unread) -> str:
     return _("line {line} was not understood: “{text}”").format(line=line.line, text=line.text)
 
 
+def moved_otherwise(axis: str, moved: Sequence[float], asked: Sequence[float]) -> str:
+    """The places before and after do not lie as far apart as the corrections say."""
+    return _("{axis}: from its place before to that after it is {moved}, but the corrections say {asked}").format(
+        axis=axis, moved=" ".join(map(um, moved)), asked=" ".join(map(um, asked))
+    )
+
+
 # --- what a run says
 
 
@@ -269,60 +276,6 @@ def cannot_confirm(row: RunRow) -> tuple[str, str]:
     return (
         _("Run {number} asks for no confirmation.").format(number=number),
         _("Only a change larger than maxModification does."),
-    )
-
-
-def is_in_effect(old: KinematicsBackup, now: KinematicsBackup) -> tuple[str, str]:
-    """Why nothing is put back."""
-    done = _("There is nothing to put back.")
-    if now.version == old.version:
-        return _("The kinematics of back-up {version} is in effect.").format(version=old.version), done
-    text = _("The values of back-up {version} are in effect, as version {now}: {who}, {at}, {reason}")
-    return (
-        text.format(
-            version=old.version,
-            now=now.version,
-            who=now.actor,
-            at=now.at.isoformat(timespec="seconds"),
-            reason=now.reason,
-        ),
-        done,
-    )
-
-
-def changed_meanwhile(seen: int, now: KinematicsBackup) -> tuple[str, str]:
-    """Somebody else has changed the kinematics since it was looked at."""
-    text = _("Version {seen} is not in effect any more: {who} made version {now} on {at}: {reason}")
-    return (
-        text.format(
-            seen=seen, now=now.version, who=now.actor, at=now.at.isoformat(timespec="seconds"), reason=now.reason
-        ),
-        _("Look at the kinematics again before you put anything back."),
-    )
-
-
-def cannot_undo(row: RunRow) -> tuple[str, str]:
-    """Why an entry is not taken back."""
-    number = row.run.id
-    if row.undone:
-        return (
-            _("Run {number} was undone already.").format(number=number),
-            _("To have its values again, put back the version that it led to."),
-        )
-    return (
-        _("Run {number} was not entered.").format(number=number),
-        _("There is nothing to undo."),
-    )
-
-
-def stands_below(row: RunRow, later: list[int], version: int) -> tuple[str, str]:
-    """Why an entry is not taken back: others were made on top of it."""
-    runs = ", ".join(map(str, later))
-    return (
-        _("After run {number} others were entered on top of it: {runs}.").format(number=row.run.id, runs=runs),
-        _(
-            "Undo those first, the latest before the others; or put back version {version}, which undoes all of them."
-        ).format(version=version),
     )
 
 
