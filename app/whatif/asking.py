@@ -3,6 +3,7 @@
 from sqlalchemy.orm import Session
 
 from app.characteristics.queries import Standing
+from app.core.policy_map import with_settings
 from app.core.spc.refusal import Refused
 from app.errors import FieldError, Invalid
 from app.statistics import queries as statistics
@@ -33,7 +34,8 @@ def map_of(past: Past, given: MapIn) -> Map:
     """The map of a past that is loaded already."""
     today = past.standing.parameters
     r34 = today.averaging_limit if given.averaging_limit is None else given.averaging_limit
-    queries.check_order(queries.Settings(zero_range=0.0, averaging_limit=r34, factor=given.factor).applied_to(today))
+    asked = Settings(averaging_limit=given.averaging_limit, factor=given.factor)
+    queries.check_order(with_settings(asked.applied_to(today), zero_range=0.0), asked)
     return queries.map_of(
         past,
         settings(past, given),

@@ -20,7 +20,7 @@ from app.core.policy_map import Criterion, Region, best_region, in_order, with_s
 from app.core.replay import FEWEST_FOR_PPK, Figures, agreement, figures_of, run
 from app.core.spc.refusal import Refused
 from app.core.zones import Zone, nanometres
-from app.errors import Invalid
+from app.errors import FieldError, Invalid
 from app.offsets.tables import Correction
 from app.statistics.queries import Window
 from app.web.i18n import _
@@ -31,6 +31,7 @@ from app.whatif.turns import on_all_cores
 __all__ = ["USUAL", "Answer", "Map", "Settings", "count_open", "map_of", "proposals", "side_by_side"]
 
 USUAL = 5_000  # readings that are replayed unless somebody says otherwise
+SETTINGS = ("zero_range", "averaging_limit", "weighting_factor", "factor")
 MOST_CELLS = 2_500
 MOST_DECISIONS = 200_000_000  # in one map: some seconds
 WELL, ROUGHLY = (0.05, 0.10), (0.15, 0.30)  # how far spread and corrections of the replay may be off
@@ -144,7 +145,7 @@ def side_by_side(session: Session, past: Past, settings: Settings) -> Answer:
     """Replay today's settings and the others, and hold the replay against what truly happened."""
     today = past.standing.parameters
     other = settings.applied_to(today)
-    check_order(other)
+    check_order(other, settings)
     delay = _delay(past, settings)
     way = past.with_effect(settings.effect)
     then_course, then = run(way, past.as_then(delay, settings.effect))
@@ -209,14 +210,18 @@ def effect_of(past: Past) -> Effect | Refused:
         return refused
 
 
-def check_order(parameters: Parameters) -> None:
-    """Raises `Invalid` with the pair that is out of order, as the set-up would."""
+def check_order(parameters: Parameters, settings: Settings) -> None:
+    """Raises `Invalid` with the pair that is out of order, as the set-up would, at the setting of it that was given."""
+    given = [name for name in SETTINGS if getattr(settings, name) is not None]
     try:
         read(parameters.as_dict())
     except ParameterError as error:
-        errors = wording.field_errors(error.problems)
+        errors = []
+        for field, message in wording.field_errors(error.problems):
+            name = field.removeprefix("parameters.")
+            errors.append(FieldError(name if name in given or not given else given[0], message))
         raise Invalid(
-            "; ".join(f"{field}: {message}" for field, message in errors[:3]),
+            "; ".join(f"{each.message}" for each in errors[:3]),
             _("Choose settings that hold to R33 < R34 ≤ R35/2."),
             errors=errors,
         ) from None
