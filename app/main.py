@@ -80,6 +80,7 @@ from app.web.templates import assets
 from app.whatif import api as what_if
 from app.whatif import pages as what_if_pages
 from app.zeros import api as zeros
+from app.zeros import pages as zero_pages
 
 # Each part of the shop floor brings its JSON routes (api) and its pages.
 ROUTERS: tuple[APIRouter, ...] = (
@@ -135,6 +136,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     calibration_pages.router,
     gauge_pages.router,
     form_pages.router,
+    zero_pages.router,
     new_run_pages.router,
     kinematics_pages.router,
     sign_in_pages.router,

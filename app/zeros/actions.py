@@ -3,7 +3,6 @@
 Every verb locks the machine first: the zero may raise an alarm of it.
 """
 
-from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
@@ -162,18 +161,29 @@ def _keep(
     return made
 
 
+def _touches(kind: str, given: dict[str, Any]) -> list[Touch]:
+    if given.get("records"):
+        return four_records(Kind(kind), *given["records"])
+    return [
+        Touch(each.get("x"), each.get("y"), Approach(each["approach"]) if each.get("approach") else None)
+        for each in given.get("touches") or ()
+    ]
+
+
+def touches_of(kind: str, given: dict[str, Any]) -> list[dict[str, Any]]:
+    """The touches that it was computed from, also where they came as records of a printed macro."""
+    return [
+        {"x": touch.x, "y": touch.y, "approach": touch.approach.value if touch.approach else None}
+        for touch in _touches(kind, given)
+    ]
+
+
 def _found(kind: str, given: dict[str, Any]) -> Zero:
     """What the touches come to. Raises `Invalid` that names those that are wrong."""
     if given.get("touches") and given.get("records"):
         wrong = _("say touches or records, not both")
         raise Invalid(f"records: {wrong}.", _("Leave one of them out."), errors=[FieldError("records", wrong)])
-    if given.get("records"):
-        touches: Sequence[Touch] = four_records(Kind(kind), *given["records"])
-    else:
-        touches = [
-            Touch(each.get("x"), each.get("y"), Approach(each["approach"]) if each.get("approach") else None)
-            for each in given.get("touches") or ()
-        ]
+    touches = _touches(kind, given)
     height = None
     if given.get("z_touched") is not None:
         height = Height(given["z_touched"], given.get("feeler", 0.0), given.get("tool_length", 0.0))

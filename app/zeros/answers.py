@@ -155,12 +155,15 @@ class FixtureOut(BaseModel):
     shift: ShiftOut
 
 
-def program_of(zero: WorkZero, machine: Machine) -> str:
-    """The text that sets it on its machine."""
-    offset = offset_of(machine.control, zero.work_offset) or offset_of("other", zero.work_offset)
-    assert offset is not None
+def program_of(zero: WorkZero, machine: Machine, control: str | None = None) -> str | None:
+    """The text that sets it on its machine, or on another control; None for a control without such a work offset."""
+    offset = offset_of(control or machine.control, zero.work_offset)
+    if offset is None and control is None:  # the machine had another control then
+        offset = offset_of("other", zero.work_offset)
+    if offset is None:
+        return None
     title = f"INBAND WORK ZERO {zero.id} FOR {machine.key.upper()}"
-    return write_zero(machine.control, ZeroText(title, offset, zero.x, zero.y, zero.z, zero.rotation))
+    return write_zero(control or machine.control, ZeroText(title, offset, zero.x, zero.y, zero.z, zero.rotation))
 
 
 def shift_out(compared: Compared, basis: str) -> ShiftOut:
@@ -202,7 +205,7 @@ def zero_out(session: Session, zero: WorkZero) -> ZeroOut:
         residuals=zero.result["residuals"],
         tip=given["tip"],
         notices=[Notice(code=code, text=wording.notice(code)) for code in zero.result["notices"]],
-        program=program_of(zero, machine),
+        program=program_of(zero, machine) or "",
         shift=None if compared is None else shift_out(compared, basis),
         readings=[PushedOut(**each._asdict()) for each in queries.pushed(session, zero)],
         touched_at=zero.touched_at,

@@ -3,16 +3,21 @@
 from typing import Annotated, Any
 
 from fastapi import Path, Query, Request, Response
+from fastapi.responses import PlainTextResponse
 
 from app.db.engine import Database
+from app.errors import NotFound
 from app.machines.queries import machine_named
+from app.machines.schemas import Control
+from app.machines.tables import Machine
 from app.readings import actions as readings
-from app.web.api import api_router, problems
+from app.web.api import api_router, plain, problems
 from app.web.deps import AnyCaller, Engineer, Operator, SessionDep
 from app.web.fields import Cursor, Limit, Page, Slug, page_of
+from app.web.i18n import _
 from app.web.theme import theme_from
 from app.zeros import actions, figures, queries
-from app.zeros.answers import FixtureOut, ZeroOut, fixture_out, zero_out
+from app.zeros.answers import TEXT, FixtureOut, ZeroOut, fixture_out, program_of, zero_out
 from app.zeros.figures import Mark
 from app.zeros.schemas import FixtureIn, RecomputeIn, ZeroIn
 
@@ -124,6 +129,30 @@ def fixture_figure(
 def get_work_zero(session: SessionDep, caller: AnyCaller, number: Number) -> ZeroOut:
     """One work zero with its touches."""
     return zero_out(session, queries.work_zero(session, number, caller.only_machine))
+
+
+@router.get("/work-zeros/{number}/program", responses=problems(404) | plain(TEXT), response_class=PlainTextResponse)
+def write_work_zero(
+    session: SessionDep,
+    caller: AnyCaller,
+    number: Number,
+    control: Annotated[
+        Control | None, Query(description="For which control; if left out, that of the machine.")
+    ] = None,
+) -> PlainTextResponse:
+    """The text that sets the work zero, for the machine's control or for another one. Running it twice changes nothing."""
+    zero = queries.work_zero(session, number, caller.only_machine)
+    machine = session.get_one(Machine, zero.machine_id)
+    text = program_of(zero, machine, control)
+    if text is None:
+        raise NotFound(
+            _("{offset} is no work offset of this control.").format(offset=zero.work_offset),
+            _("Choose the control that has it."),
+        )
+    ending = {"sinumerik": "spf", "fanuc": "nc"}.get(control or machine.control, "txt")
+    name = f"{machine.key.replace('.', '-')}-zero-{zero.id}.{ending}"
+    headers = {"Content-Disposition": f'attachment; filename="{name}"', "Cache-Control": "no-store"}
+    return PlainTextResponse(text, headers=headers)
 
 
 @router.post("/work-zeros/{number}/recompute", status_code=201, responses=problems(404, 409))

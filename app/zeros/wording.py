@@ -60,6 +60,15 @@ def value_word(name: str) -> str:
     }.get(name, name)
 
 
+def size(found: Any) -> str:
+    """Diameter, or length × width; what is not known is a dash."""
+    if found.diameter is not None:
+        return f"⌀{mm(found.diameter, 3)[:-3]}"
+    if found.length is None and found.width is None:
+        return "\N{EN DASH}"
+    return " × ".join("\N{EN DASH}" if each is None else mm(each, 3)[:-3] for each in (found.length, found.width))
+
+
 def numbers(at: Sequence[int]) -> str:
     """Touches as they are counted: 2, 3."""
     return ", ".join(map(str, at))

@@ -1,0 +1,192 @@
+"""Touches as people type or paste them, and the form as the API takes it.
+
+A pasted line is a touch: ``-X -353.012``, ``X -353.012 Y -181.25 -X``, or two numbers, X and Y. Or the text is what the
+printed macros keep: ``R1=-353.012`` to ``R4``, ``#501`` to ``#505``, with ``#508`` and ``#2`` for Z.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from app.errors import FieldError, InbandError, Invalid
+from app.web.forms import by_field, length
+from app.web.i18n import _
+from app.zeros.schemas import MOST_TOUCHES, OTHER_NAMES, RECORDS
+
+ROWS = 6
+SHOWN_ROWS = 4  # the others are opened where they are needed
+MOST_LETTERS = 20_000
+RESULTS = ("x", "y", "z", "diameter", "length", "width")
+WORDS = ("machine", "kind", "work_offset", "fixture", "part", "key")
+NUMBERS = ("tip", "z_touched", "feeler", "tool_length")
+SIGN = {"\N{MINUS SIGN}": "-", "\N{EN DASH}": "-"}
+
+# In which direction the tip goes, touch by touch, where nobody says otherwise.
+APPROACHES: dict[str, tuple[str, ...]] = {
+    "bore": ("-X", "+X", "-Y", "+Y", "", ""),
+    "boss": ("+X", "-X", "+Y", "-Y", "", ""),
+    "pocket": ("-X", "+X", "-Y", "+Y", "", ""),
+    "web": ("+X", "-X", "+Y", "-Y", "", ""),
+    "corner": ("+X", "+Y", "", "", "", ""),
+}
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)"
+_RECORD = re.compile(rf"(?<![\w.#])(R[1-4]|#50[1245]|#508|#2)\s*[=:\s]\s*({_NUMBER})(?![\w.])", re.IGNORECASE)
+_APPROACH = re.compile(r"(?<!\S)([+-])\s?([XY])(?![\w.])", re.IGNORECASE)
+_WORD = re.compile(rf"(?<![\w.])([XY])\s*[=:]?\s*({_NUMBER})(?![\w.])", re.IGNORECASE)
+_BARE = re.compile(rf"(?<![\w.])({_NUMBER})(?![\w.])")
+
+
+def blank(kind: str) -> dict[str, str]:
+    """The form as it is offered for this kind."""
+    directions = APPROACHES.get(kind, APPROACHES["pocket"])
+    return {f"approach{at}": direction for at, direction in enumerate(directions, 1)} | {"work_offset": "G54"}
+
+
+def like(given: Mapping[str, Any], kind: str, /, **more: str | None) -> dict[str, str]:
+    """The form as another zero was typed, its touches left out: the same thing is measured again."""
+    made = blank(kind) | {name: value or "" for name, value in more.items()}
+    for name in ("tip", "feeler", "tool_length"):
+        if given.get(name):
+            made[name] = f"{given[name]:.9g}"
+    if given.get("repeatability"):
+        made["repeatability"] = f"{given['repeatability'] * 1000:.6g}"
+    for at, touch in enumerate((given.get("touches") or [])[:ROWS], 1):
+        made[f"approach{at}"] = touch.get("approach") or ""
+    return made
+
+
+def fields(form: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
+    """The form as the API takes it, and by touch the field in which it was typed. Raises `Invalid` for a line that is none."""
+    given: dict[str, Any] = {name: form.get(name, "").strip() for name in WORDS}
+    given |= {name: length(form.get(name)) for name in NUMBERS}
+    micrometres = length(form.get("repeatability"))
+    given["repeatability"] = round(micrometres / 1000, 9) if isinstance(micrometres, float) else micrometres
+    if named := {name: key for name in RESULTS if (key := form.get(f"as_{name}", "").strip())}:
+        given["characteristics"] = named
+    touches: list[dict[str, Any]] = []
+    typed_in: list[str] = []
+    for at in range(1, ROWS + 1):
+        x, y = length(form.get(f"x{at}")), length(form.get(f"y{at}"))
+        if x is None and y is None:
+            continue
+        touches.append(_touch(x, y, form.get(f"approach{at}", "").strip()))
+        typed_in.append(f"touch{at}")
+    text = form.get("lines", "")
+    records = _records(text)
+    if records and not touches:
+        return given | records, ["lines"] * 4
+    pasted = _lines(text)
+    touches += pasted
+    typed_in += ["lines"] * len(pasted)
+    return given | {"touches": touches}, typed_in
+
+
+def _touch(x: Any, y: Any, approach: str) -> dict[str, Any]:
+    made = {"x": x, "y": y, "approach": approach.replace("\N{MINUS SIGN}", "-") or None}
+    return {name: value for name, value in made.items() if value is not None}
+
+
+def _plain(text: str) -> str:
+    """Signs as signs, and commas as points where they are decimal commas."""
+    for sign, plain in SIGN.items():
+        text = text.replace(sign, plain)
+    rows = []
+    for row in text.splitlines():
+        if "." not in row:
+            row = re.sub(r"(?<=\d),(?=\d)", ".", row)  # noqa: PLW2901 - the row, cleaned
+        rows.append(re.sub(r"[,;\t|]", " ", row))
+    return "\n".join(rows)
+
+
+def _records(text: str) -> dict[str, Any]:
+    """What the printed macros keep, by its name there; nothing where the text has none."""
+    found: dict[str, Any] = {}
+    for name, number in _RECORD.findall(_plain(text)):
+        found[OTHER_NAMES.get(name.upper(), name.upper())] = float(number)
+    return found if any(name in RECORDS for name in found) else {}
+
+
+def _lines(text: str) -> list[dict[str, Any]]:
+    if len(text) > MOST_LETTERS:
+        wrong = _("this is more text than {most} touches take").format(most=MOST_TOUCHES)
+        raise Invalid(f"lines: {wrong}.", errors=[FieldError("lines", wrong)])
+    return [_line(row, number) for number, row in enumerate(_plain(text).splitlines(), 1) if row.strip()]
+
+
+def _line(row: str, number: int) -> dict[str, Any]:
+    """A touch of one line. Raises `Invalid` naming it.
+
+    >>> _line("-X -353.012", 1), _line("X 12.5 Y -3 +Y", 2)
+    ({'x': -353.012, 'approach': '-X'}, {'x': 12.5, 'y': -3.0, 'approach': '+Y'})
+    >>> _line("1.5 2", 3)
+    {'x': 1.5, 'y': 2.0}
+    """
+    directions = [sign + axis.upper() for sign, axis in _APPROACH.findall(row)]
+    rest = _APPROACH.sub(" ", row)
+    named = {axis.lower(): float(value) for axis, value in _WORD.findall(rest)}
+    bare = [float(value) for value in _BARE.findall(_WORD.sub(" ", rest))]
+    left_over = _BARE.sub(" ", _WORD.sub(" ", rest)).strip()
+    if not left_over and len(directions) < 2:
+        approach = directions[0] if directions else ""
+        if named and not bare:
+            return _touch(named.get("x"), named.get("y"), approach)
+        if not named and len(bare) == 2:
+            return _touch(bare[0], bare[1], approach)
+        if not named and len(bare) == 1 and approach:
+            along_x = approach.endswith("X")
+            return _touch(bare[0] if along_x else None, None if along_x else bare[0], approach)
+    wrong = _("line {number} is no touch: {row}").format(number=number, row=repr(row.strip()[:60]))
+    raise Invalid(
+        f"lines: {wrong}.",
+        _("Write one touch a line: -X -353.012, or X and Y. Or paste R1 to R4."),
+        errors=[FieldError("lines", wrong)],
+    )
+
+
+def watch(form: Mapping[str, str]) -> dict[str, Any]:
+    """The settings of a fixture as the API takes them; limits are typed in µm."""
+    given: dict[str, Any] = {"basis": form.get("basis", "").strip(), "reason": form.get("reason", "").strip()}
+    number = form.get("reference", "").strip()
+    given["reference"] = int(number) if number.isascii() and number.isdigit() and len(number) < 19 else number
+    if given["basis"] != "frozen":
+        given["reference"] = None
+    for name in ("warning", "alarm"):
+        micrometres = length(form.get(name))
+        given[name] = round(micrometres / 1000, 9) if isinstance(micrometres, float) else micrometres
+    given["characteristics"] = {name: key for name in RESULTS if (key := form.get(f"as_{name}", "").strip())}
+    return given
+
+
+def again(form: Mapping[str, str]) -> dict[str, Any]:
+    """Computing once more, as the API takes it."""
+    given: dict[str, Any] = {"tip": length(form.get("tip")), "reason": form.get("reason", "").strip()}
+    numbers = form.get("leave_out", "").replace(",", " ").replace(";", " ").split()
+    given["leave_out"] = [
+        int(each) if each.isascii() and each.isdigit() and len(each) < 6 else each for each in numbers
+    ]
+    return given
+
+
+def at_fields(error: InbandError, typed_in: Sequence[str] = ()) -> dict[str, str]:
+    """What is wrong, by the field of the form."""
+    moved = []
+    for field, message in error.errors:
+        folder, _dot, rest = field.partition(".")
+        at = re.fullmatch(r"touches\[(\d+)\]", folder)
+        if at is not None:
+            number = int(at[1])
+            name = typed_in[number] if number < len(typed_in) else "lines"
+            message = f"{rest.upper()}: {message}" if rest and name != "lines" else message  # noqa: PLW2901 - moved
+        elif folder == "characteristics":
+            name = f"as_{rest}"
+        elif folder in {"records", *RECORDS}:
+            name = "lines"
+        elif folder.startswith("leave_out"):
+            name = "leave_out"
+        else:
+            name = folder
+        told = FieldError(name, message)
+        if told not in moved:
+            moved.append(told)
+    error.errors = moved
+    return by_field(error)
