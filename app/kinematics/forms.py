@@ -1,5 +1,6 @@
 """What people type about rotary axes: a protocol, parameters, ball centres or touches in a grid, limits one a line."""
 
+import re
 from collections.abc import Mapping
 from datetime import UTC
 from typing import Any, NamedTuple
@@ -18,6 +19,8 @@ TEXTS = ("program", "tool", "kinematics", "mode", "head")
 SETTINGS = ("ball_radius", "tip_radius", "clearance", "retract_height", "feed", "reference_angle", "backlash_angle")
 LINES, MOST_LINES, MOST_PASTED = 12, 120, 2_000
 FEWEST_TOUCHES = 4
+CHARSETS = {"windows-1250": "cp1250", "cp1250": "cp1250", "iso-8859-2": "iso8859-2", "latin2": "iso8859-2"}
+_CHARSET = re.compile(rb"charset\s*=\s*[\"']?\s*([A-Za-z0-9_-]{1,20})", re.IGNORECASE)
 SIGNS = {"": None, "+": "positive", "-": "negative", "\N{MINUS SIGN}": "negative"}
 
 
@@ -30,13 +33,15 @@ class Line(NamedTuple):
 
 
 def decoded(content: bytes) -> str:
-    """A protocol as text: UTF-8, UTF-16 with its mark, else as Western European controls write."""
+    """A protocol as text: UTF-8, UTF-16 with its mark, as it says itself, else as Western European controls write."""
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16", errors="replace").replace("\0", "")
     try:
         return content.decode("utf-8-sig").replace("\0", "")
     except UnicodeDecodeError:
-        return content.decode("cp1252", errors="replace").replace("\0", "")
+        said = _CHARSET.search(content[:2048])
+        name = said[1].decode("ascii").lower() if said else ""
+        return content.decode(CHARSETS.get(name, "cp1252"), errors="replace").replace("\0", "")
 
 
 def way(form: Mapping[str, str]) -> str:
