@@ -15,6 +15,7 @@ from app.main import ROUTERS
 from tests.conftest import Server
 from tests.control.line import Line
 from tests.forms.test_forms import BORE
+from tests.kinematics.bench import axis
 from tests.shop import Person, Shop
 
 SIZES = {"desk": (1280, 800), "large": (1920, 1080), "panel": (800, 1280)}
@@ -94,6 +95,17 @@ PAGES = {
     "/forms/new": ["/forms/new", "/forms/new?example=printed", "/forms/new?from={form}"],
     "/forms/{form}": ["/forms/{form}", "/forms/{form}?section=2"],
     "/forms/features/{machine}/{feature}": ["/forms/features/{machine}/bore-d56?kind=axis_straightness"],
+    "/kinematics": ["/kinematics"],
+    "/kinematics/new": ["/kinematics/new", "/kinematics/new?way=positions", "/kinematics/new?example=1&machine={machine}"],
+    "/kinematics/machines/{machine}": [
+        "/kinematics/machines/{machine}",
+        "/kinematics/machines/{machine}?value=backlash.C&before={run}",
+    ],
+    "/kinematics/machines/{machine}/backups/{version}": ["/kinematics/machines/{machine}/backups/1"],
+    "/kinematics/runs/{run}": ["/kinematics/runs/{run}"],
+    "/kinematics/runs/{run}/protocol": ["/kinematics/runs/{run}/protocol"],
+    "/kinematics/runs/{run}/{what}": ["/kinematics/runs/{run}/enter"],
+    "/kinematics/compare": ["/kinematics/compare?run={run}"],
     "/setup": ["/setup"],
     "/setup/characteristics": ["/setup/characteristics"],
     "/setup/characteristics/new": ["/setup/characteristics/new"],
@@ -167,6 +179,10 @@ def shop(server: Server) -> Shop:
         made.call("POST", f"/machines/{made.machine}/averages/6/pairs", 201, **pair)
     bore = BORE | {"feature": "bore-d56", "machine": made.machine}
     made.call("POST", "/forms", 201, **bore)
+    turned: dict[str, Any] = {"axes": [axis(both=True, backlash=0.002)], "machine": made.machine}
+    first = made.call("POST", "/kinematics/runs", 201, **turned)["run"]
+    made.call("POST", f"/kinematics/runs/{first}/enter", reason="Monthly check")
+    made.call("POST", "/kinematics/runs", 201, **turned)
     line = Line(made, "watched")
     line.push([9.0, 0.0, -7.0])
     line.look()
@@ -209,6 +225,7 @@ def addresses(shop: Shop) -> list[str]:
         "proposal": shop.call("GET", f"/characteristics/{shop.characteristic}/proposals")["items"][0]["id"],
         "signal": signal,
         "form": shop.call("GET", f"/forms?machine={shop.machine}")["items"][0]["id"],
+        "run": shop.call("GET", f"/kinematics/runs?machine={shop.machine}")["items"][-1]["run"],
     }
     return [address.format(**values) for opened in PAGES.values() for address in opened]
 
