@@ -11,6 +11,7 @@ from app.kinematics.drift import drift
 from app.kinematics.drift_answers import (
     BackupOut,
     ComparisonOut,
+    HeadOut,
     MachineKinematicsOut,
     backup_out,
     changes_out,
@@ -176,19 +177,42 @@ def kinematics_run_figure(
 
 
 @router.get("/machines/{machine}/kinematics", responses=problems(404))
-def get_kinematics(session: SessionDep, caller: AnyCaller, machine: MachineKey) -> MachineKinematicsOut:
-    """What the runs of a machine are held against, what has been entered, and how every value drifts."""
+def get_kinematics(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineKey,
+    head: Annotated[
+        str | None, Query(max_length=64, description="Drift with this head; else the reference head.")
+    ] = None,
+) -> MachineKinematicsOut:
+    """What the runs of a machine are held against, what has been entered, how every value drifts, and its heads compared."""
     found = machine_named(session, machine)
     caller.must_at(found.id, "viewer")
-    return _machine(session, found)
+    return _machine(session, found, head)
 
 
-def _machine(session: SessionDep, machine: Machine) -> MachineKinematicsOut:
+def _machine(session: SessionDep, machine: Machine, head: str | None = None) -> MachineKinematicsOut:
     plan = queries.plan(session, machine.id)
-    head = plan.reference_head or ""
-    return machine_out(
-        machine.key, plan, queries.in_effect(session, machine.id, head), looking.drifts(session, machine, head)
-    )
+    shown = head if head is not None else plan.reference_head or ""
+    latest = queries.heads_of(session, machine.id)
+    standard = latest.get(plan.reference_head or "")
+    heads = []
+    for name, row in latest.items():
+        in_effect, version = queries.state_at(session, machine.id, name, None)
+        against = looking.changes(standard, row) if standard is not None and standard is not row else []
+        heads.append(
+            HeadOut(
+                head=name or None,
+                reference=row is standard,
+                run=row.run.id,
+                measured_at=row.run.measured_at,
+                version=version,
+                in_effect=in_effect,
+                changes=changes_out(against, looking.to_enter(row)),
+            )
+        )
+    in_effect = queries.in_effect(session, machine.id, shown)
+    return machine_out(machine.key, plan, in_effect, looking.drifts(session, machine, shown), heads)
 
 
 @router.put("/machines/{machine}/kinematics", responses=problems(404))

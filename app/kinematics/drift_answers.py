@@ -35,6 +35,26 @@ DRIFT: dict[str, JsonValue] = {
     "slope_high": 0.0007,
     "text": "+0.40 µm a day, with 95 % certainty +0.10 to +0.70: it drifts.",
 }
+CHANGE: dict[str, JsonValue] = {
+    "name": "EX0C",
+    "words": "C stands off in X",
+    "unit": "mm",
+    "before": 0.0041,
+    "after": 0.0123,
+    "difference": 0.0082,
+    "deviation": 0.0011,
+    "moved": True,
+    "enter": 0.0123,
+}
+HEAD: dict[str, JsonValue] = {
+    "head": "Fork 2",
+    "reference": False,
+    "run": 118,
+    "measured_at": "2026-11-21T06:42:10Z",
+    "version": 3,
+    "in_effect": {"EX0C": 0.0041},
+    "changes": [CHANGE],
+}
 STATE: dict[str, JsonValue] = {
     "machine": "lathe-1",
     "ball_radius": 12.5,
@@ -46,6 +66,7 @@ STATE: dict[str, JsonValue] = {
     "characteristics": {},
     "in_effect": {"EX0C": 0.0041, "EY0C": 0.0, "EA0C": 0.0, "EB0C": 0.0},
     "drift": [DRIFT],
+    "heads": [HEAD],
 }
 
 
@@ -81,6 +102,32 @@ class DriftOut(BaseModel):
     text: str
 
 
+class ChangeOut(BaseModel):
+    """A value in two runs. moved: the difference is more than scatter; none where no run says how sure it is."""
+
+    name: str
+    words: str
+    unit: str
+    before: float
+    after: float
+    difference: float
+    deviation: float | None
+    moved: bool | None
+    enter: Annotated[float | None, Field(description="What the later run asks to enter on the control.")]
+
+
+class HeadOut(BaseModel):
+    """How the axes stand with one of the heads, by its last run; changes: against the last run with the reference head."""
+
+    head: str | None
+    reference: bool
+    run: int
+    measured_at: datetime
+    version: Annotated[int, Field(description="Of the kinematics in effect; 0: nothing was entered yet.")]
+    in_effect: dict[str, float]
+    changes: list[ChangeOut]
+
+
 class MachineKinematicsOut(BaseModel):
     """What the runs of a machine are held against, what is in effect, and how it drifts."""
 
@@ -95,7 +142,8 @@ class MachineKinematicsOut(BaseModel):
     limits: dict[str, float]
     characteristics: dict[str, str]
     in_effect: dict[str, float]
-    drift: list[DriftOut]
+    drift: Annotated[list[DriftOut], Field(description="Of the head asked for, or of the reference head.")]
+    heads: Annotated[list[HeadOut], Field(description="Every head, and how it differs from the reference head.")]
 
 
 def backup_out(row: KinematicsBackup) -> BackupOut:
@@ -132,7 +180,7 @@ def drift_out(drift: Drift) -> DriftOut:
 
 
 def machine_out(
-    machine: str, plan: KinematicsPlan, in_effect: dict[str, float], drifts: list[Drift]
+    machine: str, plan: KinematicsPlan, in_effect: dict[str, float], drifts: list[Drift], heads: list[HeadOut]
 ) -> MachineKinematicsOut:
     """The kinematics of a machine as it is answered."""
     return MachineKinematicsOut(
@@ -146,21 +194,8 @@ def machine_out(
         characteristics=plan.characteristics,
         in_effect=in_effect,
         drift=[drift_out(each) for each in drifts],
+        heads=heads,
     )
-
-
-class ChangeOut(BaseModel):
-    """A value in two runs. moved: the difference is more than scatter; none where no run says how sure it is."""
-
-    name: str
-    words: str
-    unit: str
-    before: float
-    after: float
-    difference: float
-    deviation: float | None
-    moved: bool | None
-    enter: Annotated[float | None, Field(description="What the later run asks to enter on the control.")]
 
 
 class ComparisonOut(BaseModel):
@@ -172,19 +207,7 @@ class ComparisonOut(BaseModel):
                 "machine": "lathe-1",
                 "before": 97,
                 "after": 118,
-                "changes": [
-                    {
-                        "name": "EX0C",
-                        "words": "C stands off in X",
-                        "unit": "mm",
-                        "before": 0.0041,
-                        "after": 0.0123,
-                        "difference": 0.0082,
-                        "deviation": 0.0011,
-                        "moved": True,
-                        "enter": 0.0123,
-                    }
-                ],
+                "changes": [CHANGE],
             }
         }
     )

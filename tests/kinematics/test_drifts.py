@@ -81,3 +81,46 @@ class TestDrift:
         assert [trace["meta"] for trace in figure["data"]] == ["measured", "measured", "optimised", "optimised"]
         assert figure["layout"]["yaxis"]["title"]["text"] == "EYC, µm"
         shop.call("GET", f"{RUNS}/{run}/figure?axis=A&letter=Y", 422)
+
+
+class TestHeads:
+    """Fork 2 is matched to the reference head, ball and preset untouched, and only A is measured with it."""
+
+    def test_one_head_against_the_reference_head(self, shop: Shop) -> None:
+        plan(shop, reference_head="Fork 1", limits={"EX0C": 0.01})
+        take(shop, axes=[axis((0.001, 0, 0, 0))], head="Fork 1")
+        other = take(shop, axes=[axis((0.021, 0, 0, 0), seed=3)], head="Fork 2")
+        one, two = shop.call("GET", f"/machines/{shop.machine}/kinematics")["heads"]
+        assert (one["head"], one["reference"], one["changes"]) == ("Fork 1", True, [])
+        assert (two["head"], two["reference"], two["run"], two["version"]) == ("Fork 2", False, other["run"], 0)
+        x = next(each for each in two["changes"] if each["name"] == "EX0C")
+        assert (x["difference"], x["moved"]) == (pytest.approx(0.02, abs=0.002), True)
+        assert x["enter"] == pytest.approx(0.021, abs=0.001)
+        shop.call("POST", f"{RUNS}/{other['run']}/enter", reason="Matched")
+        take(shop, axes=[axis((0.0, 0, 0, 0), seed=4)], head="Fork 2")
+        one, two = shop.call("GET", f"/machines/{shop.machine}/kinematics")["heads"]
+        x = next(each for each in two["changes"] if each["name"] == "EX0C")
+        assert abs(x["after"]) < 0.001, "what was entered belongs to the head"
+        assert (one["version"], two["version"]) == (0, 2)
+
+    def test_an_alarm_of_one_head_is_not_ended_by_another(self, shop: Shop) -> None:
+        plan(shop, limits={"EX0C": 0.01})
+        take(shop, axes=[axis((0.021, 0, 0, 0))], head="Fork 2")
+        take(shop, axes=[axis((0.001, 0, 0, 0))], head="Fork 1")
+        (alarm,) = shop.alarms()
+        assert "head Fork 2" in alarm["text"]
+        take(shop, axes=[axis((0.001, 0, 0, 0))], head="Fork 2")
+        assert shop.alarms() == []
+
+    def test_drift_of_the_head_that_is_asked_for(self, shop: Shop) -> None:
+        take(shop, axes=[axis((0.021, 0, 0, 0))], head="Fork 2")
+        path = f"/machines/{shop.machine}/kinematics"
+        assert shop.call("GET", path)["drift"] == []
+        found = {each["name"]: each["last"] for each in shop.call("GET", f"{path}?head=Fork 2")["drift"]}
+        assert found["EX0C"] == pytest.approx(0.021, abs=0.001)
+
+    def test_a_run_of_last_month_raises_no_alarm_of_today(self, shop: Shop) -> None:
+        plan(shop, limits={"EX0C": 0.01})
+        take(shop, axes=[axis((0.001, 0, 0, 0))], measured_at="2025-11-02T06:00:00Z")
+        take(shop, axes=[axis((0.021, 0, 0, 0))], measured_at="2025-10-02T06:00:00Z")
+        assert shop.alarms() == []
