@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from app.control import rules_wording
 from app.control.drafting import Draft
 from app.control.schemas import (
     BaselineOut,
@@ -19,9 +20,7 @@ from app.control.series import LeftOut
 from app.control.tables import Baseline
 from app.control.view import View
 from app.core.spc.refusal import Floats
-from app.core.spc.rules import RULES
 from app.core.spc.shewhart import ENOUGH_READINGS
-from app.statistics import wording as statistics
 
 MOST_POINTS, MOST_SIGNALS, MOST_LEFT_OUT = 10_000, 1_000, 1_000
 _RENAMED = {"freedom": "degrees_of_freedom", "slope": "wear_per_reading", "slope_error": "wear_error"}
@@ -81,7 +80,7 @@ def signals_out(view: View, most: int) -> list[SignalOut]:
             first=int(view.first[run.start]),
             last=int(view.last[run.end]),
             points=run.points,
-            text=statistics.rule(RULES[run.rule]),
+            text=rules_wording.looks_for(run.rule, view.kind),
         )
         for run in reversed(runs)
     ]

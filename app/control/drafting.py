@@ -23,6 +23,7 @@ from app.statistics.wording import refusal
 from app.web.i18n import _
 
 MOST_READINGS = 1_000_000  # in a period
+LOOKED_AT = 2_000  # readings that say whether a tool wears
 WEARS = 4.0  # standard errors from which on a slope is taken for wear
 CORRELATED = 0.3  # lag 1
 NOT_NORMAL = 0.005
@@ -41,6 +42,26 @@ class Draft:
     def said(self) -> list[tuple[str, str]]:
         """The cautions as code and words."""
         return [(which.value, wording.caution(which, count)) for which, count in self.cautions]
+
+
+def suited(session: Session, standing: Standing) -> Quantity:
+    """What is best charted of this characteristic: whether its tool wears, the newest readings say, over all their edges."""
+    if standing.parameters.measures_only:
+        return wording.suits(corrects=False, wears=False)
+    newest = statistics.window_of(session, standing.characteristic).newest
+    plan = Baseline(
+        quantity=Quantity.WITHOUT_CORRECTIONS.value,
+        excluded=[],
+        first_sequence=1,
+        last_sequence=0,
+        factor=standing.parameters.factor,
+    )
+    made = read(session, standing, plan, Window(max(1, newest - LOOKED_AT + 1), newest, newest))
+    try:
+        line = _line(made.series)
+    except Refused:  # nobody knows yet
+        return wording.suits(corrects=True, wears=True)
+    return wording.suits(corrects=True, wears=abs(line.slope) > WEARS * line.error)
 
 
 def draft_of(session: Session, standing: Standing, given: PeriodIn) -> Draft:

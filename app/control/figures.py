@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.control.reach import UNSIGNED, beyond, reach
 from app.control.thinning import thinned
 from app.control.view import Marked, View
 from app.control.wording import axis, chart_name
@@ -21,8 +22,7 @@ from app.web.theme import Palette, ThemeName, layout, palette
 
 MOST_CHANGES = 40  # lines of tool changes; more are a fence
 WITH_MARKERS = 400
-ROOM = 0.08
-UNSIGNED = (Chart.MOVING_RANGE, Chart.RANGES, Chart.DEVIATIONS)
+TOGETHER = 0.1  # of the axis: limits that lie closer than this are named in one line
 SYMBOLS = {1: "triangle-up", 0: "diamond", -1: "triangle-down"}
 
 
@@ -48,8 +48,8 @@ def control_figure(
         data += _signals(view, np.where(sides == -1, view.below, view.points), drawn, sides, colours, key, picks=picks)
     else:
         data += _signals(view, view.points, drawn, sides, colours, key, picks=picks)
-    low, high = _reach(view)
-    room = (high - low) * ROOM
+    low, high = reach(view)
+    data += beyond(view, drawn, _custom(view, drawn, key, picks=picks), colours, low, high)
     changes = _changes(view, colours)
     period = _period(marked, view, colours) if marked is not None else ([], [])
     first, last = int(view.first[0]), int(view.last[-1])
@@ -68,14 +68,14 @@ def control_figure(
                 "title": _title(_("Reading"), colours),
             },
             yaxis={
-                "range": [low - room, high + room],
+                "range": [low, high],
                 "tickformat": _format(view.kind, high - low),
                 "nticks": 7,
                 "title": _title(_axis(view), colours),
                 "fixedrange": picks,
             },
             shapes=[*period[0], *changes],
-            annotations=[*period[1], *_names(view, colours, width)],
+            annotations=[*period[1], *_names(view, colours, width, high - low)],
             **({"dragmode": "select", "selectdirection": "h"} if picks else {}),
         ),
     }
@@ -196,46 +196,45 @@ def _limits(view: View, drawn: NDArray[np.int64], colours: Palette) -> list[dict
     return made
 
 
-def _names(view: View, colours: Palette, width: int) -> list[dict[str, Any]]:
+def _names(view: View, colours: Palette, width: int, span: float) -> list[dict[str, Any]]:
     """The limits by name, at the right of the newest point."""
     if width < 600 or view.centre is None:
         return []
-    decimals = 2 if _span(view) < 20 else 1
+    decimals = 2 if span < 20 else 1
     names = [(_("centre"), view.centre), (_("lower"), view.lower), (_("upper"), view.upper)]
+    newest = {
+        name: float(np.atleast_1d(_um(values))[-1])
+        for name, values in names
+        if values is not None and not _is_floor(view, values)
+    }
+    if max(newest.values()) - min(newest.values()) < TOGETHER * span:
+        low, high = (_value(view, pick(newest.values()), decimals) for pick in (min, max))
+        said = [(_("{low} to {high}").format(low=low, high=high), float(np.mean(list(newest.values()))))]
+    else:
+        said = [(f"{name} {_value(view, value, decimals)}", value) for name, value in newest.items()]
     return [
         {
             "x": 1,
             "xref": "paper",
             "xanchor": "left",
             "xshift": 6,
-            "y": newest,
+            "y": value,
             "yanchor": "middle",
             "showarrow": False,
-            "text": f"{name} {f'{newest:.{decimals}f}' if view.kind in UNSIGNED else signed(newest, decimals)}",
+            "text": text,
             "font": {"size": 12, "color": colours.quiet},
         }
-        for name, values in names
-        if values is not None and not _is_floor(view, values)
-        for newest in [float(np.atleast_1d(_um(values))[-1])]
+        for text, value in said
     ]
+
+
+def _value(view: View, value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}" if view.kind in UNSIGNED else signed(value, decimals)
 
 
 def _is_floor(view: View, values: Any) -> bool:
     """A lower limit of 0 limits nothing where there is nothing below."""
     return view.kind in UNSIGNED and not np.any(values)
-
-
-def _span(view: View) -> float:
-    low, high = _reach(view)
-    return high - low
-
-
-def _reach(view: View) -> tuple[float, float]:
-    """What the axis shows: all points and limits."""
-    shown = [view.points, *(part for part in (view.below, view.lower, view.upper, view.centre) if part is not None)]
-    low = min(float(np.min(part)) for part in shown) * 1000
-    high = max(float(np.max(part)) for part in shown) * 1000
-    return (low, high) if high > low else (low - 1, high + 1)
 
 
 def _changes(view: View, colours: Palette) -> list[dict[str, Any]]:

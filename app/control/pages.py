@@ -13,10 +13,11 @@ from starlette.responses import RedirectResponse
 from app.characteristics import queries as characteristics
 from app.characteristics.figures_api import Choice, Chosen
 from app.characteristics.queries import Standing
-from app.control import actions, charts, forms, queries, wording
+from app.control import actions, charts, forms, queries, rules_wording, signals_queries, signals_wording, wording
 from app.control.answers import signals_out
-from app.control.drafting import Draft, draft_of
+from app.control.drafting import Draft, draft_of, suited
 from app.control.schemas import BaselineIn, PeriodIn, SignalOut
+from app.control.signals_queries import SignalRow
 from app.control.tables import Baseline
 from app.control.view import View
 from app.core.spc.quantity import Quantity
@@ -27,7 +28,6 @@ from app.proof import queries as proof
 from app.proof import wording as proof_wording
 from app.statistics import queries as statistics
 from app.statistics import wording as statistics_wording
-from app.wear import queries as wear
 from app.web.deps import Caller, Engineer, FormDep, SessionDep, Viewer, texts
 from app.web.fields import LARGEST_SERIAL, Reason
 from app.web.forms import parsed
@@ -37,7 +37,8 @@ from app.web.validation import checked
 router = APIRouter(include_in_schema=False)
 
 VERSIONS = 25  # baselines on the page
-LISTED = 20  # signals of a chart
+LISTED = 8  # signals of a chart
+KEPT = 5  # open ones
 Remembering = Literal["ewma", "moving_average", "cusum"]
 Version = Annotated[int, Path(ge=1, le=LARGEST_SERIAL)]
 
@@ -75,6 +76,13 @@ class Shown:
         window = statistics.window_of(self._session, self.standing.characteristic, **self._choice._asdict())
         return [charts.view(self._session, self.standing, self.judge, window, kind) for kind in self.kinds]
 
+    @cached_property
+    def kept(self) -> list[SignalRow]:
+        """Signals that nobody has explained yet, newest first; one more than the page lists if there are more."""
+        return signals_queries.signals(
+            self._session, characteristic=self.standing.characteristic, state="open", limit=KEPT + 1
+        )
+
     @property
     def signals(self) -> list[tuple[View, int, list[SignalOut]]]:
         """Of each chart how many signals there are, and the newest."""
@@ -86,13 +94,6 @@ class Shown:
             )
             for view in self.views
         ]
-
-
-def suited(session: Session, standing: Standing) -> Quantity:
-    """What is best charted of this characteristic."""
-    corrects = not standing.parameters.measures_only
-    fit = wear.wear_of(session, standing, wear.life_of(session, standing)).fit if corrects else None
-    return wording.suits(corrects=corrects, wears=fit is not None and fit.is_wear)
 
 
 def _as_query(choice: Choice) -> dict[str, Any]:
@@ -167,7 +168,9 @@ def _control(
         problem=error,
         wording=wording,
         said=statistics_wording,
-        rule_name=lambda name: statistics_wording.rule_name(RuleName(name)),
+        rule_name=lambda name, kind: rules_wording.name_of(RuleName(name), kind),
+        words=signals_wording,
+        most_kept=KEPT,
         proof_failing=proof.failing(),
         proof_warning=proof_wording.warning(len(proof.failing())),
         may_freeze=caller.may("engineer"),

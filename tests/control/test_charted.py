@@ -182,3 +182,22 @@ def test_where_one_picks_a_point_says_its_number_and_dragging_selects() -> None:
     figure = control_figure(seen([0.0, 4.0]), key="shaft", picks=True)
     assert traces(figure)["points"]["customdata"] == [1, 2]
     assert (figure["layout"]["dragmode"], figure["layout"]["selectdirection"]) == ("select", "h")
+
+
+def test_a_broken_insert_does_not_press_the_limits_into_a_line() -> None:
+    values = [*([0.5, -0.5] * 20), 400.0, *([0.5, -0.5] * 20), -300.0]
+    figure = control_figure(seen(values), key="shaft")
+    low, high = figure["layout"]["yaxis"]["range"]
+    assert -8 < low < -3 < 3 < high < 8
+    beyond = traces(figure)["beyond"]
+    assert (beyond["x"], beyond["text"]) == ([41, 82], ["+400 µm", "−300 µm"])
+    assert beyond["marker"]["symbol"] == ["triangle-up-open", "triangle-down-open"]
+    assert all(low < y < high for y in beyond["y"])
+    assert beyond["customdata"][0] == "/characteristics/shaft/readings/41"
+    assert {400.0, -300.0} <= set(traces(figure)["points"]["y"]), "a wider axis shows them where they are"
+    assert "beyond" not in traces(control_figure(seen([0.5, -0.5] * 20), key="shaft"))
+
+
+def test_limits_that_lie_close_together_are_named_in_one_line() -> None:
+    figure = control_figure(seen(np.linspace(-90.0, 90.0, 50)), key="shaft")
+    assert [each["text"] for each in figure["layout"]["annotations"]] == ["−3.0 to +3.0"]
