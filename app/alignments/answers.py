@@ -173,16 +173,18 @@ def turned_table(found: Alignment) -> Turned | None:
     return by_table(np.array(found.result["matrix"]), wanted)
 
 
-def program_of(found: Alignment, machine: Machine) -> str:
-    """The text that puts the frame where the part lies."""
+def program_of(found: Alignment, machine: Machine, control: str | None = None) -> str | None:
+    """The text that puts the frame where the part lies; None for another control that has not its work offset."""
     given = found.given
     turned = turned_table(found)
-    offset = offset_of(machine.control, given["work_offset"]) if "work_offset" in given else None
+    offset = offset_of(control or machine.control, given["work_offset"]) if "work_offset" in given else None
+    if control is not None and offset is None and "work_offset" in given:
+        return None
     base = None if offset is None else (offset, dict(zip("XYZ", given["base"], strict=True)))
     # The angles as they are stored, so that a turn of nothing is written as none.
     motion = frame(from_angles(*found.result["angles"]), found.result["shift"])
     return write_frame(
-        machine.control,
+        control or machine.control,
         FrameText(
             f"INBAND ALIGNMENT {found.id} FOR {machine.key.upper()}",
             motion if turned is None else turned.motion,
@@ -239,7 +241,7 @@ def alignment_out(session: Session, found: Alignment) -> AlignmentOut:
         difference=result.get("difference"),
         off=result.get("off"),
         table=table,
-        program=program_of(found, machine),
+        program=program_of(found, machine) or "",
         readings=[
             PushedOut(result=name, characteristic=key, sequence=sequence, refused=refused)
             for name, key, sequence, refused in queries.pushed(session, found)

@@ -1,6 +1,8 @@
 """Alignments as they were found. Never writes."""
 
-from sqlalchemy import select
+from typing import NamedTuple
+
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.alignments.tables import Alignment
@@ -9,6 +11,16 @@ from app.machines.tables import Machine
 from app.readings import queries as readings
 from app.web.fields import LARGEST_ID
 from app.web.i18n import _
+
+
+SHOWN = 200  # alignments of a history
+
+
+class SetUp(NamedTuple):
+    """What was aligned under one name on one machine: the newest alignment, and how many there are."""
+
+    newest: Alignment
+    alignments: int
 
 
 def alignment(session: Session, number: int, only: int | None = None) -> Alignment:
@@ -66,3 +78,38 @@ def pushed(session: Session, found: Alignment) -> list[tuple[str, str, int | Non
     return [
         (name, rows[key][0], rows[key][1].sequence, rows[key][1].refused) for key, name in keys.items() if key in rows
     ]
+
+
+def set_ups(session: Session, machine_id: int | None = None, limit: int = 100) -> list[SetUp]:
+    """Every name with its newest alignment, the one that came last first."""
+    counted = (
+        select(func.max(Alignment.id).label("id"), func.count().label("count"))
+        .where(Alignment.name.is_not(None))
+        .group_by(Alignment.machine_id, Alignment.name)
+        .order_by(func.max(Alignment.id).desc())
+        .limit(limit)
+    )
+    if machine_id is not None:
+        counted = counted.where(Alignment.machine_id == machine_id)
+    latest = counted.subquery()
+    rows = session.execute(
+        select(Alignment, latest.c.count).join(latest, latest.c.id == Alignment.id).order_by(Alignment.id.desc())
+    )
+    return [SetUp(*row) for row in rows]
+
+
+def history(session: Session, machine_id: int, name: str) -> list[Alignment]:
+    """The last alignments of one name in the order in which they were touched.
+
+    Of touches that were computed again the last result counts.
+    """
+    again = select(Alignment.recomputed_from).where(
+        Alignment.machine_id == machine_id, Alignment.recomputed_from.is_not(None)
+    )
+    rows = session.scalars(
+        select(Alignment)
+        .where(Alignment.machine_id == machine_id, Alignment.name == name, Alignment.id.not_in(again))
+        .order_by(Alignment.id.desc())
+        .limit(SHOWN)
+    )
+    return sorted(rows, key=lambda each: (each.aligned_at, each.id))
