@@ -1,0 +1,335 @@
+"""Pictures of alignments: pure, values in, Plotly figures as dicts out. mm in.
+
+The part is seen from above one of its corners, from where the touched faces are seen: grey as it should lie, in colour as it
+does, displacements enlarged so that they can be seen. Beside each touch stand its number and its deviation in µm.
+"""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from math import floor, log10
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from app.core.geometry.points import Floats
+from app.web.i18n import _
+from app.web.numbers import signed
+from app.web.theme import Palette, ThemeName, date_axis, layout, palette
+
+SEEN = 0.09  # of the part's size: so large the greatest displacement is drawn
+FAINTEST = 1e-7  # mm: what has moved by less has not moved
+MOTIONS = ("a", "b", "c")
+BOX = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+LEGEND: dict[str, Any] = {"orientation": "h", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
+
+
+class Drawn(NamedTuple):
+    """What is drawn of a touch: where, which way the face looks, how far off along it, and whether it does not fit."""
+
+    place: Sequence[float]
+    normal: Sequence[float]
+    off: float
+    doubted: bool = False
+
+
+def part_figure(motion: Floats, touches: Sequence[Drawn], *, theme: ThemeName = "light") -> dict[str, Any]:
+    """The part as it should lie and as it lies, with its touches."""
+    colours = palette(theme)
+    places = np.array([touch.place for touch in touches], dtype=np.float64)
+    normals = np.array([touch.normal for touch in touches], dtype=np.float64)
+    view, depth = _view(normals)
+    corners = _corners(places, normals)
+    size = float(np.ptp(corners, axis=0).max())
+    moved = (np.column_stack([corners, np.ones(8)]) @ motion.T)[:, :3] - corners
+    shown = max(float(np.linalg.norm(moved, axis=1).max()), *(abs(touch.off) for touch in touches), FAINTEST)
+    times = enlargement(SEEN * size / shown)
+    data = _box(corners, view, depth, colours.faint, _("As it should lie"))
+    data += _box(
+        corners + times * moved, view, depth, colours.correction, _("As it lies, {times} ×").format(times=times)
+    )
+    data += _axes(corners, view, size, colours)
+    arrows, marks, words = _touches(touches, places, normals, times, view, colours)
+    return {"data": [*data, *arrows, *marks], "layout": _framed(theme, colours, words)}
+
+
+def plane_figure(
+    motion: Floats, nominal: Sequence[Sequence[float]], found: Sequence[Sequence[float]], theme: ThemeName = "light"
+) -> dict[str, Any]:
+    """Two points of a side, or two holes, from above; displacements enlarged."""
+    colours = palette(theme)
+    places, measured = np.array(nominal, dtype=np.float64), np.array(found, dtype=np.float64)
+    size = max(float(np.linalg.norm(np.ptp(places, axis=0))), 1e-9)
+    off = measured - places
+    times = enlargement(2 * SEEN * size / max(float(np.linalg.norm(off, axis=1).max()), FAINTEST))
+    flat = np.column_stack([places, np.zeros(len(places)), np.ones(len(places))])
+    fitted = places + times * ((flat @ motion.T)[:, :2] - places)
+    drawn = places + times * off
+    data = [
+        _line(
+            places,
+            colours.faint,
+            _("As it should lie"),
+            mode="lines+markers",
+            marker={"symbol": "circle-open", "size": 16},
+        ),
+        _line(fitted, colours.correction, _("As it lies, {times} ×").format(times=times)),
+        _line(
+            drawn,
+            colours.attention,
+            _("Found"),
+            mode="markers",
+            marker={"symbol": "cross-thin-open", "size": 16, "line": {"width": 2.5}},
+        ),
+    ]
+    words = [
+        _word(
+            drawn[at],
+            f"<b>{at + 1}</b> {signed(off[at][0] * 1000, 1)} {signed(off[at][1] * 1000, 1)} µm",
+            colours,
+            yshift=18,
+        )
+        for at in range(len(places))
+    ]
+    return {"data": data, "layout": _framed(theme, colours, words)}
+
+
+def enlargement(wanted: float) -> int:
+    """The next of 1, 2, 5 times a power of ten below what would fill the picture; 1 at least.
+
+    >>> enlargement(734.0), enlargement(0.3), enlargement(20.0)
+    (500, 1, 20)
+    """
+    if wanted < 2:
+        return 1
+    power = 10 ** floor(log10(wanted * (1 + 1e-9)))
+    return int(next(step * power for step in (5, 2, 1) if step * power <= wanted * (1 + 1e-9)))
+
+
+def _view(normals: Floats) -> tuple[Floats, Floats]:
+    """Two rows, right and up of the picture, for one who sees the touched faces; and the way towards that one."""
+    sides = normals.sum(axis=0)
+    usual = np.array([-1.0, -1.0, 1.0])
+    towards = np.where(np.abs(sides) > 1e-9, np.sign(sides), usual) * np.array([1.0, 1.4, 1.0])
+    towards /= np.linalg.norm(towards)
+    right = np.cross([0.0, 0.0, 1.0], towards)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(towards, right)]), towards
+
+
+def _corners(places: Floats, normals: Floats) -> Floats:
+    """Of the box that the touches lie on: a touched side ends it, another one lies a little beyond."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    room = 0.15 * float(np.ptp(places, axis=0).max() or 1.0)
+    for axis in range(3):
+        facing = normals[:, axis]
+        touched = [places[facing * side > 0.7, axis] for side in (-1, 1)]
+        low[axis] = touched[0].min() if len(touched[0]) else low[axis] - room
+        high[axis] = touched[1].max() if len(touched[1]) else high[axis] + room
+        if high[axis] - low[axis] < room:
+            high[axis], low[axis] = max(high[axis], low[axis]), min(high[axis], low[axis])
+            if len(touched[1]):
+                low[axis] -= room
+            else:
+                high[axis] += room
+    return np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
+
+
+def _box(corners: Floats, view: Floats, towards: Floats, colour: str, name: str) -> list[dict[str, Any]]:
+    """The edges of a box: those behind it dotted."""
+    flat = corners @ view.T
+    hidden = int((corners @ towards).argmin())
+    made = []
+    for behind in (True, False):
+        x: list[float | None] = []
+        y: list[float | None] = []
+        for a, b in BOX:
+            if (hidden in (a, b)) is behind:
+                x += [float(flat[a][0]), float(flat[b][0]), None]
+                y += [float(flat[a][1]), float(flat[b][1]), None]
+        style = {"color": colour, "width": 1.2 if behind else 2.5, "dash": "dot" if behind else "solid"}
+        made.append(
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "x": x,
+                "y": y,
+                "line": style,
+                "name": name,
+                "showlegend": not behind,
+                "hoverinfo": "skip",
+            }
+        )
+    return made
+
+
+def _axes(corners: Floats, view: Floats, size: float, colours: Palette) -> list[dict[str, Any]]:
+    """X, Y and Z from below the part, so that one knows from where it is seen."""
+    flat = corners @ view.T
+    start = np.array([flat[:, 0].min() - 0.12 * size, flat[:, 1].min() - 0.02 * size])
+    made = []
+    for axis, name in enumerate("XYZ"):
+        end = start + 0.16 * size * view[:, axis]
+        made.append(
+            {
+                "type": "scatter",
+                "mode": "lines+text",
+                "x": [float(start[0]), float(end[0])],
+                "y": [float(start[1]), float(end[1])],
+                "text": ["", name],
+                "textposition": "top center" if axis == 2 else "middle right" if end[0] > start[0] else "middle left",
+                "textfont": {"size": 13, "color": colours.quiet},
+                "line": {"color": colours.quiet, "width": 1.5},
+                "showlegend": False,
+                "hoverinfo": "skip",
+                "cliponaxis": False,
+            }
+        )
+    return made
+
+
+def _touches(
+    touches: Sequence[Drawn], places: Floats, normals: Floats, times: int, view: Floats, colours: Palette
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]], list[dict[str, Any]]]:
+    """Arrows from where a touch should have been to where it was, their marks, and the words beside them."""
+    ends = places + times * normals * np.array([[touch.off] for touch in touches])
+    begin, end = places @ view.T, ends @ view.T
+    arrows = [
+        _line(np.array([begin[at], end[at]]), colours.stop if touch.doubted else colours.ink, None)
+        for at, touch in enumerate(touches)
+    ]
+    marks, words = [], []
+    for doubted, name, symbol in ((False, _("Touches"), "circle"), (True, _("Does not fit"), "x")):
+        chosen = [at for at, touch in enumerate(touches) if touch.doubted is doubted]
+        if chosen:
+            colour = colours.stop if doubted else colours.ink
+            marks.append(
+                _line(
+                    end[chosen],
+                    colour,
+                    name,
+                    mode="markers",
+                    marker={"symbol": symbol, "size": 12 if doubted else 9, "color": colour},
+                    hoverinfo="text",
+                    hovertext=[
+                        _("touch {n}: {off} µm along its face's normal").format(
+                            n=at + 1, off=signed(touches[at].off * 1000, 1)
+                        )
+                        for at in chosen
+                    ],
+                )
+            )
+    outward = normals @ view.T
+    for at, touch in enumerate(touches):
+        way = outward[at] / max(float(np.linalg.norm(outward[at])), 1e-9)
+        text = f"<b>{at + 1}</b> {signed(touch.off * 1000, 1)}"
+        words.append(_word(end[at], text, colours, xshift=float(30 * way[0]), yshift=float(18 * way[1] + 4)))
+    return arrows, marks, words
+
+
+def _line(points: Floats, colour: str, name: str | None, **more: Any) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": [float(each) for each in points[:, 0]],
+        "y": [float(each) for each in points[:, 1]],
+        "line": {"color": colour, "width": 2},
+        "name": name,
+        "showlegend": name is not None,
+        "hoverinfo": "skip",
+        "cliponaxis": False,
+    } | ({"marker": {"color": colour} | more.pop("marker", {})} | more)
+
+
+def _word(place: Floats, text: str, colours: Palette, **more: Any) -> dict[str, Any]:
+    return {
+        "x": float(place[0]),
+        "y": float(place[1]),
+        "text": text,
+        "showarrow": False,
+        "font": {"size": 14, "color": colours.ink},
+        "bgcolor": colours.surface,
+        "borderpad": 1,
+    } | more
+
+
+def _framed(theme: ThemeName, colours: Palette, words: list[dict[str, Any]]) -> dict[str, Any]:
+    hidden = {"visible": False, "fixedrange": True}
+    return layout(
+        theme,
+        margin={"l": 24, "r": 24, "t": 40, "b": 24},
+        showlegend=True,
+        legend=LEGEND | {"font": {"size": 13, "color": colours.quiet}, "itemclick": False, "itemdoubleclick": False},
+        xaxis=hidden,
+        yaxis=hidden | {"scaleanchor": "x", "scaleratio": 1},
+        annotations=words,
+        dragmode=False,
+    )
+
+
+# --- the trend
+
+
+class Mark(NamedTuple):
+    """An alignment as it is drawn over time: shifts in mm, turns in degrees."""
+
+    at: datetime
+    number: int
+    shift: Sequence[float]
+    turns: Sequence[float]
+    doubted: bool
+
+
+def trend(marks: Sequence[Mark], *, theme: ThemeName = "light") -> dict[str, Any]:
+    """Shifts above, turns below, one line for each axis, told apart by their marks as well."""
+    colours = palette(theme)
+    tones = (colours.correction, colours.waiting, colours.wear)
+    data = []
+    for axis, (name, symbol) in enumerate(zip("XYZ", ("circle", "square", "diamond"), strict=True)):
+        for below, scale, unit in ((False, 1000, "µm"), (True, 1, "°")):
+            values = [(mark.turns if below else mark.shift)[axis] * scale for mark in marks]
+            data.append(
+                {
+                    "type": "scatter",
+                    "mode": "lines+markers",
+                    "name": name,
+                    "legendgroup": name,
+                    "showlegend": not below,
+                    "x": [mark.at.isoformat() for mark in marks],
+                    "y": values,
+                    "yaxis": "y2" if below else "y",
+                    "line": {"color": tones[axis], "width": 1.5},
+                    "marker": {"symbol": symbol, "size": 8, "color": tones[axis]},
+                    "customdata": [f"/alignments/{mark.number}" for mark in marks],
+                    "text": [
+                        _("alignment {n}: {axis} {value} {unit}").format(
+                            n=mark.number, axis=name, value=signed(value, 4 if below else 1), unit=unit
+                        )
+                        for mark, value in zip(marks, values, strict=True)
+                    ],
+                    "hovertemplate": "%{text}<extra></extra>",
+                    "cliponaxis": False,
+                }
+            )
+
+    def titled(text: str) -> dict[str, Any]:
+        return {"title": {"text": text, "font": {"size": 13, "color": colours.quiet}, "standoff": 8}, "zeroline": True}
+
+    frame = layout(
+        theme,
+        margin={"l": 72, "r": 16, "t": 36, "b": 48},
+        showlegend=True,
+        legend=LEGEND | {"font": {"size": 13, "color": colours.quiet}},
+        xaxis=date_axis() | {"anchor": "y2"},
+        yaxis=titled(_("Shift, µm")) | {"domain": [0.54, 1], "tickformat": "+.4~g", "zerolinecolor": colours.faint},
+    )
+    frame["yaxis2"] = frame["yaxis"] | titled(_("Turn, °")) | {"domain": [0, 0.46]}
+    return {"data": data, "layout": frame}
+
+
+def touches_of(given: Mapping[str, Any], result: Mapping[str, Any]) -> list[Drawn]:
+    """What is drawn of an alignment by points."""
+    doubted = {at for group in result.get("misfits", []) for at in group}
+    return [
+        Drawn(touch["nominal"], np.array(touch["normal"]) / np.linalg.norm(touch["normal"]), off, number in doubted)
+        for number, (touch, off) in enumerate(zip(given["touches"], result["deviations"], strict=True), 1)
+    ]
