@@ -5,7 +5,6 @@ Every verb locks the machine first: of two who enter at once one wins, and the o
 
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
-from zoneinfo import ZoneInfo
 
 from sqlalchemy.orm import Session
 
@@ -14,7 +13,7 @@ from app.audit.actions import record as audit
 from app.core.zones import nanometres
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
-from app.formats.values import Unreadable, moment
+from app.formats.values import Unreadable, moment, zone_named
 from app.kinematics import queries, refusals, wording
 from app.kinematics.evaluation import evaluate
 from app.kinematics.outcome import Evaluated, Limits
@@ -62,7 +61,7 @@ def take(session: Session, machine: Machine, given: RunIn, caller: Caller) -> Ta
     limits = limits_of(plan)
     found = evaluate(given, limits)
     head = given.head or ""
-    said = given.measured_at or _said_time(found)
+    said = given.measured_at or _said_time(found, given.timezone)
     in_effect, version = queries.state_at(session, machine.id, head, said)
     made = KinematicsRun(
         machine_id=machine.id,
@@ -99,13 +98,13 @@ def limits_of(plan: KinematicsPlan) -> Limits:
     return Limits(*(getattr(plan, name) for name in SETTINGS))
 
 
-def _said_time(found: Evaluated) -> datetime | None:
-    """When the protocol says it was written; clocks of controls know no zone, so it is taken for UTC, and said."""
+def _said_time(found: Evaluated, timezone: str | None) -> datetime | None:
+    """When the protocol says it was written; clocks of controls know no zone: that is said, or taken for UTC."""
     text = found.head.get("created")
     if text is None:
         return None
     try:
-        said = moment(text, ZoneInfo("UTC"))
+        said = moment(text, zone_named(timezone or "UTC")).astimezone(UTC)
     except Unreadable as error:
         found.results["notes"].append(_("the time “{text}” {why}").format(text=text[:60], why=error))
         return None

@@ -2,11 +2,12 @@
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, JsonValue, model_validator
+from pydantic import ConfigDict, Field, JsonValue, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.core.kinematics.axis import AxisName, Carried
 from app.core.parameters import LARGEST_LENGTH
+from app.formats.values import Unreadable, zone_named
 from app.kinematics.values import UNITS
 from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Reason, Slug, Text200
 from app.web.i18n import _
@@ -170,9 +171,21 @@ class RunIn(Body):
     protocol: Annotated[
         str | None, Field(min_length=1, max_length=MOST_PROTOCOL, description="TCHPRAUTO.html of the control.")
     ] = None
+    timezone: Annotated[
+        Text200 | None, Field(max_length=64, description="Of the control's clock, which writes the protocol; else UTC.")
+    ] = None
     confirm: Annotated[
         Reason | None, Field(description="Confirms a change larger than permitted at once, and says why.")
     ] = None
+
+    @field_validator("timezone")
+    @classmethod
+    def _there_is_such_a_zone(cls, name: str | None) -> str | None:
+        try:
+            zone_named(name or "UTC")
+        except Unreadable as error:
+            raise PydanticCustomError("timezone", "{why}", {"why": str(error)}) from None
+        return name
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:

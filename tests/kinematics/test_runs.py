@@ -64,6 +64,22 @@ class TestForms:
             assert len(c["positions"]) == 4
             assert c["position_after"] == [250.0123, -0.0081, -120.0]
 
+    def test_the_clock_of_the_control(self, shop: Shop) -> None:
+        run = take(shop, protocol=protocol("de"), timezone="Europe/Ljubljana")
+        assert run["measured_at"] == "2026-11-21T05:42:10Z"
+        problem = take(shop, 422, protocol=protocol("de"), timezone="Ljubljana")
+        assert problem["errors"][0]["field"] == "timezone"
+        assert "Europe/Belgrade" in problem["errors"][0]["message"]
+
+    def test_places_that_contradict_the_corrections(self, shop: Shop) -> None:
+        run = take(
+            shop,
+            protocol="<h2>C axis</h2><p>Corrections: X 0.01 Y 0 Z 0</p><p>Position before: X 250 Y 0 Z 0</p>"
+            "<p>Position after: X 249.99 Y 0 Z 0</p>",
+        )
+        assert run["axes"][0]["errors"]["EX0C"]["value"] == -0.01  # where the kinematics went, not what was called so
+        assert "the corrections say" in run["not_understood"][0]
+
     def test_the_ball_alone(self, shop: Shop) -> None:
         run = take(shop, shift={"nominal": [0.0, 0.0, 0.0], "centre": [0.012, -0.003, 0.001]})
         assert run["offsets"] == {"X": 0.012, "Y": -0.003, "Z": 0.001}
