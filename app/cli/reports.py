@@ -14,6 +14,7 @@ from app.cli.base import DatabaseUrl, DataDir, cli, migrated, people, say, setti
 from app.cli.data import Zone
 from app.db.engine import Database
 from app.errors import InbandError
+from app.proof import queries as proof
 from app.reports import queries
 from app.reports.asking import Format, Paper, SectionName, Wishes, typed
 from app.reports.bundle import Bundle, BundleFormat, Part, packed
@@ -67,6 +68,7 @@ def report_files(
         [name.value for name in section or ()],
     )
     _check(keys, form, output)
+    proof.begin()
     bundle = Bundle(wishes, _bundled(form, output, keys))
     with migrated(settings_from(data_dir=data_dir, database_url=database_url)) as database:
         parts = _made(database, keys, bundle, wishes)
@@ -109,6 +111,7 @@ def _bundled(form: Format, output: Path | None, keys: Sequence[str]) -> BundleFo
 def _made(database: Database, keys: Sequence[str], bundle: Bundle, wishes: Wishes) -> list[Part]:
     """Every report, or why there is none."""
     parts: list[Part] = []
+    proof.proof()  # what is handed over says it if an example fails
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=people, transient=True, disable=not people.is_terminal) as progress:
         task = progress.add_task(_("Reports"), total=len(keys))

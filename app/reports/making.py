@@ -18,6 +18,7 @@ from sqlalchemy.exc import DBAPIError, OperationalError
 from app.characteristics import queries as characteristics
 from app.db.engine import Database
 from app.errors import InbandError
+from app.proof import queries as proof
 from app.reports import actions, queries
 from app.reports.bundle import MOST_BYTES, Bundle, Part, file_name, packed
 from app.web.i18n import _, speaking
@@ -93,6 +94,7 @@ class Reporter:
         if stored is None:
             return
         bundle = Bundle.of(stored)
+        proof.proof()  # what is handed over says it if an example fails; a page does not wait for that, this does
         with speaking(bundle.language):
             for place, key in enumerate(bundle.keys):
                 if place in ready:
