@@ -184,7 +184,7 @@ class RunIn(Body):
         try:
             zone_named(name or "UTC")
         except Unreadable as error:
-            raise PydanticCustomError("timezone", "{why}", {"why": str(error)}) from None
+            raise PydanticCustomError("zone", "{why}", {"why": str(error)}) from None
         return name
 
     @model_validator(mode="after")
