@@ -12,7 +12,6 @@ from app.readings import queries as readings
 from app.web.fields import LARGEST_ID
 from app.web.i18n import _
 
-
 SHOWN = 200  # alignments of a history
 
 
