@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from math import hypot
 from typing import Any
 
 from app.web.i18n import _
@@ -26,6 +27,15 @@ class Mark:
     offset: str
 
 
+def _tone(mark: Mark, axis: str, warning: float | None, colours: Any, quiet: str) -> str:
+    """The colour of an axis of a zero that has shifted: of the axis that has most, and of those that would do it alone."""
+    size = abs(mark.shifts[axis])
+    to_blame = size >= max(map(abs, mark.shifts.values())) or (warning is not None and size > warning)
+    if mark.state in {"alarm", "warning"} and to_blame:
+        return str(colours.stop if mark.state == "alarm" else colours.attention)
+    return quiet
+
+
 def shift_figure(
     marks: Sequence[Mark], warning: float | None, alarm: float | None, *, theme: ThemeName = "light"
 ) -> dict[str, Any]:
@@ -37,10 +47,7 @@ def shift_figure(
         mine = [mark for mark in marks if axis in mark.shifts]
         if not mine:
             continue
-        outline = [
-            colours.stop if mark.state == "alarm" else colours.attention if mark.state == "warning" else tones[axis]
-            for mark in mine
-        ]
+        outline = [_tone(mark, axis, warning, colours, tones[axis]) for mark in mine]
         traces.append(
             {
                 "type": "scatter",
@@ -60,6 +67,21 @@ def shift_figure(
                 "cliponaxis": False,
             }
         )
+    together = [mark for mark in marks if len(mark.shifts) > 1]
+    if together:
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "name": _("together"),
+                "meta": "together",
+                "x": [mark.at.isoformat() for mark in together],
+                "y": [hypot(*mark.shifts.values()) * 1000 for mark in together],
+                "line": {"width": 5, "color": colours.grid},
+                "hoverinfo": "skip",
+            }
+        )
+        traces.insert(0, traces.pop())  # behind the others
     shapes: list[dict[str, Any]] = []
     names: list[dict[str, Any]] = []
     for limit, word, tone in ((warning, _("warning"), colours.attention), (alarm, _("alarm"), colours.stop)):

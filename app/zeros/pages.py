@@ -80,7 +80,9 @@ def new_page(
         )
     else:
         chosen = kind if kind in KINDS else "pocket"
-        form = forms.blank(chosen) | {"kind": chosen, "machine": machine or "", "fixture": fixture or ""}
+        last = queries.work_zeros(session, newest_first=True, limit=1)
+        usual = session.get_one(Machine, last[0].machine_id).key if last else ""
+        form = forms.blank(chosen) | {"kind": chosen, "machine": machine or usual, "fixture": fixture or ""}
     return _new(request, session, form | {"key": f"page-{token_hex(12)}"}, like=like)
 
 

@@ -40,14 +40,19 @@ class Tip:
 
 @dataclass(frozen=True)
 class Picture:
-    """What is drawn. outline: of the part, as an SVG path; circle: x, y, radius; zero: where it lies."""
+    """What is drawn.
+
+    outline: of the part, as an SVG path; sides: what of a corner's outline is its own; circle: x, y, radius; zero: where it
+    lies, by axis; size: as it is written to the part.
+    """
 
     kind: str
     outline: str
+    sides: str
     circle: tuple[float, float, float] | None
     zero: tuple[float | None, float | None]
     tips: tuple[Tip, ...]
-    sizes: tuple[tuple[float, float, str], ...]
+    size: str
     inside: bool
     width: float = WIDTH
     height: float = HEIGHT
@@ -84,14 +89,15 @@ def draw(
     scale, put = _fitted([*corners, *standing, middle] + _box(circle), tip)
     return Picture(
         kind=kind,
-        outline=_path(kind, [put(corner) for corner in corners]),
+        outline=_path(drawn) + "Z" if (drawn := [put(corner) for corner in corners]) else "",
+        sides=_path(drawn[:3]) if kind == "corner" else "",
         circle=None if circle is None else (*put(circle[:2]), circle[2] * scale),
         zero=tuple(None if values.get(name) is None else at for name, at in zip("xy", put(middle), strict=True)),  # type: ignore[arg-type]
         tips=tuple(
             _tip(number, put(place), max(SMALLEST_TIP, tip / 2 * scale), touch.get("approach"))
             for number, (touch, place) in enumerate(zip(touches, standing, strict=True), 1)
         ),
-        sizes=_sizes(values, corners, circle, scale, put) if named else (),
+        size=_size(values) if named else "",
         inside=kind in INSIDE,
     )
 
@@ -124,7 +130,7 @@ def _part(
         for axis in (0, 1):
             signs = [STEPS[a][axis] for each in touches if (a := each.get("approach")) and STEPS[a][axis]]
             into.append(signs[0] if signs else 1.0)
-        ends = [(0.0, into[1] * arm), (0.0, 0.0), (into[0] * arm, 0.0)]
+        ends = [(0.0, into[1] * arm), (0.0, 0.0), (into[0] * arm, 0.0), (into[0] * arm, into[1] * arm)]
         return [_turned(end, angle, middle) for end in ends], None
     long, wide = values.get("length"), values.get("width")
     half = ((long or (wide or 10.0) * 1.6) / 2, (wide or (long or 10.0) * 0.64) / 2)
@@ -160,11 +166,9 @@ def _fitted(places: Sequence[Place], tip: float) -> tuple[float, Any]:
     return scale, put
 
 
-def _path(kind: str, corners: Sequence[Place]) -> str:
-    if not corners:
-        return ""
+def _path(corners: Sequence[Place]) -> str:
     first, *others = corners
-    return f"M{first[0]} {first[1]}" + "".join(f"L{x} {y}" for x, y in others) + ("" if kind == "corner" else "Z")
+    return f"M{first[0]} {first[1]}" + "".join(f"L{x} {y}" for x, y in others)
 
 
 def _tip(number: int, place: Place, radius: float, approach: str | None) -> Tip:
@@ -179,19 +183,9 @@ def _tip(number: int, place: Place, radius: float, approach: str | None) -> Tip:
     return Tip(number, x, y, radius, arrow, (x - along * far, y - up * far))
 
 
-def _sizes(
-    values: Mapping[str, float | None], corners: Sequence[Place], circle: Any, scale: float, put: Any
-) -> tuple[tuple[float, float, str], ...]:
-    """What is written beside the part: its sizes."""
-    found = []
-    if circle is not None and values.get("diameter") is not None:
-        x, y = put(circle[:2])
-        found.append((x, y + circle[2] * scale * 0.5, f"⌀{values['diameter']:.3f}"))
-    elif len(corners) == 4:
-        placed = [put(corner) for corner in corners]
-        x = sum(each[0] for each in placed) / 4
-        y = sum(each[1] for each in placed) / 4
-        reach = max(each[1] for each in placed) - y
-        said = [f"{values[name]:.3f}" for name in ("length", "width") if values.get(name) is not None]
-        found.append((x, y + reach * 0.5, " \N{MULTIPLICATION SIGN} ".join(said)))
-    return tuple(found)
+def _size(values: Mapping[str, float | None]) -> str:
+    """The size as it is written to the part; nothing for a corner."""
+    if (diameter := values.get("diameter")) is not None:
+        return f"⌀{diameter:.3f}"
+    known = [f"{value:.3f}" for name in ("length", "width") if (value := values.get(name)) is not None]
+    return " \N{MULTIPLICATION SIGN} ".join(known)

@@ -40,6 +40,12 @@ def moved(dx: float, dy: float = 0.0) -> list[dict[str, Any]]:
     return touches
 
 
+def moved_along(figure: Any, axis: str) -> list[float]:
+    (trace,) = [each for each in figure["data"] if each["meta"] == axis]
+    found: list[float] = trace["y"]
+    return found
+
+
 class TestFound:
     def test_with_size_text_and_uncertainty(self, shop: Shop) -> None:
         made = post(shop, z_touched=-201.5, feeler=0.1, tool_length=98.25, repeatability=0.001, part="SN-1")
@@ -57,7 +63,7 @@ class TestFound:
             "POST", "/work-zeros", 201, machine=shop.machine, kind="bore", tip=6.0, R1=12.0, R2=60.0, R3=7.0, R4=43.0
         )
         assert (sinumerik["x"], sinumerik["y"], sinumerik["diameter"]) == (36.0, 25.0, 66.0)
-        fanuc = {"#501": 53.0, "#502": -53.0, "#504": -33.0, "#505": 37.0, "#508": -150.0, "#2": 0.1}
+        fanuc: dict[str, Any] = {"#501": 53.0, "#502": -53.0, "#504": -33.0, "#505": 37.0, "#508": -150.0, "#2": 0.1}
         made = shop.call("POST", "/work-zeros", 201, machine=shop.machine, kind="web", tip=6.0, **fanuc)
         assert (made["x"], made["y"], made["z"], made["length"], made["width"]) == (0.0, 2.0, -150.1, 100.0, 64.0)
         assert made["records"] == [53.0, -53.0, -33.0, 37.0]
@@ -69,6 +75,20 @@ class TestFound:
         two = post(shop, kind="bore", touches=POCKET["touches"][:2])
         assert (two["y"], two["diameter"]) == (None, 100.004)
         assert "$P_UIFR[1,X,TR]=-306.01\n" in two["program"]
+
+    def test_the_text_for_another_control(self, shop: Shop) -> None:
+        made = post(shop)
+        path = f"/api/v1/work-zeros/{made['id']}/program"
+        own = shop.admin.get(path)
+        assert own.text == made["program"]
+        assert own.headers["content-disposition"].endswith('.spf"')
+        fanuc = shop.admin.get(path, params={"control": "fanuc"})
+        assert "G90 G10 L2 P1 X-306.01 Y-154.25\n" in fanuc.text
+        other = post(shop, work_offset="G505")
+        assert (
+            shop.admin.get(f"/api/v1/work-zeros/{other['id']}/program", params={"control": "fanuc"}).status_code == 404
+        )
+        assert shop.admin.get(path, params={"control": "abacus"}).status_code == 422
 
     def test_for_a_fanuc_as_g10(self, server: Server) -> None:
         other = Shop(server)
@@ -158,7 +178,12 @@ class TestFixtures:
         first = post(shop, fixture="vice")
         assert first["shift"]["state"] == "unknown"
         path = f"/work-zeros/fixtures/{shop.machine}/vice"
-        limits = {"basis": "first", "warning": 0.01, "alarm": 0.03, "reason": "a vice that is known to move"}
+        limits: dict[str, Any] = {
+            "basis": "first",
+            "warning": 0.01,
+            "alarm": 0.03,
+            "reason": "a vice that is known to move",
+        }
         shop.call("PUT", path, 200, **limits)
         near = post(shop, fixture="vice", touches=moved(0.012, -0.004))
         assert near["shift"]["shifts"] == {"x": 0.012, "y": -0.004}
@@ -175,7 +200,7 @@ class TestFixtures:
         post(shop, fixture="vice", touches=moved(0.001))
         assert shop.alarms() == []
         figure = shop.call("GET", f"{path}/figure?theme=dark")
-        assert figure["data"][0]["y"] == pytest.approx([12.0, 50.0, 60.0, 1.0])
+        assert moved_along(figure, "x") == pytest.approx([12.0, 50.0, 60.0, 1.0])
 
     def test_against_a_frozen_one_and_the_median(self, server: Server) -> None:
         shop = Shop(server)
@@ -191,7 +216,7 @@ class TestFixtures:
         told = shop.call("PUT", path, 422, basis="first", warning=0.1, alarm=0.01, reason="x")
         assert told["errors"][0]["field"] == "warning"
         figure = shop.call("GET", f"{path}/figure")
-        assert len(figure["data"][0]["y"]) == 4  # the first has nothing before it
+        assert len(moved_along(figure, "x")) == 4  # the first has nothing before it
 
     def test_two_parts_in_one_fixture_are_kept_apart(self, server: Server) -> None:
         shop = Shop(server)
