@@ -119,9 +119,11 @@ def send_proposal(
     try:
         said = forms.asked(typed).model_dump(by_alias=True)
         given = parsed(ProposalIn, said | {"reason": form.get("reason", "").strip()})
-        row = actions.propose(session, asking.replayed(session, standing, given), given.reason, caller)
+        answer = asking.replayed(session, standing, given)
+        with session.begin_nested():  # what is refused lets the machine go at once
+            row = actions.propose(session, answer, given.reason, caller)
     except (Invalid, Conflict, TooManyRequests) as error:
-        session.rollback()  # lets the machine go, and begins with what is in force now
+        session.expire_all()
         standing = characteristics.characteristic_named(session, characteristic)
         return _what_if(request, session, caller, standing, typed, reason=form.get("reason", ""), refused=error)
     return RedirectResponse(f"/proposals/{row.proposal.id}?done=proposed", 303)
@@ -166,9 +168,10 @@ def send_decision(request: Request, session: SessionDep, caller: Operator, numbe
     act, becomes = VERBS[verb]
     try:
         reason = parsed(DecisionIn, {"reason": form.get("reason", "").strip()}).reason
-        act(session, number, reason, caller)
+        with session.begin_nested():
+            act(session, number, reason, caller)
     except (Invalid, Conflict) as error:
-        session.rollback()
+        session.expire_all()
         return _proposal(request, session, caller, number, typed=form, error=error)
     return RedirectResponse(f"/proposals/{number}?done={becomes}", 303)
 

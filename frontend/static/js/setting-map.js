@@ -11,7 +11,10 @@ class SettingMap extends HTMLElement {
     const start = this.querySelector("[data-chosen]") ?? links[0];
     for (const link of links) link.tabIndex = link === start ? 0 : -1;
     this.addEventListener("keydown", (event) => this.move(event));
-    if (location.hash === "#replay" && start.dataset.chosen !== undefined) start.focus({ preventScroll: true });
+    if (location.hash !== "#replay" || start.dataset.chosen === undefined) return;
+    const focus = () => start.focus({ preventScroll: true }); // after the browser has gone to #replay, which takes the focus away
+    if (document.readyState === "complete") focus();
+    else addEventListener("load", focus, { once: true });
   }
 
   move(event) {
