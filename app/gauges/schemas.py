@@ -1,26 +1,16 @@
 """Gauge studies as they come in. Lengths in mm."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field
-from pydantic_core import PydanticCustomError
+from pydantic import ConfigDict, Field
 
 from app.core.parameters import LARGEST_LENGTH
 from app.web.fields import LARGEST_ID, Body, Reason, Slug, Text200
 
 Kind = Literal["type_one", "bias", "linearity", "grr"]
-Length = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
+Value = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
 MOST_ROWS, MOST_IN_ROW, MOST_VALUES = 2_000, 1_000, 10_000
-
-
-def _not_a_flag(value: Any) -> Any:
-    if isinstance(value, bool):
-        raise PydanticCustomError("float_type", "not a number")
-    return value
-
-
-Value = Annotated[Length, BeforeValidator(_not_a_flag)]
 
 
 class RowIn(Body):

@@ -1,27 +1,21 @@
 """How each kind of example is computed: given what an example gives, what the live engine makes of it."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from app.core.compensation import Action, State, average_of, decide
 from app.core.parameters import mean_nominal, read
 from app.core.spc import chance, constants, cusum, ewma, shewhart
-from app.core.spc.capability import Limits, capability, percentile
-from app.core.spc.gauge.crossed import Study, by_anova, by_average_and_range
-from app.core.spc.gauge.linearity import linearity
-from app.core.spc.gauge.single import bias, type_one
+from app.core.spc.capability import Limits, capability, percentile, ppk_of, spread_index, target_index
 from app.core.spc.in_time import brown_forsythe, decompose, successive
-from app.core.spc.normality import anderson_darling, shapiro_wilk
-from app.core.spc.refusal import Floats
+from app.core.spc.normality import anderson_darling, p_of, shapiro_wilk
 from app.core.spc.rules import RULES, RuleName, signals_of_cusum
-from app.core.spc.spread import Estimator, subgroups, summary
+from app.core.spc.spread import Estimator, Sigma, freedom_of_moving_ranges, from_ranges, subgroups, summary
 from app.core.uncertainty import position_uncertainty
+from app.proof import engine_of_gauges as gauges
 from app.proof import geometry
-
-Given = dict[str, Any]
-Got = dict[str, Any]
+from app.proof.given import Given, Got, readings_of
 
 
 def decision(given: Given) -> Got:
@@ -54,18 +48,6 @@ def running_average(given: Given) -> Got:
 
 def signal_path(given: Given) -> Got:
     return {"error_um": position_uncertainty(given["feed"], given["delay"]) * 1000}
-
-
-def readings_of(given: Given) -> Floats:
-    """The readings of an example: written out, alternating, in steps of one, or made to have a mean and an s."""
-    if "alternating" in given:
-        return np.array([given["first"], *(given["alternating"] * given["times"])], dtype=np.float64)
-    if "count" in given:
-        steps: Floats = np.linspace(-1.0, 1.0, given["count"])
-        return float(given["mean"]) + steps * float(given["standard_deviation"]) / float(steps.std(ddof=1))
-    if "last" in given:
-        return np.arange(given["first"], given["last"] + 1, dtype=np.float64)
-    return np.array(given["values"], dtype=np.float64)
 
 
 def summed_up(given: Given) -> Got:
@@ -172,6 +154,49 @@ def capable(given: Given) -> Got:
     return got
 
 
+def potential(given: Given) -> Got:
+    """Cp and Cpk by the sigma inside subgroups."""
+    values = readings_of(given)
+    within = from_ranges(subgroups(values, given["size"]))
+    found = capability(values, Limits(given["lower"], given["upper"]), within=within)
+    return {"cp": found.cp and found.cp.value, "cpk": found.cpk.value, "sigma": found.within.value}
+
+
+def intervals(given: Given) -> Got:
+    """Indices with their intervals from a mean, a standard deviation and a count."""
+    mean, deviation, n = given["mean"], given["standard_deviation"], given["count"]
+    limits, confidence = Limits(given["lower"], given["upper"], given.get("target")), given.get("confidence", 0.95)
+    sigma = Sigma(deviation, Estimator.OVERALL, n, 1, n - 1.0)
+    found = {
+        "pp": spread_index(limits, sigma, confidence),
+        "ppk": ppk_of(limits, mean, deviation, n, confidence),
+        "cpm": target_index(limits, mean, sigma, n, confidence),
+    }
+    return {
+        name + part: getattr(index, of)
+        for name, index in found.items()
+        if index
+        for part, of in (("", "value"), ("_low", "low"), ("_high", "high"))
+    }
+
+
+def one_sided_bounds(given: Given) -> Got:
+    """Of readings whose one limit lies k standard deviations off: 3 times the lower bound of Ppk."""
+    bounds = [ppk_of(Limits(None, k), 0.0, 1.0, given["count"], given["confidence"]).low for k in given["k"]]
+    return {"bounds": [3 * bound for bound in bounds if bound is not None]}
+
+
+def anderson_p(given: Given) -> Got:
+    return {"p_values": [p_of(statistic) for statistic in given["statistics"]]}
+
+
+def freedom(given: Given) -> Got:
+    """Degrees of freedom of a sigma from ranges, per subgroup, and from moving ranges, per reading."""
+    per_group = [from_ranges(subgroups([0.0, *[1.0] * (n - 1)], n)).degrees_of_freedom for n in given["sizes"]]
+    many = 10**7
+    return {"per_subgroup": per_group, "per_moving_range": freedom_of_moving_ranges(many) / many}
+
+
 def by_percentile(given: Given) -> Got:
     found = percentile(readings_of(given), Limits(given["lower"], given["upper"]))
     return {"low": found.low, "median": found.median, "high": found.high, "pp": found.pp, "ppk": found.ppk}
@@ -207,61 +232,6 @@ def following(given: Given) -> Got:
     return {"statistic": successive(given["values"]).statistic}
 
 
-def _block(given: Given) -> Floats:
-    """Rows of operator and trial, one entry per part, as a block of parts, operators, trials."""
-    rows = np.array(given["readings"], dtype=np.float64)
-    return rows.reshape(given["operators"], given["trials"], -1).transpose(2, 0, 1)
-
-
-def _shares(study: Study) -> Got:
-    return {
-        "ev": study.equipment,
-        "av": study.appraiser,
-        "grr": study.grr,
-        "pv": study.part,
-        "tv": study.total,
-        "percent_ev": study.percent(study.equipment),
-        "percent_av": study.percent(study.appraiser),
-        "percent_grr": study.percent(study.grr),
-        "percent_pv": study.percent(study.part),
-        "ndc": study.ndc,
-    }
-
-
-def gauge_ranges(given: Given) -> Got:
-    return _shares(by_average_and_range(_block(given)))
-
-
-def gauge_anova(given: Given) -> Got:
-    study = by_anova(_block(given))
-    table = {line.source: line for line in study.table}
-    squares = {f"ss_{source}": line.squares for source, line in table.items()}
-    return _shares(study) | squares | {"f_interaction": table["interaction"].f, "pooled": study.pooled}
-
-
-def straight(given: Given) -> Got:
-    found = linearity(dict(zip(given["references"], given["readings"], strict=True)))
-    return {
-        "biases": list(found.biases.values()),
-        "slope": found.slope.value,
-        "intercept": found.intercept.value,
-        "r_squared": found.r_squared,
-        "s": found.s,
-        "t_slope": abs(found.slope.t),
-        "t_intercept": abs(found.intercept.t),
-    }
-
-
-def biased(given: Given) -> Got:
-    found = bias(given["values"], given["reference"])
-    return {name: getattr(found, name) for name in ("mean", "repeatability", "standard_error", "t", "low", "high")}
-
-
-def first_type(given: Given) -> Got:
-    found = type_one(readings_of(given), given["reference"], given["tolerance"])
-    return {"cg": found.cg, "cgk": found.cgk}
-
-
 ENGINE: dict[str, Callable[[Given], Got]] = {
     "decision": decision,
     "mean_nominal": nominal,
@@ -272,6 +242,7 @@ ENGINE: dict[str, Callable[[Given], Got]] = {
     "d2_star": duncan,
     "individuals": individuals,
     "subgroups": grouped,
+    "freedom": freedom,
     "ewma": weighted,
     "moving_average": moving,
     "cusum": summed,
@@ -280,17 +251,21 @@ ENGINE: dict[str, Callable[[Given], Got]] = {
     "ewma_run_length": ewma_run_length,
     "cusum_run_length": cusum_run_length,
     "capability": capable,
+    "potential": potential,
+    "intervals": intervals,
+    "one_sided_bounds": one_sided_bounds,
     "percentile": by_percentile,
     "anderson_darling": anderson,
+    "anderson_p": anderson_p,
     "shapiro_wilk": shapiro,
     "variance_in_time": variance_in_time,
     "scatter_in_time": scatter_in_time,
     "following": following,
-    "gauge_ranges": gauge_ranges,
-    "gauge_anova": gauge_anova,
-    "linearity": straight,
-    "bias": biased,
-    "type_one": first_type,
+    "gauge_ranges": gauges.gauge_ranges,
+    "gauge_anova": gauges.gauge_anova,
+    "linearity": gauges.straight,
+    "bias": gauges.biased,
+    "type_one": gauges.first_type,
     "circle_fit": geometry.circle,
     "line_fit": geometry.line,
     "plane_fit": geometry.plane,

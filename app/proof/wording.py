@@ -12,13 +12,25 @@ def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
         "summary": (_("Mean, spread, autocorrelation"), ("summary",)),
         "charts": (
             _("Control charts"),
-            ("constants", "d2_star", "individuals", "subgroups", "ewma", "moving_average", "cusum"),
+            ("constants", "d2_star", "freedom", "individuals", "subgroups", "ewma", "moving_average", "cusum"),
         ),
         "chance": (
             _("How often charts signal"),
             ("rule_probability", "rule_run_length", "ewma_run_length", "cusum_run_length"),
         ),
-        "capability": (_("Capability and normality"), ("capability", "percentile", "anderson_darling", "shapiro_wilk")),
+        "capability": (
+            _("Capability and normality"),
+            (
+                "capability",
+                "potential",
+                "intervals",
+                "one_sided_bounds",
+                "percentile",
+                "anderson_darling",
+                "anderson_p",
+                "shapiro_wilk",
+            ),
+        ),
         "in_time": (_("Behaviour in time"), ("variance_in_time", "scatter_in_time", "following")),
         "gauge": (_("Gauge studies"), ("gauge_ranges", "gauge_anova", "linearity", "bias", "type_one")),
         "geometry": (_("Geometry"), ("circle_fit", "line_fit", "plane_fit", "printed_straightness")),

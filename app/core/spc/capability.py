@@ -137,7 +137,7 @@ def capability(
         cpk=_centred_index(limits, mean, inner, len(x), confidence),
         pp=spread_index(limits, total, confidence),
         ppk=_centred_index(limits, mean, total, len(x), confidence),
-        cpm=_cpm(limits, mean, total, len(x), confidence),
+        cpm=target_index(limits, mean, total, len(x), confidence),
         ppm_within=expected_ppm(limits, mean, inner.value),
         ppm_overall=expected_ppm(limits, mean, total.value),
         ppm_observed=observed_ppm(limits, x),
@@ -219,7 +219,7 @@ def _noncentral(value: float, readings: int, freedom: float, confidence: float) 
     return bound(1 - tail), bound(tail)
 
 
-def _cpm(limits: Limits, mean: float, sigma: Sigma, readings: int, confidence: float) -> Index | None:
+def target_index(limits: Limits, mean: float, sigma: Sigma, readings: int, confidence: float) -> Index | None:
     """Cpm (Taguchi's index; Chan, Cheng and Spiring 1988), for the target, else the middle of the tolerance.
 
     With tau^2 = s^2 + (mean - target)^2, s as for Pp. Interval: chi-square with the degrees of freedom

@@ -47,10 +47,10 @@ def anderson_darling(values: ArrayLike) -> Normality:
     weights = 2 * np.arange(1, n + 1) - 1
     # Logarithms of the tails, so that a far outlier does not become ln 0.
     statistic = float(-n - (weights @ (log_ndtr(z) + log_ndtr(-z[::-1]))) / n)
-    return Normality("anderson_darling", statistic, _p_of(statistic * (1 + 0.75 / n + 2.25 / n**2)), n)
+    return Normality("anderson_darling", statistic, p_of(statistic * (1 + 0.75 / n + 2.25 / n**2)), n)
 
 
-def _p_of(a: float) -> float:
+def p_of(a: float) -> float:
     """D'Agostino and Stephens (1986), table 4.9: the p-value that belongs to A*^2."""
     if a >= 10:  # beyond this the parabola would turn upward again
         return 0.0
