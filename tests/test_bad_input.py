@@ -50,6 +50,15 @@ PERIOD: dict[str, Any] = {
     "settle": 20,
     "excluded": [{"first": 3, "last": 4, "reason": "Chip on the stylus"}],
 }
+GAUGE: dict[str, Any] = {
+    "gauge": "Probe T8",
+    "reference": 40.0,
+    "tolerance": 0.016,
+    "resolution": 0.0001,
+    "each": "reading",
+    "unbalanced": "refuse",
+    "rows": [{"part": part, "operator": "A", "values": [40.0, 40.001]} for part in ("1", "2")],
+}
 BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/machines": {"key": "mill-bad", "name": "Mill", "control": "heidenhain"},
     "PATCH /api/v1/machines/{machine}": {"name": "Lathe", "control": "fanuc", "corrections_expire_after": 8.0},
@@ -161,6 +170,12 @@ BODIES: dict[str, dict[str, Any]] = {
         "paper": "letter",
         "timezone": "Europe/Belgrade",
     },
+    "POST /api/v1/gauge-studies": GAUGE
+    | {"kind": "grr", "machine": "{machine}", "characteristic": "{characteristic}", "key": "bad-study"},
+    "POST /api/v1/gauge-studies/from-readings": {name: value for name, value in GAUGE.items() if name != "rows"}
+    | {"kind": "type_one", "characteristic": "{characteristic}", "first": 1, "through": 5, "take": "readings"}
+    | {"key": "bad-probing"},
+    "PUT /api/v1/gauge-studies/{study}": GAUGE | WHY,
     "POST /api/v1/signals/{signal}/comment": {"cause": "material", "comment": "New batch, harder by 20 HB"},
     "POST /api/v1/characteristics/{characteristic}/what-if": WHAT_IF | {"weighting_factor": 3.0, "zero_range": 0.002},
     "POST /api/v1/characteristics/{characteristic}/what-if/map": WHAT_IF
@@ -452,6 +467,8 @@ class Place:
         larger = shop.call("POST", "/kinematics/runs", 201, machine=shop.machine, axes=[axis((0.1, 0, 0, 0))])["run"]
         second = shop.call("POST", "/kinematics/runs", 201, machine=shop.machine, axes=[axis()])["run"]
         self.values["run"] = first
+        study = {"kind": "grr", "machine": shop.machine, "gauge": "Probe T8", "rows": GAUGE["rows"]}
+        self.values["study"] = shop.call("POST", "/gauge-studies", 201, **study)["id"]
         reports = shop.call("POST", "/reports", 201, machines=[shop.machine], sections=["numbers"], format="csv")["id"]
         while shop.call("GET", f"/reports/{reports}")["state"] != "done":
             time.sleep(0.05)

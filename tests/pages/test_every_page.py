@@ -54,6 +54,20 @@ PAGES = {
         "/characteristics/{characteristic}-empty/report?section=numbers&section=capability",
     ],
     "/reports": ["/reports?characteristic={characteristic}"],
+    "/characteristics/{characteristic}/capability": [
+        "/characteristics/{characteristic}/capability",
+        "/characteristics/{characteristic}-watched/capability?last=all&side=upper",
+        "/characteristics/{characteristic}-empty/capability",
+    ],
+    "/gauges": ["/gauges", "/gauges?machine={machine}", "/gauges?characteristic={characteristic}"],
+    "/gauges/new": [
+        "/gauges/new",
+        "/gauges/new?kind=type_one&characteristic={characteristic}",
+        "/gauges/new?kind=grr",
+        "/gauges/new?kind=linearity&machine={machine}",
+    ],
+    "/gauges/{number}": ["/gauges/{crossed}", "/gauges/{repeated}"],
+    "/gauges/{number}/correct": ["/gauges/{crossed}/correct", "/gauges/{repeated}/correct"],
     "/characteristics/{characteristic}/what-if": [
         "/characteristics/{characteristic}/what-if",
         "/characteristics/{characteristic}/what-if?k=3&r33=2.5&goal=corrections#replay",
@@ -96,7 +110,11 @@ PAGES = {
     "/forms/{form}": ["/forms/{form}", "/forms/{form}?section=2"],
     "/forms/features/{machine}/{feature}": ["/forms/features/{machine}/bore-d56?kind=axis_straightness"],
     "/kinematics": ["/kinematics"],
-    "/kinematics/new": ["/kinematics/new", "/kinematics/new?way=positions", "/kinematics/new?example=1&machine={machine}"],
+    "/kinematics/new": [
+        "/kinematics/new",
+        "/kinematics/new?way=positions",
+        "/kinematics/new?example=1&machine={machine}",
+    ],
     "/kinematics/machines/{machine}": [
         "/kinematics/machines/{machine}",
         "/kinematics/machines/{machine}?value=backlash.C&before={run}",
@@ -186,6 +204,19 @@ def shop(server: Server) -> Shop:
     line = Line(made, "watched")
     line.push([9.0, 0.0, -7.0])
     line.look()
+    about: dict[str, Any] = {
+        "machine": made.machine,
+        "characteristic": made.characteristic,
+        "gauge": "Probe T8, ruby 2 mm",
+    }
+    cells = [
+        {"part": str(part), "operator": operator, "values": [40 + part / 1000, 40.0003 + part / 1000, 40.0001]}
+        for part in range(10)
+        for operator in ("Jovanović-Đorđević", "Živković", "third")
+    ]
+    made.call("POST", "/gauge-studies", 201, kind="grr", rows=cells, **about)
+    repeats = [{"values": [40.0 + n % 7 / 10_000 for n in range(50)]}]
+    made.call("POST", "/gauge-studies", 201, kind="type_one", reference=40.0, rows=repeats, **about)
     made.call(
         "POST",
         f"/characteristics/{made.characteristic}/proposals",
@@ -218,12 +249,14 @@ def sized(request: pytest.FixtureRequest, page: Page) -> Page:
 def addresses(shop: Shop) -> list[str]:
     alarm = shop.alarms()[0]["id"]
     signal = shop.call("GET", f"/signals?machine={shop.machine}")["items"][0]["id"]
+    studies = shop.call("GET", f"/gauge-studies?machine={shop.machine}")["items"]
     values: dict[str, Any] = {
         "machine": shop.machine,
         "characteristic": shop.characteristic,
         "alarm": alarm,
         "proposal": shop.call("GET", f"/characteristics/{shop.characteristic}/proposals")["items"][0]["id"],
         "signal": signal,
+        **dict(zip(("repeated", "crossed"), (each["id"] for each in studies), strict=True)),
         "form": shop.call("GET", f"/forms?machine={shop.machine}")["items"][0]["id"],
         "run": shop.call("GET", f"/kinematics/runs?machine={shop.machine}")["items"][-1]["run"],
     }
