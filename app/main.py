@@ -12,6 +12,8 @@ from starlette.types import ASGIApp
 from app.alarms import api as alarms
 from app.alarms import pages as alarm_pages
 from app.alignments import api as alignments
+from app.alignments import pages as alignment_pages
+from app.alignments import pictures_api as alignment_pictures
 from app.audit import api as audit
 from app.calibration import api as calibration
 from app.calibration import pages as calibration_pages
@@ -94,6 +96,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     wear.router,
     zeros.router,
     alignments.router,
+    alignment_pictures.router,
     reports.router,
     report_jobs.router,
     report_points.router,
@@ -136,6 +139,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     calibration_pages.router,
     gauge_pages.router,
     form_pages.router,
+    alignment_pages.router,
     zero_pages.router,
     new_run_pages.router,
     kinematics_pages.router,
