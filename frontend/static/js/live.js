@@ -1,8 +1,7 @@
 // One shared connection to the server's live events (SSE, /api/v1/events) for everything on the page.
 //
 //   subscribe(on, callback) -> unsubscribe
-//     on: words such as "reading:shaft-d40 alarm". Each is a kind (reading, correction, alarm, tool, average, calibration,
-//     characteristic, machine; * for all), optionally with :key, which must be the event's machine or characteristic.
+//     on: words such as "reading:shaft-d40 alarm". Each is a kind (of KINDS below; * for all), optionally with :key, which must be the event's machine or characteristic.
 //     callback(event) gets {kind, machine, characteristic, tool, …}; after a break it is called once with {kind: "resync"},
 //     because something may have been missed.
 //   watch(callback) -> unwatch
@@ -12,7 +11,10 @@
 // The server says "heartbeat" every few seconds, so a pulled cable is noticed as well: TCP itself says nothing for minutes.
 
 const URL_OF_EVENTS = "/api/v1/events";
-const KINDS = ["reading", "correction", "alarm", "tool", "average", "calibration", "characteristic", "machine"];
+const KINDS = [
+  "reading", "correction", "alarm", "tool", "average", "calibration", "characteristic", "machine",
+  "form", "work_zero", "alignment", "kinematics", "gauge_study", "baseline", "signal", "report",
+];
 const SILENCE = 15_000; // ms; three heartbeats missed
 const RETRY = 3_000;
 
