@@ -33,6 +33,8 @@ def evaluate(given: RunIn, limits: Limits) -> Evaluated:
         made = _of_positions(given.axes or [], given, limits)
     if made.outcome != "refused":
         _hold_against(made, limits)
+    if made.results["balls"] and limits.max_dev_cal_ball and not (given.ball_radius or limits.ball_radius):
+        made.results["notes"].append(wording.no_calibrated_radius())
     return made
 
 

@@ -131,12 +131,17 @@ def flaw(found: Flaw) -> str:
     """What is wrong with a result parameter."""
     values = {"name": found.parameter, "n": found.number, "text": found.text[:60], "width": WIDTH}
     return {
-        Damage.COUNT: _("{name}: four numbers are needed, {text} came"),
+        Damage.COUNT: _("{name}: four numbers are needed, {text} came; nobody can tell which, so none is taken"),
         Damage.LENGTH: _("{name}: number {n} “{text}” does not have {width} characters; digits may be lost"),
         Damage.SEPARATOR: _("{name}: the numbers are not separated by one space each"),
         Damage.COMMA: _("{name}: number {n} “{text}” has a decimal comma; it was read as a point"),
-        Damage.NOT_A_NUMBER: _("{name}: number {n} “{text}” is not a number"),
-        Damage.TOO_LARGE: _("{name}: number {n} “{text}” is too large to be true"),
+        Damage.NOT_A_NUMBER: _("{name}: number {n} “{text}” is not a number")
+        if found.number
+        else _("{name}: “{text}” is not a number"),
+        Damage.TOO_LARGE: _("{name}: number {n} “{text}” is too large to be true")
+        if found.number
+        else _("{name}: “{text}” is too large to be true"),
+        Damage.NEGATIVE: _("{name}: “{text}” is below 0, which no standard deviation is"),
         Damage.UNKNOWN: _("not understood: “{text}”"),
         Damage.TWICE: _("{name}: stands there twice; the first counts, not “{text}”"),
     }[found.damage].format(**values)
@@ -154,6 +159,11 @@ def moved_otherwise(axis: str, moved: Sequence[float], asked: Sequence[float]) -
     return _("{axis}: from its place before to that after it is {moved}, but the corrections say {asked}").format(
         axis=axis, moved=" ".join(map(um, moved)), asked=" ".join(map(um, asked))
     )
+
+
+def no_calibrated_radius() -> str:
+    """There is nothing that maxDevCalBall could hold the ball against."""
+    return _("maxDevCalBall could not be watched: neither the run nor the limits of the machine say the ball's radius")
 
 
 # --- what a run says

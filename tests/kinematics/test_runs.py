@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from tests.conftest import Server
-from tests.kinematics.bench import NAMES, RADIUS, RUNS, TRUE, axis, plan, protocol, take, touched
+from tests.kinematics.bench import NAMES, RADIUS, RUNS, TRUE, axis, enter, plan, protocol, take, touched
 from tests.shop import Shop
 
 
@@ -46,11 +46,17 @@ class TestForms:
         assert sent["parameters"] == {"Q143": 0.0134, "Q146": 0.0021, "Q149": 0.0005, "QS146": text}
         assert sent["not_understood"] == []
 
-    def test_a_damaged_string_is_read_as_far_as_it_goes(self, shop: Shop) -> None:
-        run = take(shop, results={"QS146": "0.01234567 -0.0123456 0.00123456"})
-        assert set(run["axes"][0]["errors"]) == {"EX0C", "EY0C", "EA0C"}
-        assert run["not_understood"] == ["QS146: four numbers are needed, 3 came"]
+    def test_of_a_damaged_string_nothing_is_guessed(self, shop: Shop) -> None:
+        run = take(shop, results={"Q143": 0.0134, "QS146": "0.01234567 -0.0123456 0.00123456"})
+        assert run["axes"][0]["errors"] == {}
+        assert run["not_understood"] == [
+            "QS146: four numbers are needed, 3 came; nobody can tell which, so none is taken"
+        ]
         assert "QS146" not in run["parameters"]
+        assert "no position error" in enter(shop, run, 409)["detail"]
+        take(shop, 422, results={"QS146": "0.01234567 -0.0123456 0.00123456"})
+        one = take(shop, results={"QS146": "0.01234567 xxxxxxxxxx 0.00123456 -0.0012345"})
+        assert set(one["axes"][0]["errors"]) == {"EX0C", "EA0C", "EB0C"}
 
     @pytest.mark.parametrize("language", ["de", "en", "sl"])
     def test_protocols(self, shop: Shop, language: str) -> None:

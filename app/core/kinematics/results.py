@@ -7,6 +7,7 @@ of a text file or a person may be damaged; what can be read is read, and what is
 import re
 from collections.abc import Sequence
 from enum import StrEnum
+from itertools import pairwise
 from math import isfinite
 from typing import NamedTuple
 
@@ -20,6 +21,8 @@ OFFSETS = {"Q147": "X", "Q148": "Y", "Q149": "Z"}
 SCALARS = (*MEASURED, *OPTIMISED, *OFFSETS)
 LARGEST = 1e5  # mm or degrees; nothing on a machine is further off
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)")
+_APART = re.compile(r"(?<=\d)(?=[+\N{MINUS SIGN}-]\d)")
+_BEGIN = re.compile(r"(?:(?<![\w.,=:])(?<![=:] )N?\d+\s+)?(?<!\w)QS?1[0-9]{2}\s*[=:]", re.IGNORECASE)
 _LINE = re.compile(r"""^\s*(?:N?\d+\s+)?(QS?1[0-9]{2})\s*[=:;\t ]\s*["'“”„«]?(.*?)["'“”»]?\s*;?\s*$""", re.IGNORECASE)
 
 
@@ -32,6 +35,7 @@ class Damage(StrEnum):
     COMMA = "comma"
     NOT_A_NUMBER = "not_a_number"
     TOO_LARGE = "too_large"
+    NEGATIVE = "negative"
     UNKNOWN = "unknown"
     TWICE = "twice"
 
@@ -46,7 +50,10 @@ class Flaw(NamedTuple):
 
 
 class ResultString(NamedTuple):
-    """What a string holds, by the names of the errors; None where nothing can be read."""
+    """What a string holds, by the names of the errors; None where nothing can be read.
+
+    Where there are not four numbers nobody can tell which is missing, so none of them is given a name.
+    """
 
     values: dict[str, float | None]
     flaws: tuple[Flaw, ...]
@@ -70,13 +77,14 @@ def read_string(parameter: str, text: str) -> ResultString:
     """
     names = ERRORS[STRINGS[parameter]]
     flaws: list[Flaw] = []
-    text = text.strip("\r\n")
-    parts = text.split()
+    text = text.strip()
+    parts = _APART.sub(" ", text).split()  # a sign begins a number, a separator or not
     if parts and text != " ".join(parts):
         flaws.append(Flaw(parameter, 0, Damage.SEPARATOR, text))
+    values: dict[str, float | None] = dict.fromkeys(names)
     if len(parts) != NUMBERS:
         flaws.append(Flaw(parameter, 0, Damage.COUNT, str(len(parts))))
-    values: dict[str, float | None] = dict.fromkeys(names)
+        return ResultString(values, tuple(flaws))
     for number, (name, part) in enumerate(zip(names, parts, strict=False), start=1):
         value, damage = read_number(part)
         values[name] = value
@@ -138,9 +146,7 @@ def read_results(text: str) -> Results:
     errors: dict[AxisName, dict[str, float | None]] = {}
     flaws: list[Flaw] = []
     seen: set[str] = set()
-    for line in text.splitlines():
-        if not line.strip():
-            continue
+    for line in _lines(text):
         found = _LINE.match(line)
         name = found[1].upper() if found else ""
         if found is None or name not in {*SCALARS, *STRINGS}:
@@ -152,10 +158,21 @@ def read_results(text: str) -> Results:
             flaws += read.flaws
             errors[STRINGS[name]] = read.values
         else:
-            value, damage = read_number(found[2].removesuffix("mm"))
+            value, damage = read_number(found[2].removesuffix("mm").removesuffix("мм"))
+            if value is not None and value < 0 and name not in OFFSETS:
+                value, damage = None, Damage.NEGATIVE  # a standard deviation is none
             if value is not None:
                 scalars[name] = value
             if damage is not None and damage is not Damage.COMMA:
                 flaws.append(Flaw(name, 0, damage, found[2]))
         seen.add(name)
     return Results(scalars, errors, tuple(flaws))
+
+
+def _lines(text: str) -> list[str]:
+    """One parameter a line, also where several were pasted side by side; a block number stays with its own."""
+    made: list[str] = []
+    for line in text.splitlines():
+        begins = [0, *(found.start() for found in _BEGIN.finditer(line)), len(line)]
+        made += [line[start:end].strip(" \t;,") for start, end in pairwise(begins)]
+    return [piece for piece in made if piece]

@@ -69,3 +69,17 @@ def test_pasted_parameters() -> None:
         ("", Damage.UNKNOWN),
         ("Q149", Damage.NOT_A_NUMBER),
     ]
+
+
+def test_pasted_side_by_side() -> None:
+    text = 'Q141=0.01 Q142=0.02; 11 QS146="0.01234567 -0.0123456 0.00123456 -0.0012345" Q147 = -0.001'
+    found = read_results(text)
+    assert found.scalars == {"Q141": 0.01, "Q142": 0.02, "Q147": -0.001}
+    assert found.errors["C"]["EB0C"] == -0.0012345
+    assert not found.flaws
+
+
+def test_a_standard_deviation_is_never_negative() -> None:
+    found = read_results("Q143 = -0.0134\nQ147 = -0.0134")
+    assert found.scalars == {"Q147": -0.0134}
+    assert [flaw.damage for flaw in found.flaws] == [Damage.NEGATIVE]
