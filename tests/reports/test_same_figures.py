@@ -80,6 +80,8 @@ def test_capability_is_that_of_its_page(shop: Shop, period: str) -> None:
 
 
 def test_probe_faults_and_exclusions_are_left_out_and_named(shop: Shop) -> None:
+    numbers = next(each for each in report(shop)["sections"] if each["key"] == "numbers")
+    assert numbers["warnings"][0].startswith("1 of these readings is a probe fault")
     said = facts(report(shop), "capability")
     assert (said["excluded"]["value"], said["excluded"]["note"]) == (2, "17, 560")
     assert (said["faults"]["value"], said["faults"]["note"]) == (1, "601")

@@ -9,7 +9,7 @@ from app.core.zones import HasLimits, Zone
 from app.reports.content import Column, Fact, Picture, Section, Table, count, deviation, share, width
 from app.reports.queries.frame import Frame
 from app.statistics import queries as statistics
-from app.web.i18n import _
+from app.web.i18n import _, ngettext
 from app.web.theme import zone_name
 
 HISTOGRAM = (380, 400)
@@ -52,6 +52,15 @@ def numbers(frame: Frame) -> Section:
         )
     elif found.count < 2:
         warnings.append(_("One reading has no spread: a standard deviation takes two."))
+    if faults := found.zones[Zone.PROBE_FAULT.value]:
+        warnings.append(
+            ngettext(
+                "%(num)d of these readings is a probe fault, which measures no part: it is in mean, spread and extremes here; capability and control charts leave it out.",
+                "%(num)d of these readings are probe faults, which measure no part: they are in mean, spread and extremes here; capability and control charts leave them out.",
+                faults,
+            )
+            % {"num": faults}
+        )
     tolerances = {version.parameters["tolerance_width"] for version in frame.versions_used}
     if len(tolerances) > 1:
         warnings.append(
