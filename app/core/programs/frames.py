@@ -95,6 +95,8 @@ def _sinumerik_zero(zero: ZeroText) -> Iterator[str]:
     yield f"; {zero.title}: {zero.offset.word}"
     yield f"; RUN TWICE IT CHANGES NOTHING. IT TAKES EFFECT WITH THE NEXT {zero.offset.word}."
     if len(zero.axes) == 3:
+        if zero.angle is None:
+            yield "; A ROTATION THAT STOOD THERE BECOMES 0."
         yield f"{frame}]={_ctrans(zero.axes)}" + (f":CROT(Z,{written(zero.angle)})" if zero.angle is not None else "")
     else:  # a whole frame would set what was not measured to 0
         yield "; WHAT IS NOT NAMED STAYS; A FINE OFFSET STAYS AND ADDS."
