@@ -1,7 +1,8 @@
 // One shared connection to the server's live events (SSE, /api/v1/events) for everything on the page.
 //
 //   subscribe(on, callback) -> unsubscribe
-//     on: words such as "reading:shaft-d40 alarm". Each is a kind (of KINDS below; * for all), optionally with :key, which must be the event's machine or characteristic.
+//     on: words such as "reading:shaft-d40 alarm". Each is a kind (of KINDS below; * for all), optionally with :key, which
+//     must be the event's machine or characteristic.
 //     callback(event) gets {kind, machine, characteristic, tool, …}; after a break it is called once with {kind: "resync"},
 //     because something may have been missed.
 //   watch(callback) -> unwatch
