@@ -1,5 +1,6 @@
 """Touches as they are typed or pasted, and the picture that is drawn of them."""
 
+from contextlib import suppress
 from math import cos, hypot, isfinite, radians, sin
 from typing import Any
 
@@ -75,10 +76,8 @@ class TestLines:
 
     @given(st.text(max_size=300))
     def test_anything_is_read_or_refused(self, text: str) -> None:
-        try:
-            read(text)
-        except Invalid as refused:
-            assert refused.errors
+        with suppress(Invalid):
+            assert "kind" in read(text)
 
 
 KINDS = tuple(pictures.SCHEMATIC)
