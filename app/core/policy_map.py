@@ -26,11 +26,13 @@ class Region:
     """Where a map is best: the index of the best cell, None where no cell has the number, and which are as good.
 
     calmest: of those as good the one that corrects least. What cannot be told from the best is not worth correcting for.
+    choice: which cells were compared at all.
     """
 
     best: int | None
     inside: tuple[bool, ...]
     calmest: int | None = None
+    choice: tuple[bool, ...] = ()
 
 
 def value_of(figures: Figures, criterion: Criterion) -> float | None:
@@ -81,18 +83,18 @@ def best_region(cells: Sequence[Figures | None], criterion: Criterion, today: Fi
     ]
     known = [(value, at) for at, value in enumerate(values) if value is not None]
     if not known:
-        return Region(None, (False,) * len(cells))
+        return Region(None, (False,) * len(cells), None, (False,) * len(cells))
     sign = -1.0 if criterion is Criterion.PPK else 1.0
     value, best = min(known, key=lambda each: sign * each[0])
     figures = cells[best]
     assert figures is not None
-    room = _room(figures, criterion, value)
-    inside = tuple(each is not None and sign * (each - value) <= room for each in values)
+    allowed = room(figures, criterion, value)
+    inside = tuple(each is not None and sign * (each - value) <= allowed for each in values)
     calmest = min(
         (at for at, holds in enumerate(inside) if holds),
         key=lambda at: (cells[at].corrections, sign * (values[at] or 0.0)),  # type: ignore[union-attr]
     )
-    return Region(best, inside, calmest)
+    return Region(best, inside, calmest, tuple(value is not None for value in values))
 
 
 def _worse(cell: Figures, today: Figures) -> bool:
@@ -100,10 +102,11 @@ def _worse(cell: Figures, today: Figures) -> bool:
         return True
     if cell.ppk is None or today.ppk is None:
         return False
-    return cell.ppk < today.ppk - _room(today, Criterion.PPK, today.ppk)
+    return cell.ppk < today.ppk - room(today, Criterion.PPK, today.ppk)
 
 
-def _room(figures: Figures, criterion: Criterion, value: float) -> float:
+def room(figures: Figures, criterion: Criterion, value: float) -> float:
+    """How far another setting's number may lie from this one and be as good: two standard errors, or 5 %."""
     return max(SIGMAS * _error(figures, criterion, value), NEAR * abs(value)) + 1e-12
 
 

@@ -40,7 +40,10 @@ class MapView(NamedTuple):
 
 def view_of(made: Map, answer: Answer, typed: Mapping[str, str], key: str) -> MapView:
     """Everything in words, shades by rank, so that one bad corner does not wash out the rest."""
-    values = [None if cell.figures is None else value_of(cell.figures, made.criterion) for cell in made.cells]
+    values = [
+        value_of(cell.figures, made.criterion) if cell.figures is not None and choice else None
+        for cell, choice in zip(made.cells, made.region.choice, strict=True)
+    ]
     known = sorted({value for value in values if value is not None}, reverse=made.criterion is Criterion.PPK)
     rank = {value: at * LEVELS // max(1, len(known)) for at, value in enumerate(known)}
     wide = len(made.zero_ranges)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from app.capability.wording import named
 from app.characteristics.wording import label
 from app.core.parameters import BY_NAME
-from app.core.policy_map import Criterion
+from app.core.policy_map import Criterion, room, value_of
 from app.core.replay import Figures
 from app.core.spc.refusal import Reason, Refused
 from app.web.i18n import _, ngettext
@@ -287,31 +287,29 @@ def rows(answer_figures: Sequence[Figures]) -> list[tuple[str, list[str]]]:
 
 
 def gained(today: Figures, other: Figures) -> list[tuple[str, bool | None]]:
-    """For each line of `rows` what the other settings change, and whether that is better; empty where nothing can be said."""
+    """For each line of `rows` what the other settings change, and whether that is better; None where it cannot be told."""
 
-    def share(a: float | None, b: float | None, *, more_is_better: bool = False) -> tuple[str, bool | None]:
-        if a is None or b is None or not a or a == b:
-            return ("=" if a == b and a is not None else "", None)
-        change = round(100 * (b - a) / a)
-        return f"{signed(change, 0)}{NO_BREAK_SPACE}%", (b > a) == more_is_better
-
-    def difference(a: float | None, b: float | None, decimals: int, *, more_is_better: bool) -> tuple[str, bool | None]:
+    def told(which: Criterion, text: Callable[[float, float], str]) -> tuple[str, bool | None]:
+        a, b = value_of(today, which), value_of(other, which)
         if a is None or b is None:
             return "", None
-        if round(a, decimals) == round(b, decimals):
-            return "=", None
-        return signed(b - a, decimals), (b > a) == more_is_better
+        certain = a != b if which is Criterion.CORRECTIONS else abs(b - a) > room(today, which, a)
+        return ("=" if a == b else text(a, b)), ((b > a) == (which is Criterion.PPK) if certain else None)
+
+    def share(a: float, b: float) -> str:
+        return f"{signed(100 * (b - a) / a, 0)}{NO_BREAK_SPACE}%" if a else signed(b - a, 0)
 
     nothing: tuple[str, bool | None] = ("", None)
+    alarms = other.alarms - today.alarms
     return [
-        share(today.corrections, other.corrections),
+        told(Criterion.CORRECTIONS, share),
         nothing,
-        difference(today.rejects, other.rejects, 0, more_is_better=False),
-        difference(today.ppk, other.ppk, 2, more_is_better=True),
-        share(today.spread, other.spread),
+        told(Criterion.REJECTS, lambda a, b: signed(b - a, 0)),
+        told(Criterion.PPK, lambda a, b: signed(b - a, 2)),
+        told(Criterion.SPREAD, share),
         nothing,
         nothing,
-        difference(today.alarms, other.alarms, 0, more_is_better=False),
+        (signed(alarms, 0) if alarms else "=", None),
         nothing,
         nothing,
         nothing,
