@@ -92,7 +92,7 @@ class PlotlyChart extends HTMLElement {
     try {
       const url = new URL(this.getAttribute("src"), location.href);
       url.searchParams.set("theme", theme());
-      url.searchParams.set("width", Math.round(this.clientWidth));
+      url.searchParams.set("width", Math.max(200, Math.round(this.clientWidth))); // 0 before the page is laid out
       const [Plotly, answer] = await Promise.all([loadPlotly(), fetch(url, { headers: { Accept: "application/json" } })]);
       if (!answer.ok) throw new Error(`${answer.status}`);
       const figure = wallClock(await answer.json());
