@@ -1,5 +1,6 @@
 """Runs in their four forms, limits of the control, and the door, on a running server."""
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -159,6 +160,29 @@ class TestDoor:
         first = shop.call("POST", RUNS, 201, **run)
         assert shop.call("POST", RUNS, 200, **run) == first
         assert shop.call("POST", RUNS, 409, **run | {"axes": [axis(seed=3)]})["run"] == first["run"]
+
+    def test_of_the_same_sent_at_once_one_is_kept(self, shop: Shop) -> None:
+        body = {"machine": shop.machine, "axes": [axis()], "key": "452:2"}
+        with ThreadPoolExecutor(5) as pool:
+            answers = list(pool.map(lambda _n: shop.machine_client.post(f"/api/v1{RUNS}", json=body), range(5)))
+        assert sorted(each.status_code for each in answers) == [200, 200, 200, 200, 201]
+        assert len({each.json()["run"] for each in answers}) == 1
+        assert len(shop.call("GET", f"{RUNS}?machine={shop.machine}")["items"]) == 1
+
+    def test_recomputed_from_what_was_sent(self, shop: Shop) -> None:
+        """Touches, text and protocol alike, after the limits were changed."""
+        plan(shop, ball_radius=RADIUS, max_dev_cal_ball=0.5)
+        made = [
+            take(shop, axes=[touched(radius=RADIUS + 0.1)]),
+            take(shop, pasted='QS146 = "0.01234567 -0.0123456 0.00123456 -0.0012345"'),
+            take(shop, protocol=protocol("sl")),
+            take(shop, shift={"nominal": [0.0, 0.0, 0.0], "centre": [0.012, -0.003, 0.001]}),
+        ]
+        plan(shop, ball_radius=RADIUS, max_dev_cal_ball=0.001)
+        for run in made:
+            again = shop.call("POST", f"{RUNS}/{run['run']}/recompute")
+            assert (again["same"], again["outcome"]) == (True, "measured")
+            assert (again["axes"], again["offsets"]) == (run["axes"], run["offsets"])
 
     def test_machines_push_their_own_runs_only(self, shop: Shop, server: Server) -> None:
         other = Shop(server)
