@@ -13,6 +13,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.main import ROUTERS
 from tests.conftest import Server
+from tests.alignments.test_alignments import SIX
 from tests.control.line import Line
 from tests.forms.test_forms import BORE
 from tests.kinematics.bench import axis
@@ -105,8 +106,24 @@ PAGES = {
         "/calibration/{machine}/averages/5/accept/1",
         "/calibration/{machine}/averages/6/suggestion/0",
     ],
+    "/alignments": ["/alignments", "/alignments?machine={machine}"],
+    "/alignments/new": [
+        "/alignments/new",
+        "/alignments/new?found=measured&like={alignment}",
+        "/alignments/new?kind=two_points",
+        "/alignments/new?kind=two_holes",
+    ],
+    "/alignments/pallets/new": ["/alignments/pallets/new?part={alignment}"],
+    "/alignments/history": ["/alignments/history?machine={machine}&name=pallet%204"],
+    "/alignments/{number}": ["/alignments/{alignment}"],
     "/forms": ["/forms"],
     "/forms/new": ["/forms/new", "/forms/new?example=printed", "/forms/new?from={form}"],
+    "/work-zeros": ["/work-zeros", "/work-zeros?machine={machine}"],
+    "/work-zeros/new": ["/work-zeros/new", "/work-zeros/new?kind=corner", "/work-zeros/new?like={zero}"],
+    "/work-zeros/{number}": ["/work-zeros/{zero}"],
+    "/work-zeros/fixtures/{machine}/{fixture}": [
+        "/work-zeros/fixtures/{machine}/vice-with-a-name-as-long-as-people-give-them"
+    ],
     "/forms/{form}": ["/forms/{form}", "/forms/{form}?section=2"],
     "/forms/features/{machine}/{feature}": ["/forms/features/{machine}/bore-d56?kind=axis_straightness"],
     "/kinematics": ["/kinematics"],
@@ -195,12 +212,29 @@ def shop(server: Server) -> Shop:
     for difference in (0.002, 0.0025, 0.0022, 0.0024, 0.0045):
         pair: dict[str, Any] = {"machine_value": 40.0 + difference, "external_value": 40.0, "instrument": "CMM, hall C"}
         made.call("POST", f"/machines/{made.machine}/averages/6/pairs", 201, **pair)
+    made.call("POST", "/alignments", 201, machine=made.machine, touches=SIX, name="pallet 4", repeatability=0.002)
     bore = BORE | {"feature": "bore-d56", "machine": made.machine}
     made.call("POST", "/forms", 201, **bore)
     turned: dict[str, Any] = {"axes": [axis(both=True, backlash=0.002)], "machine": made.machine}
     first = made.call("POST", "/kinematics/runs", 201, **turned)["run"]
     made.call("POST", f"/kinematics/runs/{first}/enter", reason="Monthly check")
     made.call("POST", "/kinematics/runs", 201, **turned)
+    vice = "vice-with-a-name-as-long-as-people-give-them"
+    web: dict[str, Any] = {
+        "kind": "web",
+        "tip": 6.0,
+        "fixture": vice,
+        "repeatability": 0.001,
+        "z_touched": -200.0,
+        "part": "SN-0008127731-B",
+    }
+    for shift in (0.0, 0.02):
+        sides = [{"x": -1053.0 + shift, "y": 0, "approach": "+X"}, {"x": -947.0 + shift, "y": 0, "approach": "-X"}]
+        ends = [{"x": -1040, "y": -833.0, "approach": "+Y"}, {"x": -960, "y": -832.2, "approach": "+Y"}]
+        top = {"x": -1000, "y": -763.0, "approach": "-Y"}
+        made.call("POST", "/work-zeros", 201, machine=made.machine, touches=[*sides, *ends, top], **web)
+    watched: dict[str, Any] = {"warning": 0.01, "alarm": 0.03, "reason": "It creeps"}
+    made.call("PUT", f"/work-zeros/fixtures/{made.machine}/{vice}", **watched)
     line = Line(made, "watched")
     line.push([9.0, 0.0, -7.0])
     line.look()
@@ -257,6 +291,8 @@ def addresses(shop: Shop) -> list[str]:
         "proposal": shop.call("GET", f"/characteristics/{shop.characteristic}/proposals")["items"][0]["id"],
         "signal": signal,
         **dict(zip(("repeated", "crossed"), (each["id"] for each in studies), strict=True)),
+        "zero": shop.call("GET", f"/work-zeros?machine={shop.machine}")["items"][0]["id"],
+        "alignment": shop.call("GET", f"/alignments?machine={shop.machine}")["items"][0]["id"],
         "form": shop.call("GET", f"/forms?machine={shop.machine}")["items"][0]["id"],
         "run": shop.call("GET", f"/kinematics/runs?machine={shop.machine}")["items"][-1]["run"],
     }
