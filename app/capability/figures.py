@@ -10,7 +10,9 @@ from scipy.special import ndtri
 
 from app.core.spc.capability import Limits
 from app.core.spc.refusal import Floats
-from app.web.i18n import _
+from app.core.spc.spread import far_off
+from app.web.i18n import _, ngettext
+from app.web.numbers import signed
 from app.web.theme import Palette, ThemeName, layout, palette
 
 MOST_BARS, FEWEST_BARS = 60, 8
@@ -37,8 +39,9 @@ def histogram(drawn: Drawn, *, theme: ThemeName = "light") -> dict[str, Any]:
     colours = palette(theme)
     if not len(drawn.values):
         return _empty(theme)
-    edges = edges_of(drawn.values)
-    counts, _edges = np.histogram(drawn.values, edges)
+    near = _near(drawn)
+    edges = edges_of(near)
+    counts, _edges = np.histogram(near, edges)
     width = float(edges[1] - edges[0])
     centres = (edges[:-1] + edges[1:]) / 2
     low, high = _range(drawn, edges)
@@ -76,7 +79,7 @@ def histogram(drawn: Drawn, *, theme: ThemeName = "light") -> dict[str, Any]:
             xaxis=_axis(_("Deviation, µm"), colours, (low, high)),
             yaxis={"rangemode": "tozero", "nticks": 5, "title": _title(_("Readings"), colours)},
             shapes=lines,
-            annotations=names,
+            annotations=[*names, *_beyond(drawn, colours)],
         ),
     }
 
@@ -90,7 +93,8 @@ def probability(drawn: Drawn, *, theme: ThemeName = "light") -> dict[str, Any]:
     n = len(ordered)
     at = np.arange(n) if n <= MOST_POINTS else _spread(n)
     z = ndtri((at + 1 - 0.3) / (n + 0.4))  # median ranks, Benard
-    low, high = _range(drawn, ordered[[0, -1]])
+    near = _near(drawn)
+    low, high = _range(drawn, np.array([near.min(), near.max()]))
     reach = max(3.4, float(np.abs(z).max()) + 0.2)
     data: list[dict[str, Any]] = [
         {
@@ -131,9 +135,41 @@ def probability(drawn: Drawn, *, theme: ThemeName = "light") -> dict[str, Any]:
                 "title": _title(_("Share of the readings below"), colours),
             },
             shapes=lines,
-            annotations=names,
+            annotations=[*names, *_beyond(drawn, colours)],
         ),
     }
+
+
+def _near(drawn: Drawn) -> Floats:
+    """The readings that the picture shows: those far from all others would leave nothing to be seen of the rest."""
+    return np.asarray(drawn.values[~far_off(drawn.values)])
+
+
+def _beyond(drawn: Drawn, colours: Palette) -> list[dict[str, Any]]:
+    """How many readings lie outside the picture, at the side where they do."""
+    far, middle = drawn.values[far_off(drawn.values)], float(np.median(drawn.values))
+    words = []
+    for side, values in (("left", far[far < middle]), ("right", far[far > middle])):
+        if len(values):
+            furthest = values[np.abs(values - middle).argmax()] * 1000
+            text = ngettext(
+                "%(num)d reading beyond: %(at)s µm", "%(num)d readings beyond, up to %(at)s µm", len(values)
+            )
+            text %= {"num": len(values), "at": signed(furthest, 1)}
+            words.append(
+                {
+                    "xref": "paper",
+                    "yref": "paper",
+                    "x": 0.0 if side == "left" else 1.0,
+                    "y": 0.5,
+                    "xanchor": side,
+                    "text": f"◂ {text}" if side == "left" else f"{text} ▸",
+                    "showarrow": False,
+                    "font": {"size": 13, "color": colours.attention},
+                    "bgcolor": colours.surface,
+                }
+            )
+    return words
 
 
 def edges_of(values: Floats) -> Floats:
@@ -167,7 +203,7 @@ def _outside(value: float, limits: Limits) -> bool:
 def _range(drawn: Drawn, values: Floats) -> tuple[float, float]:
     held = [float(values[0]), float(values[-1])]
     held += [limit for limit in (drawn.limits.lower, drawn.limits.upper) if limit is not None]
-    if drawn.mean is not None and drawn.overall:
+    if drawn.mean is not None and drawn.overall and not far_off(drawn.values).any():
         held += [drawn.mean - 3.2 * drawn.overall, drawn.mean + 3.2 * drawn.overall]
     room = max(0.04 * (max(held) - min(held)), 1e-5)
     return min(held) - room, max(held) + room

@@ -35,6 +35,7 @@ from app.core.spc.capability import (
 from app.core.spc.in_time import InTime
 from app.core.spc.normality import MOST_FOR_SHAPIRO, Normality
 from app.core.spc.refusal import Floats, Refused
+from app.core.spc.spread import far_off
 from app.core.spc.stability import Stability
 from app.core.spc.uncompensated import Uncompensated
 from app.core.zones import Zone
@@ -76,6 +77,7 @@ class Study:
     """Everything that is said of one run of readings. What could not be said is the `Refused` that says why.
 
     values: deviations, mm, ascending in time. excluded: sequences that somebody took out; faults: probe faults.
+    far: readings that lie far from all others (`far_off`), and how far the furthest is, mm.
     fallout: parts outside the tolerance in force, per million; outside: how many. baseline: version of the frozen baseline
     that stability was judged by, None where the readings had to judge themselves. without: None where nothing is
     compensated; unknown: readings of it that do not say with which corrections they were cut.
@@ -91,6 +93,8 @@ class Study:
     last_at: datetime | None
     excluded: list[int]
     faults: list[int]
+    far: list[int]
+    furthest: float | None
     limits: Limits
     versions: list[InForce]
     outside: int
@@ -183,7 +187,7 @@ def capability_of(
     known = None if isinstance(found, Refused) else found
     judged, baseline = _stability(session, standing, window, kept)
     without, unknown = _without(session, standing, window, kept, limits, confidence) if compensated else (None, 0)
-    at = kept["measured_at"]
+    at, far = kept["measured_at"], far_off(values)
     return Study(
         standing=standing,
         window=window,
@@ -195,6 +199,8 @@ def capability_of(
         last_at=_moment(at.max()) if len(at) else None,
         excluded=history["sequence"][history.excluded].tolist(),
         faults=history["sequence"][faulty & ~history.excluded].tolist(),
+        far=kept["sequence"][far].tolist(),
+        furthest=max(values[far].tolist(), key=abs, default=None),
         limits=limits,
         versions=versions,
         outside=outside,

@@ -134,6 +134,7 @@ EXAMPLE: dict[str, Any] = {
     "readings": 199,
     "excluded": [17],
     "probe_faults": [],
+    "far": [],
     "lower_limit": -0.008,
     "upper_limit": 0.008,
     "versions": [{"version": 1, "target": 40.0, "half": 0.008, "readings": 199}],
@@ -179,6 +180,9 @@ class CapabilityOut(BaseModel):
     readings: int
     excluded: list[int] = Field(description="Sequences that somebody took out of the statistics; at most 1000.")
     probe_faults: list[int] = Field(description="Probe faults, which are no measurement of a part; at most 1000.")
+    far: list[int] = Field(
+        description="Readings more than ten sigma of the middle half from the median: counted, but to be looked at; at most 1000."
+    )
     lower_limit: float | None = Field(description="Limits of the deviation, of the newest reading's version.")
     upper_limit: float | None
     versions: list[InForceOut] = Field(description="By which the readings were judged, the newest reading's last.")
@@ -228,6 +232,7 @@ def capability_out(study: Study) -> CapabilityOut:
         readings=len(study.values),
         excluded=study.excluded[:MOST_NAMED],
         probe_faults=study.faults[:MOST_NAMED],
+        far=study.far[:MOST_NAMED],
         lower_limit=study.limits.lower,
         upper_limit=study.limits.upper,
         versions=[InForceOut(**_fields(each)) for each in study.versions],

@@ -8,6 +8,7 @@ from app.core.spc.refusal import Refused
 from app.core.spc.stability import Fired, Stability
 from app.statistics import wording as statistics
 from app.web.i18n import _, ngettext
+from app.web.numbers import signed
 
 CAPABLE, VERY_CAPABLE = 4 / 3, 5 / 3
 """What is usually asked for: four sigma to each limit, five for what matters to safety."""
@@ -225,6 +226,15 @@ def cautions(study: Study) -> list[str]:
     if study.stable is False:
         said.insert(
             0, _("Cp and Cpk are not to be quoted: the process is not stable. Ppk says what was, not what will be.")
+        )
+    if study.far and study.furthest is not None:
+        said.append(
+            ngettext(
+                "Reading %(which)s lies far from all others (%(furthest)s µm), and makes the numbers. Look at it: if the part was not so, exclude it with a reason.",
+                "Readings %(which)s lie far from all others (up to %(furthest)s µm), and make the numbers. Look at them: if a part was not so, exclude it with a reason.",
+                len(study.far),
+            )
+            % {"which": named(study.far), "furthest": signed(study.furthest * 1000, 1)}
         )
     if study.limits_differ:
         said.append(

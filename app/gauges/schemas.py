@@ -104,8 +104,10 @@ class FromReadingsIn(SettingsIn):
         description="grr: of touches alone, each reading is a part and its touches are the trials."
     )
     characteristic: Slug = Field(examples=["shaft-d40"])
-    first: int = Field(ge=1, le=LARGEST_ID, description="From this reading on.", examples=[788])
-    through: int = Field(ge=1, le=LARGEST_ID, description="To this reading, itself included.", examples=[812])
+    first: int = Field(strict=True, ge=1, le=LARGEST_ID, description="From this reading on.", examples=[788])
+    through: int = Field(
+        strict=True, ge=1, le=LARGEST_ID, description="To this reading, itself included.", examples=[812]
+    )
     take: Literal["readings", "touches"] = Field(
         "readings", description="What each reading says, or the repeats at its first point."
     )
@@ -114,6 +116,18 @@ class FromReadingsIn(SettingsIn):
 
 class CorrectionIn(SettingsIn):
     """A study put right: settings and all values anew, and why. The revision before stays on record."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "gauge": "Probe T8, ruby 2 mm",
+                "reference": 39.992,
+                "tolerance": 0.016,
+                "rows": [{"values": [39.9921, 39.9923, 39.992, 39.9922, 39.9921]}],
+                "reason": "Third value was typed 39.9202",
+            }
+        }
+    )
 
     rows: list[RowIn] = Field(min_length=1, max_length=MOST_ROWS)
     reason: Reason

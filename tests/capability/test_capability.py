@@ -79,6 +79,22 @@ def test_excluded_readings_and_probe_faults_are_named_and_left_out(shop: Shop) -
     assert found["sigma_overall"] < 0.0015
 
 
+def test_readings_far_from_all_others_are_named_counted_and_kept_out_of_the_picture(shop: Shop) -> None:
+    shop.add("far", mode="measure_only", tool_memory=0)
+    push(shop, [*quiet(120), 250.0, *quiet(30, seed=2), -180.0], "far")
+    found = of(shop, characteristic="far")
+    assert (found["far"], found["readings"], found["outside"]) == ([121, 152], 152, 2)
+    assert found["ppk"]["value"] < 0.3
+    assert any("Readings 121, 152 lie far from all others (up to +250.0 µm)" in each for each in found["cautions"])
+    figure = shop.call("GET", "/characteristics/far/figures/capability?last=all")
+    low, high = figure["layout"]["xaxis"]["range"]
+    assert -20 < low < high < 20
+    assert sum(figure["data"][0]["y"]) == 150
+    words = [each["text"] for each in figure["layout"]["annotations"]]
+    assert "1 reading beyond: +250.0 µm ▸" in words
+    assert "◂ 1 reading beyond: −180.0 µm" in words
+
+
 def test_every_part_is_judged_by_the_tolerance_in_force(shop: Shop) -> None:
     shop.add("changed", mode="measure_only", tool_memory=0)
     push(shop, [6.0, -6.0, 7.0] * 10, "changed")
@@ -166,5 +182,7 @@ def test_ppk_of_every_characteristic_for_ranking(server: Server, shop: Shop) -> 
         every = capability_by_characteristic(session)
     found = mine[standing.characteristic.id]
     assert found == every[standing.characteristic.id]
-    assert (found.readings, found.ppk and found.ppk.value) == (200, pytest.approx(told["ppk"]["value"]))
+    assert found.ppk
+    assert found.readings == 200
+    assert found.ppk.value == pytest.approx(told["ppk"]["value"])
     assert {each.ppk for each in mine.values() if each.readings < 20} == {None}

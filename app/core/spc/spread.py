@@ -21,6 +21,10 @@ from app.core.spc.refusal import Floats, Reason, Refused, checked
 
 Factor = Callable[[int], float]
 
+FAR, QUARTILES = 10.0, 1.349
+"""Beyond so many sigma a reading is named; the quartiles of a normal distribution lie 1.349 sigma apart."""
+FEWEST_TO_STAND_OUT = 8
+
 
 class Estimator(StrEnum):
     """How a sigma was come by."""
@@ -208,3 +212,19 @@ def _weighted(groups: Subgroups, statistic: Floats, estimator: Estimator, *, mea
     value = float((worth * statistic[usable] / means).sum() / worth.sum())
     # Var(sigma^)/sigma^2 = 1 / sum of the worths.
     return Sigma(value, estimator, int(groups.sizes[usable].sum()), int(usable.sum()), float(worth.sum()) / 2)
+
+
+def far_off(values: Floats) -> NDArray[np.bool_]:
+    """Which readings lie more than ten sigma of the middle half (quartile distance/1.349) from the median.
+
+    No process of one mode brings such readings; a chip under the stylus does, a broken edge, a part of another kind. They
+    are named, never left out: whether the part was so is for a person to say.
+
+    >>> far_off(np.array([1.0, 2, 3, 4, 5, 6, 7, 8, 400])).nonzero()[0].tolist()
+    [8]
+    """
+    if len(values) < FEWEST_TO_STAND_OUT:
+        return np.zeros(len(values), np.bool_)
+    quarter, median, three = np.quantile(values, [0.25, 0.5, 0.75])
+    sigma = float(three - quarter) / QUARTILES
+    return np.asarray(np.abs(values - median) > FAR * sigma) if sigma > 0 else np.zeros(len(values), np.bool_)
