@@ -50,6 +50,7 @@ def histogram(drawn: Drawn, *, theme: ThemeName = "light") -> dict[str, Any]:
         {
             "type": "bar",
             "name": _("Readings"),
+            "showlegend": False,
             "meta": "histogram",
             "x": (centres * 1000).tolist(),
             "y": counts.tolist(),
@@ -146,30 +147,21 @@ def _near(drawn: Drawn) -> Floats:
 
 
 def _beyond(drawn: Drawn, colours: Palette) -> list[dict[str, Any]]:
-    """How many readings lie outside the picture, at the side where they do."""
+    """How many readings lie outside the picture, below it."""
     far, middle = drawn.values[far_off(drawn.values)], float(np.median(drawn.values))
     words = []
-    for side, values in (("left", far[far < middle]), ("right", far[far > middle])):
+    for left, values in ((True, far[far < middle]), (False, far[far > middle])):
         if len(values):
             furthest = values[np.abs(values - middle).argmax()] * 1000
             text = ngettext(
                 "%(num)d reading beyond: %(at)s µm", "%(num)d readings beyond, up to %(at)s µm", len(values)
             )
             text %= {"num": len(values), "at": signed(furthest, 1)}
-            words.append(
-                {
-                    "xref": "paper",
-                    "yref": "paper",
-                    "x": 0.0 if side == "left" else 1.0,
-                    "y": 0.5,
-                    "xanchor": side,
-                    "text": f"◂ {text}" if side == "left" else f"{text} ▸",
-                    "showarrow": False,
-                    "font": {"size": 13, "color": colours.attention},
-                    "bgcolor": colours.surface,
-                }
-            )
-    return words
+            words.append(f"◂ {text}" if left else f"{text} ▸")
+    if not words:
+        return []
+    said = {"xref": "paper", "x": 1.0, "xanchor": "right", "yref": "paper", "y": -0.2, "yanchor": "top"}
+    return [said | {"text": "  ".join(words), "showarrow": False, "font": {"size": 13, "color": colours.attention}}]
 
 
 def edges_of(values: Floats) -> Floats:
