@@ -76,6 +76,11 @@ class Shown:
         window = statistics.window_of(self._session, self.standing.characteristic, **self._choice._asdict())
         return [charts.view(self._session, self.standing, self.judge, window, kind) for kind in self.kinds]
 
+    @property
+    def excluded_since(self) -> int:
+        """Readings of the baseline that were taken out of the statistics after it was frozen."""
+        return 0 if self.judge is None else queries.excluded_since(self._session, self.judge)
+
     @cached_property
     def kept(self) -> list[SignalRow]:
         """Signals that nobody has explained yet, newest first; one more than the page lists if there are more."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Select, select
+from sqlalchemy import Select, func, select
 from sqlalchemy.orm import Session
 
 from app.characteristics.queries import Standing
@@ -19,6 +19,7 @@ from app.core.spc.rules import RuleName
 from app.core.spc.shewhart import Chart, ControlChart
 from app.core.spc.spread import Estimator, Sigma, Subgroups, subgroups
 from app.errors import NotFound
+from app.readings.tables import Exclusion
 from app.statistics.queries import Window
 from app.web.i18n import _
 
@@ -63,6 +64,17 @@ def _of(characteristic: Characteristic) -> Select[Baseline]:
     return select(Baseline).where(
         Baseline.machine_id == characteristic.machine_id, Baseline.characteristic_id == characteristic.id
     )
+
+
+def excluded_since(session: Session, baseline: Baseline) -> int:
+    """How many readings of its period were excluded from the statistics after it was frozen; its numbers hold them still."""
+    query = select(func.count()).where(
+        Exclusion.machine_id == baseline.machine_id,
+        Exclusion.characteristic_id == baseline.characteristic_id,
+        Exclusion.sequence.between(baseline.first_sequence, baseline.last_sequence),
+        Exclusion.at > baseline.at,
+    )
+    return session.scalar(query) or 0
 
 
 def main_chart(baseline: Baseline) -> Chart:

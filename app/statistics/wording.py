@@ -108,8 +108,8 @@ def refusal(refused: Refused) -> str:
             ) % {"have": refused.have, "needed": refused.needed, "num": missing}
         case Reason.TOO_FEW_SUBGROUPS:
             return ngettext(
-                "%(have)d subgroups of the %(needed)d that this takes: %(num)d is missing.",
-                "%(have)d subgroups of the %(needed)d that this takes: %(num)d are missing.",
+                "%(have)d subgroups with two readings or more, of the %(needed)d that this takes: %(num)d is missing.",
+                "%(have)d subgroups with two readings or more, of the %(needed)d that this takes: %(num)d are missing.",
                 missing,
             ) % {"have": refused.have, "needed": refused.needed, "num": missing}
         case Reason.NO_VARIATION:

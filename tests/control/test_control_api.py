@@ -9,7 +9,7 @@ import pytest
 
 from tests.conftest import Server
 from tests.control.rows import MEASURED, control, frozen, pushed
-from tests.shop import Shop
+from tests.shop import Person, Shop
 from tests.wear.test_wear_api import shift
 
 _keys = count(1)
@@ -142,6 +142,18 @@ class TestFrozen:
         frozen(shop, 1, 41, status=409, key="monday")
         assert len(versions(shop)) == 1
 
+    def test_readings_excluded_since_leave_the_numbers_and_are_told_of(self, shop: Shop, server: Server) -> None:
+        pushed(shop, [0, 1] * 30)
+        made = frozen(shop, 1, 60)
+        viewer, path = Person(server, "viewer"), f"/characteristics/{shop.characteristic}/control"
+        assert "after it was frozen" not in viewer.open(path)
+        for sequence in range(1, 61):
+            shop.call("POST", f"/readings/{shop.characteristic}/{sequence}/exclude", reason="Wrong gauge")
+        assert versions(shop) == [made]
+        assert "60 readings of its period were excluded from the statistics after it was frozen" in viewer.open(path)
+        assert control(shop, last="all")["count"] == 0
+        assert "0 readings of the 20 that this takes" in preview(shop, 422)["detail"]
+
     def test_operators_look_and_engineers_freeze(self, shop: Shop, server: Server) -> None:
         pushed(shop, [0, 1] * 30)
         operator = server.client(server.key("operator"))
@@ -205,6 +217,12 @@ class TestRefused:
         assert "8 are missing" in preview(shop, 422, last_sequence=12)["detail"]
         pushed(shop, [0.0] * 28)
         assert "All values are the same" in preview(shop, 422)["detail"]
+
+    def test_parts_of_one_reading_are_no_subgroups(self, shop: Shop) -> None:
+        parts = [*(f"SN-{n}" for n in range(40)), *(f"SN-{n // 2}" for n in range(100, 120))]
+        pushed(shop, [0, 1, 3] * 20, part=parts)
+        problem = preview(shop, 422, chart="xbar_s", grouping="part", last_sequence=60)
+        assert "10 subgroups with two readings or more, of the 20 that this takes: 10 are missing" in problem["detail"]
 
     def test_a_chart_that_the_baseline_has_no_limits_for(self, shop: Shop) -> None:
         pushed(shop, [0, 1] * 30)

@@ -78,7 +78,7 @@ def test_from_the_chart_to_a_frozen_baseline(page: Page, line: Line, server: Any
     assert (made["first_sequence"], made["last_sequence"], made["actor"]) == (11, 110, engineer.name)
     assert made["excluded"] == [{"first": 61, "last": 61, "reason": "chip on the stylus"}]
 
-    expect(page.locator("live-status")).to_contain_text("live")
+    expect(page.locator("live-status")).to_have_attribute("state", "live")
     line.push([9.0])
     line.look()
     found = page.get_by_role("region", name="Open signals").get_by_text("reading 122")

@@ -31,10 +31,11 @@ def test_from_the_rules_to_the_cause(page: Page, server: Any) -> None:
 
     page.goto(f"/characteristics/{line.key}/signals")
     expect(page.get_by_text("No signals")).to_be_visible()
+    expect(page.locator("live-status")).to_have_attribute("state", "live")
     line.push([0.5] * 9)
     line.look()
     signal = page.get_by_role("link", name="Nelson 2, Individuals, readings 75 to 83")  # comes by itself
-    expect(signal).to_be_visible()
+    expect(signal).to_be_visible(timeout=20_000)
     page.locator(".kept-signals").get_by_role("link", name="alarm").click()
     expect(page.get_by_role("heading", level=1)).to_contain_text("Signal")
     page.get_by_role("link", name="control chart").click()

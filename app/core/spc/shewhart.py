@@ -110,9 +110,13 @@ def subgroup_baseline(
     minimum: int = FEWEST_SUBGROUPS,
     width: float = 3.0,
 ) -> Baseline:
-    """Centre = mean of all readings, sigma from ranges, standard deviations or pooled variances inside the subgroups."""
-    if len(groups) < minimum:
-        raise Refused(Reason.TOO_FEW_SUBGROUPS, have=len(groups), needed=minimum)
+    """Centre = mean of all readings, sigma from ranges, standard deviations or pooled variances inside the subgroups.
+
+    minimum: subgroups of two readings or more; those of one tell nothing of sigma.
+    """
+    telling = int((groups.sizes > 1).sum())
+    if telling < minimum:
+        raise Refused(Reason.TOO_FEW_SUBGROUPS, have=telling, needed=minimum)
     estimate = {
         Estimator.RANGES: from_ranges,
         Estimator.STANDARD_DEVIATIONS: from_deviations,
