@@ -65,6 +65,8 @@ def run(form: Mapping[str, str]) -> dict[str, Any]:
             made["shift"] |= {"centre": found[0]} if len(found) == 1 else {"touches": found}
         case kind:
             made[kind] = form.get(kind, "").strip()
+            if kind == "protocol":  # clocks of controls know no zone: that of who sends it
+                made["timezone"] = form.get("timezone", "").strip()
             if not made[kind]:
                 wrong = _("choose the file of the protocol, or paste its text")
                 wrong = wrong if kind == "protocol" else _("paste the result parameters")
