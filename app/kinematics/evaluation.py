@@ -1,11 +1,12 @@
 """From what was sent to what it comes to, whichever form it came in. Pure but for the words of refusals."""
 
 from collections.abc import Sequence
+from math import sqrt
 from typing import Any
 
 from app.core.kinematics.axis import AxisErrors, Estimate, NoAxis, Position, estimate
 from app.core.kinematics.results import OFFSETS, read_results
-from app.core.kinematics.sphere import NoSphere, fit_sphere, radius_is_wrong
+from app.core.kinematics.sphere import FEWEST, NoSphere, Sphere, fit_sphere, radius_is_wrong
 from app.core.zones import nanometres
 from app.errors import FieldError, Invalid
 from app.kinematics import wording
@@ -64,11 +65,15 @@ def _of_positions(axes: Sequence[AxisIn], given: RunIn, limits: Limits) -> Evalu
     made = Evaluated("touches" if touched else "centres")
     shifts: list[Sequence[Estimate]] = []
     for at, axis in enumerate(axes):
-        seen = []
+        seen: list[Position] = []
+        balls: list[Sphere] = []
         for number, position in enumerate(axis.positions):
             where = f"axes[{at}].positions[{number}]"
-            centre = _from_axis(axis, _centre(position, where, given, limits, made))
-            seen.append(Position(position.angle, centre, APPROACHES[position.approach]))
+            ball = _ball(position, where, given, limits, made)
+            balls += [] if ball is None else [ball]
+            centre = _from_axis(axis, (ball.centre if ball else position.centre) or ())
+            approach = APPROACHES[position.approach]
+            seen.append(Position(position.angle, centre, approach, ball.spread if ball else None))
             if made.outcome == "refused":
                 made.reason |= {"axis": axis.axis, "angle": position.angle}
                 return made
@@ -80,6 +85,7 @@ def _of_positions(axes: Sequence[AxisIn], given: RunIn, limits: Limits) -> Evalu
                 ball_known=axis.ball_known and axis.ball is not None,
                 carries=axis.carries,
                 reversed_=axis.reversed,
+                touch=_of_a_touch(balls),
             )
         except NoAxis as fault:
             wrong = wording.no_axis(axis.axis, fault)
@@ -105,15 +111,12 @@ def _from_axis(axis: AxisIn, point: Sequence[float]) -> tuple[float, float, floa
     return x, y, z
 
 
-def _centre(
-    position: PositionIn | ShiftIn, where: str, given: RunIn, limits: Limits, made: Evaluated
-) -> tuple[float, float, float]:
-    """The centre of the ball; a radius that is wrong makes the run a refused one (maxDevCalBall)."""
-    if position.centre is not None:
-        x, y, z = position.centre
-        return x, y, z
+def _ball(position: PositionIn | ShiftIn, where: str, given: RunIn, limits: Limits, made: Evaluated) -> Sphere | None:
+    """The ball, where it was touched; a radius that is wrong makes the run a refused one (maxDevCalBall)."""
+    if position.touches is None:
+        return None
     try:
-        ball = fit_sphere(position.touches or [])
+        ball = fit_sphere(position.touches)
     except NoSphere as fault:
         wrong = wording.no_sphere(fault)
         raise Invalid(
@@ -132,12 +135,20 @@ def _centre(
             "calibrated": calibrated,
             "limit": limits.max_dev_cal_ball,
         }
-    return ball.centre
+    return ball
+
+
+def _of_a_touch(balls: Sequence[Sphere]) -> float | None:
+    """The standard deviation of a touch, from all balls together; None where none was touched more than four times."""
+    free = sum(len(ball.residuals) - FEWEST for ball in balls)
+    squares = sum(residual**2 for ball in balls for residual in ball.residuals)
+    return sqrt(squares / free) if free else None
 
 
 def _of_shift(shift: ShiftIn, given: RunIn, limits: Limits) -> Evaluated:
     made = Evaluated("centres" if shift.centre is not None else "touches")
-    centre = _centre(shift, "shift", given, limits, made)
+    ball = _ball(shift, "shift", given, limits, made)
+    centre = (ball.centre if ball else shift.centre) or ()
     if made.outcome != "refused":
         made.results["offsets"] = {
             letter: round(found - nominal, 9) + 0.0

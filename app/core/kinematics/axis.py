@@ -40,6 +40,7 @@ ERRORS: dict[AxisName, tuple[str, str, str, str]] = {
 FEWEST = 3
 NARROWEST_ARC = 60.0  # degrees; on less, where the axis stands and where the ball lies can hardly be told apart
 WORST_CONDITION = 1e6
+EXACT = 1e-9  # mm; what scatters less does not scatter
 SMALLEST_RADIUS = 1.0  # mm; a ball (nearly) on the axis does not move when it turns
 ELSEWHERE, ELSEWHERE_SHARE = 10.0, 0.5  # mm and of the radius: further off, the positions are not of this axis and ball
 
@@ -75,11 +76,15 @@ class NoAxis(Exception):
 
 
 class Position(NamedTuple):
-    """Where the ball was found (mm) at an angle of the axis, degrees; approach: +1, -1, or 0 where nobody said from where."""
+    """Where the ball was found (mm) at an angle of the axis, degrees; approach: +1, -1, or 0 where nobody said from where.
+
+    spread: covariance of the centre for touches that scatter by 1; None: each coordinate is as sure as the others.
+    """
 
     angle: float
     centre: Point
     approach: int = 0
+    spread: tuple[Point, Point, Point] | None = None
 
 
 class Estimate(NamedTuple):
@@ -154,12 +159,13 @@ def estimate(
     ball_known: bool = False,
     carries: Carried = Carried.TABLE,
     reversed_: bool = False,
+    touch: float | None = None,
 ) -> AxisErrors:
     """The position errors of an axis.
 
     ball: nominal centre p0 at the angle 0, from where the axis should be; the mean of the centres turned back if nobody
     says it. ball_known: it lies there exactly, as the printed model takes it. carries: what the axis turns. reversed_: its
-    angles count against the right hand. Raises `NoAxis` for fewer than three angles, an arc below 60°, a ball on the axis,
+    angles count against the right hand. touch: standard deviation of a touch (mm), where positions have a spread. Raises `NoAxis` for fewer than three angles, an arc below 60°, a ball on the axis,
     or centres that lie nowhere near.
 
     >>> seen = [Position(φ, tuple(rotation("C", φ) @ (100, 0, 50) + (1 - c, -s, 0))) for φ, c, s in
@@ -182,7 +188,8 @@ def estimate(
     approaches = sense * np.array([each.approach for each in positions], dtype=np.float64)
     both = bool((approaches > 0).any() and (approaches < 0).any())
     columns = _columns(turns, nominal, approaches if both else None, ball_known=ball_known, head=head)
-    solved, spread, condition, noise, freedom = _solve(columns, deviations.ravel())
+    sure = _spreads(positions, order)
+    solved, spread, condition, noise, freedom = _solve(columns, deviations.ravel(), sure, touch)
     residuals = deviations - (columns @ solved).reshape(-1, 3)
     values = [Estimate(float(v) + 0.0, float(s)) for v, s in zip(solved, spread, strict=True)]
     tilts = [Estimate(degrees(v), degrees(s)) for v, s in values[2:4]]
@@ -266,8 +273,43 @@ def _columns(turns: Floats, ball: Floats, approaches: Floats | None, *, ball_kno
     return np.stack(columns, axis=-1).reshape(-1, len(columns))
 
 
-def _solve(columns: Floats, wanted: Floats) -> tuple[Floats, Floats, float, float, int]:
-    """Least squares with standard deviations, condition number, standard deviation of one coordinate, and freedom."""
+def _spreads(positions: Sequence[Position], order: Sequence[int]) -> Floats | None:
+    """The spreads of all centres, with the axis as the third; None where one of them has none."""
+    given = [each.spread for each in positions if each.spread is not None]
+    return np.array(given)[:, order][:, :, order] if len(given) == len(positions) else None
+
+
+def _solve(
+    columns: Floats, wanted: Floats, spreads: Floats | None = None, touch: float | None = None
+) -> tuple[Floats, Floats, float, float, int]:
+    """Least squares with standard deviations, condition number, standard deviation of one coordinate, and freedom.
+
+    Centres that are less sure in one direction than in another are weighted: by what the touches leave unsure, and what
+    scatters besides alike in all directions (an axis that does not come back quite).
+    """
+    made = _least_squares(columns, wanted)
+    noise = made[3]
+    if spreads is None or noise < EXACT:
+        return made
+    touched = spreads * (noise if touch is None else touch) ** 2
+    besides = 0.0 if touch is None else max(noise**2 - _mean_variance(touched), 0.0)
+    whole = touched + besides * np.eye(3)
+    size = _mean_variance(whole)
+    if not size > 0:
+        return made
+    roots = np.linalg.inv(np.linalg.cholesky(whole / size))
+    weighted = np.einsum("nij,njp->nip", roots, columns.reshape(len(roots), 3, -1)).reshape(columns.shape)
+    solved, spread, _condition, noise, freedom = _least_squares(
+        weighted, np.einsum("nij,nj->ni", roots, wanted.reshape(-1, 3)).ravel()
+    )
+    return solved, spread, made[2], noise, freedom
+
+
+def _mean_variance(covariances: Floats) -> float:
+    return float(np.trace(covariances, axis1=1, axis2=2).mean()) / 3
+
+
+def _least_squares(columns: Floats, wanted: Floats) -> tuple[Floats, Floats, float, float, int]:
     scale = np.linalg.norm(columns, axis=0)
     if not scale.min() > 0:
         raise NoAxis(AxisFault.RANK, float("inf"), WORST_CONDITION)

@@ -44,6 +44,7 @@ class Sphere(NamedTuple):
     """A ball, mm. residuals: how far each touch lies outside it; form: largest minus smallest of them.
 
     deviation: standard deviation of a touch; None where there are four touches only. condition: 1 is best.
+    spread: covariance of the centre for touches that scatter by 1; a single touch on top leaves Z less sure than X and Y.
     """
 
     centre: Point
@@ -51,6 +52,7 @@ class Sphere(NamedTuple):
     residuals: tuple[float, ...]
     deviation: float | None
     condition: float
+    spread: tuple[Point, Point, Point]
 
     @property
     def form(self) -> float:
@@ -90,12 +92,16 @@ def fit_sphere(touches: Sequence[Sequence[float]]) -> Sphere:
             break
     residuals = (np.linalg.norm(scaled - centre, axis=1) - radius) * size
     free = len(points) - FEWEST
+    away = scaled - centre
+    directions = np.column_stack([away / np.linalg.norm(away, axis=1)[:, None], np.ones(len(scaled))])
+    spread = np.linalg.inv(directions.T @ directions)[:3, :3]
     return Sphere(
         _point(centre * size + middle),
         round(radius * size, 9),
         tuple((residuals.round(9) + 0.0).tolist()),
         sqrt(float(residuals @ residuals) / free) if free else None,
         condition,
+        (_point(spread[0]), _point(spread[1]), _point(spread[2])),
     )
 
 

@@ -20,6 +20,7 @@ from app.core.kinematics.axis import (
     estimate,
     rotation,
 )
+from app.core.kinematics.sphere import fit_sphere
 from tests.core.kinematics.simulated import positions
 
 ANGLES = [-90.0, -45.0, 0.0, 45.0, 90.0, 135.0, 180.0]
@@ -114,6 +115,35 @@ class TestRecovered:
             noises.append(found.noise**2)
         assert 0.93 < inside / runs < 0.97
         assert sqrt(float(np.mean(noises))) == pytest.approx(0.002, rel=0.05)
+
+    @pytest.mark.parametrize("around", [3, 4, 8])
+    @pytest.mark.parametrize("besides", [0.0, 0.001])
+    def test_within_the_stated_uncertainty_from_touches(self, around: int, besides: float) -> None:
+        """One touch on top leaves Z less sure than X and Y; the axis itself does not come back quite."""
+        random = np.random.default_rng(around)
+        directions = [(np.cos(2 * np.pi * n / around), np.sin(2 * np.pi * n / around), 0.0) for n in range(around)]
+        directions.append((0.0, 0.0, 1.0))
+        inside = dict.fromkeys(ERRORS["C"], 0)
+        for seed in range(300):
+            seen, squares, free = [], 0.0, 0
+            for place in positions("C", BALLS["C"], ANGLES, errors=TRUE, shift=(0.002, 0, 0), noise=besides, seed=seed):
+                radii = 12.5 + random.normal(0, 0.001, len(directions))
+                ball = fit_sphere(
+                    [np.add(place.centre, np.multiply(r, d)) for r, d in zip(radii, directions, strict=True)]
+                )
+                seen.append(Position(place.angle, ball.centre, 0, ball.spread))
+                squares, free = squares + sum(r**2 for r in ball.residuals), free + len(directions) - 4
+            found = estimate("C", seen, BALLS["C"], touch=sqrt(squares / free) if free else None)
+            for name, true in zip(ERRORS["C"], TRUE, strict=True):
+                inside[name] += abs(found.errors[name].value - true) <= found.half_width(name)
+        assert all(0.91 <= hits / 300 <= 0.98 for hits in inside.values()), inside
+
+    def test_exact_touches_weigh_nothing(self) -> None:
+        """What scatters then is not the touches, so every coordinate is as sure as the others."""
+        plain = positions("C", BALLS["C"], ANGLES, errors=TRUE, noise=0.001)
+        spread = ((0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 1.25))
+        weighed = estimate("C", [each._replace(spread=spread) for each in plain], BALLS["C"], touch=0.0)
+        assert values_of(weighed) == pytest.approx(values_of(estimate("C", plain, BALLS["C"])), abs=1e-12)
 
     def test_a_nominal_centre_that_nobody_says(self) -> None:
         seen = positions("C", BALLS["C"], ANGLES, errors=TRUE, noise=0.001)
