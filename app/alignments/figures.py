@@ -5,7 +5,6 @@ does, displacements enlarged so that they can be seen. Beside each touch stand i
 """
 
 from collections.abc import Mapping, Sequence
-from datetime import datetime
 from math import floor, log10
 from typing import Any, NamedTuple
 
@@ -14,11 +13,11 @@ import numpy as np
 from app.core.geometry.points import Floats
 from app.web.i18n import _
 from app.web.numbers import signed
-from app.web.theme import Palette, ThemeName, date_axis, layout, palette
+from app.web.theme import Palette, ThemeName, layout, palette
 
 SEEN = 0.09  # of the part's size: so large the greatest displacement is drawn
+FACING = 0.7  # cosine: so far a face looks along an axis
 FAINTEST = 1e-7  # mm: what has moved by less has not moved
-MOTIONS = ("a", "b", "c")
 BOX = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 LEGEND: dict[str, Any] = {"orientation": "h", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
 
@@ -37,7 +36,7 @@ def part_figure(motion: Floats, touches: Sequence[Drawn], *, theme: ThemeName = 
     colours = palette(theme)
     places = np.array([touch.place for touch in touches], dtype=np.float64)
     normals = np.array([touch.normal for touch in touches], dtype=np.float64)
-    view, depth = _view(normals)
+    view, depth = _view(normals, places)
     corners = _corners(places, normals)
     size = float(np.ptp(corners, axis=0).max())
     moved = (np.column_stack([corners, np.ones(8)]) @ motion.T)[:, :3] - corners
@@ -86,7 +85,8 @@ def plane_figure(
             drawn[at],
             f"<b>{at + 1}</b> {signed(off[at][0] * 1000, 1)} {signed(off[at][1] * 1000, 1)} µm",
             colours,
-            yshift=18,
+            yshift=22,
+            bgcolor=None,
         )
         for at in range(len(places))
     ]
@@ -105,11 +105,30 @@ def enlargement(wanted: float) -> int:
     return int(next(step * power for step in (5, 2, 1) if step * power <= wanted * (1 + 1e-9)))
 
 
-def _view(normals: Floats) -> tuple[Floats, Floats]:
+def _ends(places: Floats, normals: Floats) -> Floats:
+    """By axis at which end of the part it is touched: -1, 1, both (2) or none (0).
+
+    Told by where the touches lie, so that it does not matter whether a normal points out of the part or into it.
+    """
+    low, high = places.min(axis=0), places.max(axis=0)
+    ends = np.zeros(3)
+    for axis in range(3):
+        facing = np.abs(normals[:, axis]) > FACING
+        if not facing.any():
+            continue
+        if high[axis] - low[axis] < FAINTEST:  # all at one height: the normal tells
+            ends[axis] = np.sign(normals[facing, axis].sum()) or 1.0
+            continue
+        beyond = places[facing, axis] > (low[axis] + high[axis]) / 2
+        ends[axis] = 2.0 if beyond.any() and not beyond.all() else 1.0 if beyond.all() else -1.0
+    return ends
+
+
+def _view(normals: Floats, places: Floats) -> tuple[Floats, Floats]:
     """Two rows, right and up of the picture, for one who sees the touched faces; and the way towards that one."""
-    sides = normals.sum(axis=0)
+    ends = _ends(places, normals)
     usual = np.array([-1.0, -1.0, 1.0])
-    towards = np.where(np.abs(sides) > 1e-9, np.sign(sides), usual) * np.array([1.0, 1.4, 1.0])
+    towards = np.where(np.abs(ends) == 1, ends, usual) * np.array([1.0, 1.4, 1.0])
     towards /= np.linalg.norm(towards)
     right = np.cross([0.0, 0.0, 1.0], towards)
     right /= np.linalg.norm(right)
@@ -117,20 +136,14 @@ def _view(normals: Floats) -> tuple[Floats, Floats]:
 
 
 def _corners(places: Floats, normals: Floats) -> Floats:
-    """Of the box that the touches lie on: a touched side ends it, another one lies a little beyond."""
+    """Of the box that holds the touches: it ends where it was touched, elsewhere a little beyond."""
     low, high = places.min(axis=0), places.max(axis=0)
     room = 0.15 * float(np.ptp(places, axis=0).max() or 1.0)
-    for axis in range(3):
-        facing = normals[:, axis]
-        touched = [places[facing * side > 0.7, axis] for side in (-1, 1)]
-        low[axis] = touched[0].min() if len(touched[0]) else low[axis] - room
-        high[axis] = touched[1].max() if len(touched[1]) else high[axis] + room
-        if high[axis] - low[axis] < room:
-            high[axis], low[axis] = max(high[axis], low[axis]), min(high[axis], low[axis])
-            if len(touched[1]):
-                low[axis] -= room
-            else:
-                high[axis] += room
+    for axis, end in enumerate(_ends(places, normals)):
+        if end in (0, 1):
+            low[axis] -= room
+        if end in (0, -1):
+            high[axis] += room
     return np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
 
 
@@ -221,8 +234,10 @@ def _touches(
     outward = normals @ view.T
     for at, touch in enumerate(touches):
         way = outward[at] / max(float(np.linalg.norm(outward[at])), 1e-9)
-        text = f"<b>{at + 1}</b> {signed(touch.off * 1000, 1)}"
-        words.append(_word(end[at], text, colours, xshift=float(30 * way[0]), yshift=float(18 * way[1] + 4)))
+        beside = abs(way[0]) > 0.5
+        anchor = {"xanchor": "left" if way[0] > 0 else "right", "xshift": 9 if way[0] > 0 else -9} if beside else {}
+        rise = float(4 * way[1]) if beside else (18.0 if way[1] >= 0 else -18.0)
+        words.append(_word(end[at], f"<b>{at + 1}</b> {signed(touch.off * 1000, 1)}", colours, yshift=rise, **anchor))
     return arrows, marks, words
 
 
@@ -264,66 +279,6 @@ def _framed(theme: ThemeName, colours: Palette, words: list[dict[str, Any]]) -> 
         annotations=words,
         dragmode=False,
     )
-
-
-# --- the trend
-
-
-class Mark(NamedTuple):
-    """An alignment as it is drawn over time: shifts in mm, turns in degrees."""
-
-    at: datetime
-    number: int
-    shift: Sequence[float]
-    turns: Sequence[float]
-    doubted: bool
-
-
-def trend(marks: Sequence[Mark], *, theme: ThemeName = "light") -> dict[str, Any]:
-    """Shifts above, turns below, one line for each axis, told apart by their marks as well."""
-    colours = palette(theme)
-    tones = (colours.correction, colours.waiting, colours.wear)
-    data = []
-    for axis, (name, symbol) in enumerate(zip("XYZ", ("circle", "square", "diamond"), strict=True)):
-        for below, scale, unit in ((False, 1000, "µm"), (True, 1, "°")):
-            values = [(mark.turns if below else mark.shift)[axis] * scale for mark in marks]
-            data.append(
-                {
-                    "type": "scatter",
-                    "mode": "lines+markers",
-                    "name": name,
-                    "legendgroup": name,
-                    "showlegend": not below,
-                    "x": [mark.at.isoformat() for mark in marks],
-                    "y": values,
-                    "yaxis": "y2" if below else "y",
-                    "line": {"color": tones[axis], "width": 1.5},
-                    "marker": {"symbol": symbol, "size": 8, "color": tones[axis]},
-                    "customdata": [f"/alignments/{mark.number}" for mark in marks],
-                    "text": [
-                        _("alignment {n}: {axis} {value} {unit}").format(
-                            n=mark.number, axis=name, value=signed(value, 4 if below else 1), unit=unit
-                        )
-                        for mark, value in zip(marks, values, strict=True)
-                    ],
-                    "hovertemplate": "%{text}<extra></extra>",
-                    "cliponaxis": False,
-                }
-            )
-
-    def titled(text: str) -> dict[str, Any]:
-        return {"title": {"text": text, "font": {"size": 13, "color": colours.quiet}, "standoff": 8}, "zeroline": True}
-
-    frame = layout(
-        theme,
-        margin={"l": 72, "r": 16, "t": 36, "b": 48},
-        showlegend=True,
-        legend=LEGEND | {"font": {"size": 13, "color": colours.quiet}},
-        xaxis=date_axis() | {"anchor": "y2"},
-        yaxis=titled(_("Shift, µm")) | {"domain": [0.54, 1], "tickformat": "+.4~g", "zerolinecolor": colours.faint},
-    )
-    frame["yaxis2"] = frame["yaxis"] | titled(_("Turn, °")) | {"domain": [0, 0.46]}
-    return {"data": data, "layout": frame}
 
 
 def touches_of(given: Mapping[str, Any], result: Mapping[str, Any]) -> list[Drawn]:

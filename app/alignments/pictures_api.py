@@ -7,7 +7,7 @@ from fastapi import Path, Query
 from fastapi.responses import PlainTextResponse
 from sqlalchemy.orm import Session
 
-from app.alignments import figures, queries
+from app.alignments import figures, queries, trends
 from app.alignments.answers import TEXT, program_of
 from app.alignments.tables import Alignment
 from app.errors import NotFound
@@ -99,9 +99,9 @@ def alignment_trend_figure(
             _("Nothing was aligned under the name {name} on this machine.").format(name=repr(name[:60])),
             _("GET /api/v1/alignments lists what was aligned."),
         )
-    return figures.trend(
+    return trends.trend(
         [
-            figures.Mark(
+            trends.Mark(
                 each.aligned_at, each.id, each.result["shift"], each.result["angles"], bool(each.result.get("misfits"))
             )
             for each in rows
