@@ -1,5 +1,6 @@
 """Work zeros and fixtures as they are answered. Lengths in mm, angles in degrees."""
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Any, Literal, cast
 
@@ -11,7 +12,7 @@ from app.machines.tables import Machine
 from app.zeros import queries, wording
 from app.zeros.queries import Compared, FixtureRow
 from app.zeros.schemas import ApproachName, KindName
-from app.zeros.tables import WorkZero
+from app.zeros.tables import Fixture, WorkZero
 
 State = Literal["unknown", "steady", "warning", "alarm"]
 Basis = Literal["first", "median", "frozen"]
@@ -178,11 +179,25 @@ def shift_out(compared: Compared, basis: str) -> ShiftOut:
     )
 
 
+def zeros_out(session: Session, zeros: Sequence[WorkZero]) -> list[ZeroOut]:
+    """Work zeros as they are answered."""
+    became = queries.pushed(session, zeros)
+    places = {(zero.machine_id, zero.fixture) for zero in zeros if zero.fixture is not None}
+    watched = {place: queries.settings_of(session, *place) for place in places}
+    return [
+        _zero_out(session, zero, became[zero.id], watched.get((zero.machine_id, zero.fixture or ""))) for zero in zeros
+    ]
+
+
 def zero_out(session: Session, zero: WorkZero) -> ZeroOut:
     """A work zero as it is answered."""
+    return zeros_out(session, [zero])[0]
+
+
+def _zero_out(session: Session, zero: WorkZero, became: Sequence[queries.Pushed], settings: Fixture | None) -> ZeroOut:
     machine = session.get_one(Machine, zero.machine_id)
-    compared = queries.compared(session, zero)
-    basis = queries.settings_of(session, machine.id, zero.fixture).basis if zero.fixture else "first"
+    compared = queries.compared(session, zero, settings)
+    basis = "first" if settings is None else settings.basis
     given: dict[str, Any] = zero.given
     return ZeroOut(
         id=zero.id,
@@ -207,7 +222,7 @@ def zero_out(session: Session, zero: WorkZero) -> ZeroOut:
         notices=[Notice(code=code, text=wording.notice(code)) for code in zero.result["notices"]],
         program=program_of(zero, machine) or "",
         shift=None if compared is None else shift_out(compared, basis),
-        readings=[PushedOut(**each._asdict()) for each in queries.pushed(session, zero)],
+        readings=[PushedOut(**each._asdict()) for each in became],
         touched_at=zero.touched_at,
         received_at=zero.received_at,
         by=zero.actor,

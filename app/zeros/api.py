@@ -17,7 +17,7 @@ from app.web.fields import Cursor, Limit, Page, Slug, page_of
 from app.web.i18n import _
 from app.web.theme import theme_from
 from app.zeros import actions, figures, queries
-from app.zeros.answers import TEXT, FixtureOut, ZeroOut, fixture_out, program_of, zero_out
+from app.zeros.answers import TEXT, FixtureOut, ZeroOut, fixture_out, program_of, zero_out, zeros_out
 from app.zeros.figures import Mark
 from app.zeros.schemas import FixtureIn, RecomputeIn, ZeroIn
 
@@ -58,7 +58,8 @@ def find_work_zero(
 
 def _push(database: Database, session: SessionDep, number: int) -> None:
     """What of a zero becomes readings is pushed once the zero is stored for good; what cannot be now, a chore does."""
-    if any(each.sequence is None for each in queries.pushed(session, queries.work_zero(session, number))):
+    became = queries.pushed(session, [queries.work_zero(session, number)])[number]
+    if any(each.sequence is None for each in became):
         with database.begin() as own:
             readings.push_waiting(own)
 
@@ -79,7 +80,7 @@ def list_work_zeros(
         caller.must_at(found.id, "viewer")
         only = found.id
     rows = queries.work_zeros(session, only, fixture, after=after, limit=limit + 1)
-    return page_of([zero_out(session, row) for row in rows], limit, lambda row: row.id)
+    return page_of(zeros_out(session, rows), limit, lambda row: row.id)
 
 
 @router.get("/work-zeros/fixtures")

@@ -110,14 +110,14 @@ def _standing(machine_id: int, fixture: str) -> Select[WorkZero]:
     return select(WorkZero).where(WorkZero.machine_id == machine_id, WorkZero.fixture == fixture, ~again.exists())
 
 
-def compared(session: Session, zero: WorkZero) -> Compared | None:
+def compared(session: Session, zero: WorkZero, settings: Fixture | None = None) -> Compared | None:
     """A zero against what its fixture is compared with; None for one without a fixture.
 
-    Only zeros of the same work offset are compared: two parts may lie in one fixture.
+    Only zeros of the same work offset are compared: two parts may lie in one fixture. settings: of the fixture, if known.
     """
     if zero.fixture is None:
         return None
-    settings = settings_of(session, zero.machine_id, zero.fixture)
+    settings = settings or settings_of(session, zero.machine_id, zero.fixture)
     others = _standing(zero.machine_id, zero.fixture).where(WorkZero.work_offset == zero.work_offset)
     if settings.basis == "frozen":
         found = select(WorkZero).where(WorkZero.machine_id == zero.machine_id, WorkZero.id == settings.reference)
@@ -225,15 +225,20 @@ def fixture_of(session: Session, machine: str, fixture: str) -> FixtureRow:
     return FixtureRow(found, fixture, count or 0, mine, settings_of(session, found.id, fixture))
 
 
-def pushed(session: Session, zero: WorkZero) -> list[Pushed]:
-    """The results of a zero that are, or become, readings."""
-    keys = {f"work-zero:{zero.id}:{name}": name for name in (*AXES, "diameter", "length", "width")}
+def pushed(session: Session, zeros: Sequence[WorkZero]) -> dict[int, list[Pushed]]:
+    """The results of these zeros that are, or become, readings, by the number of the zero."""
+    keys = {
+        f"work-zero:{zero.id}:{name}": (zero.id, name)
+        for zero in zeros
+        for name in (*AXES, "diameter", "length", "width")
+    }
     rows = readings.readings_of_results(session, keys)
-    return [
-        Pushed(name, rows[key][0], rows[key][1].sequence, rows[key][1].refused)
-        for key, name in keys.items()
-        if key in rows
-    ]
+    found: dict[int, list[Pushed]] = {zero.id: [] for zero in zeros}
+    for key, (number, name) in keys.items():
+        if key in rows:
+            characteristic, row = rows[key]
+            found[number].append(Pushed(name, characteristic, row.sequence, row.refused))
+    return found
 
 
 def recomputed_as(session: Session, zero: WorkZero) -> int | None:
