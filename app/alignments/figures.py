@@ -17,6 +17,7 @@ from app.web.theme import Palette, ThemeName, layout, palette
 
 SEEN = 0.09  # of the part's size: so large the greatest displacement is drawn
 FACING = 0.7  # cosine: so far a face looks along an axis
+MOST = 10_000  # times: what has to be enlarged more is nothing
 FAINTEST = 1e-7  # mm: what has moved by less has not moved
 BOX = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 LEGEND: dict[str, Any] = {"orientation": "h", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
@@ -94,13 +95,14 @@ def plane_figure(
 
 
 def enlargement(wanted: float) -> int:
-    """The next of 1, 2, 5 times a power of ten below what would fill the picture; 1 at least.
+    """The next of 1, 2, 5 times a power of ten below what would fill the picture; from 1 to `MOST`.
 
     >>> enlargement(734.0), enlargement(0.3), enlargement(20.0)
     (500, 1, 20)
     """
     if wanted < 2:
         return 1
+    wanted = min(wanted, MOST)
     power = 10 ** floor(log10(wanted * (1 + 1e-9)))
     return int(next(step * power for step in (5, 2, 1) if step * power <= wanted * (1 + 1e-9)))
 

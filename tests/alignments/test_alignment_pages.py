@@ -1,6 +1,7 @@
 """Aligning in a real browser: six touches typed in give the frame; the touch that does not fit is named and left out."""
 
 import re
+from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -31,9 +32,9 @@ def operator(shop: Shop) -> Person:
     return Person(shop.server, "operator")
 
 
-def six(machine: str, **more: str) -> dict[str, str]:
+def six(machine: str, **more: str) -> dict[str, Any]:
     """The form with the six points typed in."""
-    typed = {"machine": machine, "kind": "points", "rows": "6", "found": "deviation"}
+    typed: dict[str, Any] = {"machine": machine, "kind": "points", "rows": "6", "found": "deviation"}
     for at, ((x, y, z, face), off) in enumerate(zip(PLACES, FOUND, strict=False)):
         typed |= {f"x{at}": x, f"y{at}": y, f"z{at}": z, f"n{at}": face, f"d{at}": off}
     return typed | more

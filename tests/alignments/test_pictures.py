@@ -1,0 +1,71 @@
+"""The picture of a part: it holds its touches, shows what moved as large as can be seen, and marks what does not fit."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.alignments.figures import MOST, Drawn, enlargement, part_figure, plane_figure
+from app.core.geometry.frames import frame, from_angles
+
+OUTWARD = [
+    Drawn([10.0, 10.0, 0.0], [0.0, 0.0, 1.0], 0.02),
+    Drawn([180.0, 15.0, 0.0], [0.0, 0.0, 1.0], 0.05),
+    Drawn([90.0, 120.0, 0.0], [0.0, 0.0, 1.0], 0.03),
+    Drawn([20.0, 0.0, -15.0], [0.0, -1.0, 0.0], 0.1),
+    Drawn([170.0, 0.0, -15.0], [0.0, -1.0, 0.0], -0.2, doubted=True),
+    Drawn([0.0, 60.0, -15.0], [-1.0, 0.0, 0.0], 0.05),
+]
+INWARD = [each._replace(normal=[-n for n in each.normal]) for each in OUTWARD]
+MOVED = frame(from_angles(0.0, 0.0, 0.1), [0.05, -0.1, 0.02])
+
+
+def spans(figure: dict[str, Any], name: str) -> tuple[float, float, float, float]:
+    xs, ys = (
+        [
+            each
+            for trace in figure["data"]
+            if str(trace.get("name", "")).startswith(name)
+            for each in trace[axis]
+            if each is not None
+        ]
+        for axis in ("x", "y")
+    )
+    return min(xs), max(xs), min(ys), max(ys)
+
+
+@pytest.mark.parametrize("touches", [OUTWARD, INWARD])
+def test_the_part_holds_its_touches_whichever_way_normals_point(touches: list[Drawn]) -> None:
+    figure = part_figure(MOVED, touches)
+    left, right, low, high = spans(figure, "As it should lie")
+    for name in ("Touches", "Does not fit"):
+        a, b, c, d = spans(figure, name)
+        room = 0.15 * (right - left)
+        assert left - room < a <= b < right + room
+        assert low - room < c <= d < high + room
+
+
+def test_what_does_not_fit_is_marked_by_shape_and_name() -> None:
+    (trace,) = [each for each in part_figure(MOVED, OUTWARD)["data"] if each.get("name") == "Does not fit"]
+    assert trace["marker"]["symbol"] == "x"
+    assert trace["hovertext"] == ["touch 5: −200.0 µm along its face's normal"]
+
+
+def test_displacements_are_enlarged_as_the_legend_says() -> None:
+    names = [str(each.get("name")) for each in part_figure(MOVED, OUTWARD)["data"]]
+    assert "As it lies, 50 ×" in names  # 0.4 mm at the far corner of 180, drawn 9 % of it at the most
+    assert (enlargement(1e9), enlargement(1.5), enlargement(2.0)) == (MOST, 1, 2)
+
+
+@pytest.mark.parametrize(
+    "touches",
+    [
+        [Drawn([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], 0.0)],
+        [Drawn([5.0, 5.0, 5.0], [0.0, 0.0, 1.0], 0.1)] * 3,
+        [Drawn([0.0, 0.0, 5.0], [1.0, 0.0, 0.0], -5e4), Drawn([0.0, 10.0, 5.0], [0.0, 0.6, 0.8], 1e5)],
+    ],
+)
+def test_odd_touches_are_drawn_in_plain_numbers(touches: list[Drawn]) -> None:
+    json.dumps(part_figure(np.eye(4), touches, theme="dark"), allow_nan=False)
+    json.dumps(plane_figure(np.eye(4), [[0.0, 0.0], [100.0, 0.0]], [[0.0, 0.0], [100.0, 0.0]]), allow_nan=False)
