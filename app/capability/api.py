@@ -42,6 +42,25 @@ class Asked(NamedTuple):
     confidence: float
 
 
+Last = Annotated[
+    str | None,
+    Query(
+        pattern=r"^([1-9][0-9]{0,17}|all)$",
+        description="Of the last so many readings, or of `all`; the last 1000 where neither this nor a time is given.",
+    ),
+]
+OneSide = Annotated[Side, Query(description="Both limits, or only one of them.")]
+Confidence = Annotated[float, Query(gt=0.5, lt=1, allow_inf_nan=False, description="Of the intervals.")]
+
+
+def in_order(choice: Asked) -> Asked:
+    """The choice, unless it runs backwards. Raises `Invalid`."""
+    if choice.start is not None and choice.end is not None and choice.start > choice.end:
+        message = _("is later than the end; exchange the two")
+        raise Invalid(f"from: {message}.", _("Exchange the two moments."), errors=[FieldError("from", message)])
+    return choice
+
+
 def asked(
     start: Annotated[
         Moment | None, Query(alias="from", description="Measured at this moment or later.", examples=[None])
@@ -49,23 +68,12 @@ def asked(
     end: Annotated[
         Moment | None, Query(alias="to", description="Measured at this moment or earlier.", examples=[None])
     ] = None,
-    last: Annotated[
-        str | None,
-        Query(
-            pattern=r"^([1-9][0-9]{0,17}|all)$",
-            description="Of the last so many readings, or of `all`; the last 1000 where neither this nor a time is given.",
-        ),
-    ] = None,
-    side: Annotated[Side, Query(description="Both limits, or only one of them.")] = "both",
-    confidence: Annotated[
-        float, Query(gt=0.5, lt=1, allow_inf_nan=False, description="Of the intervals.")
-    ] = CONFIDENCE,
+    last: Last = None,
+    side: OneSide = "both",
+    confidence: Confidence = CONFIDENCE,
 ) -> Asked:
-    """The choice of readings, the same for page, API and figures."""
-    if start is not None and end is not None and start > end:
-        message = _("is later than the end; exchange the two")
-        raise Invalid(f"from: {message}.", _("Exchange the two moments."), errors=[FieldError("from", message)])
-    return Asked(last, start, end, side, confidence)
+    """The choice of readings, the same for API and figures."""
+    return in_order(Asked(last, start, end, side, confidence))
 
 
 AskedDep = Annotated[Asked, Depends(asked)]

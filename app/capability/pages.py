@@ -1,22 +1,26 @@
 """Page: the capability of a characteristic."""
 
-from typing import Any
+from datetime import datetime
+from typing import Annotated, Any
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 
 from app.capability import wording
-from app.capability.api import Asked, AskedDep, judged
+from app.capability.api import Asked, Confidence, Last, OneSide, in_order, judged
 from app.capability.pictures import interval
-from app.capability.queries import USUAL
+from app.capability.queries import CONFIDENCE, USUAL, Side
 from app.characteristics import queries as characteristics
 from app.core.spc.refusal import Refused
+from app.errors import Invalid
+from app.formats import values
 from app.gauges import queries as gauges
 from app.gauges import wording as gauge_wording
 from app.proof import queries as proof
 from app.proof import wording as proof_wording
 from app.statistics import wording as statistics
 from app.web.deps import AnyCaller, SessionDep, require
+from app.web.forms import by_field
 from app.web.i18n import _
 from app.web.templates import page
 
@@ -24,11 +28,48 @@ router = APIRouter(include_in_schema=False)
 RUNS = ("125", "500", "1000", "5000", "all")
 
 
+def _typed(given: dict[str, str], last: str | None, side: Side, confidence: float) -> tuple[Asked, dict[str, str]]:
+    """What people typed, and by field what is wrong with it; then the last readings are shown. Moments are of their time zone."""
+    errors: dict[str, str] = {}
+    zone, moments = None, dict[str, datetime | None]()
+    try:
+        zone = values.zone_named(given["timezone"].strip() or "UTC")
+    except (values.Unreadable, ValueError) as error:
+        errors["timezone"] = str(error)
+    for name in ("from", "to"):
+        text = given[name].strip()
+        try:
+            moments[name] = values.moment(text, zone) if text else None
+        except values.Unreadable as error:
+            errors[name] = str(error)
+    choice = Asked(last, None, None, side, confidence)
+    if not errors:
+        try:
+            return in_order(choice._replace(start=moments["from"], end=moments["to"])), {}
+        except Invalid as error:
+            errors |= by_field(error)
+    return choice, errors
+
+
+Typed = Annotated[str, Query(max_length=64)]
+
+
 @router.get("/characteristics/{characteristic}/capability", dependencies=[require("viewer")])
 def capability_page(
-    request: Request, session: SessionDep, caller: AnyCaller, characteristic: str, choice: AskedDep
+    request: Request,
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: str,
+    start: Annotated[str, Query(alias="from", max_length=64)] = "",
+    end: Annotated[str, Query(alias="to", max_length=64)] = "",
+    timezone: Typed = "",
+    last: Last = None,
+    side: OneSide = "both",
+    confidence: Confidence = CONFIDENCE,
 ) -> Response:
     """Indices with intervals and what they are worth, spread and shape, behaviour in time, the tool without corrections."""
+    typed = {"from": start, "to": end, "timezone": timezone}
+    choice, errors = _typed(typed, last, side, confidence)
     standing = characteristics.characteristic_named(session, characteristic)
     study = judged(session, standing, choice)
     path = f"/characteristics/{standing.characteristic.key}/capability"
@@ -48,6 +89,9 @@ def capability_page(
     return page(
         request,
         "capability/capability.html",
+        status=422 if errors else 200,
+        typed=typed,
+        errors=errors,
         study=study,
         characteristic=standing.characteristic,
         machine=standing.machine,

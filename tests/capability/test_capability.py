@@ -8,7 +8,7 @@ import pytest
 from app.capability.queries import capability_by_characteristic
 from app.characteristics.queries import characteristic_named
 from tests.conftest import Server
-from tests.shop import Shop
+from tests.shop import Person, Shop
 
 
 @pytest.fixture
@@ -185,3 +185,30 @@ def test_ppk_of_every_characteristic_for_ranking(server: Server, shop: Shop) -> 
     assert found.readings == 200
     assert found.ppk.value == pytest.approx(told["ppk"]["value"])
     assert {each.ppk for each in mine.values() if each.readings < 20} == {None}
+
+
+def test_the_period_is_typed_as_people_write_it_and_stays_if_it_is_wrong(server: Server, shop: Shop) -> None:
+    push(shop, quiet(40))
+    viewer, path = Person(server, "viewer"), f"/characteristics/{shop.characteristic}/capability"
+    page = viewer.open(f"{path}?from=2020-01-01+06:00&to=2020-01-02&timezone=Europe/Belgrade")
+    assert "20 are missing" in page
+    assert 'value="2020-01-01 06:00"' in page
+    for wrong in (
+        "from=yesterday",
+        "from=2026-02-01&to=2026-01-01",
+        "to=2026-13-01",
+        "timezone=Mars/Base&from=2026-01-01",
+    ):
+        page = viewer.open(f"{path}?{wrong}", 422)
+        assert "The period was not understood" in page
+        assert f'value="{wrong.partition("=")[2].partition("&")[0]}"' in page
+    viewer.open(f"{path}?last=0", 422)
+
+
+def test_the_page_greys_what_must_not_be_quoted(server: Server, shop: Shop) -> None:
+    shop.add("greyed", mode="measure_only", tool_memory=0)
+    push(shop, [value + 0.02 * place for place, value in enumerate(quiet(250))], "greyed")
+    page = Person(server, "viewer").open("/characteristics/greyed/capability")
+    assert "Cp and Cpk are not to be quoted" in page
+    assert page.count("not to be quoted here") >= 2
+    assert "No gauge study yet" in page
