@@ -18,6 +18,7 @@ from app.web.theme import Palette
 ROOM = 0.08
 TOO_FAR = 4.0  # times as far as limits and most points reach
 WITH_VALUES = 8  # points beyond that are labelled
+CLOSE = 0.05  # of the width of the chart: of points closer than this the farthest is labelled, behind the last of them
 FEW = 8  # points of which none is far
 UNSIGNED = (Chart.MOVING_RANGE, Chart.RANGES, Chart.DEVIATIONS)
 
@@ -59,15 +60,18 @@ def beyond(
     inset = (high - low) * 0.025
     above = values[far] > 0.5 * (low + high)
     said = [f"{value:.0f} µm" if view.kind in UNSIGNED else f"{signed(value, 0)} µm" for value in values[far].tolist()]
+    x = view.last[drawn[far]]
+    labels = _spaced(said, np.abs(values[far]), x, above, CLOSE * (view.last[-1] - view.first[0]))
     return [
         {
             "type": "scatter",
-            "mode": "markers+text" if len(said) <= WITH_VALUES else "markers",
+            "mode": "markers+text" if sum(map(bool, labels)) <= WITH_VALUES else "markers",
             "name": _("Beyond the axis"),
             "meta": "beyond",
-            "x": view.last[drawn[far]].tolist(),
+            "x": x.tolist(),
             "y": np.where(above, high - inset, low + inset).tolist(),
-            "text": said,
+            "text": labels,
+            "hovertext": said,
             "textposition": "middle right",
             "textfont": {"size": 12, "color": colours.ink},
             "customdata": [custom[at] for at in np.flatnonzero(far).tolist()],
@@ -77,6 +81,19 @@ def beyond(
                 "symbol": ["triangle-up-open" if up else "triangle-down-open" for up in above.tolist()],
                 "line": {"width": 2},
             },
-            "hovertemplate": f"{_('Reading')} %{{x:d}}<br>%{{text}}<extra></extra>",
+            "hovertemplate": f"{_('Reading')} %{{x:d}}<br>%{{hovertext}}<extra></extra>",
         }
     ]
+
+
+def _spaced(
+    said: list[str], size: NDArray[np.float64], x: NDArray[np.int64], above: NDArray[np.bool_], close: float
+) -> list[str]:
+    """The labels of points that lie too close to each other become one."""
+    labels = [""] * len(said)
+    ends = [*np.flatnonzero((np.diff(x) > close) | (above[1:] != above[:-1])).tolist(), len(said) - 1]
+    start = 0
+    for end in ends:
+        labels[end] = "\N{NO-BREAK SPACE}" + said[start + int(np.argmax(size[start : end + 1]))]
+        start = end + 1
+    return labels

@@ -190,12 +190,19 @@ def test_a_broken_insert_does_not_press_the_limits_into_a_line() -> None:
     low, high = figure["layout"]["yaxis"]["range"]
     assert -8 < low < -3 < 3 < high < 8
     beyond = traces(figure)["beyond"]
-    assert (beyond["x"], beyond["text"]) == ([41, 82], ["+400 µm", "−300 µm"])
+    assert (beyond["x"], beyond["hovertext"]) == ([41, 82], ["+400 µm", "−300 µm"])
+    assert [label.strip() for label in beyond["text"]] == ["+400 µm", "−300 µm"]
     assert beyond["marker"]["symbol"] == ["triangle-up-open", "triangle-down-open"]
     assert all(low < y < high for y in beyond["y"])
     assert beyond["customdata"][0] == "/characteristics/shaft/readings/41"
     assert {400.0, -300.0} <= set(traces(figure)["points"]["y"]), "a wider axis shows them where they are"
     assert "beyond" not in traces(control_figure(seen([0.5, -0.5] * 20), key="shaft"))
+
+
+def test_of_points_beyond_that_are_neighbours_the_farthest_is_labelled() -> None:
+    values = [*([0.5, -0.5] * 50), 390.0, 400.0, 395.0, -380.0, *([0.5, -0.5] * 50)]
+    beyond = traces(control_figure(seen(values), key="shaft"))["beyond"]
+    assert [label.strip() for label in beyond["text"]] == ["", "", "+400 µm", "−380 µm"]
 
 
 def test_limits_that_lie_close_together_are_named_in_one_line() -> None:
