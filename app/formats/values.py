@@ -77,7 +77,11 @@ def moment(text: str, zone: ZoneInfo | None, pattern: str | None = None) -> date
     if zone is None:
         raise Unreadable(_("does not say in which time zone; name the time zone, such as Europe/Belgrade"))
     local = read.replace(tzinfo=zone)
-    if local.astimezone(UTC).astimezone(zone).replace(tzinfo=None) != read:
+    try:
+        there = local.astimezone(UTC).astimezone(zone).replace(tzinfo=None)
+    except OverflowError:  # the first and the last day that a calendar knows
+        raise Unreadable(_("lies outside the years 1 to 9999")) from None
+    if there != read:
         raise Unreadable(_("does not exist in {zone}: the clocks went forward in that hour").format(zone=zone.key))
     return local
 
