@@ -233,7 +233,7 @@ def _touches(
                     ],
                 )
             )
-    outward = normals @ view.T
+    outward = _outward(places, normals) @ view.T
     for at, touch in enumerate(touches):
         way = outward[at] / max(float(np.linalg.norm(outward[at])), 1e-9)
         beside = abs(way[0]) > 0.5
@@ -241,6 +241,16 @@ def _touches(
         rise = float(4 * way[1]) if beside else (18.0 if way[1] >= 0 else -18.0)
         words.append(_word(end[at], f"<b>{at + 1}</b> {signed(touch.off * 1000, 1)}", colours, yshift=rise, **anchor))
     return arrows, marks, words
+
+
+def _outward(places: Floats, normals: Floats) -> Floats:
+    """Of each touch the axis that its face looks along, away from the middle of the part: where words have room."""
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    ways = np.zeros_like(normals)
+    for at, axis in enumerate(np.abs(normals).argmax(axis=1)):
+        off = places[at, axis] - middle[axis]
+        ways[at, axis] = np.sign(off if abs(off) > FAINTEST else normals[at, axis]) or 1.0
+    return ways
 
 
 def _line(points: Floats, colour: str, name: str | None, **more: Any) -> dict[str, Any]:
