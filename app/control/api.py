@@ -8,19 +8,21 @@ from fastapi import Path, Query, Response
 from app.characteristics import queries as characteristics
 from app.characteristics.figures_api import Chosen
 from app.characteristics.queries import Standing
-from app.control import actions, charts, queries
+from app.control import actions, charts, queries, signals_queries
 from app.control.answers import baseline_out, control_out, draft_out
 from app.control.drafting import draft_of
 from app.control.editor import PICKED, Picked, picture_of
 from app.control.figures import control_figure
 from app.control.schemas import BaselineIn, BaselineOut, ChartName, ControlOut, DraftAnswer, Grouping, PeriodIn, WhyIn
 from app.control.tables import Baseline
+from app.control.view import Marked
 from app.core.spc.quantity import Quantity
 from app.core.spc.shewhart import Chart
 from app.statistics import queries as statistics
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, Engineer, SessionDep
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Limit, Page, page_of
+from app.web.i18n import _
 from app.web.theme import ThemeName
 
 router = api_router("control charts")
@@ -176,6 +178,9 @@ def get_control_chart(
     choice: Chosen,
     chart: Kind = None,
     version: Judge = None,
+    signal: Annotated[
+        int | None, Query(ge=1, le=LARGEST_ID, description="Mark the run of this signal, not the baseline's period.")
+    ] = None,
     theme: Theme = "light",
     width: Width = 1240,
 ) -> Response:
@@ -188,9 +193,15 @@ def get_control_chart(
             control_figure(charts.unjudged(session, standing, window), key=characteristic, theme=theme, width=width)
         )
     view = charts.view(session, standing, baseline, window, chart)
-    return _answer(
-        control_figure(view, key=characteristic, marked=charts.marked_by(baseline), theme=theme, width=width)
-    )
+    marked = charts.marked_by(baseline) if signal is None else _run_of(session, standing, signal)
+    return _answer(control_figure(view, key=characteristic, marked=marked, theme=theme, width=width))
+
+
+def _run_of(session: SessionDep, standing: Standing, number: int) -> Marked:
+    row = signals_queries.signal(session, number)
+    if row.characteristic.key != standing.characteristic.key:
+        raise signals_queries.unknown(number)
+    return Marked(row.signal.first_sequence, row.signal.last_sequence, _("Signal {n}").format(n=number))
 
 
 @router.get("/characteristics/{characteristic}/figures/baseline", responses=problems(404) | FIGURE, response_model=None)

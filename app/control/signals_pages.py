@@ -88,7 +88,11 @@ def _signal(
     error: Invalid | None = None,
 ) -> Response:
     told = words.told(row.signal)
-    query = words.window(told) | {"chart": row.signal.chart, "baseline": row.signal.baseline_version}
+    query = words.window(told) | {
+        "chart": row.signal.chart,
+        "baseline": row.signal.baseline_version,
+        "signal": row.signal.id,
+    }
     return page(
         request,
         "control/signal.html",

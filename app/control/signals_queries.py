@@ -62,11 +62,16 @@ def signal(session: Session, number: int) -> SignalRow:
     """One signal by its number. Raises `NotFound`."""
     row = session.execute(_rows().where(Signal.id == number)).one_or_none() if 0 < number <= LARGEST_ID else None
     if row is None:
-        raise NotFound(
-            _("There is no signal {number}.").format(number=number),
-            _("Check the number; GET /api/v1/signals lists them."),
-        )
+        raise unknown(number)
     return SignalRow(*row)
+
+
+def unknown(number: int) -> NotFound:
+    """Nobody knows this signal, or not here."""
+    return NotFound(
+        _("There is no signal {number}.").format(number=number),
+        _("Check the number; GET /api/v1/signals lists them."),
+    )
 
 
 def signals(

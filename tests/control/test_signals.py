@@ -8,7 +8,7 @@ from sqlalchemy import select
 from app.control.signal_tables import Watching
 from tests.conftest import Server
 from tests.control.line import Line
-from tests.shop import Shop
+from tests.shop import Person, Shop
 
 
 @pytest.fixture
@@ -184,6 +184,19 @@ def test_a_false_reading_behind_a_signal_is_taken_out(shop: Shop) -> None:
     assert done["outcome"][0]["sequences"] == [61]
     line.look()
     assert [each["state"] for each in line.signals()] == ["withdrawn"]
+
+
+def test_its_run_is_marked_on_its_chart(shop: Shop, server: Server) -> None:
+    line = Line(shop)
+    line.push([0.0, 9.0, 9.0])
+    line.look()
+    (signal,) = line.signals("open")
+    path = f"/characteristics/{line.key}/figures/control?first=50&through=63&signal={signal['id']}"
+    (box,) = [shape for shape in shop.call("GET", path)["layout"]["shapes"] if shape["type"] == "rect"]
+    assert (box["x0"], box["x1"]) == (61.5, 63.5)
+    shop.call("GET", f"/characteristics/{Line(shop, 'other').key}/figures/control?signal={signal['id']}", 404)
+    page = Person(server, "viewer").open(f"/signals/{signal['id']}")
+    assert f"signal={signal['id']}" in page
 
 
 def test_what_a_signal_was_is_said_by_an_engineer_and_kept(shop: Shop) -> None:
