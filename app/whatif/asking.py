@@ -36,11 +36,14 @@ def map_of(past: Past, given: MapIn) -> Map:
     r34 = today.averaging_limit if given.averaging_limit is None else given.averaging_limit
     asked = Settings(averaging_limit=given.averaging_limit, factor=given.factor)
     queries.check_order(with_settings(asked.applied_to(today), zero_range=0.0), asked)
+    ks, r33s = grid.weighting_factors(today), grid.zero_ranges(today, r34)
+    if len(ks) * len(r33s) * len(past.way.free) > queries.MOST_DECISIONS:
+        ks, r33s = grid.coarser(ks, today.weighting_factor), grid.coarser(r33s, today.zero_range)
     return queries.map_of(
         past,
         settings(past, given),
-        grid.weighting_factors(today) if given.weighting_factors is None else given.weighting_factors,
-        grid.zero_ranges(today, r34) if given.zero_ranges is None else given.zero_ranges,
+        ks if given.weighting_factors is None else given.weighting_factors,
+        r33s if given.zero_ranges is None else given.zero_ranges,
         given.criterion,
     )
 

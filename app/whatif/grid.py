@@ -61,6 +61,15 @@ def _with(values: list[float], today: float) -> list[float]:
     return sorted([*values[:nearest], today, *values[nearest + 1 :]])
 
 
+def coarser(values: Sequence[float], today: float) -> list[float]:
+    """Every second value, and today's, which stays on the map.
+
+    >>> coarser([1.0, 1.5, 2.0, 2.5, 3.0], 2.5)
+    [1.0, 2.0, 2.5, 3.0]
+    """
+    return sorted({*values[::2], *(value for value in values if nanometres(value * 1000) == nanometres(today * 1000))})
+
+
 def place(values: Sequence[float], value: float) -> int | None:
     """Where a value stands, to the picometre; None where it does not."""
     found = [at for at, each in enumerate(values) if nanometres(each * 1000) == nanometres(value * 1000)]

@@ -60,7 +60,9 @@ def _what_if(
         given = forms.asked(typed)
         answer, made = asking.both(session, standing, given, forms.around(typed))
     except (Invalid, TooManyRequests) as error:
-        status, problem, errors = error.status, error, forms.at_fields(by_field(error))
+        # That a period holds nothing to replay is no mistake of who looks at it.
+        status = error.status if error.errors or isinstance(error, TooManyRequests) else 200
+        problem, errors = error, forms.at_fields(by_field(error))
     changes = wording.changed(asdict(answer.past.standing.parameters), actions.changes_of(answer)) if answer else []
     key, failing = standing.characteristic.key, proof.failing()
     criterion = Criterion(typed["goal"]) if typed["goal"] in set(Criterion) else Criterion.PPK

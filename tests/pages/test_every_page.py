@@ -12,8 +12,8 @@ from fastapi.routing import APIRoute
 from playwright.sync_api import Browser, Page, expect
 
 from app.main import ROUTERS
-from tests.conftest import Server
 from tests.alignments.test_alignments import SIX
+from tests.conftest import Server
 from tests.control.line import Line
 from tests.forms.test_forms import BORE
 from tests.kinematics.bench import axis
@@ -73,6 +73,7 @@ PAGES = {
         "/characteristics/{characteristic}/what-if",
         "/characteristics/{characteristic}/what-if?k=3&r33=2.5&goal=corrections#replay",
         "/characteristics/{characteristic}-watched/what-if?r34=6",
+        "/characteristics/{characteristic}-empty/what-if",
     ],
     "/proposals": ["/proposals", "/proposals?status=all"],
     "/proposals/{number}": ["/proposals/{proposal}"],
