@@ -198,6 +198,7 @@ def test_the_period_is_typed_as_people_write_it_and_stays_if_it_is_wrong(server:
         "from=2026-02-01&to=2026-01-01",
         "to=2026-13-01",
         "timezone=Mars/Base&from=2026-01-01",
+        "from=0001-01-01&timezone=Europe/Belgrade",
     ):
         page = viewer.open(f"{path}?{wrong}", 422)
         assert "The period was not understood" in page

@@ -21,7 +21,7 @@ from app.core.spc.capability import (
 )
 from app.core.spc.normality import anderson_darling, shapiro_wilk
 from app.core.spc.refusal import Reason, Refused
-from app.core.spc.spread import pooled, subgroups
+from app.core.spc.spread import far_off, pooled, subgroups
 
 READINGS = st.lists(st.integers(-300, 300), min_size=20, max_size=80).filter(lambda values: len(set(values)) > 8)
 
@@ -108,6 +108,45 @@ def test_parts_out_of_tolerance_are_counted_and_expected() -> None:
     assert observed_ppm(Limits(0.0, 2.0), np.array([0.0, 1.0, 2.0, 2.5])) == 250_000
     assert observed_ppm(Limits(None, 2.0), np.array([-9.0, 1.0, 2.0, 2.5])) == 250_000
     assert expected_ppm(Limits(-6, 6), 1.5, 1.0) == pytest.approx(3.3977, abs=1e-4)  # the 3.4 ppm of six sigma
+
+
+@given(values=READINGS, shift=st.integers(-50, 50), scale=st.sampled_from([-7.0, -1.0, 0.001, 2.0]))
+@settings(max_examples=60, deadline=None)
+def test_normality_does_not_know_unit_sign_or_zero(values: list[int], shift: int, scale: float) -> None:
+    x = np.array(values, dtype=np.float64)
+    for test in (anderson_darling, shapiro_wilk):
+        before, after = test(x), test(shift + scale * x)
+        assert after.statistic == pytest.approx(before.statistic, rel=1e-6)
+        assert after.p_value == pytest.approx(before.p_value, rel=1e-4, abs=1e-9)
+
+
+@given(values=READINGS, shift=st.integers(-50, 50), scale=st.sampled_from([-7.0, -1.0, 0.001, 2.0]))
+@settings(max_examples=60, deadline=None)
+def test_percentiles_do_not_know_unit_sign_or_zero(values: list[int], shift: int, scale: float) -> None:
+    x = np.array(values, dtype=np.float64)
+    limits = sorted((shift - scale * 310, shift + scale * 380))
+    try:
+        before = percentile(x, Limits(-310, 380), minimum=20)
+    except Refused:
+        return
+    after = percentile(shift + scale * x, Limits(*limits), minimum=20)
+    assert (after.pp, after.ppk) == pytest.approx((before.pp, before.ppk), rel=1e-6)
+
+
+@given(values=READINGS, scale=st.sampled_from([-7.0, 0.001, 2.0]))
+@settings(max_examples=60, deadline=None)
+def test_what_lies_far_off_lies_there_in_any_unit(values: list[int], scale: float) -> None:
+    x = np.array([*values, 90_000], dtype=np.float64)
+    assert far_off(x)[-1]
+    assert far_off(5 + scale * x).tolist() == far_off(x).tolist()
+
+
+def test_nothing_lies_far_off_by_chance_or_in_a_saw_tooth() -> None:
+    rng = np.random.default_rng(6)
+    assert not far_off(rng.normal(size=100_000)).any()
+    assert not far_off(np.tile(np.linspace(0, 1, 50), 20)).any()
+    assert not far_off(np.array([1.0, 400.0])).any()
+    assert not far_off(np.full(50, 1.0)).any()
 
 
 class TestCautions:

@@ -155,6 +155,61 @@ class TestLinearity:
                 linearity.linearity(wrong)
 
 
+SIZES = st.lists(st.integers(-400, 400), min_size=12, max_size=40).filter(lambda values: len(set(values)) > 3)
+MOVES = {"shift": st.floats(-1e3, 1e3), "scale": st.sampled_from([-3.0, -1.0, 0.001, 25.4])}
+
+
+@given(values=SIZES, **MOVES)
+def test_bias_and_cg_do_not_know_unit_sign_or_zero(values: list[int], shift: float, scale: float) -> None:
+    before = single.type_one([value / 100 for value in values], 0.5, 40.0)
+    moved = [shift + scale * value / 100 for value in values]
+    after = single.type_one(moved, shift + scale * 0.5, abs(scale) * 40.0)
+    assert (after.cg, after.cgk) == pytest.approx((before.cg, before.cgk), rel=1e-6, abs=1e-9)
+    assert after.bias.bias == pytest.approx(scale * before.bias.bias, rel=1e-6, abs=1e-9)
+    assert after.bias.p_value == pytest.approx(before.bias.p_value, rel=1e-5, abs=1e-9)
+    assert after.cgk <= after.cg + 1e-12
+
+
+@given(values=SIZES, **MOVES)
+def test_linearity_does_not_know_unit_sign_or_zero(values: list[int], shift: float, scale: float) -> None:
+    def study(scale: float, shift: float) -> linearity.Linearity:
+        return linearity.linearity(
+            {
+                shift + scale * size: [shift + scale * (size + value / 1000) for value in values[place::3]]
+                for place, size in enumerate((10.0, 30.0, 50.0))
+            }
+        )
+
+    try:
+        before = study(1.0, 0.0)
+    except Refused:
+        return
+    after = study(scale, shift)
+    assert after.slope.value == pytest.approx(before.slope.value, rel=1e-5, abs=1e-9)
+    assert after.r_squared == pytest.approx(before.r_squared, rel=1e-5, abs=1e-7)
+    assert after.average_bias == pytest.approx(scale * before.average_bias, rel=1e-5, abs=1e-7)
+    assert after.slope.p_value == pytest.approx(before.slope.p_value, rel=1e-4, abs=1e-9)
+
+
+def test_negative_variances_are_told() -> None:
+    rng = np.random.default_rng(8)
+    found = [by_anova(rng.normal(size=(8, 2, 3))) for _ in range(40)]
+    told = {name for study in found for name in study.zeroed}
+    assert told >= {"part", "appraiser"}
+    for study in found:
+        for name in study.zeroed:
+            assert getattr(study, name) == 0.0
+    assert by_anova(study_with_everything()).zeroed == ()
+    ranges = [by_average_and_range(rng.normal(size=(8, 2, 3))) for _ in range(40)]
+    assert any(each.zeroed == ("appraiser",) and each.appraiser == 0.0 for each in ranges)
+
+
+def study_with_everything() -> np.ndarray:
+    parts, operators = np.arange(10.0), np.array([0.0, 1.0, 3.0])
+    rng = np.random.default_rng(9)
+    return parts[:, None, None] * 5 + operators[None, :, None] + rng.normal(0, 0.2, (10, 3, 3))
+
+
 class TestZeroRange:
     def test_it_reaches_as_far_as_chance(self) -> None:
         assert zero_range.suggest(0.001).zero_range == 0.003
