@@ -92,7 +92,8 @@ class PlotlyChart extends HTMLElement {
     try {
       const url = new URL(this.getAttribute("src"), location.href);
       url.searchParams.set("theme", theme());
-      url.searchParams.set("width", Math.max(200, Math.round(this.clientWidth))); // 0 before the page is laid out
+      const width = this.clientWidth; // 0 before the page is laid out
+      url.searchParams.set("width", Math.max(200, Math.round(width)));
       const [Plotly, answer] = await Promise.all([loadPlotly(), fetch(url, { headers: { Accept: "application/json" } })]);
       if (!answer.ok) throw new Error(`${answer.status}`);
       const figure = wallClock(await answer.json());
@@ -102,9 +103,10 @@ class PlotlyChart extends HTMLElement {
       await Plotly.react(this.plot, figure.data, { ...figure.layout, ...(touch && { dragmode: false }) }, CONFIG);
       if (!this.drawn) this.plot.on("plotly_click", (event) => this.open(event.points[0]));
       this.drawn = true;
-      this.width = this.clientWidth;
+      this.width = width;
       this.fetched = Date.now();
       this.settle();
+      if (Math.abs(this.clientWidth - width) > 40) this.refresh(); // laid out while it was on its way
     } catch (error) {
       this.complain(error);
       setTimeout(() => this.isConnected && this.refresh(), 5_000);
