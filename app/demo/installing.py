@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from random import Random
 
-from app.demo import calibrating, plant, turning
+from app.demo import calibrating, plant, touching, turning
 from app.demo.client import Client, Refused
 from app.demo.running import Line, Pace
 from app.demo.simulation import Machine
@@ -63,6 +63,7 @@ def lines(
         set_up(admin, spec)
         calibrating.behind(admin, spec.key, seed)
         turning.behind(admin, spec.key, seed)
+        touching.behind(admin, spec.key, seed)
         gateway = Client(url, new_key(admin, f"/machines/{spec.key}/keys", {"name": KEY_NAME}), ending)
         rng = Random(f"{seed}:{spec.key}:operator")
         made.append(Line(Machine(spec, seed), gateway, operator, run, rng, ending))
