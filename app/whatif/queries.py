@@ -220,9 +220,10 @@ def check_order(parameters: Parameters, settings: Settings) -> None:
         for field, message in wording.field_errors(error.problems):
             name = field.removeprefix("parameters.")
             errors.append(FieldError(name if name in given or not given else given[0], message))
+        limits = {each.field for each in errors} & {"zero_range", "averaging_limit"}
         raise Invalid(
-            "; ".join(f"{each.message}" for each in errors[:3]),
-            _("Choose settings that hold to R33 < R34 ≤ R35/2."),
+            "; ".join(each.message.rstrip(".") for each in errors[:3]) + ".",
+            _("Choose settings that hold to R33 < R34 ≤ R35/2.") if limits else _("Choose another value."),
             errors=errors,
         ) from None
 
