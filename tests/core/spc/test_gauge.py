@@ -207,7 +207,8 @@ def test_negative_variances_are_told() -> None:
 def study_with_everything() -> np.ndarray:
     parts, operators = np.arange(10.0), np.array([0.0, 1.0, 3.0])
     rng = np.random.default_rng(9)
-    return parts[:, None, None] * 5 + operators[None, :, None] + rng.normal(0, 0.2, (10, 3, 3))
+    made: np.ndarray = parts[:, None, None] * 5 + operators[None, :, None] + rng.normal(0, 0.2, (10, 3, 3))
+    return made
 
 
 class TestZeroRange:
