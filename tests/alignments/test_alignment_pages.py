@@ -70,7 +70,7 @@ class TestInABrowser:
         expect(page.locator("main")).to_contain_text("The touches hold the part well")
         expect(page.locator("main")).to_contain_text("One touch more near")
         expect(page.get_by_label("Text for Sinumerik")).to_have_value(re.compile(r"CTRANS\(X,.*:CROT\("))
-        expect(page.locator("plotly-chart .main-svg").first).to_be_visible()
+        expect(page.locator("plotly-chart .main-svg").first).to_be_visible(timeout=30_000)
         expect(page.locator("table.touches tbody tr")).to_have_count(6)
 
         # The same pallet again, a little elsewhere: its history has both.
@@ -81,7 +81,7 @@ class TestInABrowser:
         page.get_by_role("button", name="Align and keep").click()
         page.get_by_role("link", name="History of pallet 4").click()
         expect(page.locator("tbody tr")).to_have_count(2)
-        expect(page.locator("plotly-chart .main-svg").first).to_be_visible()
+        expect(page.locator("plotly-chart .main-svg").first).to_be_visible(timeout=30_000)
 
     def test_the_touch_that_does_not_fit_is_named_and_left_out(self, shop: Shop, operator: Person, page: Page) -> None:
         operator.sign_in(page)
