@@ -21,8 +21,10 @@ from app.control.signals_queries import SignalRow
 from app.control.tables import Baseline
 from app.control.view import View
 from app.core.spc.quantity import Quantity
+from app.core.spc.refusal import Reason as Why
+from app.core.spc.refusal import Refused
 from app.core.spc.rules import RuleName
-from app.core.spc.shewhart import Chart
+from app.core.spc.shewhart import FEWEST_READINGS, Chart
 from app.errors import Conflict, InbandError, Invalid
 from app.proof import queries as proof
 from app.proof import wording as proof_wording
@@ -75,6 +77,14 @@ class Shown:
             return []
         window = statistics.window_of(self._session, self.standing.characteristic, **self._choice._asdict())
         return [charts.view(self._session, self.standing, self.judge, window, kind) for kind in self.kinds]
+
+    @property
+    def missing(self) -> str:
+        """How many readings there have to be before a baseline can be frozen; nothing where there are enough."""
+        have = statistics.window_of(self._session, self.standing.characteristic).newest
+        if have >= FEWEST_READINGS:
+            return ""
+        return statistics_wording.refusal(Refused(Why.TOO_FEW_READINGS, have=have, needed=FEWEST_READINGS))
 
     @property
     def excluded_since(self) -> int:

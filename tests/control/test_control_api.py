@@ -218,6 +218,15 @@ class TestRefused:
         pushed(shop, [0.0] * 28)
         assert "All values are the same" in preview(shop, 422)["detail"]
 
+    def test_the_page_says_how_many_readings_are_missing(self, shop: Shop, server: Server) -> None:
+        viewer, path = Person(server, "viewer"), f"/characteristics/{shop.characteristic}/control"
+        pushed(shop, [0, 1] * 6)
+        assert "12 readings of the 20 that this takes: 8 are missing" in viewer.open(path)
+        pushed(shop, [0, 1] * 6)
+        page = viewer.open(path)
+        assert "No baseline is in force" in page
+        assert "missing" not in page
+
     def test_parts_of_one_reading_are_no_subgroups(self, shop: Shop) -> None:
         parts = [*(f"SN-{n}" for n in range(40)), *(f"SN-{n // 2}" for n in range(100, 120))]
         pushed(shop, [0, 1, 3] * 20, part=parts)
