@@ -24,7 +24,7 @@ FILE: dict[int | str, dict[str, Any]] = {
     200: {
         "description": "The report as a file",
         "content": {
-            media.partition(";")[0]: {"schema": {"type": "string", "format": "binary"}}
+            media.partition(";")[0]: {"schema": {"type": "string", "format": "binary"}, "example": "(the file)"}
             for media in MEDIA_TYPES.values()
         },
     }
@@ -95,7 +95,12 @@ def get_report(session: SessionDep, caller: AnyCaller, characteristic: Character
     return ReportOut.of(made(session, caller, characteristic, wishes))
 
 
-@router.get("/characteristics/{characteristic}/report.{form}", responses=problems(404) | FILE, response_model=None)
+@router.get(
+    "/characteristics/{characteristic}/report.{form}",
+    responses=problems(404) | FILE,
+    response_model=None,
+    response_class=Response,
+)
 def get_report_file(
     session: SessionDep,
     caller: AnyCaller,

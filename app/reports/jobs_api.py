@@ -20,7 +20,7 @@ FILE: dict[int | str, dict[str, Any]] = {
     200: {
         "description": "The file: a ZIP, or an XLSX workbook",
         "content": {
-            media: {"schema": {"type": "string", "format": "binary"}}
+            media: {"schema": {"type": "string", "format": "binary"}, "example": "(the file)"}
             for media in (media_type("pdf"), media_type("workbook"))
         },
     }
@@ -80,6 +80,7 @@ def throw_reports_away(session: SessionDep, caller: Viewer, number: Number) -> N
     dependencies=[require("viewer")],
     responses=problems(404, 409) | FILE,
     response_model=None,
+    response_class=Response,
 )
 def get_reports_file(session: SessionDep, number: Number) -> Response:
     """The file, once they are done."""

@@ -35,12 +35,21 @@ COLUMNS = (
     "upper_limit_mm",
     "signals",
 )
+EXAMPLE = f"{','.join(COLUMNS)}\r\nindividuals,3,812,812,1,0.0052,,-0.00363,0.0,0.00363,nelson_1\r\n"
 FILE: dict[int | str, dict[str, Any]] = {
-    200: {"description": "One line per point", "content": {"text/csv": {"schema": {"type": "string"}}}}
+    200: {
+        "description": "One line per point",
+        "content": {"text/csv": {"schema": {"type": "string"}, "example": EXAMPLE}},
+    }
 }
 
 
-@router.get("/characteristics/{characteristic}/control.csv", responses=problems(404) | FILE, response_model=None)
+@router.get(
+    "/characteristics/{characteristic}/control.csv",
+    responses=problems(404) | FILE,
+    response_model=None,
+    response_class=Response,
+)
 def get_control_points(
     session: SessionDep,
     caller: AnyCaller,

@@ -244,8 +244,9 @@ def _tidy(part: Any) -> None:
     if isinstance(part, dict):
         if isinstance(part.get("title"), str) and "status" not in part:
             del part["title"]
-        for inner in part.values():
-            _tidy(inner)
+        for name, inner in part.items():
+            if name not in {"example", "examples"}:  # what is sent and answered may well have a title
+                _tidy(inner)
     elif isinstance(part, list):
         for inner in part:
             _tidy(inner)

@@ -13,6 +13,7 @@ import httpx
 import psycopg
 import pytest
 from openpyxl import load_workbook
+from playwright.sync_api import Page, expect
 from pypdf import PdfReader
 
 from app.people import actions as people
@@ -353,6 +354,26 @@ class TestPage:
         text = ana.open("/reports")
         assert f'href="/api/v1/reports/{number}/file"' in text
         assert ana.browser.get(f"/api/v1/reports/{number}/file").status_code == 200
+
+    def test_the_bar_moves_and_ends_in_a_file_without_a_reload(self, shop: Shop, page: Page) -> None:
+        ana = Person(shop.server, "viewer")
+        ana.sign_in(page)
+        page.goto("/reports?characteristic=bore-3")
+        for key in keys(3):
+            page.locator(f"input[value={key}]").check()
+        page.get_by_role("button", name="Make them").click()
+        number = shop.call("GET", "/reports")["items"][0]["id"]
+        row = page.locator(f"#job-{number}")
+        expect(row).to_contain_text("4 characteristics")
+        expect(row).to_contain_text(ana.name)
+        page.evaluate("window.stayed = true")
+        with page.expect_download(timeout=120_000) as got:
+            row.get_by_role("link", name="Fetch").click(timeout=120_000)
+        assert got.value.suggested_filename == f"reports-{number}.zip"
+        assert page.evaluate("window.stayed"), "the page was not loaded again"
+        expect(row.locator("progress")).to_have_count(0)
+        row.get_by_role("button", name="Throw away").click()
+        expect(page.locator(f"#job-{number}")).to_have_count(0)
 
     def test_what_was_typed_wrong_is_kept_and_named(self, shop: Shop) -> None:
         ana = Person(shop.server, "viewer")
