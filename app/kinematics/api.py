@@ -3,6 +3,7 @@
 from typing import Annotated, Any, Literal
 
 from fastapi import Path, Query, Response
+from pydantic import StringConstraints
 
 from app.errors import FieldError, Invalid
 from app.kinematics import actions, figures, looking, queries
@@ -34,6 +35,7 @@ Version = Annotated[int, Path(description="Version of the kinematics.", examples
 After = Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")]
 Theme = Annotated[str | None, Query(description="`light` or `dark`", max_length=20)]
 Other = Annotated[int, Query(alias="with", ge=1, le=2**63 - 1, description="Number of the other run.", examples=[97])]
+HeadName = Annotated[str, StringConstraints(strip_whitespace=True, max_length=64, pattern=r"^[^\x00-\x1f]*$")]
 FIGURE: dict[int | str, dict[str, Any]] = {
     200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}
 }
@@ -181,9 +183,7 @@ def get_kinematics(
     session: SessionDep,
     caller: AnyCaller,
     machine: MachineKey,
-    head: Annotated[
-        str | None, Query(max_length=64, description="Drift with this head; else the reference head.")
-    ] = None,
+    head: Annotated[HeadName | None, Query(description="Drift with this head; else the reference head.")] = None,
 ) -> MachineKinematicsOut:
     """What the runs of a machine are held against, what has been entered, how every value drifts, and its heads compared."""
     found = machine_named(session, machine)
@@ -232,7 +232,7 @@ def kinematics_drift_figure(
     caller: AnyCaller,
     machine: MachineKey,
     value: Annotated[str, Query(max_length=20, description="EX0C, Q146, backlash.C …", examples=["EX0C"])],
-    head: Annotated[str, Query(max_length=64, description="With this head.")] = "",
+    head: Annotated[HeadName, Query(description="With this head.")] = "",
     theme: Theme = None,
 ) -> dict[str, Any]:
     """A value over the runs with its limit, what has been entered, and the trend."""
