@@ -21,6 +21,7 @@ LINES, MOST_LINES, MOST_PASTED = 12, 120, 2_000
 FEWEST_TOUCHES = 4
 CHARSETS = {"windows-1250": "cp1250", "cp1250": "cp1250", "iso-8859-2": "iso8859-2", "latin2": "iso8859-2"}
 _CHARSET = re.compile(rb"charset\s*=\s*[\"']?\s*([A-Za-z0-9_-]{1,20})", re.IGNORECASE)
+_POSITION = re.compile(r"positions\[(\d+)\]")
 SIGNS = {"": None, "+": "positive", "-": "negative", "\N{MINUS SIGN}": "negative"}
 
 
@@ -254,10 +255,14 @@ def filled_in(plan: KinematicsPlan) -> dict[str, str]:
 def at_fields(error: Invalid, form: Mapping[str, str]) -> dict[str, str]:
     """What is wrong, by the field of the form: what lies within a list stands with the list."""
     found: dict[str, str] = {}
-    for field, message in error.errors:
+    for field, wrong in error.errors:
+        message = wrong
         top = field.partition("[")[0].partition(".")[0]
         inner = "nominal" if "nominal" in field else "found"
         name = {"axes": "positions", "body": way(form), "results": "pasted", "shift": inner}.get(top, top)
+        place = _POSITION.search(field)
+        if place is not None and name == "positions":
+            message = _("position {n}: {message}").format(n=int(place[1]) + 1, message=message)
         said = message[:1].upper() + message[1:]
         found[name] = f"{found[name]}. {said}" if name in found and said not in found[name] else said
     return found

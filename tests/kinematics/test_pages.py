@@ -107,6 +107,7 @@ class TestEntering:
             ({"as": "positions", "angle_0": "0", "x_0": 'ž’"', "y_3": "7"}, "Line 1:", 'value="ž’&#34;"'),
             ({"as": "positions", "angle_0": "0", "x_0": "nan", "y_0": "1", "z_0": "2"}, "", 'value="nan"'),
             ({"as": "positions", "positions": "C 0 1 2 3\nC 90 1"}, "Line 2:", "C 90 1"),
+            ({"as": "positions", "positions": "C 0 1 2 3\nC 90 3 2 1\nC 400 1 2 3"}, "Position 3: must be at most 360", "C 400"),
             ({"as": "positions"}, "Type the positions", 'value="positions" checked'),
             ({"as": "shift", "nominal": "0 0", "found": "1 2 3"}, "X, Y and Z are needed", "1 2 3"),
             ({"as": "shift", "nominal": "0 0 0", "found": "1 2 3\n4 5 6"}, "a ball needs 4", "4 5 6"),
