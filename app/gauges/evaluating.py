@@ -46,6 +46,15 @@ class Evaluated:
         return self.linearity.s if isinstance(self.linearity, Linearity) else None
 
     @property
+    def freedom(self) -> int:
+        """Degrees of freedom of that sigma."""
+        if isinstance(self.anova, crossed.Study):
+            return next(line.freedom for line in self.anova.table if line.source == "repeatability")
+        if isinstance(self.bias, Bias):
+            return self.bias.readings - 1
+        return self.linearity.readings - 2 if isinstance(self.linearity, Linearity) else 0
+
+    @property
     def refused(self) -> Refused | None:
         """Why the study says nothing."""
         every = (self.bias, self.type_one, self.linearity, self.anova, self.ranges)

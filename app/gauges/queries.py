@@ -12,8 +12,9 @@ from app.capability.queries import scatter_of_parts
 from app.characteristics import queries as characteristics
 from app.characteristics.queries import Standing
 from app.characteristics.tables import Characteristic
+from app.core.spc.gauge.single import FEWEST_REPEATS
 from app.core.spc.gauge.zero_range import Suggestion, suggest
-from app.core.spc.refusal import Refused
+from app.core.spc.refusal import Reason, Refused
 from app.core.zones import Zone
 from app.errors import FieldError, Invalid, NotFound
 from app.gauges.evaluating import Evaluated, evaluate
@@ -143,10 +144,15 @@ class Advice:
 
 
 def advice(session: Session, found: StudyRow) -> Advice | Refused | None:
-    """R33 from the repeatability that the study found; None where it serves no characteristic or found none."""
-    sigma = found.found.repeatability
+    """R33 from the repeatability that the study found; None where it serves no characteristic or found none.
+
+    `Refused` where the study is too small to say it: a sigma with 9 degrees of freedom is wrong by a quarter already.
+    """
+    sigma, freedom = found.found.repeatability, found.found.freedom
     if found.characteristic is None or sigma is None:
         return None
+    if freedom + 1 < FEWEST_REPEATS:
+        return Refused(Reason.TOO_FEW_READINGS, have=freedom + 1, needed=FEWEST_REPEATS)
     standing = characteristics.characteristic_named(session, found.characteristic)
     parameters = standing.parameters
     repeats = parameters.repeats if found.settings["each"] == "touch" else 1

@@ -124,3 +124,9 @@ class TestZeroRange:
         )
         study = send(shop, "type_one", single(sigma=0.00001), reference=40.0, characteristic=shop.characteristic)
         assert study["zero_range"]["zero_range"] >= 600 / 60 * 0.25 / 1000
+
+    def test_a_handful_of_values_suggests_nothing(self, shop: Shop) -> None:
+        few = [{"values": [40.0, 40.001, 40.0, 40.001]}]
+        study = send(shop, "bias", few, reference=40.0, characteristic=shop.characteristic)
+        assert study["bias"] is not None
+        assert study["zero_range"] is None

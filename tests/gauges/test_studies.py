@@ -155,6 +155,9 @@ class TestHalfStudies:
         assert equal["type_one"] is None
         rows: Rows = [{"part": part, "operator": "A", "values": [1.0, 1.0]} for part in "12"]
         assert "same" in send(shop, "grr", rows)["refused"]
+        apart = [row | {"values": [float(row["part"]), float(row["part"])]} for row in aiag()]
+        found = send(shop, "grr", apart)
+        assert (found["grr"], found["verdicts"]) == ([], []), "cells of equal values know no repeatability"
         few = send(shop, "type_one", [{"values": [40.0, 40.1]}], reference=40.0, tolerance=0.016)
         assert "8 are missing" in few["refused"]
         assert few["bias"] is not None
