@@ -9,12 +9,12 @@ from app.control.drafting import Draft
 from app.control.schemas import (
     BaselineOut,
     CautionOut,
+    ChartSignalOut,
     ControlOut,
     DraftAnswer,
     DraftOut,
     LeftOutOut,
     PointsOut,
-    SignalOut,
 )
 from app.control.series import LeftOut
 from app.control.tables import Baseline
@@ -70,11 +70,11 @@ def left_out(found: LeftOut | None) -> LeftOutOut:
     return LeftOutOut(**numbers, count=len(found))
 
 
-def signals_out(view: View, most: int) -> list[SignalOut]:
+def signals_out(view: View, most: int) -> list[ChartSignalOut]:
     """The newest signals, newest first; their sequences are those of the readings."""
     runs = sorted(view.signals or (), key=lambda run: run.end)[-most:]
     return [
-        SignalOut(
+        ChartSignalOut(
             rule=run.rule.value,
             side=run.side,
             first=int(view.first[run.start]),

@@ -13,7 +13,16 @@ from app.control.answers import baseline_out, control_out, draft_out
 from app.control.drafting import draft_of
 from app.control.editor import PICKED, Picked, picture_of
 from app.control.figures import control_figure
-from app.control.schemas import BaselineIn, BaselineOut, ChartName, ControlOut, DraftAnswer, Grouping, PeriodIn, WhyIn
+from app.control.schemas import (
+    BaselineIn,
+    BaselineOut,
+    BaselineWhyIn,
+    ChartName,
+    ControlOut,
+    DraftAnswer,
+    Grouping,
+    PeriodIn,
+)
 from app.control.tables import Baseline
 from app.control.view import Marked
 from app.core.spc.quantity import Quantity
@@ -125,7 +134,7 @@ def get_baseline(
 
 @router.post("/characteristics/{characteristic}/baselines/{version}/retire", responses=problems(404, 409))
 def retire_baseline(
-    session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, version: Version, given: WhyIn
+    session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, version: Version, given: BaselineWhyIn
 ) -> BaselineOut:
     """Take the baseline out of force: nothing is judged until another is frozen."""
     standing = characteristics.characteristic_named(session, characteristic)
@@ -138,7 +147,7 @@ def retire_baseline(
     responses=problems(404, 409),
 )
 def put_baseline_in_force(
-    session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, version: Version, given: WhyIn
+    session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, version: Version, given: BaselineWhyIn
 ) -> BaselineOut:
     """Go back to an older baseline: its numbers become a new version, which is in force."""
     standing = characteristics.characteristic_named(session, characteristic)

@@ -16,7 +16,7 @@ from app.characteristics.queries import Standing
 from app.control import actions, charts, forms, queries, rules_wording, signals_queries, signals_wording, wording
 from app.control.answers import signals_out
 from app.control.drafting import Draft, draft_of, suited
-from app.control.schemas import BaselineIn, PeriodIn, SignalOut
+from app.control.schemas import BaselineIn, ChartSignalOut, PeriodIn
 from app.control.signals_queries import SignalRow
 from app.control.tables import Baseline
 from app.control.view import View
@@ -99,7 +99,7 @@ class Shown:
         )
 
     @property
-    def signals(self) -> list[tuple[View, int, list[SignalOut]]]:
+    def signals(self) -> list[tuple[View, int, list[ChartSignalOut]]]:
         """Of each chart how many signals there are, and the newest."""
         return [
             (

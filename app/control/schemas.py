@@ -82,8 +82,12 @@ class BaselineIn(PeriodIn):
     )
 
 
-class WhyIn(Body):
+class BaselineWhyIn(Body):
     """Why, in words."""
+
+    model_config = ConfigDict(
+        extra="forbid", allow_inf_nan=False, json_schema_extra={"example": {"reason": "The spindle was rebuilt"}}
+    )
 
     reason: Reason
 
@@ -228,7 +232,7 @@ class PointsOut(Body):
     upper: list[float] | float | None
 
 
-class SignalOut(Body):
+class ChartSignalOut(Body):
     """A run of points that a rule speaks of."""
 
     rule: str
@@ -294,4 +298,4 @@ class ControlOut(Body):
     left_out: LeftOutOut
     points: PointsOut
     signal_count: int
-    signals: list[SignalOut] = Field(description="Newest first, at most 1000.")
+    signals: list[ChartSignalOut] = Field(description="Newest first, at most 1000.")
