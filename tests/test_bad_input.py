@@ -477,7 +477,7 @@ class Place:
         self.numbers = {"approve": awaiting, "release": held["correction"]["number"]} | {
             f"/api/v1{path}/{{number}}/recompute": each["id"] for path, each in made.items()
         }
-        of_alignment = ("/api/v1/alignments/{number}", "/api/v1/alignments/{number}/figure")
+        of_alignment: tuple[str, ...] = ("/api/v1/alignments/{number}", "/api/v1/alignments/{number}/figure")
         of_alignment += ("/api/v1/alignments/{number}/program",)
         self.numbers |= dict.fromkeys(of_alignment, made["/alignments"]["id"])
         of_form = ("/api/v1/forms/{number}", "/api/v1/forms/{number}/figure", "/api/v1/forms/{number}/recompute")
