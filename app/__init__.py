@@ -28,6 +28,7 @@ The map of the house. Whoever knows the shop floor knows where to look:
     audit            who changed what, from what, to what, and why
     programs         program text of the controls: read, written, corrections fetched as text
     formats          files in and out
+    paper            what a report says as values, and how it is written: picture, PDF, spreadsheet, CSV, JSON
     demo             a simulated plant that talks to the public API like real machines do
 
     web              the browser kit: templates, problem pages, live events, translation

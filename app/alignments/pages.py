@@ -1,6 +1,7 @@
 """Pages: what was aligned, touches typed in, a pallet with its part, one alignment, the history of one set-up."""
 
 from collections.abc import Mapping
+from functools import partial
 from secrets import token_hex
 from typing import Annotated
 from urllib.parse import urlencode
@@ -16,8 +17,8 @@ from app.alignments.tables import Alignment
 from app.db.engine import Database
 from app.errors import Conflict, FieldError, InbandError, Invalid, NotFound
 from app.machines import queries as machines
-from app.machines.queries import machine_named
-from app.machines.tables import Machine
+from app.machines.queries import machine_named, machine_of
+from app.machines.wording import texts_by_control
 from app.readings import actions as readings
 from app.web.deps import Caller, FormDep, Operator, SessionDep, Viewer, require
 from app.web.fields import LARGEST_ID
@@ -28,7 +29,6 @@ from app.web.templates import page
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 25
 TO_CHOOSE = 60  # alignments offered for a pallet and its part
-CONTROLS = {"sinumerik": "Sinumerik", "fanuc": "Fanuc", "heidenhain": "Heidenhain", "other": ""}
 Word = Annotated[str | None, Query(max_length=64)]
 Name = Annotated[str, Query(max_length=200)]
 Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
@@ -99,7 +99,7 @@ def new_page(
     form = asking.blank(kind if kind in asking.KINDS else "points") | {"machine": machine or ""}
     if like is not None:
         other = queries.alignment(session, like)
-        key = session.get_one(Machine, other.machine_id).key
+        key = machine_of(session, other.machine_id).key
         form = asking.like(other.kind if other.kind in asking.KINDS else "points", other.given)
         form |= {"machine": key, "name": other.name or "", "method": other.method}
     if found is not None:
@@ -220,7 +220,7 @@ def _alignment(
     form: Mapping[str, str] | None = None,
     error: InbandError | None = None,
 ) -> Response:
-    machine = session.get_one(Machine, found.machine_id)
+    machine = machine_of(session, found.machine_id)
     made = alignment_out(session, found)
     composed = [queries.alignment(session, each) for each in (found.pallet_id, found.part_id) if each is not None]
     return page(
@@ -232,7 +232,7 @@ def _alignment(
         result=found.result,
         machine=machine,
         composed=composed,
-        texts=_texts(found, machine),
+        texts=texts_by_control(machine.control, partial(program_of, found, machine)),
         later=queries.recomputed_as(session, found),
         doubted={at for group in made.misfits for at in group},
         history=history_url(machine.key, found.name) if found.name else None,
@@ -243,17 +243,6 @@ def _alignment(
         face=asking.face_word,
         may_align=caller.may("operator"),
     )
-
-
-def _texts(found: Alignment, machine: Machine) -> list[tuple[str, str, str]]:
-    """Control, its name, and the text that puts the frame there: that of the machine first."""
-    order = [machine.control, *(each for each in ("sinumerik", "fanuc") if each != machine.control)]
-    texts: list[tuple[str, str, str]] = []
-    for control in order:
-        text = program_of(found, machine, None if control == machine.control else control)
-        if text is not None:
-            texts.append((control, CONTROLS.get(control) or _("To type in"), text))
-    return texts
 
 
 @router.post("/alignments/{number}/recompute")

@@ -11,11 +11,10 @@ from app.alignments import figures, queries, trends
 from app.alignments.answers import TEXT, program_of
 from app.alignments.tables import Alignment
 from app.errors import NotFound
-from app.machines.queries import machine_named
-from app.machines.schemas import Control
-from app.machines.tables import Machine
+from app.machines.queries import machine_named, machine_of
 from app.web.api import api_router, plain, problems
 from app.web.deps import AnyCaller, SessionDep
+from app.web.fields import Control
 from app.web.i18n import _
 from app.web.theme import ThemeName, theme_from
 
@@ -66,7 +65,7 @@ def write_alignment(
 ) -> PlainTextResponse:
     """The text that puts the frame where the part lies, for the machine's control or another. Running it twice changes nothing."""
     found = queries.alignment(session, number, caller.only_machine)
-    machine = session.get_one(Machine, found.machine_id)
+    machine = machine_of(session, found.machine_id)
     text = program_of(found, machine, control)
     if text is None:
         raise NotFound(

@@ -7,7 +7,7 @@ from typing import Any
 from app.calibration.due import PlaceRow
 from app.core.calibration import SECTIONS
 from app.errors import FieldError, Invalid
-from app.web.forms import by_field, length
+from app.web.forms import by_field, length, whole
 from app.web.i18n import _
 
 NUMBERS = ("gauge_size", "zero_range", "averaging_limit", "confidence_limit", "weighting_factor", "path_factor")
@@ -17,12 +17,6 @@ LENGTHS = ("zero_range", "averaging_limit", "confidence_limit", "path_factor")
 IN_SECTIONS = tuple(f"sections[{number}].{side}" for number in range(SECTIONS) for side in ("plus", "minus"))
 _BETWEEN = re.compile(r"[\s;]+")
 MOST_LINES = 500
-
-
-def whole(text: str | None) -> int | str | None:
-    """A whole number as people type it; what is none is left for the schema to refuse."""
-    text = (text or "").strip()
-    return int(text) if text.isdecimal() and len(text) < 12 else text or None
 
 
 def lengths(text: str | None) -> list[float | str | None]:

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
-from app.capability.ranking import Ranked, capability_by_characteristic
+from app.capability.ranking import LOOKED_BACK, Ranked, capability_by_characteristic
 from app.characteristics import queries as characteristics
 from app.characteristics.queries import Standing
 from app.control import queries as control
-from app.control.series import read as read_series
+from app.control.series_queries import read as read_series
 from app.core.spc import in_time, normality, stability, uncompensated
 from app.core.spc.capability import (
     ENOUGH_READINGS,
@@ -44,6 +44,7 @@ from app.statistics.queries import History, Window
 
 __all__ = [
     "CONFIDENCE",
+    "LOOKED_BACK",
     "USUAL",
     "InForce",
     "Ranked",

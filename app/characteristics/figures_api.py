@@ -1,10 +1,9 @@
 """JSON routes: the figures of a characteristic, as Plotly takes them."""
 
-from datetime import datetime
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 import msgspec
-from fastapi import Depends, Path, Query, Response
+from fastapi import Path, Query, Response
 
 from app.characteristics import queries
 from app.characteristics.beside import results_of
@@ -13,13 +12,12 @@ from app.characteristics.figures import histogram_edges, histogram_figure, resul
 from app.characteristics.queries import Standing
 from app.characteristics.wording import result_label
 from app.core.variants import yielded_by
-from app.errors import FieldError, Invalid
 from app.statistics import queries as statistics
 from app.statistics.queries import Window
 from app.web.api import api_router, problems
+from app.web.choice import Choice, Chosen
 from app.web.deps import AnyCaller, SessionDep
-from app.web.fields import LARGEST_ID, Moment
-from app.web.i18n import _
+from app.web.fields import LARGEST_ID
 from app.web.theme import ThemeName
 
 router = api_router("characteristics")
@@ -34,42 +32,6 @@ ResultName = Literal["run_out", "out_of_roundness", "taper", "repeat_range", "re
 CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 Theme = Annotated[ThemeName, Query(description="For a light or a dark page.")]
 Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
-
-
-class Choice(NamedTuple):
-    """Which readings are asked for."""
-
-    last: int | None
-    first: int | None
-    through: int | None
-    start: datetime | None
-    end: datetime | None
-
-
-def chosen(
-    last: Annotated[
-        str | None, Query(pattern=r"^([1-9][0-9]{0,17}|all)$", description="The last so many readings, or `all`.")
-    ] = None,
-    first: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="From this reading on.")] = None,
-    through: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="To this reading, itself included.")] = None,
-    start: Annotated[Moment | None, Query(alias="from", description="Measured at this moment or later.")] = None,
-    end: Annotated[Moment | None, Query(alias="to", description="Measured at this moment or earlier.")] = None,
-) -> Choice:
-    """The readings by number, by time, or the last ones; the last 200 if nothing is said."""
-    for name, low, high in (("first", first, through), ("from", start, end)):
-        if low is not None and high is not None and low > high:  # type: ignore[operator]
-            message = _("is beyond the end of the range; exchange the two")
-            raise Invalid(
-                f"{name}: {message}",
-                _("Correct the named fields and send it again."),
-                errors=[FieldError(name, message)],
-            )
-    if last is None and all(value is None for value in (first, through, start, end)):
-        return Choice(200, None, None, None, None)
-    return Choice(None if last in (None, "all") else int(last), first, through, start, end)
-
-
-Chosen = Annotated[Choice, Depends(chosen)]
 
 
 def _found(session: SessionDep, caller: AnyCaller, characteristic: str, choice: Choice) -> tuple[Standing, Window]:

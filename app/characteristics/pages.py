@@ -18,7 +18,7 @@ from app.calibration import queries as calibrations
 from app.characteristics import chart, queries
 from app.characteristics.decisions import Decision, decision, decisions, version_of
 from app.characteristics.figures import angle_of, band_picture, residuals_of, touches_picture
-from app.characteristics.figures_api import Choice, Chosen, ResultName
+from app.characteristics.figures_api import ResultName
 from app.characteristics.queries import Standing
 from app.characteristics.wording import history, in_order, label, result_label, worded
 from app.core.parameters import BY_NAME
@@ -34,6 +34,7 @@ from app.statistics.queries import MOST_IN_HISTOGRAM, Numbers, Rejects, Window
 from app.wear import queries as wear
 from app.wear.queries import Wear
 from app.wear.wording import WearWords
+from app.web.choice import Choice, Chosen
 from app.web.deps import Caller, FormDep, Operator, SessionDep, Viewer
 from app.web.fields import LARGEST_ID, Reason
 from app.web.forms import by_field

@@ -14,9 +14,10 @@ from app.cli.base import DatabaseUrl, DataDir, cli, migrated, people, say, setti
 from app.cli.data import Zone
 from app.db.engine import Database
 from app.errors import InbandError
+from app.paper.content import Format, Paper
 from app.proof import queries as proof
 from app.reports import queries
-from app.reports.asking import Format, Paper, SectionName, Wishes, typed
+from app.reports.asking import SectionName, Wishes, typed
 from app.reports.bundle import Bundle, BundleFormat, Part, packed
 from app.web.i18n import _, ngettext
 

@@ -16,7 +16,7 @@ from app.control.schemas import (
     LeftOutOut,
     PointsOut,
 )
-from app.control.series import LeftOut
+from app.control.series_queries import LeftOut
 from app.control.tables import Baseline
 from app.control.view import View
 from app.core.spc.refusal import Floats

@@ -6,7 +6,6 @@ import msgspec
 from fastapi import Path, Query, Response
 
 from app.characteristics import queries as characteristics
-from app.characteristics.figures_api import Chosen
 from app.characteristics.queries import Standing
 from app.control import actions, charts, queries, signals_queries
 from app.control.answers import baseline_out, control_out, draft_out
@@ -29,6 +28,7 @@ from app.core.spc.quantity import Quantity
 from app.core.spc.shewhart import Chart
 from app.statistics import queries as statistics
 from app.web.api import api_router, problems
+from app.web.choice import Chosen
 from app.web.deps import AnyCaller, Engineer, SessionDep
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Limit, Page, page_of
 from app.web.i18n import _

@@ -17,7 +17,7 @@ from app.characteristics.queries import Standing
 from app.control import queries
 from app.control.queries import LOOK_BACK, Charted, charted, judged_by
 from app.control.rules_queries import rules_in_force
-from app.control.series import read
+from app.control.series_queries import read
 from app.control.tables import Baseline
 from app.control.view import Marked, View, since
 from app.control.watching import Place
@@ -31,6 +31,7 @@ from app.errors import FieldError, Invalid
 from app.statistics.queries import Window
 from app.web.i18n import _
 
+__all__ = ["Marked", "View", "kinds", "marked_by", "unjudged", "view"]
 NEIGHBOURS = (
     100  # points before the window that are looked at too: runs of points go on, and the one before may be excluded
 )

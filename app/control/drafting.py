@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 from app.characteristics.queries import Standing
 from app.control import queries, wording
 from app.control.schemas import PeriodIn
-from app.control.series import LeftOut, Read, read
+from app.control.series_queries import LeftOut, Read, read
 from app.control.tables import Baseline
 from app.control.wording import Caution
 from app.core.spc import quantity, shewhart

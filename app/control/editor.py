@@ -8,7 +8,7 @@ from app.characteristics.queries import Standing
 from app.control import charts
 from app.control.drafting import draft_of
 from app.control.schemas import ExcludedIn, PeriodIn
-from app.control.series import read
+from app.control.series_queries import read
 from app.control.tables import Baseline
 from app.control.view import Marked, View
 from app.core.spc import quantity

@@ -4,11 +4,10 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from app.calibration.forms import whole
 from app.control.schemas import PeriodIn
 from app.core.spc.quantity import Quantity
 from app.errors import FieldError, InbandError, Invalid
-from app.web.forms import by_field, length
+from app.web.forms import by_field, length, whole
 from app.web.i18n import _
 
 WHOLE = ("first_sequence", "last_sequence", "group_size", "settle", "average_span")

@@ -11,7 +11,6 @@ from starlette.datastructures import FormData, UploadFile
 from starlette.responses import RedirectResponse
 
 from app.characteristics import queries as characteristics
-from app.characteristics.figures_api import Choice, Chosen
 from app.characteristics.queries import Standing
 from app.control import actions, charts, forms, queries, rules_wording, signals_queries, signals_wording, wording
 from app.control.answers import signals_out
@@ -30,6 +29,7 @@ from app.proof import queries as proof
 from app.proof import wording as proof_wording
 from app.statistics import queries as statistics
 from app.statistics import wording as statistics_wording
+from app.web.choice import Choice, Chosen
 from app.web.deps import Caller, Engineer, FormDep, SessionDep, Viewer, texts
 from app.web.fields import LARGEST_SERIAL, Reason
 from app.web.forms import parsed

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from app.characteristics.queries import Standing
 from app.characteristics.tables import Characteristic
-from app.control.series import Moments, Plan, Read, Whole, groups_of, read
+from app.control.series_queries import Moments, Plan, Read, Whole, groups_of, read
 from app.control.tables import Baseline
 from app.core.spc import quantity, shewhart
 from app.core.spc.quantity import SETTLE, Quantity, Series

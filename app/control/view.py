@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.control.series import LeftOut
+from app.control.series_queries import LeftOut
 from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Floats
 from app.core.spc.rules import Signals

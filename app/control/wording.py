@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from enum import StrEnum
 
-from app.control.series import LeftOut
+from app.control.series_queries import LeftOut
 from app.control.tables import Baseline
 from app.core.spc.quantity import Quantity
 from app.core.spc.shewhart import Chart

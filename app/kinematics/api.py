@@ -12,16 +12,14 @@ from app.kinematics.drift import drift
 from app.kinematics.drift_answers import (
     BackupOut,
     ComparisonOut,
-    HeadOut,
     MachineKinematicsOut,
     backup_out,
     changes_out,
-    machine_out,
+    machine_state,
 )
 from app.kinematics.schemas import EnterIn, PlanIn, ReasonIn, RestoreIn, RunIn
 from app.kinematics.values import UNITS, to_enter
 from app.machines.queries import machine_named
-from app.machines.tables import Machine
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, Caller, Engineer, Operator, SessionDep
 from app.web.fields import LARGEST_SERIAL, Cursor, Limit, Page, Text200, page_of
@@ -188,31 +186,7 @@ def get_kinematics(
     """What the runs of a machine are held against, what has been entered, how every value drifts, and its heads compared."""
     found = machine_named(session, machine)
     caller.must_at(found.id, "viewer")
-    return _machine(session, found, head)
-
-
-def _machine(session: SessionDep, machine: Machine, head: str | None = None) -> MachineKinematicsOut:
-    plan = queries.plan(session, machine.id)
-    shown = head if head is not None else plan.reference_head or ""
-    latest = queries.heads_of(session, machine.id)
-    standard = latest.get(plan.reference_head or "")
-    heads = []
-    for name, row in latest.items():
-        in_effect, version = queries.state_at(session, machine.id, name, None)
-        against = looking.changes(standard, row) if standard is not None and standard is not row else []
-        heads.append(
-            HeadOut(
-                head=name or None,
-                reference=row is standard,
-                run=row.run.id,
-                measured_at=row.run.measured_at,
-                version=version,
-                in_effect=in_effect,
-                changes=changes_out(against, looking.to_enter(row)),
-            )
-        )
-    in_effect = queries.in_effect(session, machine.id, shown)
-    return machine_out(machine.key, plan, in_effect, looking.drifts(session, machine, shown), heads)
+    return machine_state(session, found, head)
 
 
 @router.put("/machines/{machine}/kinematics", responses=problems(404))
@@ -223,7 +197,7 @@ def plan_kinematics(session: SessionDep, caller: Engineer, machine: MachineKey, 
     """
     found = machine_named(session, machine)
     actions.set_plan(session, found, given, caller)
-    return _machine(session, found)
+    return machine_state(session, found)
 
 
 @router.get("/machines/{machine}/kinematics/drift-figure", responses=problems(404) | FIGURE)

@@ -5,11 +5,13 @@ from datetime import datetime
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from sqlalchemy.orm import Session
 
-from app.kinematics import wording
+from app.kinematics import looking, queries, wording
 from app.kinematics.drift import Compared, Drift
 from app.kinematics.tables import KinematicsBackup, KinematicsPlan
 from app.kinematics.values import UNITS
+from app.machines.tables import Machine
 
 BACKUP: dict[str, JsonValue] = {
     "version": 3,
@@ -234,3 +236,28 @@ def changes_out(changes: list[Compared], errors: Mapping[str, float]) -> list[Ch
         )
         for each in changes
     ]
+
+
+def machine_state(session: Session, machine: Machine, head: str | None = None) -> MachineKinematicsOut:
+    """What its runs are held against, what has been entered, the drifts of one head, and every head compared."""
+    plan = queries.plan(session, machine.id)
+    shown = head if head is not None else plan.reference_head or ""
+    latest = queries.heads_of(session, machine.id)
+    standard = latest.get(plan.reference_head or "")
+    heads = []
+    for name, row in latest.items():
+        in_effect, version = queries.state_at(session, machine.id, name, None)
+        against = looking.changes(standard, row) if standard is not None and standard is not row else []
+        heads.append(
+            HeadOut(
+                head=name or None,
+                reference=row is standard,
+                run=row.run.id,
+                measured_at=row.run.measured_at,
+                version=version,
+                in_effect=in_effect,
+                changes=changes_out(against, looking.to_enter(row)),
+            )
+        )
+    in_effect = queries.in_effect(session, machine.id, shown)
+    return machine_out(machine.key, plan, in_effect, looking.drifts(session, machine, shown), heads)

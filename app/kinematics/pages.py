@@ -15,9 +15,9 @@ from app.kinematics.protocol import protocol_of
 from app.kinematics.schemas import EnterIn, PlanIn
 from app.kinematics.showing import COMMON, ON_PAGE, machine_url, others_of, shown_machine, shown_run
 from app.machines.queries import machine_named
-from app.reports.content import Picture
-from app.reports.drawing import drawing_of, svg
-from app.reports.files import MEDIA_TYPES
+from app.paper.content import Picture
+from app.paper.drawing import drawing_of, svg
+from app.paper.files import MEDIA_TYPES
 from app.web.deps import Engineer, FormDep, Operator, SessionDep, Viewer, require
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed, words

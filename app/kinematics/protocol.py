@@ -10,7 +10,7 @@ from app.kinematics.answers import parameters_of
 from app.kinematics.figures import LETTERS, diagram, greatest
 from app.kinematics.looking import in_order, surer
 from app.kinematics.queries import RunRow
-from app.reports.content import (
+from app.paper.content import (
     Column,
     Fact,
     Picture,

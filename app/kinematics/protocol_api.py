@@ -7,10 +7,9 @@ from fastapi import Path, Query, Response
 
 from app.kinematics import queries
 from app.kinematics.protocol import protocol_of
-from app.reports.asking import Format, Paper
-from app.reports.content import Report
-from app.reports.files import MEDIA_TYPES, file_name, file_of
-from app.reports.schemas import ReportOut
+from app.paper.content import Format, Paper, Report
+from app.paper.files import MEDIA_TYPES, file_name, file_of
+from app.paper.schemas import ReportOut
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, Caller, SessionDep
 

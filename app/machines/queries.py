@@ -27,6 +27,11 @@ def machine_named(session: Session, key: str) -> Machine:
     return found
 
 
+def machine_of(session: Session, machine_id: int) -> Machine:
+    """The machine that something belongs to."""
+    return session.get_one(Machine, machine_id)
+
+
 def key_is_taken(session: Session, key: str) -> bool:
     return session.scalar(select(Machine.id).where(Machine.key == key)) is not None
 

@@ -6,11 +6,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from app.core.uncertainty import DEFAULT_DELAY, DEFAULT_FEED
-from app.web.fields import Body, Slug, Text200
+from app.web.fields import Body, Control, Slug, Text200
 
-Control = Annotated[
-    Literal["sinumerik", "fanuc", "heidenhain", "other"], Field(description="Which family its control belongs to.")
-]
 ExpireAfter = Annotated[
     float,
     Field(

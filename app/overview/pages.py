@@ -6,7 +6,7 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 
-from app.capability.ranking import LOOKED_BACK
+from app.capability.queries import LOOKED_BACK
 from app.machines import queries as machines
 from app.overview import queries, wording
 from app.overview.queries import By

@@ -10,13 +10,13 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.alarms.tables import Alarm
-from app.capability import ranking as capability
+from app.capability import queries as capability
 from app.control import signals_queries as signals
+from app.core.state import State
 from app.machines.tables import Machine
 from app.overview.ranking import Told
 from app.plant import queries as plant
 from app.plant.queries import Row
-from app.plant.state import State
 from app.readings.tables import Reading, Stream
 
 SHIFT = timedelta(hours=8)

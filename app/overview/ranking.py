@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import inf
 
-from app.plant.state import NEED_SOMEONE, State
+from app.core.state import NEED_SOMEONE, State
 
 CAPABLE = 1.33
 """Ppk from which a process is usually called capable (ISO 22514-2; AIAG SPC asks for 1.33 or more)."""

@@ -7,10 +7,9 @@ from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
 
 from app.characteristics.figures import band_picture, sparkline
-from app.machines.tables import Machine
+from app.core.state import State
 from app.plant import queries
 from app.plant.queries import Group, Row
-from app.plant.state import State
 from app.plant.wording import state_word
 from app.wear.queries import foretold
 from app.wear.wording import hunting_word
@@ -25,11 +24,10 @@ MOST_OF_A_MACHINE = 500
 
 
 class Shown(NamedTuple):
-    """A machine with the characteristics that are shown, and how many are not; `alarms` are those of its tools."""
+    """A machine with those of its characteristics that are shown, and how many are not."""
 
-    machine: Machine
+    group: Group
     rows: list[Row]
-    alarms: list[tuple[int, str]]
     folded: int
 
 
@@ -78,7 +76,7 @@ def _shown(group: Group, show: str, most: int) -> Shown:
     if len(rows) > most:
         rows = sorted(rows, key=lambda row: not row.needs_someone)[:most]
     folded = 0 if show == "attention" else len(group.rows) - len(rows)
-    return Shown(group.machine, rows, group.alarms, folded)
+    return Shown(group, rows, folded)
 
 
 def _summary(groups: list[Group]) -> dict[str, Any]:

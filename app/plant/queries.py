@@ -11,10 +11,10 @@ from sqlalchemy.orm import Session
 from app.alarms.tables import Alarm
 from app.characteristics.tables import Characteristic, ParametersVersion
 from app.core.parameters import Parameters
+from app.core.state import CALM, NEED_SOMEONE, Known, State, state_of
 from app.machines.queries import machine_named
 from app.machines.tables import Machine
 from app.offsets.tables import OPEN, AverageMemory, Correction, Tool
-from app.plant.state import CALM, NEED_SOMEONE, Known, State, state_of
 from app.readings.tables import Stream
 from app.statistics import queries as statistics
 from app.statistics.queries import Rejects

@@ -1,6 +1,6 @@
 """The words of the states."""
 
-from app.plant.state import State
+from app.core.state import State
 from app.web.i18n import _
 
 

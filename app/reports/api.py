@@ -7,12 +7,12 @@ from typing import Annotated, Any, NamedTuple
 from fastapi import Depends, Path, Query, Response
 
 from app.characteristics import queries as characteristics
+from app.paper.content import Format, Paper, Report
+from app.paper.files import MEDIA_TYPES, file_name, file_of
+from app.paper.schemas import ReportOut
 from app.people.callers import Caller
 from app.reports import queries
-from app.reports.asking import EVERYTHING, Format, Paper, SectionName, Wishes, section_names
-from app.reports.content import Report
-from app.reports.files import MEDIA_TYPES, file_name, file_of
-from app.reports.schemas import ReportOut
+from app.reports.asking import EVERYTHING, SectionName, Wishes, section_names
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, SessionDep
 from app.web.fields import Moment

@@ -8,6 +8,7 @@ from zoneinfo import ZoneInfo
 
 from app.errors import FieldError, Invalid
 from app.formats import values
+from app.paper.content import Paper
 from app.web.i18n import _
 
 LAST = 1_000
@@ -32,21 +33,6 @@ class SectionName(StrEnum):
     PARAMETERS = "parameters"
     EXCLUDED = "excluded"
     DECISIONS = "decisions"
-
-
-class Paper(StrEnum):
-    """What a report is printed on."""
-
-    A4 = "a4"
-    LETTER = "letter"
-
-
-class Format(StrEnum):
-    """What one report is written as."""
-
-    PDF = "pdf"
-    XLSX = "xlsx"
-    CSV = "csv"
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 
 from app.formats.delimited import defused
-from app.reports.asking import Format, Paper, SectionName, Wishes
-from app.reports.content import Report
-from app.reports.files import MEDIA_TYPES, file_of, workbook
+from app.paper.content import Format, Paper, Report
+from app.paper.files import MEDIA_TYPES, file_of, workbook
+from app.reports.asking import SectionName, Wishes
 
 BundleFormat = Literal["pdf", "xlsx", "csv", "workbook"]
 """A ZIP of files, or one XLSX with a sheet for each."""

@@ -11,11 +11,12 @@ from starlette.responses import RedirectResponse
 from app.characteristics import queries as characteristics
 from app.characteristics.queries import Standing
 from app.errors import InbandError, Invalid
+from app.paper.content import Paper
 from app.proof import queries as proof
 from app.proof import wording as proof_wording
 from app.reports import actions, queries
 from app.reports.actions import KEPT_DAYS
-from app.reports.asking import Paper, SectionName, typed
+from app.reports.asking import SectionName, typed
 from app.reports.bundle import Bundle
 from app.reports.jobs_api import Number, reporter
 from app.web.deps import Caller, SessionDep, Viewer, texts

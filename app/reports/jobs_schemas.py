@@ -5,8 +5,9 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
+from app.paper.content import Paper
 from app.reports.actions import KEPT_DAYS, MOST_AT_ONCE
-from app.reports.asking import Paper, SectionName, Wishes, section_names
+from app.reports.asking import SectionName, Wishes, section_names
 from app.reports.bundle import Bundle, BundleFormat
 from app.reports.tables import ReportJob
 from app.web.fields import LARGEST_ID, Body, Moment, Slug

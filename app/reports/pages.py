@@ -10,12 +10,12 @@ from markupsafe import Markup
 
 from app.characteristics import queries as characteristics
 from app.errors import InbandError, Invalid
+from app.paper.content import Format, Paper, Picture
+from app.paper.drawing import drawing_of, svg
 from app.proof import queries as proof
 from app.proof import wording as proof_wording
 from app.reports import queries
-from app.reports.asking import EVERYTHING, LAST, Format, Paper, SectionName, Wishes, typed
-from app.reports.content import Picture
-from app.reports.drawing import drawing_of, svg
+from app.reports.asking import EVERYTHING, LAST, SectionName, Wishes, typed
 from app.web.deps import SessionDep, require
 from app.web.forms import by_field
 from app.web.i18n import _

@@ -9,15 +9,15 @@ import numpy as np
 from fastapi import Path, Query, Response
 
 from app.characteristics import queries as characteristics
-from app.characteristics.figures_api import Chosen
 from app.control import charts, queries
-from app.control.view import View
+from app.control.charts import View
 from app.core.spc.shewhart import Chart
+from app.paper.content import Format
+from app.paper.files import MEDIA_TYPES
 from app.reports.api import Named, download
-from app.reports.asking import Format
-from app.reports.files import MEDIA_TYPES
 from app.statistics import queries as statistics
 from app.web.api import api_router, problems
+from app.web.choice import Chosen
 from app.web.deps import AnyCaller, SessionDep
 from app.web.fields import LARGEST_SERIAL
 

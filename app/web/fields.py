@@ -8,7 +8,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime, timedelta
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -77,6 +77,9 @@ def _sensible(moment: datetime) -> datetime:
 LatelyOrNow = Annotated[Moment, AfterValidator(_sensible)]
 """When something happened at a machine, by its clock."""
 
+Control = Annotated[
+    Literal["sinumerik", "fanuc", "heidenhain", "other"], Field(description="Which family its control belongs to.")
+]
 Slug = Annotated[str, AfterValidator(_slug), Field(json_schema_extra={"pattern": f"^{SLUG}$", "maxLength": 64})]
 """A key that people choose and programs use in addresses."""
 

@@ -45,6 +45,12 @@ def length(text: str | None) -> float | str | None:
         return text
 
 
+def whole(text: str | None) -> int | str | None:
+    """A whole number as people type it; what is none is left for the schema to refuse."""
+    text = (text or "").strip()
+    return int(text) if text.isdecimal() and len(text) < 12 else text or None
+
+
 def words(fields: Mapping[str, str], name: str) -> str:
     """A reason or comment: the one that was chosen as `name`, and what was typed besides as `more`."""
     chosen, more = fields.get(name, "").strip(), fields.get("more", "").strip()

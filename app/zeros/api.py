@@ -7,13 +7,11 @@ from fastapi.responses import PlainTextResponse
 
 from app.db.engine import Database
 from app.errors import NotFound
-from app.machines.queries import machine_named
-from app.machines.schemas import Control
-from app.machines.tables import Machine
+from app.machines.queries import machine_named, machine_of
 from app.readings import actions as readings
 from app.web.api import api_router, plain, problems
 from app.web.deps import AnyCaller, Engineer, Operator, SessionDep
-from app.web.fields import Cursor, Limit, Page, Slug, page_of
+from app.web.fields import Control, Cursor, Limit, Page, Slug, page_of
 from app.web.i18n import _
 from app.web.theme import theme_from
 from app.zeros import actions, figures, queries
@@ -143,7 +141,7 @@ def write_work_zero(
 ) -> PlainTextResponse:
     """The text that sets the work zero, for the machine's control or for another one. Running it twice changes nothing."""
     zero = queries.work_zero(session, number, caller.only_machine)
-    machine = session.get_one(Machine, zero.machine_id)
+    machine = machine_of(session, zero.machine_id)
     text = program_of(zero, machine, control)
     if text is None:
         raise NotFound(

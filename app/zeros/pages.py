@@ -1,6 +1,7 @@
 """Pages: fixtures and zeros, touches typed in, one zero with its picture and text, one fixture with its history."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from secrets import token_hex
 from typing import Annotated, Any
 
@@ -11,13 +12,12 @@ from starlette.responses import RedirectResponse
 from app.db.engine import Database
 from app.errors import Conflict, FieldError, InbandError, Invalid, NotFound
 from app.machines import queries as machines
-from app.machines.queries import machine_named
-from app.machines.tables import Machine
+from app.machines.queries import machine_named, machine_of
+from app.machines.wording import texts_by_control
 from app.readings import actions as readings
 from app.web.deps import Caller, Engineer, FormDep, Operator, SessionDep, Viewer, require
 from app.web.fields import LARGEST_ID
 from app.web.forms import parsed
-from app.web.i18n import _
 from app.web.templates import page
 from app.zeros import actions, forms, pictures, queries, wording
 from app.zeros.answers import program_of, zero_out
@@ -27,7 +27,6 @@ from app.zeros.tables import WorkZero
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 25
 KINDS = ("bore", "boss", "pocket", "web", "corner")
-CONTROLS = {"sinumerik": "Sinumerik", "fanuc": "Fanuc", "heidenhain": "Heidenhain", "other": ""}
 Word = Annotated[str | None, Query(max_length=64)]
 Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
 
@@ -68,7 +67,7 @@ def new_page(
     """The form for one kind; with `like` as another zero was typed, its touches left out."""
     if like is not None:
         zero = queries.work_zero(session, like)
-        key = session.get_one(Machine, zero.machine_id).key
+        key = machine_of(session, zero.machine_id).key
         chosen = kind if kind in KINDS else zero.kind
         form = forms.like(
             zero.given if chosen == zero.kind else {},
@@ -81,7 +80,7 @@ def new_page(
     else:
         chosen = kind if kind in KINDS else "pocket"
         last = queries.work_zeros(session, newest_first=True, limit=1)
-        usual = session.get_one(Machine, last[0].machine_id).key if last else ""
+        usual = machine_of(session, last[0].machine_id).key if last else ""
         form = forms.blank(chosen) | {"kind": chosen, "machine": machine or usual, "fixture": fixture or ""}
     return _new(request, session, form | {"key": f"page-{token_hex(12)}"}, like=like)
 
@@ -159,7 +158,7 @@ def _zero(
     form: Mapping[str, str] | None = None,
     error: InbandError | None = None,
 ) -> Response:
-    machine = session.get_one(Machine, zero.machine_id)
+    machine = machine_of(session, zero.machine_id)
     made = zero_out(session, zero)
     touches = [each.model_dump() for each in made.touches] or actions.touches_of(zero.kind, zero.given)
     return page(
@@ -171,7 +170,7 @@ def _zero(
         machine=machine,
         touches=touches,
         picture=pictures.draw(zero.kind, touches, made.model_dump(), made.tip),
-        texts=_texts(zero, machine),
+        texts=texts_by_control(machine.control, partial(program_of, zero, machine)),
         later=queries.recomputed_as(session, zero),
         form=form or {},
         errors=forms.at_fields(error) if error else {},
@@ -179,17 +178,6 @@ def _zero(
         wording=wording,
         may_measure=caller.may("operator"),
     )
-
-
-def _texts(zero: WorkZero, machine: Machine) -> list[tuple[str, str, str]]:
-    """Control, its name, and the text that sets the zero there: that of the machine first."""
-    order = [machine.control, *(each for each in ("sinumerik", "fanuc") if each != machine.control)]
-    found = []
-    for control in order:
-        text = program_of(zero, machine, None if control == machine.control else control)
-        if text is not None:
-            found.append((control, CONTROLS.get(control) or _("To type in"), text))
-    return found
 
 
 @router.post("/work-zeros/{number}/recompute")

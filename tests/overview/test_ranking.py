@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.core.state import State
 from app.overview.ranking import Told, Why
-from app.plant.state import State
 
 CALM = Told(State.IN_BAND, 0, 0, 1.7, None, hunting=False, per_shift=0.0)
 told = st.builds(

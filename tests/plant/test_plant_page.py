@@ -8,8 +8,8 @@ import pytest
 from playwright.sync_api import Page, expect
 from sqlalchemy import event
 
+from app.core.state import State
 from app.plant import queries
-from app.plant.state import State
 from tests.conftest import RunServer, Server
 from tests.shop import PARAMETERS, Person, Shop
 

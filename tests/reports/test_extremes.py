@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 from openpyxl import load_workbook
 from pypdf import PdfReader
 
-from app.reports.asking import Format, Paper
-from app.reports.content import Column, Fact, Report, Section, Table, count, deviation, moment, words
-from app.reports.files import file_of
-from app.reports.files.letters import MISSING
+from app.paper.content import Column, Fact, Format, Paper, Report, Section, Table, count, deviation, moment, words
+from app.paper.files import file_of
+from app.paper.files.letters import MISSING
 from tests.conftest import Server
 from tests.reports.story import facts, file, pushed, report, scatter
 from tests.shop import Person, Shop

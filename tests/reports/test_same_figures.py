@@ -233,9 +233,10 @@ def test_a_failing_proof_stands_above_everything(shop: Shop, failing: None) -> N
     from datetime import UTC, datetime
 
     from app.characteristics.queries import characteristic_named
+    from app.paper.content import Format
+    from app.paper.files import file_of
     from app.reports import queries
-    from app.reports.asking import Format, SectionName, Wishes
-    from app.reports.files import file_of
+    from app.reports.asking import SectionName, Wishes
 
     with shop.server.database.begin() as session:
         standing = characteristic_named(session, shop.characteristic)

@@ -5,7 +5,7 @@ from app.capability import wording
 from app.capability.queries import Study
 from app.core.spc.capability import Index
 from app.core.spc.refusal import Refused
-from app.reports.content import Fact, Section, count, deviation, number, probability, width, words
+from app.paper.content import Fact, Section, count, deviation, number, probability, width, words
 from app.reports.queries.frame import Frame
 from app.statistics import wording as statistics
 from app.web.i18n import _

@@ -2,7 +2,7 @@
 
 from app.characteristics.chart import Chart, chart_of
 from app.characteristics.figures import zone_chart
-from app.reports.content import Column, Picture, Section, Table, count, deviation, moment, words
+from app.paper.content import Column, Picture, Section, Table, count, deviation, moment, words
 from app.reports.queries.frame import Frame
 from app.web.i18n import _
 from app.web.theme import zone_name

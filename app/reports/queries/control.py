@@ -8,15 +8,15 @@ import numpy as np
 from app.control import charts, signals_queries, wording
 from app.control import queries as controls
 from app.control import signals_wording as signals
+from app.control.charts import View
 from app.control.figures import control_figure
 from app.control.signals_queries import SignalRow
 from app.control.tables import Baseline
-from app.control.view import View
 from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Floats
 from app.core.spc.rules import RuleName
 from app.core.spc.shewhart import ENOUGH_READINGS, Chart
-from app.reports.content import (
+from app.paper.content import (
     Column,
     Fact,
     Picture,

@@ -8,10 +8,10 @@ from sqlalchemy.orm import Session
 
 from app.characteristics.queries import Standing
 from app.errors import InbandError
+from app.paper.content import Fact, Report, Section, count, deviation, moment, size, width, words
 from app.proof import queries as proof
 from app.proof import wording as proof_wording
 from app.reports.asking import SectionName, Wishes
-from app.reports.content import Fact, Report, Section, count, deviation, moment, size, width, words
 from app.reports.queries import capability, charts, control, loop, numbers, record
 from app.reports.queries.frame import Frame
 from app.web.i18n import _

@@ -4,7 +4,7 @@ from sqlalchemy import func, select
 
 from app.offsets import wording as offsets
 from app.offsets.tables import Correction, ToolEvent
-from app.reports.content import Column, Fact, Picture, Section, Table, count, deviation, moment, size, words
+from app.paper.content import Column, Fact, Picture, Section, Table, count, deviation, moment, size, words
 from app.reports.queries.frame import Frame
 from app.wear import queries as wears
 from app.wear.chart import chart_of

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.characteristics.figures import histogram_edges, histogram_figure
 from app.core.zones import HasLimits, Zone
-from app.reports.content import Column, Fact, Picture, Section, Table, count, deviation, share, width
+from app.paper.content import Column, Fact, Picture, Section, Table, count, deviation, share, width
 from app.reports.queries.frame import Frame
 from app.statistics import queries as statistics
 from app.web.i18n import _, ngettext

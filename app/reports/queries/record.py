@@ -8,9 +8,9 @@ from app.alarms.tables import Alarm
 from app.characteristics import wording
 from app.core.parameters import BY_NAME
 from app.offsets.wording import status_word
+from app.paper.content import Column, Fact, Section, Table, count, deviation, moment, size, words
 from app.readings import queries as readings
 from app.readings.tables import Exclusion, Reading
-from app.reports.content import Column, Fact, Section, Table, count, deviation, moment, size, words
 from app.reports.queries.frame import Frame
 from app.web.i18n import _
 from app.web.theme import zone_name

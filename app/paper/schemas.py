@@ -4,7 +4,7 @@ from datetime import datetime
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.reports.content import Fact, Report, Section, Value
+from app.paper.content import Fact, Report, Section, Value
 
 
 class ValueOut(BaseModel):

@@ -25,11 +25,10 @@ from reportlab.platypus import (
 )
 from reportlab.platypus import Table as Grid
 
-from app.reports.asking import Paper
-from app.reports.content import Fact, Picture, Report, Section, Table
-from app.reports.drawing import drawing_of
-from app.reports.files.canvas import Chart, colour
-from app.reports.files.letters import BOLD, REGULAR, fonts, markup, runs, width_of
+from app.paper.content import Fact, Paper, Picture, Report, Section, Table
+from app.paper.drawing import drawing_of
+from app.paper.files.canvas import Chart, colour
+from app.paper.files.letters import BOLD, REGULAR, fonts, markup, runs, width_of
 from app.web.i18n import _
 
 PAPERS = {Paper.A4: A4, Paper.LETTER: LETTER}

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from app.core.parameters import Parameters, read
-from app.plant.state import Known, State, state_of
+from app.core.state import Known, State, state_of
 from tests.shop import PARAMETERS
 
 NOW = datetime(2026, 11, 21, 8, tzinfo=UTC)

@@ -15,7 +15,7 @@ from xlsxwriter.chart import Chart
 from xlsxwriter.format import Format
 from xlsxwriter.worksheet import Worksheet
 
-from app.reports.content import Picture, Report, Section, Table, Value
+from app.paper.content import Picture, Report, Section, Table, Value
 from app.web.i18n import _
 
 WIDEST = 60  # letters of a column

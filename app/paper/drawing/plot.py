@@ -9,8 +9,8 @@ from html import unescape
 from itertools import groupby
 from typing import Any, Literal
 
-from app.reports.drawing.axes import Axis, axis_of, position, spread
-from app.reports.drawing.marks import Anchor, Area, Box, Drawing, Group, Line, Mark, Place, Words, symbol
+from app.paper.drawing.axes import Axis, axis_of, position, spread
+from app.paper.drawing.marks import Anchor, Area, Box, Drawing, Group, Line, Mark, Place, Words, symbol
 
 INK, QUIET = "#1d2328", "#5a646c"
 LEGEND_GAP = 24  # between two entries, pixels

@@ -6,8 +6,8 @@ from reportlab.lib.colors import Color
 from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import Flowable
 
-from app.reports.drawing import Area, Dot, Drawing, Line, Mark, Words
-from app.reports.files.letters import BOLD, CHINESE, REGULAR, runs, width_of
+from app.paper.drawing import Area, Dot, Drawing, Line, Mark, Words
+from app.paper.files.letters import BOLD, CHINESE, REGULAR, runs, width_of
 
 
 def colour(text: str) -> Color:

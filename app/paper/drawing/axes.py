@@ -7,7 +7,7 @@ from itertools import pairwise
 from math import ceil, floor, isfinite, log10
 from typing import Any
 
-from app.reports.drawing.marks import Box
+from app.paper.drawing.marks import Box
 from app.web.numbers import MINUS
 
 Layout = Mapping[str, Any]

@@ -1,9 +1,8 @@
 """Reports as files. Pure: a report in, bytes out; the same report gives the same bytes."""
 
-from app.reports.asking import Format, Paper
-from app.reports.content import Report
-from app.reports.files.lines import csv_of
-from app.reports.files.sheets import workbook
+from app.paper.content import Format, Paper, Report
+from app.paper.files.lines import csv_of
+from app.paper.files.sheets import workbook
 
 MEDIA_TYPES = {
     Format.PDF: "application/pdf",
@@ -16,7 +15,7 @@ def file_of(report: Report, as_: Format, paper: Paper = Paper.A4) -> bytes:
     """The report as one file."""
     match as_:
         case Format.PDF:
-            from app.reports.files.pdf import pdf_of  # a second of fonts and layout that a server starts well without
+            from app.paper.files.pdf import pdf_of  # a second of fonts and layout that a server starts well without
 
             return pdf_of(report, paper)
         case Format.XLSX:

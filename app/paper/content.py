@@ -6,6 +6,7 @@ same sections, so that page, PDF, XLSX, CSV and JSON cannot say different things
 
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from enum import StrEnum
 from math import floor, isfinite
 from typing import Any, Literal
 from zoneinfo import ZoneInfo
@@ -16,6 +17,21 @@ from app.web.numbers import MINUS, NO_BREAK_SPACE, NOTHING, signed
 Kind = Literal["text", "count", "deviation", "width", "size", "number", "probability", "share", "moment"]
 LONGEST = 500  # letters of a text in a cell
 UNITS: dict[Kind, str] = {"deviation": "µm", "width": "µm", "size": "mm", "share": "%"}
+
+
+class Paper(StrEnum):
+    """What a report is printed on."""
+
+    A4 = "a4"
+    LETTER = "letter"
+
+
+class Format(StrEnum):
+    """What one report is written as."""
+
+    PDF = "pdf"
+    XLSX = "xlsx"
+    CSV = "csv"
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import io
 from zoneinfo import ZoneInfo
 
 from app.formats.delimited import defused
-from app.reports.content import Report, Value
+from app.paper.content import Report, Value
 
 COLUMNS = ("section", "row", "key", "name", "value", "unit", "text")
 
