@@ -19,14 +19,14 @@ from app.formats.values import folded
 LARGEST = 1e6
 LONGEST_LABEL = 120
 _AXIS = re.compile(
-    r"\b(?:drehachse|achse|axis|os|osi|rotacijska os|rotary axis)\s+([abc])\b"
-    r"|\b([abc])\s?(?:achse|drehachse|axis|os|osi)\b"
+    r"\b(?:[a-z]{0,20}achse|[a-z]{0,20}tisch|axis(?: of rotation)?|rotary table|os|osi|miza)\s+([abc])\b"
+    r"|\b([abc])\s?(?:[a-z]{0,20}achse|axis|rotary axis|os|osi)\b"
 )
 _NUMBER = re.compile(r"(?<![\w.,])([+-]?\d{1,12}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm|°|deg|grad|inch|in|\")?(?![\w])")
 _COORDINATE = re.compile(r"\b([xyz])\s*[=:]?\s*([+-]?\d{1,12}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm)?", re.IGNORECASE)
 _DEVIATION = re.compile(r"\be([xyz])([abc])\b")
 _CLOCK = re.compile(r"\d{1,2}:\d{2}")
-_ALONE = re.compile(r"(?:dreh|rotary |rotacijska )?(?:achse|axis|os)")
+_ALONE = re.compile(r"(?:[a-z]{1,20} ){0,2}(?:[a-z]{0,20}achse|axis|os)(?: of rotation)?")  # Vermessene Rotationsachse
 _LETTER = re.compile(r"\s*([abc])(?:[\s-]*(?:achse|axis|os))?\s*", re.IGNORECASE)
 _ERROR = re.compile(
     r"\b(E[XYZABC]0[ABC])\b\s*[=:]?\s*([+-]?\d{1,6}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm|°|deg|grad)?(?![\w.,]*\w)",
@@ -100,6 +100,9 @@ def read_protocol(text: str) -> Protocol:
             axis = _axis_of(named)
             made.axes.setdefault(axis, AxisProtocol())
             words = " ".join(_AXIS.sub(" ", words).split())
+        elif not values and (letter := _LETTER.fullmatch(label)):  # a heading that is the letter alone
+            axis = _named(letter[1])
+            continue
         elif _ALONE.fullmatch(words) and len(values) == 1 and (letter := _LETTER.fullmatch(values[0])):
             axis = _named(letter[1])
             continue

@@ -18,6 +18,13 @@ OPTIMISED = ("optimi", "kompensiert", "compensated", "kompenzirano")  # after th
 WORTHLESS = frozenset(
     [
         "messprotokoll",
+        "tchprauto",
+        "rotary",
+        "vrtilna",
+        "merjena",
+        "measured",
+        "vermessene",
+        "gemessene",
         "protokoll",
         "measuring",
         "log",

@@ -93,9 +93,28 @@ def test_date_and_time_apart() -> None:
     assert made.head["created"] == "22.11.2026 10:15"
 
 
-@pytest.mark.parametrize("heading", ["Achse: C", "C-Achse", "Rotary axis: C", "Os C", "Axis C:", "Rotacijska os: C"])
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "Achse: C",
+        "C-Achse",
+        "Rotationsachse C",
+        "C-Rundachse",
+        "Vermessene Drehachse: C",
+        "Drehtisch C",
+        "Rotary axis: C",
+        "Axis of rotation: C",
+        "Rotary table C",
+        "Os C",
+        "Axis C:",
+        "Rotacijska os: C",
+        "Vrtilna os C",
+        "C",
+    ],
+)
 def test_headings_of_an_axis(heading: str) -> None:
-    assert read_protocol(f"<p>{heading}</p><p>Backlash: 0.002</p>").axes["C"].numbers == {"backlash": 0.002}
+    made = read_protocol(f"<title>TCHPRAUTO</title><p>{heading}</p><p>Backlash: 0.002</p>")
+    assert (made.axes["C"].numbers, made.unread) == ({"backlash": 0.002}, [])
 
 
 def test_axes_side_by_side() -> None:
