@@ -272,7 +272,7 @@ def capability_out(study: Study) -> CapabilityOut:
             FiredOut(rule=each.rule.value, signals=each.signals, expected=each.expected, p_value=each.p_value)
             for each in (judged.fired if judged else ())
         ],
-        in_time=_in_time(model) if model else None,
+        in_time=_in_time(study, model) if model else None,
         compensated=study.compensated,
         without=_without(study),
         cautions=wording.cautions(study),
@@ -283,7 +283,7 @@ def _fields(given: Any) -> dict[str, Any]:
     return {name: getattr(given, name) for name in given.__slots__}
 
 
-def _in_time(found: InTime) -> InTimeOut:
+def _in_time(study: Study, found: InTime) -> InTimeOut:
     return InTimeOut(
         model=found.model.value,
         location=found.location.value,
@@ -296,7 +296,7 @@ def _in_time(found: InTime) -> InTimeOut:
             for question, test, numbers, answer in wording.model_tests(found)
         ],
         text=wording.model(found),
-        means=wording.model_means(found.model),
+        means=wording.model_means(study),
     )
 
 

@@ -141,27 +141,42 @@ def model(found: InTime) -> str:
     return _("{mean}, {scatter}, {shape}.").format(mean=location(found), scatter=scatter, shape=shape).capitalize()
 
 
-def model_means(which: Model) -> str:
-    """Which index this model allows."""
+def model_means(study: Study) -> str:
+    """Which index the model in time allows: the one that `Study.quote` names, for what else is known counts as well.
+
+    A steady model does not outweigh signals of the run rules. Empty where there is no model.
+    """
+    if isinstance(study.in_time, Refused):
+        return ""
+    which = study.in_time.model
+    index = _("Ppk by percentiles") if study.quote == "percentile" else _("Pp and Ppk")
+    if which.steady and study.stable is not True:
+        why = (
+            _("the run rules find more signals than chance explains")
+            if study.stable is False
+            else _("too little is known to call it stable")
+        )
+        return _("The mean and the scatter hold, yet {why}: quote {index}, not Cp and Cpk.").format(
+            why=why, index=index
+        )
     match which:
-        case Model.A1:
+        case Model.A1 | Model.A2 if study.quote == "cpk":
             return _("Cp and Cpk may be quoted, and what was is what will be: 6 sigma hold 99.73 % of the parts.")
-        case Model.A2:
-            return _("Cp and Cpk may be quoted by percentiles: the process is steady, but not normal.")
-        case Model.B:
-            return _("Quote Pp and Ppk by percentiles: the scatter changes, so no one sigma describes the process.")
-        case Model.C1:
-            return _("Quote Pp and Ppk of all readings: sigma within subgroups leaves out how the mean wanders.")
-        case Model.C2:
-            return _("Quote Pp and Ppk by percentiles: the mean wanders, and the parts together are not normal.")
-        case Model.C3:
+        case Model.A1 | Model.A2:
             return _(
-                "Quote Pp and Ppk by percentiles over whole courses of the drift, from tool change to tool change."
-            )
+                "Quote {index}: the process is steady, but not normal, so no sigma says what its tails hold."
+            ).format(index=index)
+        case Model.B:
+            said = _("Quote {index}: the scatter changes, so no one sigma describes the process.")
+        case Model.C1 | Model.C2:
+            said = _("Quote {index} of all readings: sigma within subgroups leaves out how the mean wanders.")
+        case Model.C3:
+            said = _("Quote {index} over whole courses of the drift, from tool change to tool change.")
         case Model.C4:
-            return _("Quote Pp and Ppk by percentiles over long enough a time: drift and jumps both belong to it.")
+            said = _("Quote {index} over long enough a time: drift and jumps both belong to it.")
         case Model.D:
-            return _("Quote Pp and Ppk by percentiles, and look for the causes first: mean and scatter both move.")
+            said = _("Quote {index}, and look for the causes first: mean and scatter both move.")
+    return said.format(index=index)
 
 
 def model_tests(found: InTime) -> list[tuple[str, str, str, str]]:

@@ -143,6 +143,20 @@ def test_the_model_in_time_and_which_number_it_allows(shop: Shop) -> None:
     push(shop, quiet(250, seed=5), "steady")
     found = of(shop, characteristic="steady")
     assert (found["in_time"]["model"], found["stable"], found["quote"]) == ("A1", True, "cpk")
+    assert "Cp and Cpk may be quoted" in found["in_time"]["means"]
+
+    # Heavy tails: the mean and the scatter hold, yet a rule fires more often than chance explains. The model says no other
+    # than the verdict of stability and the index named to be quoted.
+    shop.add("tails", mode="measure_only", tool_memory=0)
+    rng = Random(2)
+    push(shop, [round(rng.choice((-1, 1)) * rng.expovariate(1 / 0.6), 3) for _ in range(250)], "tails")
+    found = of(shop, characteristic="tails")
+    assert (found["in_time"]["model"], found["stable"], found["quote"]) == ("A2", False, "percentile")
+    assert "quote Ppk by percentiles, not Cp and Cpk" in found["in_time"]["means"]
+    page = shop.admin.get("/characteristics/tails/capability?last=all").text
+    assert found["in_time"]["means"] in page
+    report = shop.admin.get("/characteristics/tails/report?section=capability&last=all").text
+    assert found["in_time"]["means"] in report
 
 
 def test_which_readings(shop: Shop) -> None:

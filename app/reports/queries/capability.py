@@ -35,7 +35,7 @@ def capability(frame: Frame) -> Section:
         model = study.in_time.model
         said = _("Time-dependent model {model} (ISO 22514-2): {words} {means}")
         sentences.append(
-            said.format(model=model.value, words=wording.model(study.in_time), means=wording.model_means(model))
+            said.format(model=model.value, words=wording.model(study.in_time), means=wording.model_means(study))
         )
     return Section(
         "capability",
