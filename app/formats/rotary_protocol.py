@@ -100,10 +100,7 @@ def read_protocol(text: str) -> Protocol:
             axis = _axis_of(named)
             made.axes.setdefault(axis, AxisProtocol())
             words = " ".join(_AXIS.sub(" ", words).split())
-        elif not values and (letter := _LETTER.fullmatch(label)):  # a heading that is the letter alone
-            axis = _named(letter[1])
-            continue
-        elif _ALONE.fullmatch(words) and len(values) == 1 and (letter := _LETTER.fullmatch(values[0])):
+        elif letter := _LETTER.fullmatch(_heading(words, label, values)):
             axis = _named(letter[1])
             continue
         if abreast := _abreast(row):
@@ -139,6 +136,13 @@ def _split(row: Row) -> tuple[str, list[str]]:
         if at > 0 and not (mark == ":" and clock is not None and clock.start() < at < clock.end()):
             return text[:at].strip(), [text[at + 1 :].strip()] if text[at + 1 :].strip() else []
     return text.strip(), []
+
+
+def _heading(words: str, label: str, values: Sequence[str]) -> str:
+    """Where the letter of an axis may stand alone: beside the word for it, or as the whole of a heading; else nothing."""
+    if not values:
+        return label
+    return values[0] if len(values) == 1 and _ALONE.fullmatch(words) else ""
 
 
 def _axis_of(found: re.Match[str]) -> AxisName:

@@ -21,6 +21,7 @@ WORTHLESS = frozenset(
         "tchprauto",
         "rotary",
         "vrtilna",
+        "rotacijska",
         "merjena",
         "measured",
         "vermessene",
