@@ -29,7 +29,7 @@ async def events(
         int | None, Query(ge=0, le=LARGEST_ID, description="The same, for programs that cannot set the header.")
     ] = None,
 ) -> StreamingResponse:
-    """Server-sent events: reading, correction, alarm, tool, average, characteristic, machine; `heartbeat` while all is quiet.
+    """Server-sent events: reading, correction, alarm, tool, signal, work_zero and what else changes; `heartbeat` while all is quiet.
 
     Each carries what changed (machine, characteristic, numbers); look the thing itself up. Of many readings of one
     characteristic within a tenth of a second the last one is told. `resync` means: more was missed than is kept.
