@@ -119,7 +119,8 @@ def moving_range(values: ArrayLike) -> Sigma:
     1.32934
     """
     x = checked(values, at_least=2)
-    value = float(np.abs(np.diff(x)).mean()) / d2(2)
+    ranges = np.diff(x)
+    value = float(np.abs(ranges, out=ranges).mean()) / d2(2)
     return Sigma(value, Estimator.MOVING_RANGE, len(x), len(x) - 1, freedom_of_moving_ranges(len(x)))
 
 
