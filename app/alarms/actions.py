@@ -25,15 +25,18 @@ def raise_for_tool(session: Session, machine_id: int, tool_memory: int, kind: st
         )
         .execution_options(populate_existing=True)
     ).one_or_none()
-    if active is None:
-        active = Alarm(machine_id=machine_id, tool_memory=tool_memory, kind=kind, data=data)
-        session.add(active)
-    else:
-        active.count += 1
-        active.last_at = func.clock_timestamp()
-        active.data = data
+    return _raised(session, active or Alarm(machine_id=machine_id, tool_memory=tool_memory, kind=kind), data)
+
+
+def _raised(session: Session, alarm: Alarm, data: dict[str, Any]) -> Alarm:
+    """A new alarm is kept; on one that is active already, one more is counted."""
+    if alarm in session:
+        alarm.count += 1
+        alarm.last_at = func.clock_timestamp()
+    alarm.data = data
+    session.add(alarm)
     session.flush()
-    return active
+    return alarm
 
 
 def raise_for_characteristic(
@@ -55,21 +58,14 @@ def raise_for_characteristic(
         )
         .execution_options(populate_existing=True)
     ).one_or_none()
-    if active is None:
-        active = Alarm(
-            machine_id=machine_id,
-            characteristic_id=characteristic_id,
-            tool_memory=tool_memory or None,
-            kind=kind,
-            data=data,
-        )
-        session.add(active)
-    else:
-        active.count += 1
-        active.last_at = func.clock_timestamp()
-        active.data = data
-    session.flush()
-    return active
+    return _raised(
+        session,
+        active
+        or Alarm(
+            machine_id=machine_id, characteristic_id=characteristic_id, tool_memory=tool_memory or None, kind=kind
+        ),
+        data,
+    )
 
 
 def raise_for_place(session: Session, machine_id: int, kind: str, data: dict[str, Any]) -> Alarm:
@@ -78,15 +74,7 @@ def raise_for_place(session: Session, machine_id: int, kind: str, data: dict[str
     While it is active, one more counts on it.
     """
     active = _of_place(session, machine_id, kind, data)
-    if active is None:
-        active = Alarm(machine_id=machine_id, kind=kind, data=data)
-        session.add(active)
-    else:
-        active.count += 1
-        active.last_at = func.clock_timestamp()
-        active.data = data
-    session.flush()
-    return active
+    return _raised(session, active or Alarm(machine_id=machine_id, kind=kind), data)
 
 
 def settle_for_place(

@@ -13,14 +13,13 @@ import numpy as np
 from app.core.geometry.points import Floats
 from app.web.i18n import _
 from app.web.numbers import signed
-from app.web.theme import Palette, ThemeName, layout, palette
+from app.web.theme import Palette, ThemeName, layout, legend, palette
 
 SEEN = 0.09  # of the part's size: so large the greatest displacement is drawn
 FACING = 0.7  # cosine: so far a face looks along an axis
 MOST = 10_000  # times: what has to be enlarged more is nothing
 FAINTEST = 1e-7  # mm: what has moved by less has not moved
 BOX = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-LEGEND: dict[str, Any] = {"orientation": "h", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
 
 
 class Drawn(NamedTuple):
@@ -49,7 +48,7 @@ def part_figure(motion: Floats, touches: Sequence[Drawn], *, theme: ThemeName = 
     )
     data += _axes(corners, view, size, colours)
     arrows, marks, words = _touches(touches, places, normals, times, view, colours)
-    return {"data": [*data, *arrows, *marks], "layout": _framed(theme, colours, words)}
+    return {"data": [*data, *arrows, *marks], "layout": _framed(theme, words)}
 
 
 def plane_figure(
@@ -91,7 +90,7 @@ def plane_figure(
         )
         for at in range(len(places))
     ]
-    return {"data": data, "layout": _framed(theme, colours, words)}
+    return {"data": data, "layout": _framed(theme, words)}
 
 
 def enlargement(wanted: float) -> int:
@@ -279,13 +278,13 @@ def _word(place: Floats, text: str, colours: Palette, **more: Any) -> dict[str, 
     } | more
 
 
-def _framed(theme: ThemeName, colours: Palette, words: list[dict[str, Any]]) -> dict[str, Any]:
+def _framed(theme: ThemeName, words: list[dict[str, Any]]) -> dict[str, Any]:
     hidden = {"visible": False, "fixedrange": True}
     return layout(
         theme,
         margin={"l": 24, "r": 24, "t": 40, "b": 24},
         showlegend=True,
-        legend=LEGEND | {"font": {"size": 13, "color": colours.quiet}, "itemclick": False, "itemdoubleclick": False},
+        legend=legend(theme),
         xaxis=hidden,
         yaxis=hidden | {"scaleanchor": "x", "scaleratio": 1},
         annotations=words,

@@ -3,7 +3,7 @@
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import Path, Query
+from fastapi import Path, Query, Response
 from fastapi.responses import PlainTextResponse
 from sqlalchemy.orm import Session
 
@@ -12,8 +12,10 @@ from app.alignments.answers import TEXT, program_of
 from app.alignments.tables import Alignment
 from app.errors import NotFound
 from app.machines.queries import machine_named, machine_of
+from app.machines.wording import file_name
 from app.web.api import api_router, plain, problems
 from app.web.deps import AnyCaller, SessionDep
+from app.web.downloads import download
 from app.web.fields import Control
 from app.web.i18n import _
 from app.web.theme import ThemeName, theme_from
@@ -62,7 +64,7 @@ def write_alignment(
     control: Annotated[
         Control | None, Query(description="For which control; if left out, that of the machine.")
     ] = None,
-) -> PlainTextResponse:
+) -> Response:
     """The text that puts the frame where the part lies, for the machine's control or another. Running it twice changes nothing."""
     found = queries.alignment(session, number, caller.only_machine)
     machine = machine_of(session, found.machine_id)
@@ -72,10 +74,7 @@ def write_alignment(
             _("{offset} is no work offset of this control.").format(offset=found.given.get("work_offset", "")),
             _("Choose the control that has it."),
         )
-    ending = {"sinumerik": "spf", "fanuc": "nc"}.get(control or machine.control, "txt")
-    name = f"{machine.key.replace('.', '-')}-alignment-{found.id}.{ending}"
-    headers = {"Content-Disposition": f'attachment; filename="{name}"', "Cache-Control": "no-store"}
-    return PlainTextResponse(text, headers=headers)
+    return download(text, file_name(control or machine.control, f"{machine.key}-alignment-{found.id}"))
 
 
 @router.get("/machines/{machine}/alignments/figure", responses=problems(404) | FIGURE)

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any, NamedTuple
 
-from app.alignments.figures import LEGEND
 from app.web.i18n import _
 from app.web.numbers import signed
-from app.web.theme import ThemeName, date_axis, layout, palette
+from app.web.theme import ThemeName, date_axis, layout, legend, palette
 
 
 class Mark(NamedTuple):
@@ -59,7 +58,7 @@ def trend(marks: Sequence[Mark], *, theme: ThemeName = "light") -> dict[str, Any
         theme,
         margin={"l": 72, "r": 16, "t": 36, "b": 48},
         showlegend=True,
-        legend=LEGEND | {"font": {"size": 13, "color": colours.quiet}},
+        legend=legend(theme),
         xaxis=date_axis() | {"anchor": "y2"},
         yaxis=titled(_("Shift, µm")) | {"domain": [0.54, 1], "tickformat": "+.4~g", "zerolinecolor": colours.faint},
     )

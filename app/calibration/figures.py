@@ -9,7 +9,7 @@ from typing import Any
 
 from app.web.i18n import _
 from app.web.numbers import um
-from app.web.theme import Palette, ThemeName, date_axis, layout, palette
+from app.web.theme import Palette, ThemeName, date_axis, layout, legend, nothing_drawn, palette
 
 SYMBOLS = {
     "unchanged": "circle",
@@ -55,7 +55,7 @@ def gauge_figure(
     """
     colours = palette(theme)
     if not marks and not changes:
-        return _empty(theme, _("Not calibrated yet"))
+        return nothing_drawn(theme, _("Not calibrated yet"))
     heights = [value] + [each for _at, each in changes]
     for mark in marks:
         heights += [mark.before + side * (mark.averaging or mark.zero or 0.0) for side in (-1, 1)]
@@ -196,7 +196,7 @@ def ring_figure(marks: Sequence[Mark], *, theme: ThemeName = "light") -> dict[st
     """Above, how far the probe stood beside the spindle; below, the ring's diameters at the three sections."""
     colours = palette(theme)
     if not marks:
-        return _empty(theme, _("Not calibrated yet"))
+        return nothing_drawn(theme, _("Not calibrated yet"))
     good = [mark.difference for mark in marks if mark.difference is not None]
     reach = max([abs(each) for each in good] + [0.001]) * 1.2
     ring = [mark for mark in marks if mark.smallest is not None and mark.largest is not None]
@@ -288,28 +288,4 @@ def _axis(colours: Palette, title: str, extent: list[float]) -> dict[str, Any]:
 
 
 def _layout(theme: ThemeName, **more: Any) -> dict[str, Any]:
-    colours = palette(theme)
-    legend = {
-        "orientation": "h",
-        "x": 0,
-        "xanchor": "left",
-        "y": 1.02,
-        "yanchor": "bottom",
-        "font": {"size": 13, "color": colours.quiet},
-        "itemclick": False,
-        "itemdoubleclick": False,
-    }
-    return layout(theme, margin={"l": 84, "t": 34}, showlegend=True, legend=legend, xaxis=date_axis(), **more)
-
-
-def _empty(theme: ThemeName, words: str) -> dict[str, Any]:
-    middle = {"xref": "paper", "yref": "paper", "x": 0.5, "y": 0.5, "showarrow": False, "text": f"<b>{words}</b>"}
-    return {
-        "data": [],
-        "layout": layout(
-            theme,
-            xaxis={"visible": False},
-            yaxis={"visible": False},
-            annotations=[middle | {"font": {"size": 15, "color": palette(theme).quiet}}],
-        ),
-    }
+    return layout(theme, margin={"l": 84, "t": 34}, showlegend=True, legend=legend(theme), xaxis=date_axis(), **more)

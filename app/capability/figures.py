@@ -13,7 +13,7 @@ from app.core.spc.refusal import Floats
 from app.core.spc.spread import far_off
 from app.web.i18n import _, ngettext
 from app.web.numbers import signed
-from app.web.theme import Palette, ThemeName, layout, palette
+from app.web.theme import Palette, ThemeName, layout, legend, nothing_drawn, palette
 
 MOST_BARS, FEWEST_BARS = 60, 8
 CURVE = 161  # points of a drawn curve
@@ -38,7 +38,7 @@ def histogram(drawn: Drawn, *, theme: ThemeName = "light") -> dict[str, Any]:
     """Bars of equal width, the fitted normal curve (overall; dashed: within) or the percentiles, and the limits."""
     colours = palette(theme)
     if not len(drawn.values):
-        return _empty(theme)
+        return nothing_drawn(theme, _("No readings here"))
     near = _near(drawn)
     edges = edges_of(near)
     counts, _edges = np.histogram(near, edges)
@@ -89,7 +89,7 @@ def probability(drawn: Drawn, *, theme: ThemeName = "light") -> dict[str, Any]:
     """Ordered readings against normal quantiles: normal readings lie on the line. Of many, the ends and a thinned middle."""
     colours = palette(theme)
     if len(drawn.values) < 2:
-        return _empty(theme)
+        return nothing_drawn(theme, _("No readings here"))
     ordered = np.sort(drawn.values)
     n = len(ordered)
     at = np.arange(n) if n <= MOST_POINTS else _spread(n)
@@ -274,24 +274,10 @@ def _axis(title: str, colours: Palette, extent: tuple[float, float]) -> dict[str
 
 
 def _layout(theme: ThemeName, **more: Any) -> dict[str, Any]:
-    colours = palette(theme)
-    legend = {
-        "orientation": "h",
-        "x": 0,
-        "xanchor": "left",
-        "y": -0.2,
-        "yanchor": "top",
-        "font": {"size": 13, "color": colours.quiet},
-        "itemclick": False,
-        "itemdoubleclick": False,
-    }
-    return layout(theme, margin={"l": 76, "r": 28, "t": 44, "b": 96}, showlegend=True, legend=legend, **more)
-
-
-def _empty(theme: ThemeName) -> dict[str, Any]:
-    middle = {"xref": "paper", "yref": "paper", "x": 0.5, "y": 0.5, "showarrow": False}
-    words = middle | {"text": f"<b>{_('No readings here')}</b>", "font": {"size": 15, "color": palette(theme).quiet}}
-    return {
-        "data": [],
-        "layout": layout(theme, xaxis={"visible": False}, yaxis={"visible": False}, annotations=[words]),
-    }
+    return layout(
+        theme,
+        margin={"l": 76, "r": 28, "t": 44, "b": 96},
+        showlegend=True,
+        legend=legend(theme, y=-0.2, yanchor="top"),
+        **more,
+    )

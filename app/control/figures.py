@@ -18,7 +18,7 @@ from app.core.spc.rules import Signals
 from app.core.spc.shewhart import Chart
 from app.web.i18n import _
 from app.web.numbers import signed
-from app.web.theme import Palette, ThemeName, layout, palette
+from app.web.theme import Palette, ThemeName, layout, nothing_drawn, palette
 
 MOST_CHANGES = 40  # lines of tool changes; more are a fence
 WITH_MARKERS = 400
@@ -38,7 +38,7 @@ def control_figure(
     """One control chart. picks: dragging chooses a period, and a click a point (see pick-period.js)."""
     colours = palette(theme)
     if not len(view.points):
-        return {"data": [], "layout": _empty(theme, colours)}
+        return nothing_drawn(theme, _("No points in this period."))
     sides = _sides(view.signals, len(view))
     drawn = thinned(view.points if view.below is None else view.points - view.below, sides != NO_SIGNAL)
     data = _limits(view, drawn, colours)
@@ -302,22 +302,3 @@ def _format(kind: Chart, span: float) -> str:
 
 def _title(text: str, colours: Palette) -> dict[str, Any]:
     return {"text": text, "font": {"size": 13, "color": colours.quiet}, "standoff": 8}
-
-
-def _empty(theme: ThemeName, colours: Palette) -> dict[str, Any]:
-    return layout(
-        theme,
-        xaxis={"visible": False},
-        yaxis={"visible": False},
-        annotations=[
-            {
-                "text": _("No points in this period."),
-                "x": 0.5,
-                "y": 0.5,
-                "xref": "paper",
-                "yref": "paper",
-                "showarrow": False,
-                "font": {"size": 14, "color": colours.quiet},
-            }
-        ],
-    )

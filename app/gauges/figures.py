@@ -11,7 +11,7 @@ from app.core.spc.gauge.single import Bias
 from app.gauges.evaluating import Evaluated
 from app.gauges.labels import components
 from app.web.i18n import _
-from app.web.theme import Palette, ThemeName, layout, palette
+from app.web.theme import Palette, ThemeName, layout, legend, palette
 
 SHARE = 0.1  # of the tolerance on either side of the reference: what the gauge may take (type 1)
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "star", "hexagon")
@@ -94,7 +94,7 @@ def _linearity(rows: Sequence[Mapping[str, Any]], found: Evaluated, theme: Theme
         _("Reference, mm"),
         _("Bias, µm"),
         x_range=[min(x) - room, max(x) + room],
-        legend=True,
+        named=True,
         tickformat="~g",
     )
 
@@ -131,7 +131,7 @@ def _components(settings: Mapping[str, Any], found: Evaluated, theme: ThemeName)
         _level(10.0, colours.quiet, "10 %", 1.5, "4px,4px"),
         _level(30.0, colours.attention, "30 %", 1.5, "8px,4px"),
     ]
-    figure = _drawn(data, lines, [0.0, top], theme, None, _("Share, %"), x_range=None, legend=True)
+    figure = _drawn(data, lines, [0.0, top], theme, None, _("Share, %"), x_range=None, named=True)
     figure["layout"]["yaxis"] |= {"range": [0, max(top, 32) * 1.12], "tickformat": "~g"}
     figure["layout"] |= {"bargap": 0.25, "bargroupgap": 0.08}
     return figure
@@ -164,7 +164,7 @@ def _crossed(found: Evaluated, theme: ThemeName, *, by_operator: bool) -> dict[s
         mean = _points(list(found.parts), off[:, place, :].mean(axis=1), name, tone, symbol=symbol, size=9, lines=True)
         mean["line"] |= {"dash": DASHES[place % len(DASHES)]}
         data.append(mean)
-    return _drawn(data, [_level(0.0, colours.quiet, "", 1, "4px,4px")], off.reshape(-1).tolist(), theme, _("Part"), _("Value less the mean of all, µm"), x_range=None, legend=len(found.operators) > 1)  # fmt: skip
+    return _drawn(data, [_level(0.0, colours.quiet, "", 1, "4px,4px")], off.reshape(-1).tolist(), theme, _("Part"), _("Value less the mean of all, µm"), x_range=None, named=len(found.operators) > 1)  # fmt: skip
 
 
 def _points(
@@ -220,7 +220,7 @@ def _drawn(
     y_title: str,
     *,
     x_range: list[float] | None,
-    legend: bool = False,
+    named: bool = False,
     tickformat: str = "d",
 ) -> dict[str, Any]:
     colours = palette(theme)
@@ -235,18 +235,9 @@ def _drawn(
         "data": data,
         "layout": layout(
             theme,
-            margin={"l": 76, "r": 140 if labelled and x_range is not None else 44, "t": 40 if legend else 20, "b": 56},
-            showlegend=legend,
-            legend={
-                "orientation": "h",
-                "x": 0,
-                "xanchor": "left",
-                "y": 1.02,
-                "yanchor": "bottom",
-                "font": {"size": 13, "color": colours.quiet},
-                "itemclick": False,
-                "itemdoubleclick": False,
-            },
+            margin={"l": 76, "r": 140 if labelled and x_range is not None else 44, "t": 40 if named else 20, "b": 56},
+            showlegend=named,
+            legend=legend(theme),
             xaxis=xaxis,
             yaxis={
                 "range": [low - room, high + room],

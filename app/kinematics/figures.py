@@ -16,7 +16,7 @@ from app.kinematics.values import UNITS, as_reading
 from app.kinematics.wording import difference, name_words
 from app.kinematics.wording import entered as told
 from app.web.i18n import _
-from app.web.theme import Palette, ThemeName, date_axis, layout, palette
+from app.web.theme import Palette, ThemeName, date_axis, layout, legend, nothing_drawn, palette
 
 GREEN: dict[ThemeName, str] = {"light": "#1a7a3c", "dark": "#62c985"}
 LETTERS = "XYZ"
@@ -65,7 +65,7 @@ def diagram(axis: Mapping[str, Any], letter: str, *, theme: ThemeName = "light",
                 }
             )
     if not traces:
-        return _empty(theme, _("This run holds no single positions"))
+        return nothing_drawn(theme, _("This run holds no single positions"))
     reach = max([abs(y) for trace in traces for y in trace["y"]] + [height * 1000, 1.0]) * ROOM
     return {
         "data": traces,
@@ -73,7 +73,7 @@ def diagram(axis: Mapping[str, Any], letter: str, *, theme: ThemeName = "light",
             theme,
             margin={"l": 64, "t": 34, "b": 46},
             showlegend=True,
-            legend=_legend(colours),
+            legend=legend(theme),
             xaxis={
                 "title": {"text": _("{axis}, °").format(axis=axis["axis"]), "standoff": 6},
                 "tickvals": sorted(set(axis["angles"])) if len(axis["angles"]) <= 8 else None,
@@ -104,7 +104,7 @@ def comparison(
     colours = palette(theme)
     rows = [each for each in changes if each.name.startswith("E")]
     if not rows:
-        return _empty(theme, _("The two runs have no position error in common"))
+        return nothing_drawn(theme, _("The two runs have no position error in common"))
     names = [f"<b>{each.name}</b>  {name_words(each.name)}" for each in rows]
     before = [_um(each.name, each.change.before) for each in rows]
     after = [_um(each.name, each.change.after) for each in rows]
@@ -153,7 +153,7 @@ def comparison(
             theme,
             margin={"l": 196, "t": 34, "r": 12, "b": 46},
             showlegend=True,
-            legend=_legend(colours),
+            legend=legend(theme),
             xaxis={
                 "title": {"text": _("µm; how an axis leans as µm over 1 m"), "standoff": 6},
                 "range": [-1.15 * largest, span],
@@ -221,7 +221,7 @@ def course(drift: Drift, *, theme: ThemeName = "light") -> dict[str, Any]:
     """A value over the runs: its true course, what has been entered (steps), the limit about that, and the trend."""
     colours = palette(theme)
     if not drift.points:
-        return _empty(theme, _("No run holds {name}").format(name=drift.name))
+        return nothing_drawn(theme, _("No run holds {name}").format(name=drift.name))
     angle = UNITS[drift.name] == "°"
     factor, unit = (1.0, "°") if angle else (1000.0, "µm")
     if drift.name.startswith("radius"):
@@ -311,29 +311,3 @@ def _steps(at: list[str], values: list[float], name: str, line: dict[str, Any]) 
 
 def _um(name: str, value: float) -> float:
     return as_reading(name, value) * 1000
-
-
-def _legend(colours: Palette) -> dict[str, Any]:
-    return {
-        "orientation": "h",
-        "x": 0,
-        "xanchor": "left",
-        "y": 1.02,
-        "yanchor": "bottom",
-        "font": {"size": 13, "color": colours.quiet},
-        "itemclick": False,
-        "itemdoubleclick": False,
-    }
-
-
-def _empty(theme: ThemeName, words: str) -> dict[str, Any]:
-    middle = {"xref": "paper", "yref": "paper", "x": 0.5, "y": 0.5, "showarrow": False, "text": f"<b>{words}</b>"}
-    return {
-        "data": [],
-        "layout": layout(
-            theme,
-            xaxis={"visible": False},
-            yaxis={"visible": False},
-            annotations=[middle | {"font": {"size": 15, "color": palette(theme).quiet}}],
-        ),
-    }

@@ -12,6 +12,7 @@ from app.paper.files import MEDIA_TYPES, file_name, file_of
 from app.paper.schemas import ReportOut
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, Caller, SessionDep
+from app.web.downloads import download
 
 router = api_router("kinematics")
 RunNumber = Annotated[int, Path(description="Number of the run.", examples=[118])]
@@ -47,9 +48,4 @@ def get_kinematics_protocol_file(
 ) -> Response:
     """The same as a file, with its diagrams: to print, to work on, or to read by a program."""
     report = _protocol(session, caller, run)
-    headers = {
-        "Content-Disposition": f'attachment; filename="{file_name(report, form)}"',
-        "Cache-Control": "no-store",
-        "X-Content-Type-Options": "nosniff",
-    }
-    return Response(file_of(report, form, paper), media_type=MEDIA_TYPES[form], headers=headers)
+    return download(file_of(report, form, paper), file_name(report, form), MEDIA_TYPES[form])

@@ -14,3 +14,9 @@ def texts_by_control(own: str, write: Callable[[str | None], str | None]) -> lis
     """
     written = [(own, write(None)), *((each, write(each)) for each in ("sinumerik", "fanuc") if each != own)]
     return [(control, CONTROLS.get(control) or _("To type in"), text) for control, text in written if text is not None]
+
+
+def file_name(control: str, what: str) -> str:
+    """A name for program text that the control and every file system take; with full stops only before its ending."""
+    ending = {"sinumerik": "spf", "fanuc": "nc"}.get(control, "txt")
+    return f"{what.replace('.', '-')}.{ending}"

@@ -9,7 +9,7 @@ from typing import Any
 
 from app.web.i18n import _
 from app.web.numbers import um
-from app.web.theme import ThemeName, date_axis, layout, palette
+from app.web.theme import ThemeName, date_axis, layout, legend, palette
 
 SYMBOLS = {"correction": "circle", "edit": "square", "change": "triangle-down", "reported": "diamond"}
 
@@ -83,16 +83,7 @@ def offset_figure(changes: Sequence[OffsetChange], *, theme: ThemeName = "light"
             theme,
             margin={"l": 84, "t": 34},
             showlegend=True,
-            legend={
-                "orientation": "h",
-                "x": 0,
-                "xanchor": "left",
-                "y": 1.02,
-                "yanchor": "bottom",
-                "font": {"size": 13, "color": colours.quiet},
-                "itemclick": False,
-                "itemdoubleclick": False,
-            },
+            legend=legend(theme),
             xaxis=date_axis() | {"visible": bool(changes)},
             yaxis={
                 "visible": bool(changes),

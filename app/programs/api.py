@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from fastapi import Path, Query
+from fastapi import Path, Query, Response
 from fastapi.responses import PlainTextResponse
 
 from app.characteristics import queries as characteristics
@@ -11,6 +11,7 @@ from app.programs import queries
 from app.programs.schemas import ProgramIn, ProgramRead, looked_out
 from app.web.api import api_router, plain, problems
 from app.web.deps import AnyCaller, SessionDep, require
+from app.web.downloads import download
 
 router = api_router("programs")
 CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
@@ -49,7 +50,7 @@ def write_program(
     ] = None,
     surface: Annotated[Literal["free", "groove"], Query(description="Calibration: where (R21, R23).")] = "free",
     probe: Annotated[Literal["axial", "radial"], Query(description="Calibration: type of the probe (R22).")] = "axial",
-) -> PlainTextResponse:
+) -> Response:
     """The measuring or the calibration subprogram of a characteristic. Read back it gives the same parameters.
 
     What R numbers cannot say (factor, mode, acceptance …) stands in comments such as `(INBAND FACTOR=-1)`.
@@ -59,4 +60,4 @@ def write_program(
     chosen = queries.control_of(standing, control)
     text = queries.program_of(standing, chosen, kind, gauge=gauge, surface=surface, probe=probe)
     name = queries.file_name(standing, chosen, kind)
-    return PlainTextResponse(text, headers={"Content-Disposition": f'attachment; filename="{name}"'})
+    return download(text, name)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 from fastapi import Depends, Path, Query, Response
 
@@ -15,6 +15,7 @@ from app.reports import queries
 from app.reports.asking import EVERYTHING, SectionName, Wishes, section_names
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, SessionDep
+from app.web.downloads import download
 from app.web.fields import Moment
 
 router = api_router("reports")
@@ -68,24 +69,6 @@ def made(session: SessionDep, caller: Caller, characteristic: str, wishes: Wishe
     return queries.report_of(session, standing, wishes, datetime.now(UTC))
 
 
-class Named(NamedTuple):
-    """A file with its name and kind."""
-
-    content: bytes
-    name: str
-    media_type: str
-
-
-def download(file: Named) -> Response:
-    """A file to keep: never shown in the browser's place, never guessed at."""
-    headers = {
-        "Content-Disposition": f'attachment; filename="{file.name}"',
-        "Cache-Control": "no-store",
-        "X-Content-Type-Options": "nosniff",
-    }
-    return Response(file.content, media_type=file.media_type, headers=headers)
-
-
 @router.get("/characteristics/{characteristic}/report.json", responses=problems(404))
 def get_report(session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, wishes: Asked) -> ReportOut:
     """A report of a characteristic and a period: numbers, capability, wear, corrections, alarms, parameters, decisions.
@@ -110,4 +93,4 @@ def get_report_file(
 ) -> Response:
     """The same report as a file to print, to work on, or to read by a program (CSV: one line per value)."""
     report = made(session, caller, characteristic, wishes)
-    return download(Named(file_of(report, form, wishes.paper), file_name(report, form), MEDIA_TYPES[form]))
+    return download(file_of(report, form, wishes.paper), file_name(report, form), MEDIA_TYPES[form])

@@ -5,12 +5,12 @@ from typing import Annotated, Any
 from fastapi import Path, Query, Request, Response
 
 from app.reports import actions, queries
-from app.reports.api import Named, download
 from app.reports.bundle import media_type
 from app.reports.jobs_schemas import ReportsIn, ReportsOut
 from app.reports.making import Reporter
 from app.web.api import api_router, problems
 from app.web.deps import SessionDep, Viewer, require
+from app.web.downloads import download
 from app.web.fields import LARGEST_SERIAL, Limit, Page, page_of
 
 router = api_router("reports")
@@ -86,4 +86,4 @@ def get_reports_file(session: SessionDep, number: Number) -> Response:
     """The file, once they are done."""
     job = queries.job(session, number)
     content = queries.content(session, job)
-    return download(Named(content, job.file_name or f"reports-{job.id}", media_type(job.request["format"])))
+    return download(content, job.file_name or f"reports-{job.id}", media_type(job.request["format"]))

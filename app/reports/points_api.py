@@ -14,11 +14,11 @@ from app.control.charts import View
 from app.core.spc.shewhart import Chart
 from app.paper.content import Format
 from app.paper.files import MEDIA_TYPES
-from app.reports.api import Named, download
 from app.statistics import queries as statistics
 from app.web.api import api_router, problems
 from app.web.choice import Chosen
 from app.web.deps import AnyCaller, SessionDep
+from app.web.downloads import download
 from app.web.fields import LARGEST_SERIAL
 
 router = api_router("reports")
@@ -86,7 +86,7 @@ def get_control_points(
     writer.writerow(COLUMNS)
     writer.writerows(_rows(view, "" if baseline is None else baseline.version))
     name = f"control-{standing.characteristic.key}-{view.kind.value}.csv"
-    return download(Named(("\ufeff" + file.getvalue()).encode(), name, MEDIA_TYPES[Format.CSV]))
+    return download(("\ufeff" + file.getvalue()).encode(), name, MEDIA_TYPES[Format.CSV])
 
 
 def _rows(view: View, baseline: int | str) -> Iterator[tuple[Any, ...]]:

@@ -13,7 +13,7 @@ from app.core.wear import Fit, Forecast, Towards
 from app.wear.wording import parts_left, per_part, towards_name
 from app.web.i18n import _
 from app.web.numbers import um
-from app.web.theme import Palette, ThemeName, layout, palette
+from app.web.theme import Palette, ThemeName, layout, legend, nothing_drawn, palette
 
 AHEAD, LEAST_AHEAD = 0.6, 20  # how far the forecast is drawn at most, in shares of what is shown; in parts
 STEPS = 24  # points of a curved edge
@@ -53,7 +53,7 @@ def wear_figure(chart: WearChart, *, theme: ThemeName = "light", width: int = 12
     lives = [*chart.lives, chart.now]
     sequences = [n for life in lives for n in life.sequence]
     if not sequences:
-        return {"data": [], "layout": _empty(theme, colours)}
+        return nothing_drawn(theme, _("No readings of this tool yet"))
     last = sequences[-1]
     ahead = _ahead(chart, len(range(sequences[0], last)) + 1)
     near = {
@@ -94,16 +94,7 @@ def wear_figure(chart: WearChart, *, theme: ThemeName = "light", width: int = 12
             theme,
             margin={"l": 76, "r": 20 if width < 700 else 150, "t": 44, "b": 48},
             showlegend=True,
-            legend={
-                "orientation": "h",
-                "x": 0,
-                "xanchor": "left",
-                "y": 1.01,
-                "yanchor": "bottom",
-                "font": {"size": 13, "color": colours.quiet},
-                "itemclick": False,
-                "itemdoubleclick": False,
-            },
+            legend=legend(theme, y=1.01),
             xaxis={
                 "range": [sequences[0] - 1, last + max(ahead, 2)],
                 "showgrid": False,
@@ -358,25 +349,6 @@ def _labels(chart: WearChart, colours: Palette, ahead: float, width: int) -> lis
             "font": {"size": 12, "color": colours.ink},
         }
     ]
-
-
-def _empty(theme: ThemeName, colours: Palette) -> dict[str, Any]:
-    return layout(
-        theme,
-        xaxis={"visible": False},
-        yaxis={"visible": False},
-        annotations=[
-            {
-                "xref": "paper",
-                "yref": "paper",
-                "x": 0.5,
-                "y": 0.5,
-                "text": f"<b>{_('No readings of this tool yet')}</b>",
-                "showarrow": False,
-                "font": {"size": 15, "color": colours.quiet},
-            }
-        ],
-    )
 
 
 def _title(text: str, colours: Palette) -> dict[str, Any]:

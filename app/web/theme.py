@@ -176,3 +176,31 @@ def date_axis(**more: Any) -> dict[str, Any]:
             {"dtickrange": [day, None], "value": "%-d %b\n%Y"},
         ],
     } | more
+
+
+def legend(theme: ThemeName, **more: Any) -> dict[str, Any]:
+    """The names of what is drawn, in a row above the chart; to touch one hides nothing."""
+    return {
+        "orientation": "h",
+        "x": 0,
+        "xanchor": "left",
+        "y": 1.02,
+        "yanchor": "bottom",
+        "font": {"size": 13, "color": palette(theme).quiet},
+        "itemclick": False,
+        "itemdoubleclick": False,
+    } | more
+
+
+def nothing_drawn(theme: ThemeName, words: str) -> dict[str, Any]:
+    """A figure that says why there is nothing in it."""
+    middle = {"xref": "paper", "yref": "paper", "x": 0.5, "y": 0.5, "showarrow": False, "text": f"<b>{words}</b>"}
+    return {
+        "data": [],
+        "layout": layout(
+            theme,
+            xaxis={"visible": False},
+            yaxis={"visible": False},
+            annotations=[middle | {"font": {"size": 15, "color": palette(theme).quiet}}],
+        ),
+    }

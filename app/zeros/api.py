@@ -8,9 +8,11 @@ from fastapi.responses import PlainTextResponse
 from app.db.engine import Database
 from app.errors import NotFound
 from app.machines.queries import machine_named, machine_of
+from app.machines.wording import file_name
 from app.readings import actions as readings
 from app.web.api import api_router, plain, problems
 from app.web.deps import AnyCaller, Engineer, Operator, SessionDep
+from app.web.downloads import download
 from app.web.fields import Control, Cursor, Limit, Page, Slug, page_of
 from app.web.i18n import _
 from app.web.theme import theme_from
@@ -138,7 +140,7 @@ def write_work_zero(
     control: Annotated[
         Control | None, Query(description="For which control; if left out, that of the machine.")
     ] = None,
-) -> PlainTextResponse:
+) -> Response:
     """The text that sets the work zero, for the machine's control or for another one. Running it twice changes nothing."""
     zero = queries.work_zero(session, number, caller.only_machine)
     machine = machine_of(session, zero.machine_id)
@@ -148,10 +150,7 @@ def write_work_zero(
             _("{offset} is no work offset of this control.").format(offset=zero.work_offset),
             _("Choose the control that has it."),
         )
-    ending = {"sinumerik": "spf", "fanuc": "nc"}.get(control or machine.control, "txt")
-    name = f"{machine.key.replace('.', '-')}-zero-{zero.id}.{ending}"
-    headers = {"Content-Disposition": f'attachment; filename="{name}"', "Cache-Control": "no-store"}
-    return PlainTextResponse(text, headers=headers)
+    return download(text, file_name(control or machine.control, f"{machine.key}-zero-{zero.id}"))
 
 
 @router.post("/work-zeros/{number}/recompute", status_code=201, responses=problems(404, 409))

@@ -10,7 +10,7 @@ from typing import Any
 
 from app.web.i18n import _
 from app.web.numbers import um
-from app.web.theme import ThemeName, date_axis, layout, palette
+from app.web.theme import ThemeName, date_axis, layout, legend, palette
 
 SYMBOLS = {"x": "circle", "y": "square", "z": "diamond"}
 DASHES = {"x": "solid", "y": "dash", "z": "dot"}
@@ -114,23 +114,13 @@ def shift_figure(
     heights = [abs(value) for mark in marks for value in mark.shifts.values()]
     heights += [limit for limit in (warning, alarm) if limit is not None]
     reach = max([*heights, 0.001]) * 1150
-    legend = {
-        "orientation": "h",
-        "x": 0,
-        "xanchor": "left",
-        "y": 1.02,
-        "yanchor": "bottom",
-        "font": {"size": 13, "color": colours.quiet},
-        "itemclick": False,
-        "itemdoubleclick": False,
-    }
     return {
         "data": traces,
         "layout": layout(
             theme,
             margin={"l": 84, "t": 34},
             showlegend=True,
-            legend=legend,
+            legend=legend(theme),
             xaxis=date_axis(),
             yaxis={
                 "range": [-reach, reach],

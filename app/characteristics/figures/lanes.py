@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any
 
+from app.offsets.wording import status_word
 from app.web.i18n import _
 from app.web.numbers import um
 from app.web.theme import ZONE_SYMBOLS, Palette
@@ -242,15 +243,3 @@ def offset_lane(
             }
         )
     return [course, *([dots] if at else [])], notes
-
-
-def status_word(status: str) -> str:
-    """The status of a correction in a word."""
-    return {
-        "held": _("held"),
-        "awaiting_approval": _("awaiting approval"),
-        "pending": _("pending"),
-        "applied": _("applied"),
-        "rejected": _("rejected"),
-        "superseded": _("superseded"),
-    }.get(status, status)

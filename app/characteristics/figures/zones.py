@@ -22,7 +22,7 @@ from app.characteristics.figures.scale import Scale, ScaleName, TrueScale, ZoneS
 from app.core.zones import HasLimits, Limits
 from app.web.i18n import _
 from app.web.numbers import um
-from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, layout, palette, zone_colour, zone_name
+from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, layout, legend, palette, zone_colour, zone_name
 
 __all__ = ["Block", "Mark", "Point", "Step", "zone_chart"]
 
@@ -123,17 +123,7 @@ def zone_chart(
             margin={"l": left, "r": right, "t": 34, "b": 48},
             hoverdistance=24,
             showlegend=True,
-            legend={
-                "orientation": "h",
-                "x": 0,
-                "xanchor": "left",
-                "y": 1.008,
-                "yanchor": "bottom",
-                "font": {"size": 13, "color": colours.quiet},
-                "bgcolor": "rgba(0,0,0,0)",
-                "itemclick": False,
-                "itemdoubleclick": False,
-            },
+            legend=legend(theme, y=1.008, bgcolor="rgba(0,0,0,0)"),
             xaxis={
                 "range": list(span),
                 "anchor": "y3",

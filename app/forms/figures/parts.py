@@ -4,24 +4,13 @@ from collections.abc import Sequence
 from math import cos, floor, log10, pi, sin
 from typing import Any
 
-from app.web.theme import Palette, ThemeName, layout, palette
-
-LEGEND: dict[str, Any] = {
-    "orientation": "h",
-    "x": 0,
-    "xanchor": "left",
-    "y": 1.02,
-    "yanchor": "bottom",
-    "itemclick": False,
-    "itemdoubleclick": False,
-}
+from app.web.theme import Palette, ThemeName, layout, legend
 
 
 def framed(theme: ThemeName, **more: Any) -> dict[str, Any]:
     """The layout with a legend above the picture."""
-    legend = LEGEND | {"font": {"size": 13, "color": palette(theme).quiet}}
     margin = {"l": 72, "r": 16, "t": 36, "b": 52}
-    return layout(theme, **({"margin": margin, "showlegend": True, "legend": legend} | more))
+    return layout(theme, **({"margin": margin, "showlegend": True, "legend": legend(theme)} | more))
 
 
 def titled(text: str, colours: Palette, **more: Any) -> dict[str, Any]:
