@@ -10,21 +10,6 @@ from tests.kinematics.walking import QS, grid, machine, runs, take, words
 from tests.shop import Person, Shop
 
 
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture(scope="module")
-def operator(server: Server) -> Person:
-    return Person(server, "operator")
-
-
-@pytest.fixture(scope="module")
-def engineer(server: Server) -> Person:
-    return Person(server, "engineer")
-
-
 class TestEntering:
     def test_result_parameters(self, shop: Shop, operator: Person) -> None:
         text = operator.send(

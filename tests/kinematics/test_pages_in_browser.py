@@ -16,11 +16,6 @@ SIZES = {"desk": (1280, 800), "large": (1920, 1080), "panel": (800, 1280)}
 
 
 @pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture
 def engineer(server: Server, page: Page) -> Person:
     person = Person(server, "engineer")
     person.sign_in(page)

@@ -4,25 +4,9 @@ import re
 
 import pytest
 
-from tests.conftest import Server
 from tests.kinematics.bench import TRUE, axis, protocol
 from tests.kinematics.walking import LAST_MONTH, QS, last_month, machine, take, words
 from tests.shop import Person, Shop
-
-
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture(scope="module")
-def operator(server: Server) -> Person:
-    return Person(server, "operator")
-
-
-@pytest.fixture(scope="module")
-def engineer(server: Server) -> Person:
-    return Person(server, "engineer")
 
 
 class TestComparing:
