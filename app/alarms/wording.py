@@ -163,7 +163,7 @@ def what_to_do(kind: str) -> str:
             "Look at the part and the stylus, and whether the right tool has cut it. Then say what it was."
         ),
         "tool_life": _("Change the tool, or go on with its sister."),
-        "hunting": _("An engineer sets the parameters in Set-up; the page of the characteristic says to what."),
+        "hunting": _("An engineer chooses a setting on the map of what if, and proposes it from there."),
         "signal": _("Look at the chart and at the parts; then say what it was. The parts need not be bad."),
         "calibration_overdue": _("Calibrate it; that ends this alarm."),
         "fixture_shifted": _(

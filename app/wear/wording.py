@@ -176,7 +176,7 @@ def hunting_sentence(data: Mapping[str, Any]) -> str:
 
 
 def remedy_sentence(data: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
-    """What to set, and by how much. settings: the parameters in force, by name."""
+    """What would quiet the loop, and where to find out whether it pays. settings: the parameters in force, by name."""
     if data["state"] == State.SWINGING:
         return _(
             "Look at the factor of this characteristic, at whether the machine says what was in effect (correction_in_effect or "
@@ -200,21 +200,25 @@ def remedy_sentence(data: Mapping[str, Any], settings: Mapping[str, Any]) -> str
                 "No setting helps: the process scatters too much for this tolerance. Average more touches (R27), or find what "
                 "makes it scatter."
             )
-        text = _("Raise R34 from {r34} to {new_r34} and R33 from {r33} to {new_r33}")
+        text = _("With R34 at {new_r34} instead of {r34} and R33 at {new_r33} instead of {r33}")
     elif remedy.zero_range is not None and remedy.weighting_factor is not None:
-        text = _("Raise R33 from {r33} to {new_r33}, or k from {k} to {new_k}")
+        text = _("With R33 at {new_r33} instead of {r33}, or k at {new_k} instead of {k}")
     elif remedy.zero_range is not None:
-        text = _("Raise R33 from {r33} to {new_r33}; k alone does not help")
+        text = _("With R33 at {new_r33} instead of {r33} (k alone does not help)")
     elif remedy.weighting_factor is not None:
-        text = _("Raise k from {k} to {new_k}; R33 alone does not help")
+        text = _("With k at {new_k} instead of {k} (R33 alone does not help)")
     else:
         return _("No setting helps: the process scatters too much for these limits.")
-    text = (text + _(": then scatter alone corrects no more than {goal} of the readings.")).format(**values)
+    text = (text + _(" scatter alone would correct no more than {goal} of the readings.")).format(**values)
     if remedy.floor and remedy.zero_range == remedy.floor:
         text += " " + _("R33 is not below {floor}, the uncertainty of the probe's signal path.").format(
             floor=_um(remedy.floor, 1)
         )
-    return text
+    # The remedy is worked out for scatter alone. A loop that corrects less lets wear and warming up pass as well.
+    return f"{text} " + _(
+        "Whether that much pays, these numbers do not know: a loop that corrects less also lets more wear and warming up pass. "
+        "The map of what if replays the parts with every setting: choose by it."
+    )
 
 
 def _um(length: float | None, decimals: int) -> str:

@@ -200,14 +200,14 @@ def test_a_loop_that_runs_after_its_scatter_is_told_once_and_by_how_much(shop: S
     assert told["scatter"] == pytest.approx(0.001, rel=0.25)
     assert 0.003 < told["remedy"]["zero_range"] < 0.005
     assert told["remedy"]["weighting_factor"] is None
-    assert "Raise" in told["what_to_do"]
+    assert "With R33 at" in told["what_to_do"]
     for _round in range(3):
         go(shop)
     (alarm,) = shop.alarms()
     assert alarm["kind"] == "hunting"
     assert alarm["characteristic"] == shop.characteristic
     assert alarm["count"] == 1
-    assert "Raise" in alarm["text"]
+    assert "With R33 at" in alarm["text"]
     assert outlook(shop).hunting == "hunting"
     shop.acknowledge(alarm["id"], "noted")
     shift(shop, 10, scatter=1.0, seed=2, tool=4)

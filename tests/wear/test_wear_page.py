@@ -39,8 +39,14 @@ def test_a_loop_that_hunts_is_told_on_all_three_pages_and_noted(server: Server, 
     shift(shop, 50, scatter=1.0, tool=4)
     go(shop)
     person = Person(server, "operator")
-    assert "Raise R33" in person.open(f"/characteristics/{shop.characteristic}")
-    assert "Hunting" in person.open(f"/alarms?machine={shop.machine}")
+    # What is worked out for scatter alone leads to the map, where wear and warming up are in the parts.
+    what_if = f'href="/characteristics/{shop.characteristic}/what-if"'
+    curve = person.open(f"/characteristics/{shop.characteristic}").partition('id="wear-curve"')[2]
+    assert "With R33 at" in curve
+    assert what_if in curve
+    board = person.open(f"/alarms?machine={shop.machine}")
+    assert "Hunting" in board
+    assert what_if in board
     (alarm,) = shop.alarms()
     shop.acknowledge(alarm["id"], "noted")
     assert "overcorrects" in person.open(f"/plant/{shop.machine}"), "noted, but not over"
