@@ -30,11 +30,25 @@ class PickPeriod extends HTMLElement {
       if (!event?.range) return;
       const [low, high] = event.range.x;
       this.pick(Math.max(1, Math.ceil(Math.min(low, high))), Math.max(1, Math.floor(Math.max(low, high))));
+      this.show(plot);
     });
     plot.on("plotly_click", (event) => {
       const number = event.points[0]?.customdata;
       if (Number.isInteger(number)) this.leaveOut(number, number);
     });
+  }
+
+  // Plotly keeps what was selected, and the next drag that begins inside would move it: what is left out lies inside the
+  // period. So the selection goes, and a band without a handle shows the period.
+  show(plot) {
+    const { first_sequence: first, last_sequence: last } = this.fields;
+    const shapes = (plot.layout.shapes ?? []).filter((shape) => shape.name !== "picked");
+    if (first.value && last.value) {
+      const [x0, x1] = [Number(first.value) - 0.5, Number(last.value) + 0.5];
+      const fill = { fillcolor: plot.layout.font?.color, opacity: 0.12, line: { width: 0 }, layer: "below" };
+      shapes.push({ name: "picked", type: "rect", xref: "x", yref: "paper", x0, x1, y0: 0, y1: 1, ...fill });
+    }
+    window.Plotly.relayout(plot, { selections: [], shapes });
   }
 
   pick(first, last) {
