@@ -64,6 +64,15 @@ class Lanes(NamedTuple):
             np.array([_whole(lane) for lane in lanes], dtype=np.int64).reshape(-1, 8),
         )
 
+    @classmethod
+    def unknown(cls, count: int) -> "Lanes":
+        """So many lanes that nothing is known of yet: none is quiet."""
+        return cls(np.zeros((count, 4)), np.zeros((count, 8), np.int64))
+
+    def silence(self, which: NDArray[np.bool_]) -> None:
+        """Let no reading of these lanes be quiet, until they are replaced."""
+        self.limits[which, 7] = 0
+
     def replace(self, at: int, lane: Lane) -> None:
         """Put another lane in the place of one."""
         parameters = lane.parameters

@@ -50,7 +50,7 @@ def answer(
         "late": record.late,
         "deviation": record.deviation,
         "decided_deviation": record.decided,
-        "outstanding": record.outstanding or [],
+        "outstanding": list(record.outstanding or ()),
         "zone": record.zone,
         "results": None if results is None else results._asdict(),
         "average_before": record.average_before,

@@ -4,6 +4,7 @@ The ground is loaded under the machines' locks and moved along by what is decide
 next transaction, which then must see that the machines' versions have not moved (`statements.GUARD`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any, NamedTuple
@@ -58,6 +59,36 @@ class IssuedCorrection:
 
 
 @dataclass(slots=True)
+class Named:
+    """The last correction that a machine had applied when it cut a part: when that was, and when a person let it go."""
+
+    applied_at: datetime | None
+    decided_at: datetime | None
+    fetched_at: datetime | None = None
+
+
+@dataclass(slots=True)
+class Cut:
+    """What parts were cut without that name one correction as the last in effect, or none (`app.readings.cutting`).
+
+    seen: how many of the tool's corrections it knows. previous_tool: they were cut before the tool was changed. confirms:
+    a pending correction is among those they were cut with. has_applied: an applied one is among those seen. issued: amounts
+    of the open ones. numbers, amounts: of those they were cut without; applied_since: amounts of those that are applied by now.
+    """
+
+    in_effect: int | None
+    last: Named | None
+    seen: int = 0
+    previous_tool: bool = False
+    confirms: bool = False
+    has_applied: bool = False
+    issued: list[float] = field(default_factory=list)
+    numbers: list[int] = field(default_factory=list)
+    amounts: list[float] = field(default_factory=list)
+    applied_since: list[float] = field(default_factory=list)
+
+
+@dataclass(slots=True)
 class ToolState:
     """One location of the tool memory, with its corrections in the order of their numbers."""
 
@@ -72,12 +103,20 @@ class ToolState:
     # Of the applied corrections there are those with a higher number than `since_number`, and those applied after `since`.
     since_number: int | None = None
     since: datetime | None = None
+    # What is worked out of `corrections`, and how many of the first ones are known not to be held.
+    cuts: dict[int | None, Cut] = field(default_factory=dict)
+    none_held: int = 0
+
+    def forget(self) -> None:
+        """The corrections are others, or have another status than when something was worked out of them."""
+        self.cuts, self.none_held = {}, 0
 
     def settle(self) -> None:
         """What was decided is committed."""
         if self.changed or self.corrections:
             self.changed = False
             self.corrections = [c for c in self.corrections if c.status not in {"rejected", "superseded"}]
+            self.forget()
             for correction in self.corrections:
                 correction.new = correction.changed = False
 
@@ -111,15 +150,6 @@ class StreamState:
     alarms: dict[str, OpenAlarm] = field(default_factory=dict)
     before: int = 0  # sequence when it was loaded
     last: "Verdict | None" = None
-
-
-@dataclass(slots=True)
-class Named:
-    """The last correction that a machine had applied when it cut a part: when that was, and when a person let it go."""
-
-    applied_at: datetime | None
-    decided_at: datetime | None
-    fetched_at: datetime | None = None
 
 
 class Known(NamedTuple):
@@ -225,7 +255,7 @@ class Verdict:
     received_at: datetime
     late: bool
     decision: Decision
-    outstanding: list[int]
+    outstanding: Sequence[int]
     correction: IssuedCorrection | None
     paused_by: int | OpenAlarm | None
     alarms: list[OpenAlarm]

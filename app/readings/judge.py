@@ -6,6 +6,7 @@ ground along for the next one, and collects the rows to write. It does no I/O, s
 """
 
 from datetime import UTC, datetime
+from itertools import islice
 
 from app.core.compensation import (
     DECIMALS,
@@ -23,13 +24,11 @@ from app.core.plausibility import is_jump, moved, uncorrected
 from app.core.probing import TouchError, measured_value
 from app.core.variants import Results, results_of
 from app.errors import Conflict, FieldError, Invalid
-from app.offsets.tables import OUTSTANDING
+from app.readings.cutting import confirm, cut_with, issued_total
 from app.readings.ground import (
     Ground,
     IssuedCorrection,
-    Named,
     OpenAlarm,
-    Step,
     Stored,
     StreamState,
     ToolState,
@@ -64,8 +63,8 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
     sequence = stream.sequence + 1
     measured_at = now if reading.measured_at is None else reading.measured_at.astimezone(UTC)
     if tool is not None and tool.corrections and in_effect is not None:
-        _confirm(ground, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
-    previous_tool, outstanding, compensated = cut_with(ground, tool, reading)
+        confirm(ground, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
+    previous_tool, outstanding, amounts, compensated = cut_with(ground, tool, reading)
     average = stream.average
     empirical_value = average.empirical_value if average else 0.0
     results = results_of(parameters, reading.touches or (), points, empirical_value) if points else None
@@ -79,11 +78,11 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
         parameters,
         State(
             average.average if average else 0.0,
-            _issued_total(tool) if parameters.max_total is not None else 0.0,
+            issued_total(ground, tool) if parameters.max_total is not None else 0.0,
             paused_by is not None,
         ),
         deviation,
-        outstanding=outstanding_effect((c.amount for c in outstanding), parameters.factor) if outstanding else 0.0,
+        outstanding=outstanding_effect(amounts, parameters.factor) if outstanding else 0.0,
         previous_tool=previous_tool,
         accepted=results is None or not results.rejected,
         jump=jump,
@@ -116,7 +115,7 @@ def judge(ground: Ground, entry: Entry, reading: ReadingIn, now: datetime) -> Ve
         now,
         late,
         decision,
-        [c.number for c in outstanding],
+        outstanding,
         correction,
         paused_by,
         alarms,
@@ -183,127 +182,15 @@ def _known(ground: Ground, entry: Entry, key: str, reading: ReadingIn) -> Verdic
     return here or Stored(entry, sequence)
 
 
-def _confirm(ground: Ground, stream: StreamState, tool: ToolState, in_effect: int, at: datetime) -> None:
-    """The machine says it cut with correction `in_effect`: this tool's pending ones up to it are applied."""
-    last = ground.named.get((tool.machine_id, in_effect))
-    for correction in tool.corrections:
-        if correction.status != "pending" or not _had(correction, in_effect, last):
-            continue
-        before = tool.offset
-        tool.offset = round(before + correction.amount, DECIMALS)
-        tool.total = round(tool.total + correction.amount, DECIMALS)
-        tool.changed = True
-        actor = f"reading {stream.entry.characteristic} {stream.sequence + 1}"
-        correction.status, correction.applied_at, correction.applied_by = "applied", at, actor
-        correction.offset_after, correction.changed = tool.offset, True
-        if last is not None and correction.number == in_effect:
-            last.applied_at = at
-        ground.steps.append(Step(tool.machine_id, tool.number, at, before, tool.offset, correction.number, actor))
-        ground.touched_machines.add(tool.machine_id)
-
-
-def confirms(ground: Ground, tool: ToolState | None, in_effect: int | None) -> bool:
-    """Whether a reading that names this correction confirms one that is pending."""
-    if tool is None or in_effect is None:
-        return False
-    last = ground.named.get((tool.machine_id, in_effect))
-    return any(c.status == "pending" and _had(c, in_effect, last) for c in tool.corrections)
-
-
-def cut_with(
-    ground: Ground, tool: ToolState | None, reading: ReadingIn
-) -> tuple[bool, list[IssuedCorrection], float | None]:
-    """What the part of a reading was cut with.
-
-    Whether with an offset from before a tool change or an edit by hand; the corrections it was cut without; and the sum
-    (mm) of those of this tool's life that it was cut with, None in the first case.
-    """
-    if tool is None:
-        return False, [], 0.0
-    in_effect = reading.correction_in_effect
-    last = None if in_effect is None else ground.named.get((tool.machine_id, in_effect))
-    previous_tool = _cut_before_reset(tool, reading, last)
-    outstanding = [c for c in tool.corrections if _not_in_effect(c, tool, reading, last)]
-    return previous_tool, outstanding, None if previous_tool else _compensated(tool, outstanding)
-
-
-def _had(correction: IssuedCorrection, in_effect: int, last: Named | None) -> bool:
-    """Whether a machine whose last applied correction was `in_effect` had applied this one too.
-
-    Corrections take effect in the order of their numbers, but one that waited for a person may have been overtaken: by
-    those that were applied, or fetched as program text, before it was let go.
-    """
-    if correction.number == in_effect:
-        return True
-    if correction.number < in_effect:
-        since = (last.fetched_at or last.applied_at) if last is not None else None
-        return correction.decided_at is None or since is None or correction.decided_at <= since
-    since = correction.fetched_at or correction.applied_at
-    if last is None or last.decided_at is None or since is None:
-        return False
-    return since < last.decided_at
-
-
-def _cut_before_reset(tool: ToolState, reading: ReadingIn, last: Named | None) -> bool:
-    """Whether the part was cut before the tool was changed or its offset edited by hand.
-
-    Told by `machined_at`, or by a correction that was applied before that moment and was not yet in effect.
-    """
-    if tool.reset_at is None:
-        return False
-    if reading.machined_at is not None:
-        return reading.machined_at < tool.reset_at
-    if reading.correction_in_effect is None:
-        return False
-    return any(
-        c.status == "applied"
-        and not _had(c, reading.correction_in_effect, last)
-        and c.applied_at is not None
-        and c.applied_at <= tool.reset_at
-        for c in tool.corrections
-    )
-
-
-def _not_in_effect(correction: IssuedCorrection, tool: ToolState, reading: ReadingIn, last: Named | None) -> bool:
-    """Whether the part of this reading was cut without that correction, which has been issued since."""
-    if correction.status == "awaiting_approval":
-        return True
-    if correction.status not in OUTSTANDING and correction.status != "applied":
-        return False
-    applied_at = correction.applied_at
-    if applied_at is not None and tool.reset_at is not None and applied_at <= tool.reset_at:
-        return False  # it went out with the tool, or was written over by hand
-    if reading.correction_in_effect is not None:
-        return not _had(correction, reading.correction_in_effect, last)
-    if reading.machined_at is not None:
-        return applied_at is None or applied_at > reading.machined_at
-    return applied_at is None
-
-
-def _compensated(tool: ToolState, outstanding: list[IssuedCorrection]) -> float:
-    """The corrections of this tool's life that were in effect when the part was cut, summed, mm; what it wore lies behind them."""
-    total = tool.total
-    for correction in outstanding:
-        if correction.status == "applied":
-            total -= correction.amount
-    return round(total, DECIMALS) + 0.0
-
-
-def _issued_total(tool: ToolState | None) -> float:
-    """Corrections of the tool since it was changed, those not yet applied included, mm."""
-    if tool is None:
-        return 0.0
-    return tool.total + sum(c.amount for c in tool.corrections if c.status in OUTSTANDING)
-
-
 def _issue(ground: Ground, stream: StreamState, tool: ToolState, sequence: int, decision: Decision) -> IssuedCorrection:
     """Number the correction; whatever is held for this tool is superseded by it, so that they never add up."""
     number = ground.last_correction[tool.machine_id] + 1
     ground.last_correction[tool.machine_id] = number
     ground.touched_machines.add(tool.machine_id)
-    for earlier in tool.corrections:
+    for earlier in islice(tool.corrections, tool.none_held, None):
         if earlier.status == "held":
             earlier.status, earlier.superseded_by, earlier.changed = "superseded", number, True
+    tool.none_held = len(tool.corrections)
     if decision.action is Action.HOLD:
         status = "held"
     elif needs_approval(stream.parameters):

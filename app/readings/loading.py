@@ -150,6 +150,7 @@ def _add_stream(
                 row.machine_id, row.tool, row.offset or 0.0, row.total or 0.0, row.reset_at, row.tool_paused_by
             )
         tool.since_number, tool.since = number, since
+        tool.forget()
         tool.corrections = [
             IssuedCorrection(
                 row.machine_id,

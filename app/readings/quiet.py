@@ -13,16 +13,14 @@ from numpy.typing import NDArray
 
 from app.core.compensation import Action, Decision, outstanding_effect
 from app.core.recursion import CODES, ZONES, Lane, Lanes, Quiet, quiet_run
+from app.readings.cutting import Circumstance, confirms, cut_with
 from app.readings.ground import AverageState, Ground, StreamState, Verdict
-from app.readings.judge import confirms, cut_with
 from app.readings.records import Entry, Record
 from app.readings.rows import EPOCH, MICROSECOND, always, array_of_int4, fixed, moment, moments, one_of, table, texts
 from app.readings.schemas import ReadingIn
 
 FEWEST = 64  # readings that are worth making columns of
 NEVER = -(2**62)
-Circumstance = tuple[list[int], float | None]
-"""The corrections that a part was cut without, and the sum of those it was cut with, mm."""
 
 
 def compile_now() -> None:
@@ -37,27 +35,26 @@ class _Kind:
 
     def __init__(self, ground: Ground, stream: StreamState, in_effect: int | None) -> None:
         self.ground, self.stream, self.in_effect = ground, stream, in_effect
-        self.circumstance = 0
+        self.example = ReadingIn(stream.entry.characteristic, correction_in_effect=in_effect)
 
     def lane(self, stream: int, memory: int) -> tuple[Lane, Circumstance]:
         """How things stand now."""
         state, parameters, in_effect = self.stream, self.stream.parameters, self.in_effect
-        example = ReadingIn(state.entry.characteristic, correction_in_effect=in_effect)
-        previous_tool, outstanding, compensated = cut_with(self.ground, state.tool, example)
+        found = cut_with(self.ground, state.tool, self.example)
         return Lane(
             parameters,
             state.average.empirical_value if state.average else 0.0,
-            outstanding_effect((c.amount for c in outstanding), parameters.factor) if outstanding else 0.0,
+            outstanding_effect(found.amounts, parameters.factor) if found.outstanding else 0.0,
             stream,
             memory,
-            quiet=not previous_tool
+            quiet=not found.previous_tool
             and state.paused_by is None
             and (state.tool is None or state.tool.paused_by is None)
             and parameters.accept_m == 1
             and parameters.plausible_jump is None
             and (in_effect is None or in_effect <= self.ground.last_correction[state.entry.machine_id])
             and not confirms(self.ground, state.tool, in_effect),
-        ), ([c.number for c in outstanding], compensated)
+        ), found._replace(amounts=())
 
 
 class QuietReadings:
@@ -78,7 +75,12 @@ class QuietReadings:
         self._latest = self._latest_before()
         self._circumstances: list[Circumstance] = []
         self._circumstance_of = np.zeros(len(wanted), np.int64)
-        self._lanes = Lanes.of([self._lane(kind) for kind in self._kinds])
+        # A lane is made when a reading needs it: a batch may have as many kinds as readings, and each correction changes all.
+        self._lanes = Lanes.unknown(len(self._kinds))
+        self._stale = np.ones(len(self._kinds), np.bool_)
+        self._now = np.zeros(len(self._kinds), np.int64)  # the circumstance of each kind
+        self._of_stream = streams
+        self._of_tool = np.array([0 if kind.stream.tool is None else id(kind.stream.tool) for kind in self._kinds])
         self._sequences = np.array([stream.sequence for _, stream in self._streams.values()], np.int64)
         self._averages = np.array([memory.average for _, memory in self._memories.values()] or [0.0])
         self._made = Quiet.room(len(wanted))
@@ -96,15 +98,18 @@ class QuietReadings:
                 self._memories.setdefault(id(stream.average), (len(self._memories), stream.average))
         return [numbers[name] for name in names]
 
-    def _lane(self, kind: _Kind) -> Lane:
+    def _refresh(self, number: int) -> None:
+        """Make the lane of one kind as things stand now."""
+        kind = self._kinds[number]
         average = kind.stream.average
         lane, circumstance = kind.lane(
             self._streams[kind.stream.entry.characteristic_id][0],
             self._memories[id(average)][0] if average is not None else -1,
         )
-        kind.circumstance = len(self._circumstances)
+        self._lanes.replace(number, lane)
+        self._stale[number] = False
+        self._now[number] = len(self._circumstances)
         self._circumstances.append(circumstance)
-        return lane
 
     def _latest_before(self) -> NDArray[np.int64]:
         """For each reading the latest time of measurement in its stream before it."""
@@ -118,11 +123,14 @@ class QuietReadings:
 
     def run(self, at: int) -> int:
         """Decide readings from a position on, as long as they are quiet; the position of the first that is not."""
-        end = quiet_run(at, self._measured, self._lane_of, self._lanes, self._sequences, self._averages, self._made)
-        self._quiet[at:end] = True
-        now = np.array([kind.circumstance for kind in self._kinds])
-        self._circumstance_of[at:end] = now[self._kind_of[at:end]]
-        return end
+        while True:
+            end = quiet_run(at, self._measured, self._lane_of, self._lanes, self._sequences, self._averages, self._made)
+            self._quiet[at:end] = True
+            self._circumstance_of[at:end] = self._now[self._kind_of[at:end]]
+            if end == len(self._lane_of) or self._lane_of[end] < 0 or not self._stale[self._lane_of[end]]:
+                return end
+            self._refresh(int(self._lane_of[end]))
+            at = end
 
     def hand_over(self, at: int) -> None:
         """Bring the ground to where it is before the reading at a position, for `judge` to go on."""
@@ -144,10 +152,11 @@ class QuietReadings:
         self._sequences[index] = judged.sequence
         if judged.average is not None:
             self._averages[self._memories[id(judged.average)][0]] = judged.average.average
-        for number, kind in enumerate(self._kinds):
-            stream = kind.stream
-            if stream is judged or (stream.tool is not None and stream.tool is judged.tool):
-                self._lanes.replace(number, self._lane(kind))
+        stale = self._of_stream == index
+        if judged.tool is not None:
+            stale |= self._of_tool == id(judged.tool)
+        self._stale |= stale
+        self._lanes.silence(stale)
 
     def close(self) -> None:
         """Bring the ground to where it is after the last reading."""
@@ -176,7 +185,7 @@ class QuietReadings:
         """The quiet reading at a position, as `judge` would have left it."""
         made, (entry, reading) = self._made, self.wanted[at]
         _, stream = self._streams[entry.characteristic_id]
-        outstanding, compensated = self._circumstances[self._circumstance_of[at]]
+        circumstance = self._circumstances[self._circumstance_of[at]]
         decision = Decision(
             deviation=float(made.deviation[at]),
             decided=float(made.decided[at]),
@@ -202,23 +211,27 @@ class QuietReadings:
             self.now,
             bool(self._times[at] < self._latest[at]),
             decision,
-            outstanding,
+            circumstance.outstanding,
             correction=None,
             paused_by=None,
             alarms=[],
-            compensated=compensated,
+            compensated=circumstance.compensated,
         )
 
     def rows(self) -> memoryview:
         """The quiet readings as rows of the table `reading`, for a binary COPY."""
         at = np.flatnonzero(self._quiet)
-        made, stream, circumstance = self._made, self._stream_of[at], self._circumstance_of[at]
+        made, stream = self._made, self._stream_of[at]
+        met, circumstance = np.unique(self._circumstance_of[at], return_inverse=True)
+        circumstances = [self._circumstances[number] for number in met.tolist()]
         streams = self.streams()
         readings = [self.wanted[position][1] for position in at.tolist()]
         in_effect = np.array([kind.in_effect or 0 for kind in self._kinds])[self._kind_of[at]]
         named = np.array([kind.in_effect is None for kind in self._kinds])[self._kind_of[at]]
         null = always(None)
-        compensated = np.array([np.nan if each is None else each for _, each in self._circumstances])[circumstance]
+        compensated = np.array([np.nan if c.compensated is None else c.compensated for c in circumstances])[
+            circumstance
+        ]
         columns = {
             "machine_id": fixed(np.array([s.entry.machine_id for s in streams])[stream], ">i4"),
             "characteristic_id": fixed(np.array([s.entry.characteristic_id for s in streams])[stream], ">i4"),
@@ -242,7 +255,7 @@ class QuietReadings:
             "key": texts([reading.key for reading in readings]),
             "part": texts([reading.part for reading in readings]),
             "outstanding": one_of(
-                [array_of_int4(numbers) if numbers else None for numbers, _ in self._circumstances], circumstance
+                [array_of_int4(c.outstanding) if c.outstanding else None for c in circumstances], circumstance
             ),
             "alarms": null,
             "compensated": fixed(compensated, ">f8", np.isnan(compensated)),

@@ -1,5 +1,6 @@
 """The shape of a stored reading, shared by the one who writes it and those who read it."""
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import NamedTuple
 
@@ -37,6 +38,6 @@ class Record(NamedTuple):
     code: str
     key: str | None
     part: str | None
-    outstanding: list[int] | None
+    outstanding: Sequence[int] | None
     alarms: list[int] | None
     compensated: float | None

@@ -68,3 +68,4 @@ def _as_if_done(ground: Ground, stream: StreamState) -> None:
     ground.by_key.clear()
     if stream.tool is not None:
         stream.tool.corrections.clear()
+        stream.tool.forget()

@@ -11,6 +11,7 @@ from app.db.pipeline import Pipeline, Step
 from app.readings.ground import Ground, OpenAlarm, StreamState, ToolState
 from app.readings.quiet import QuietReadings
 from app.readings.records import Entry, Record
+from app.readings.rows import array_of_int4
 from app.readings.statements import (
     ACTIVE_ALARMS,
     ALARM_NUMBERS,
@@ -132,7 +133,8 @@ async def _copy(pipeline: Pipeline, records: list[Record]) -> None:
     async with pipeline.connection.cursor() as cursor, cursor.copy(COPY) as copy:
         copy.set_types(COPY_TYPES)
         for record in records:
-            await copy.write_row(record)
+            outstanding = array_of_int4(record.outstanding) if record.outstanding else None
+            await copy.write_row(record._replace(outstanding=outstanding))
 
 
 def _stream_row(stream: StreamState) -> dict[str, Any]:

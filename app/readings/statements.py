@@ -14,7 +14,7 @@ from app.core.zones import Zone
 from app.db.events import CHANNEL, PUBLISHED
 from app.readings.records import Record
 
-_json = msgspec.json.Encoder()
+_json = msgspec.json.Encoder(enc_hook=list)  # a list that is shared by many rows
 
 
 def as_json(value: Any) -> str:
@@ -111,7 +111,8 @@ _READING = """machine_id int4, characteristic_id int4, sequence int8, measured f
     late bool, zone text, action text, code text, key text, part text, outstanding int4[], alarms int8[],
     compensated float8"""
 _COLUMNS = ", ".join(Record._fields)
-COPY_TYPES = [column.split()[1] for column in _READING.split(",")]
+# A column that the writer encodes itself goes out as the bytes it is: COPY sends no types.
+COPY_TYPES = ["bytea" if column.split()[0] == "outstanding" else column.split()[1] for column in _READING.split(",")]
 MOVE_STREAMS = """
 UPDATE stream s SET sequence = n.sequence, paused_by = n.paused_by, last_measured_at = n.last_measured_at,
     last_received_at = n.last_received_at, last_measured = n.last_measured, last_deviation = n.last_deviation,

@@ -75,6 +75,7 @@ class Shift:
                 told.correction_in_effect = in_effect
             elif self.how == "time":
                 told.machined_at = cut_at
+            self.tool.forget()  # people and machine have been at the corrections; a server would load them anew
             verdict = judge(self.ground, entry, told, self.now)
             assert isinstance(verdict, Verdict)
             self.ground.streams[entry.characteristic_id].paused_by = None
