@@ -13,6 +13,8 @@ from app.readings.statements import BASE_LEVEL, FAN, SUMMARISE_READINGS, SUMMARI
 
 CORRECTED = 97  # every so many readings a correction
 TOOL_LIFE = 50_000
+CORRECTIONS_OF_A_LIFE = TOOL_LIFE // CORRECTED
+STEP = -0.0004  # mm, each of them
 OUTSIDE = 40_009  # every so many readings a part out of tolerance
 
 # Deviations (mm) that are put at places of their own, as shares of the way: whatever a chart leaves out, these it must show.
@@ -20,13 +22,14 @@ EXTREMES = {0.21: 0.0113, 0.37: 0.4213, 0.58: -0.0127, 0.83: 1.7019}
 
 READINGS = f"""
 INSERT INTO reading (machine_id, characteristic_id, sequence, measured, deviation, decided, average_before, average_after,
-    measured_at, received_at, parameters_version, correction, late, zone, action, code, part)
+    measured_at, received_at, parameters_version, correction, late, zone, action, code, part, compensated)
 SELECT m, c, s, round((t + d)::numeric, 6)::float8, d, d, 0, d / 2, at, at, 1,
     CASE WHEN s %% {CORRECTED} = 0 THEN s / {CORRECTED} END, false,
     CASE WHEN abs(d) >= 1 THEN 'probe_fault' WHEN abs(d) >= 0.3 THEN 'wear'
          WHEN d > w / 2 THEN 'oversize' WHEN d < -w / 2 THEN 'undersize'
          WHEN abs(d) > 0.0053 THEN 'full' WHEN abs(d) > 0.001 THEN 'average' ELSE 'zero' END,
-    CASE WHEN s %% {CORRECTED} = 0 THEN 'correct' ELSE 'none' END, 'average_kept', 'SN-' || s
+    CASE WHEN s %% {CORRECTED} = 0 THEN 'correct' ELSE 'none' END, 'average_kept', 'SN-' || s,
+    round(({STEP} * ((s - 1) / {CORRECTED} %% {CORRECTIONS_OF_A_LIFE}))::numeric, 9)::float8
 FROM (SELECT %(machine)s::int AS m, %(characteristic)s::int AS c, %(target)s::float8 AS t, %(width)s::float8 AS w, s,
         timestamptz '2026-01-05 06:00+00' + s * interval '1 second' AS at,
         coalesce(%(extremes)s::jsonb ->> s::text,
@@ -39,8 +42,8 @@ FROM (SELECT %(machine)s::int AS m, %(characteristic)s::int AS c, %(target)s::fl
 CORRECTIONS = f"""
 INSERT INTO correction (machine_id, number, characteristic_id, sequence, tool_memory, size_error, amount, status,
     created_at, applied_at, applied_by, offset_after)
-SELECT %(machine)s::int, n, %(characteristic)s::int, n * {CORRECTED}, 3, 0.0004, -0.0004, 'applied', at, at, 'bench',
-    -0.0004 * (n %% {TOOL_LIFE // CORRECTED})
+SELECT %(machine)s::int, n, %(characteristic)s::int, n * {CORRECTED}, 3, {-STEP}, {STEP}, 'applied', at, at, 'bench',
+    {STEP} * (n %% {CORRECTIONS_OF_A_LIFE})
 FROM generate_series(1, %(count)s::bigint / {CORRECTED}) AS n,
      LATERAL (SELECT timestamptz '2026-01-05 06:00+00' + n * {CORRECTED} * interval '1 second' AS at) AS moment
 """  # noqa: S608 - made of constants

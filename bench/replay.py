@@ -122,6 +122,7 @@ def over_http(count: int, rounds: int) -> None:
             fill(connection, "c", count)
             connection.execute("VACUUM ANALYZE")
         asked = {
+            "last": count,
             "weighting_factors": np.linspace(1, 20, STEPS).tolist(),
             "zero_ranges": np.round(np.linspace(0, 0.005, STEPS), 6).tolist(),
         }
