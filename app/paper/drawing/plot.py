@@ -250,11 +250,17 @@ class _Plot:
                     (x + 9, middle),
                     min(_number(marker.get("size"), 6), 10),
                     _first(marker.get("color"), INK),
-                    (None, 1),
+                    _edge(marker),
                 )
             marks.append(Words((x + 24, y), str(trace["name"]), size, QUIET))
             x += 24 + len(str(trace["name"])) * size * LETTER + LEGEND_GAP
         return marks
+
+
+def _edge(marker: Figure) -> tuple[str | None, float]:
+    """The edge of a marker in the legend: what is filled like the paper would not be seen without it."""
+    line = marker.get("line") or {}
+    return (_first(line.get("color"), INK), _number(line.get("width"), 1)) if line.get("width") else (None, 1)
 
 
 def _bars(trace: Figure, x: Axis, y: Axis) -> list[Mark]:

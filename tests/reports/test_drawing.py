@@ -1,0 +1,25 @@
+"""Figures of the pages on paper: what the legend shows is what is drawn."""
+
+from app.paper.drawing.marks import Area
+from app.paper.drawing.plot import drawing_of
+
+
+def test_a_hollow_marker_is_seen_in_the_legend() -> None:
+    marker = {"symbol": "square", "size": 9, "color": "#ffffff", "line": {"color": "#1a7a3c", "width": 2}}
+    trace = {
+        "type": "scatter",
+        "mode": "lines+markers",
+        "name": "optimised",
+        "x": [0, 90],
+        "y": [1, 2],
+        "marker": marker,
+    }
+    drawn = drawing_of({"data": [trace], "layout": {"showlegend": True}}, 400, 200)
+    squares = [
+        mark
+        for group in drawn.groups
+        for mark in group.marks
+        if isinstance(mark, Area) and mark.fill == "#ffffff" and len(mark.places) == 4
+    ]
+    edges = [(mark.edge, mark.width) for mark in squares if mark.edge is not None]
+    assert edges == [("#1a7a3c", 2)] * 3  # two in the chart, one in its legend
