@@ -10,6 +10,7 @@ from app.web.i18n import _, ngettext
 from app.web.numbers import MINUS, mm
 
 GOOD, WEAK = 10.0, 100.0  # conditions
+WORTH_A_TOUCH = 1.05  # by less, a touch more makes nothing more certain that anybody would see
 
 
 def kind_word(kind: str) -> str:
@@ -90,6 +91,8 @@ def advice(found: Mapping[str, Any] | None) -> str:
     where = {"place": place(found["place"]), "normal": direction(found["normal"])}
     if gain is None:
         return _("A touch near {place} on the face {normal} would stop it.").format(**where)
+    if gain < WORTH_A_TOUCH:
+        return _("No single touch more makes that much more certain.")
     return _("One touch more near {place} on the face {normal} makes that {gain:.2g} times as certain.").format(
         **where, gain=gain
     )

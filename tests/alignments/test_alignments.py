@@ -154,7 +154,7 @@ class TestRefused:
             ({"touches": SIX[:5]}, "touches", "5 touches cannot hold 6 motions", "A touch near"),
             ({"touches": [*touches([0.0] * 3, [([x, x, 0.0], "+Z") for x in (0.0, 50.0, 90.0)]), *SIX[3:]]}, "touches[0]", "one line", "Move touch 2"),
             ({"touches": [*SIX[:4], SIX[3] | {"nominal": [20.0, 0.0, -40.0]}, SIX[5]]}, "touches[3]", "same place", "Move touch 5"),
-            ({"touches": [*SIX[:5], SIX[4] | {"nominal": [50.0, 0.0, -4.0]}]}, "touches[0]", "shift in X", "another face"),
+            ({"touches": [*SIX[:5], SIX[4] | {"nominal": [50.0, 0.0, -4.0]}]}, "touches[3]", "shift in X", "another face"),
             ({"touches": [*SIX[:5], {"nominal": [0, 0, 0], "normal": [0, 0, 0], "deviation": 0}]}, "touches[5]", "no direction", "0, 0, 0"),
             ({"kind": "two_points"}, "side", "is needed", "touches"),
             ({"kind": "two_points", "side": [{"nominal": [0, 0], "measured": [0, 0]}] * 2}, "side[0]", "same place", "spread"),

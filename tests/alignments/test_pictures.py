@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.alignments import wording
 from app.alignments.figures import MOST, Drawn, enlargement, part_figure, plane_figure
 from app.core.geometry.frames import frame, from_angles
 
@@ -19,6 +20,12 @@ OUTWARD = [
 ]
 INWARD = [each._replace(normal=[-n for n in each.normal]) for each in OUTWARD]
 MOVED = frame(from_angles(0.0, 0.0, 0.1), [0.05, -0.1, 0.02])
+
+
+def test_a_touch_more_is_advised_only_where_it_helps() -> None:
+    near = {"place": [0.0, 0.0, 0.0], "normal": [0.0, -1.0, 0.0]}
+    assert "2.1 times as certain" in wording.advice(near | {"gain": 2.1})
+    assert "No single touch more" in wording.advice(near | {"gain": 1.01})
 
 
 def spans(figure: dict[str, Any], name: str) -> tuple[float, float, float, float]:

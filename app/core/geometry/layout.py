@@ -184,8 +184,9 @@ def _cause(layout: Layout) -> tuple[Loose, tuple[int, ...], int | None]:
     wanted = layout.normals if len(layout.columns) == len(MOTIONS) else np.eye(3)
     faces = faces_of(layout.normals)
     if np.linalg.svd(wanted, compute_uv=False)[-1] < 1e-6 or len(wanted) < 3:
-        largest = max(faces, key=len)
-        return Loose.PARALLEL_NORMALS, tuple(at + 1 for at in largest), largest[-1] + 1
+        spare = _spare(layout)
+        mine = next(face for face in faces if spare in face)
+        return Loose.PARALLEL_NORMALS, tuple(at + 1 for at in mine), spare + 1
     for face in sorted(faces, key=len, reverse=True):
         places = layout.places[face]
         normal = layout.normals[face[0]]
@@ -201,6 +202,13 @@ def _cause(layout: Layout) -> tuple[Loose, tuple[int, ...], int | None]:
         if across is not None and len(face) == 2 and float(np.ptp(flat @ across)) < 1e-6 * max(1.0, layout.reach):
             return Loose.SAME_PLACE, numbers, numbers[-1]
     return Loose.LOOSE, (), int(layout.leverage.argmin()) + 1
+
+
+def _spare(layout: Layout) -> int:
+    """The touch that is missed least where it is moved: of whose finding the others say most; the last of equals."""
+    left, sizes, _right = np.linalg.svd(layout.scaled, full_matrices=False)
+    held = (left[:, sizes > sizes[0] / WORST_CONDITION] ** 2).sum(axis=1).round(9)
+    return int(np.flatnonzero(held == held.min())[-1])
 
 
 def _guiding(layout: Layout, face: list[int]) -> Floats | None:
