@@ -64,7 +64,7 @@ def measure(session: Session, machine: Machine, given: FormIn, caller: Caller) -
     if (before := _sent_before(session, machine, given)) is not None:
         return before
     entries = (
-        streams.entries_for_results(session, machine.id, {"deviation": given.characteristic})
+        streams.entries_for_results(session, machine.id, {"deviation": given.characteristic}, "characteristic")
         if given.characteristic
         else {}
     )

@@ -59,15 +59,20 @@ def entry_by_id(session: Session, machine_id: int, characteristic_id: int) -> En
     return Entry(*row)
 
 
-def entries_for_results(session: Session, machine_id: int, named: Mapping[str, str]) -> dict[str, Entry]:
-    """The characteristics that results are to become, by result. Raises `Invalid` for one that this machine has not."""
+def entries_for_results(
+    session: Session, machine_id: int, named: Mapping[str, str], field: str = "characteristics.{result}"
+) -> dict[str, Entry]:
+    """The characteristics that results are to become, by result. Raises `Invalid` for one that this machine has not.
+
+    field: where a result's characteristic stands in what was sent.
+    """
     found: dict[str, Entry] = {}
     errors = []
     for result, characteristic in named.items():
         entry = entry_of(session, characteristic)
         if entry is None or entry.machine_id != machine_id:
             wrong = _("there is no characteristic {key} on this machine").format(key=repr(characteristic[:64]))
-            errors.append(FieldError(f"characteristics.{result}", wrong))
+            errors.append(FieldError(field.format(result=result), wrong))
         else:
             found[result] = entry
     if errors:
