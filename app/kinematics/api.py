@@ -18,7 +18,7 @@ from app.kinematics.drift_answers import (
     machine_state,
 )
 from app.kinematics.schemas import EnterIn, PlanIn, ReasonIn, RestoreIn, RunIn
-from app.kinematics.values import UNITS, to_enter
+from app.kinematics.values import UNITS
 from app.machines.queries import machine_named
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, Caller, Engineer, Operator, SessionDep
@@ -140,7 +140,7 @@ def compare_kinematics_runs(session: SessionDep, caller: AnyCaller, run: RunNumb
         machine=before.machine.key,
         before=before.run.id,
         after=after.run.id,
-        changes=changes_out(changes, to_enter(after.run.results, offsets=True)),
+        changes=changes_out(changes, looking.to_enter(after, offsets=True)),
     )
 
 

@@ -115,7 +115,12 @@ class ChangeOut(BaseModel):
     difference: float
     deviation: float | None
     moved: bool | None
-    enter: Annotated[float | None, Field(description="What the later run asks to enter on the control.")]
+    enter: Annotated[
+        float | None,
+        Field(
+            description="What the later run asks to enter on the control; none once it was entered, or when it is not to be."
+        ),
+    ]
 
 
 class HeadOut(BaseModel):

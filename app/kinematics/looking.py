@@ -190,9 +190,12 @@ def changes(before: RunRow, after: RunRow) -> list[Compared]:
     return compared(as_measured(before.run), now, true=same_head)
 
 
-def to_enter(row: RunRow) -> dict[str, float]:
-    """What is to be entered on the control because of this run; nothing, if it was entered or overtaken."""
-    return in_order(to_be_entered(row.run.results)) if row.may_be_entered else {}
+def to_enter(row: RunRow, *, offsets: bool = False) -> dict[str, float]:
+    """What is to be entered on the control because of this run; nothing, if it was entered or overtaken.
+
+    offsets: those of the ball (Q147 to Q149) beside the errors of axes as well.
+    """
+    return in_order(to_be_entered(row.run.results, offsets=offsets)) if row.may_be_entered else {}
 
 
 def in_order(values: Mapping[str, Item]) -> dict[str, Item]:

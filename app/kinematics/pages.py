@@ -109,6 +109,7 @@ def compare_page(
         moved=[each for each in changes if each.change.moved],
         unknown=any(each.change.moved is None for each in changes if each.name.startswith("E")),
         entering=looking.to_enter(after),
+        by_name=looking.to_enter(after, offsets=True),
         unrecorded=", ".join(looking.unrecorded(before.run, after.run)),
         same_head=before.run.head == after.run.head,
         **COMMON,

@@ -44,6 +44,11 @@ class RunRow(NamedTuple):
         return "to_confirm" if self.run.outcome == "too_large" else "measured"
 
     @property
+    def shown(self) -> str:
+        """How it stands for people, who have to see that an entry was taken back: the status, or `undone`."""
+        return "undone" if self.undone else self.status
+
+    @property
     def may_be_entered(self) -> bool:
         """Whether its errors could be entered on the control now, confirmed or not."""
         return self.status not in {"refused", "entered"} and not self.overtaken and bool(to_enter(self.run.results))

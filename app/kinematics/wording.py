@@ -216,6 +216,7 @@ def status_word(status: str) -> str:
         "confirmed": _("Confirmed"),
         "measured": _("Measured"),
         "entered": _("Entered"),
+        "undone": _("Taken back"),
     }.get(status, status)
 
 

@@ -147,6 +147,17 @@ class TestWhen:
         x = next(each for each in found if each["name"] == "EX0C")
         assert (x["before"], x["after"]) == (pytest.approx(0.005, abs=1e-3), pytest.approx(0.0133, abs=1e-3))
 
+    def test_what_was_entered_is_not_asked_for_again(self, shop: Shop) -> None:
+        old = take(shop, axes=[axis((0.001, 0, 0, 0))], measured_at="2025-10-20T06:00:00Z")
+        new = take(shop, axes=[axis()], measured_at="2025-11-20T06:00:00Z")
+        asked = []
+        for _time in range(2):
+            changes = shop.call("GET", f"{RUNS}/{old['run']}/comparison?with={new['run']}")["changes"]
+            asked.append({each["name"] for each in changes if each["enter"] is not None})
+            if new["status"] != "entered":
+                new = enter(shop, new)
+        assert asked == [{"EX0C", "EY0C", "EA0C", "EB0C", "Q147", "Q148", "Q149"}, set()]
+
     def test_an_entry_of_then(self, shop: Shop) -> None:
         run = take(shop, axes=[axis()], measured_at="2025-10-20T06:00:00Z")
         for at in ("2025-10-19T06:00:00Z", (datetime.now(UTC) + timedelta(hours=2)).isoformat()):

@@ -159,6 +159,8 @@ class TestDeciding:
         operator.send(f"{here}/undo", 403, reason="x")
         assert "is taken back" in engineer.send(f"{here}/undo", reason="Worse than before")
         assert "had been entered, and were taken back" in engineer.open(here)
+        for place in (here, machine(shop), "/kinematics"):
+            assert 'data-state="undone"' in engineer.open(place)
         assert shop.call("GET", f"/machines/{shop.machine}/kinematics")["in_effect"].get("EX0C", 0.0) == 0.0
 
     def test_a_kinematics_is_put_back(self, shop: Shop, operator: Person, engineer: Person) -> None:
