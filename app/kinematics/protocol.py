@@ -49,7 +49,7 @@ def protocol_of(row: RunRow, made_at: datetime) -> Report:
         name=_("Rotary axes, run {n}").format(n=run.id),
         machine=row.machine.name,
         part="",
-        period=f"{row.machine.name}, {run.measured_at:%Y-%m-%d %H:%M} UTC, {wording.status_word(row.status)}",
+        period=f"{row.machine.name}, {run.measured_at:%Y-%m-%d %H:%M} UTC, {wording.status_word(row.shown)}",
         zone="UTC",
         made_at=moment(made_at),
         head=_head(row),
