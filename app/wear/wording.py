@@ -204,9 +204,9 @@ def remedy_sentence(data: Mapping[str, Any], settings: Mapping[str, Any]) -> str
     elif remedy.zero_range is not None and remedy.weighting_factor is not None:
         text = _("With R33 at {new_r33} instead of {r33}, or k at {new_k} instead of {k}")
     elif remedy.zero_range is not None:
-        text = _("With R33 at {new_r33} instead of {r33} (k alone does not help)")
+        text = _("With R33 at {new_r33} instead of {r33} (k alone does not bring that about)")
     elif remedy.weighting_factor is not None:
-        text = _("With k at {new_k} instead of {k} (R33 alone does not help)")
+        text = _("With k at {new_k} instead of {k} (R33 alone does not bring that about)")
     else:
         return _("No setting helps: the process scatters too much for these limits.")
     text = (text + _(" scatter alone would correct no more than {goal} of the readings.")).format(**values)

@@ -53,9 +53,12 @@ def test_the_plant_page_is_quiet_about_what_is_far_and_marks_what_is_near() -> N
         ),
         (
             Remedy(None, 0.0025, None, 0.0),
-            "With R33 at 2.5 µm instead of 0.2 µm (k alone does not help) scatter alone would",
+            "With R33 at 2.5 µm instead of 0.2 µm (k alone does not bring that about) scatter alone would",
         ),
-        (Remedy(4.0, None, None, 0.0), "With k at 4 instead of 1 (R33 alone does not help) scatter alone would"),
+        (
+            Remedy(4.0, None, None, 0.0),
+            "With k at 4 instead of 1 (R33 alone does not bring that about) scatter alone would",
+        ),
         (
             Remedy(None, 0.006, 0.007, 0.0),
             "With R34 at 7.0 µm instead of 5.0 µm and R33 at 6.0 µm instead of 0.2 µm scatter alone would",
