@@ -10,7 +10,7 @@ from app.core.spc import chance, constants, cusum, ewma, shewhart
 from app.core.spc.capability import Limits, capability, percentile, ppk_of, spread_index, target_index
 from app.core.spc.in_time import brown_forsythe, decompose, successive
 from app.core.spc.normality import anderson_darling, p_of, shapiro_wilk
-from app.core.spc.rules import RULES, RuleName, signals_of_cusum
+from app.core.spc.rules import RULES, Rule, RuleName, signals, signals_of_cusum
 from app.core.spc.spread import Estimator, Sigma, freedom_of_moving_ranges, from_ranges, subgroups, summary
 from app.core.uncertainty import position_uncertainty
 from app.proof import engine_of_gauges as gauges
@@ -76,7 +76,7 @@ def individuals(given: Given) -> Got:
 
 
 def grouped(given: Given) -> Got:
-    groups = subgroups(readings_of(given), given["size"])
+    groups = subgroups(readings_of(given), given.get("sizes") or given["size"])
     baseline = shewhart.subgroup_baseline(groups, Estimator(given["estimator"]), minimum=len(groups))
     means, ranges = shewhart.means(baseline, groups), shewhart.ranges(baseline, groups)
     deviations = shewhart.deviations(baseline, groups)
@@ -115,12 +115,14 @@ def moving(given: Given) -> Got:
 
 def summed(given: Given) -> Got:
     chart = cusum.cusum(shewhart.given(given["centre"], given["sigma"]), given["values"], given["k"], given["h"])
-    first = next(iter(signals_of_cusum(chart))).start
+    runs = list(signals_of_cusum(chart))
+    first = runs[0].start
     return {
         "above": (chart.above.round(9)).tolist(),
         "below": (chart.below.round(9)).tolist(),
         "since_above": chart.since_above.tolist(),
         "first_signal": first + 1,
+        "signalled": sorted({at + 1 for run in runs for at in range(run.start, run.end + 1)}),
         "new_mean": chart.new_mean(first),
     }
 
@@ -131,7 +133,16 @@ def rule_probability(given: Given) -> Got:
 
 def rule_run_length(given: Given) -> Got:
     sets = [[RULES[RuleName(name)] for name in names] for names in given["sets"]]
-    return {"run_lengths": [chance.average_run_length(rules) for rules in sets]}
+    return {"run_lengths": [chance.average_run_length(rules, given.get("shift", 0.0)) for rules in sets]}
+
+
+def rules_on_data(given: Given) -> Got:
+    """At which points, counted from 1, each rule fires while points in sigma come in one by one."""
+
+    def fired(rule: Rule, points: list[float]) -> list[int]:
+        return [n for n in range(1, len(points) + 1) if any(run.end == n - 1 for run in signals(points[:n], [rule]))]
+
+    return {name: fired(RULES[RuleName(name)], points) for name, points in given["points"].items()}
 
 
 def ewma_run_length(given: Given) -> Got:
@@ -147,8 +158,13 @@ def cusum_run_length(given: Given) -> Got:
 
 def capable(given: Given) -> Got:
     limits = Limits(given.get("lower"), given.get("upper"), given.get("target"))
-    found = capability(readings_of(given), limits)
-    got: Got = {"ppk": found.ppk.value, "ppm": found.ppm_overall}
+    found = capability(readings_of(given), limits, minimum=2)
+    got: Got = {
+        "ppk": found.ppk.value,
+        "ppk_low": found.ppk.low,
+        "ppk_high": found.ppk.high,
+        "ppm": found.ppm_overall,
+    }
     if found.pp and found.cpm:
         got |= {"pp": found.pp.value, "pp_low": found.pp.low, "pp_high": found.pp.high, "cpm": found.cpm.value}
     return got
@@ -248,6 +264,7 @@ ENGINE: dict[str, Callable[[Given], Got]] = {
     "cusum": summed,
     "rule_probability": rule_probability,
     "rule_run_length": rule_run_length,
+    "rules_on_data": rules_on_data,
     "ewma_run_length": ewma_run_length,
     "cusum_run_length": cusum_run_length,
     "capability": capable,

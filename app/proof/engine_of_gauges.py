@@ -19,6 +19,7 @@ def _shares(study: Study, tolerance: float | None = None) -> Got:
     return {
         "ev": study.equipment,
         "av": study.appraiser,
+        "interaction": study.interaction,
         "grr": study.grr,
         "pv": study.part,
         "tv": study.total,

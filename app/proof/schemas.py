@@ -4,6 +4,7 @@ from math import isnan
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.proof.cases import Basis
 from app.proof.queries import Check, Proof, Result
 
 Number = float | bool
@@ -14,7 +15,7 @@ class CheckOut(BaseModel):
     """One number of an example, or one list of them."""
 
     name: str = Field(examples=["upper"])
-    expected: Numbers = Field(description="As it was published.")
+    expected: Numbers = Field(description="As it was published, or as `basis` says.")
     got: Numbers | None = Field(description="What this program computes now.")
     tolerance: float = Field(description="How far apart they may be.")
     difference: float | None = Field(description="How far apart they are; of a list the entry that is furthest off.")
@@ -35,11 +36,15 @@ class CheckOut(BaseModel):
 
 
 class ExampleOut(BaseModel):
-    """One published example."""
+    """One example."""
 
     kind: str = Field(examples=["individuals"])
     name: str = Field(examples=["flow rate of ten batches"])
     source: str = Field(examples=["NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2"])
+    basis: Basis = Field(
+        description="published in `source`; derived by hand, or computed independently, as `source` says.",
+        examples=["published"],
+    )
     note: str = Field(description="Why it cannot come out nearer, where that needs saying.")
     passed: bool
     error: str | None = Field(description="What went wrong when it could not be computed at all.")
@@ -52,6 +57,7 @@ class ExampleOut(BaseModel):
             kind=result.case.kind,
             name=result.case.name,
             source=result.case.source,
+            basis=result.case.basis,
             note=result.case.note,
             passed=result.passed,
             error=result.error,
@@ -74,6 +80,7 @@ class ProofOut(BaseModel):
                         "kind": "individuals",
                         "name": "flow rate of ten batches",
                         "source": "NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2",
+                        "basis": "published",
                         "note": "",
                         "passed": True,
                         "error": None,

@@ -1,6 +1,6 @@
 """What the examples are about, and how their numbers are written."""
 
-from app.proof.cases import Value
+from app.proof.cases import Basis, Case, Value
 from app.proof.queries import Check
 from app.web.i18n import _, ngettext
 
@@ -12,7 +12,17 @@ def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
         "summary": (_("Mean, spread, autocorrelation"), ("summary",)),
         "charts": (
             _("Control charts"),
-            ("constants", "d2_star", "freedom", "individuals", "subgroups", "ewma", "moving_average", "cusum"),
+            (
+                "constants",
+                "d2_star",
+                "freedom",
+                "individuals",
+                "subgroups",
+                "ewma",
+                "moving_average",
+                "cusum",
+                "rules_on_data",
+            ),
         ),
         "chance": (
             _("How often charts signal"),
@@ -49,6 +59,18 @@ def number(value: float | bool | None) -> str:
 def written(value: Value | None) -> str:
     """A number, or a list of them."""
     return ", ".join(map(number, value)) if isinstance(value, list) else number(value)
+
+
+def basis(case: Case) -> str:
+    """Where expected numbers come from that nobody published; empty for published ones."""
+    return {Basis.PUBLISHED: "", Basis.DERIVED: _("derived by hand"), Basis.COMPUTED: _("computed independently")}[
+        case.basis
+    ]
+
+
+def expected(case: Case) -> str:
+    """Over the column of what is expected."""
+    return _("Published") if case.basis is Basis.PUBLISHED else _("Expected")
 
 
 def size(check: Check) -> int:

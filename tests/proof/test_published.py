@@ -5,7 +5,7 @@ from collections import Counter
 
 import pytest
 
-from app.proof.cases import FOLDER, Case, cases
+from app.proof.cases import FOLDER, Basis, Case, cases
 from app.proof.engine import ENGINE
 from app.proof.queries import run
 from app.proof.wording import topics
@@ -34,6 +34,15 @@ def test_every_example_names_its_source_and_what_it_may_be_off_by() -> None:
             if isinstance(tolerance, list):
                 assert isinstance(expected, list)
                 assert len(tolerance) == len(expected)
+
+
+def test_what_nobody_published_says_so() -> None:
+    """A citation is only for what was opened; everything else says in its source how the numbers came about."""
+    for case in cases():
+        said = case.source.lower()
+        assert (case.basis is Basis.DERIVED) == said.startswith("derived by hand"), case.name
+        assert ("computed independently" in said) >= (case.basis is Basis.COMPUTED), case.name
+        assert case.basis is not Basis.PUBLISHED or not said.startswith(("computed", "not looked up")), case.name
 
 
 def test_no_example_is_there_twice() -> None:
