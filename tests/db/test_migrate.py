@@ -2,6 +2,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import psycopg
 import pytest
+from alembic import command
 
 from app.db import migrate
 from app.db.migrate import MigrationError
@@ -27,6 +28,23 @@ def test_an_empty_database_is_brought_to_the_head(empty: str) -> None:
     assert migrate.upgrade(empty) == todo
     assert migrate.current(empty) == migrate.head()
     assert migrate.pending(empty) == migrate.upgrade(empty) == []
+
+
+def test_what_was_measured_before_the_last_migrations_stays(empty: str) -> None:
+    with migrate._connected(empty) as connection:
+        command.upgrade(migrate._config(connection), "0009")
+    with psycopg.connect(empty) as connection:
+        connection.execute("INSERT INTO machine (key, name, control) VALUES ('lathe-1', 'Lathe 1', 'fanuc')")
+        connection.execute("INSERT INTO machine_state (machine_id) SELECT id FROM machine")
+        connection.execute(
+            "INSERT INTO alarm (machine_id, tool_memory, kind, data) SELECT id, 3, 'tool_life', '{}' FROM machine"
+        )
+    assert migrate.upgrade(empty)[0].startswith("0010 ")
+    with psycopg.connect(empty) as connection:
+        assert connection.execute(
+            "SELECT m.key, a.kind FROM machine m JOIN alarm a ON a.machine_id = m.id"
+        ).fetchall() == [("lathe-1", "tool_life")]
+    assert migrate.differences(empty) == []
 
 
 def test_of_processes_that_start_together_one_migrates(empty: str) -> None:
