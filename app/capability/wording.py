@@ -90,7 +90,7 @@ def stability(found: Stability | Refused, baseline: int | None) -> str:
     by = (
         _("judged by baseline {n}").format(n=baseline)
         if baseline is not None
-        else _("judged by limits of the same readings; a frozen baseline would say more")
+        else _("judged by limits of the same readings; a baseline frozen of the deviations themselves would say more")
     )
     if found.stable:
         return _("Stable: no rule fires more often than chance explains ({by}).").format(by=by)
