@@ -51,7 +51,7 @@ def one_of(values: Sequence[bytes | None], which: NDArray[Any]) -> Column:
     """Values of which there are few: each row says which one it has."""
     if len(values) == 1:
         return always(values[0])
-    lengths = np.array([-1 if value is None else len(value) for value in values])
+    lengths = np.array([-1 if value is None else len(value) for value in values], np.int64)  # there may be none
     sizes = np.maximum(lengths, 0)
     at = which.astype(np.int64)
     return Column(b"".join(value or b"" for value in values), (np.cumsum(sizes) - sizes)[at], lengths[at])

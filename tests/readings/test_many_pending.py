@@ -13,7 +13,7 @@ from app.readings.ground import AverageState, Ground, Named, StreamState, ToolSt
 from app.readings.judge import judge
 from app.readings.quiet import QuietReadings
 from app.readings.records import Entry, Record
-from app.readings.rows import array_of_int4
+from app.readings.rows import HEADER, TRAILER, array_of_int4
 from app.readings.schemas import ReadingIn
 from app.readings.transaction import _decide
 from tests.shop import PARAMETERS
@@ -72,6 +72,8 @@ def test_a_batch_asks_once_for_each_reading_however_many_corrections_its_reading
     _decide(ground, wanted, NOW, columns)
     assert len(ground.issued) == COUNT
     assert calls[0] <= 2 * COUNT
+    assert len(columns) == 0
+    assert len(columns.rows()) == len(HEADER) + len(TRAILER)
 
 
 @pytest.mark.parametrize("seed", range(12))
