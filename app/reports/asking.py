@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from zoneinfo import ZoneInfo
 
@@ -35,6 +35,15 @@ class SectionName(StrEnum):
     DECISIONS = "decisions"
 
 
+def _in_every_zone(moment: datetime) -> bool:
+    """Whether a report can write it in any time zone: the first and the last day of the calendar it cannot."""
+    try:
+        _around = [moment.astimezone(UTC) + timedelta(days=way) for way in (-1, 1)]
+    except OverflowError:
+        return False
+    return True
+
+
 @dataclass(frozen=True)
 class Wishes:
     """What a report is made of. `last`: only the last so many readings; of them those measured from `start` to `end`."""
@@ -54,6 +63,11 @@ class Wishes:
                 start=self.start.isoformat(), end=self.end.isoformat()
             )
             errors.append(FieldError("from", message))
+        errors += [
+            FieldError(name, _("lies outside the years 1 to 9999"))
+            for name, at in (("from", self.start), ("to", self.end))
+            if at is not None and not _in_every_zone(at)
+        ]
         try:
             values.zone_named(self.zone)
         except (values.Unreadable, ValueError) as error:
