@@ -16,7 +16,8 @@ from app.web.templates import TEMPLATE_DIR, environment
 TEMPLATES = sorted(path.relative_to(TEMPLATE_DIR).as_posix() for path in TEMPLATE_DIR.rglob("*.html"))
 READ_ATTRIBUTES = {"alt", "aria-label", "placeholder", "title"}
 WORD = re.compile(r"[^\W\d_]{3,}")
-NAMES = {"Inband", "curl", "Cpk", "Cpm", "Ppk", "ndc", "ppm"}  # and symbols of the standards: the same in every language
+# Symbols of the standards too: they are the same in every language.
+NAMES = {"Inband", "curl", "Cpk", "Cpm", "Ppk", "ndc", "ppm"}
 UNREAD = {"script", "style", "code", "kbd", "svg", "template"}
 TRANSLATING = {"_", "gettext", "ngettext", "pgettext", "npgettext"}
 HOLE = "\N{OBJECT REPLACEMENT CHARACTER}"  # where the template puts a value
