@@ -76,7 +76,8 @@ class Listener:
 def listening(client: httpx.Client, last_event_id: int | str | None = None, **query: Any) -> Iterator[Listener]:
     headers = {} if last_event_id is None else {"Last-Event-ID": str(last_event_id)}
     if last_event_id is None:
-        time.sleep(0.7)  # the server looks ten times a second, twice while nobody listens; what was done before we came may still be told
+        # The server looks ten times a second, twice while nobody listens: what was done before we came may still be told.
+        time.sleep(0.7)
     with client.stream("GET", "/api/v1/events", headers=headers, params=query) as response:
         assert response.status_code == 200
         assert response.headers["content-type"].startswith("text/event-stream")
