@@ -101,6 +101,7 @@ async def get_caller(request: Request, session: SessionDep) -> Caller:
                 _("This key is not known, or was revoked."),
                 _("Ask an administrator for a new key: Set-up, machine, keys."),
             )
+        request.state.person = caller  # a page says to whom it is shown, whoever that is
         return caller
     token = request.cookies.get(SESSION_COOKIE)
     found = await run_in_threadpool(signed_in, session, token) if token else None

@@ -300,6 +300,13 @@ def addresses(shop: Shop) -> list[str]:
     return [address.format(**values) for opened in PAGES.values() for address in opened]
 
 
+def test_a_key_in_place_of_a_sign_in_meets_no_fault(server: Server, shop: Shop) -> None:
+    for key in (server.key("viewer"), server.key(machine=shop.machine)):
+        with server.client(key) as client:
+            answers = {address: client.get(address).status_code for address in addresses(shop)}
+        assert {address: status for address, status in answers.items() if status >= 500} == {}
+
+
 def too_wide(page: Page) -> int:
     """Pixels by which the page is wider than the screen."""
     return int(page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth"))
