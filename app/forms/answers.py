@@ -48,7 +48,7 @@ FORM_OUT: dict[str, JsonValue] = {
 
 
 class VerdictOut(BaseModel):
-    """Whether the tolerance is kept. sure: the limit lies outside the uncertainty."""
+    """Whether the tolerance is kept. sure: the limit lies outside the uncertainty, which is known."""
 
     code: Annotated[str, Field(description="good, good_unsure, bad_unsure or bad.")]
     good: bool
@@ -137,7 +137,7 @@ def form_out(row: FormRow, became: Became | None = None) -> FormOut:
         verdict = VerdictOut(
             code=found.verdict,
             good=found.verdict.startswith("good"),
-            sure=not found.verdict.endswith("unsure"),
+            sure=found.uncertainty is not None and not found.verdict.endswith("unsure"),
             text=wording.sentence(found.value, made.tolerance, found.uncertainty, found.verdict),
         )
     return FormOut(

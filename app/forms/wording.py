@@ -104,11 +104,11 @@ def sentence(value: float, tolerance: float | None, uncertainty: float | None, v
         case None:
             text = _("{value}; no tolerance was stated.")
         case "good" if uncertainty is None:
-            text = _("{value} is within the tolerance {tolerance}.")
+            text = _("{value} is within the tolerance {tolerance}; how certain that is, these touches do not say.")
         case "good":
             text = _("{value} ± {uncertainty} is within the tolerance {tolerance}.")
         case "bad" if uncertainty is None:
-            text = _("{value} is more than the tolerance {tolerance}.")
+            text = _("{value} is more than the tolerance {tolerance}; how certain that is, these touches do not say.")
         case "bad":
             text = _("{value} ± {uncertainty} is more than the tolerance {tolerance}.")
         case "good_unsure":
