@@ -37,8 +37,8 @@ PERIOD: dict[str, Any] = {
     "quantity": "deviation",
     "first_sequence": 1,
     "last_sequence": 60,
-    "grouping": "pause",
-    "group_size": 3,
+    "grouping": "consecutive",
+    "group_size": 2,
     "group_pause": 2.5,
     "ewma_lambda": 0.2,
     "ewma_width": 3.0,
@@ -434,6 +434,7 @@ class Place:
         line = Line(shop)
         line.push([9.0])
         line.look()
+        self.line = line
         proposals = f"/characteristics/{shop.characteristic}/proposals"
         proposal = shop.call("POST", proposals, 201, zero_range=0.003, reason="Fewer corrections")
         self.values: dict[str, Any] = {
@@ -459,6 +460,7 @@ class Place:
         made = {
             path: shop.call("POST", path, 201, **body) for path, body in (("/work-zeros", zero), ("/alignments", side))
         }
+        self.zero = made["/work-zeros"]["id"]
         form = shop.call("POST", "/forms", 201, **BODIES["POST /api/v1/forms"] | {"machine": shop.machine, "key": None})
         plan = "PUT /api/v1/machines/{machine}/kinematics"
         shop.call("PUT", f"/machines/{shop.machine}/kinematics", **BODIES[plan])
@@ -489,6 +491,10 @@ class Place:
         verb = operation.path.rpartition("/")[2]
         values["number"] = self.numbers.get(operation.path) or self.numbers.get(verb, values["number"])
         values["run"] = self.runs.get(verb, values["run"])
+        if "/baselines" in operation.path:
+            values["characteristic"] = self.line.key
+        if operation.path.endswith("/put-in-force"):
+            self.line.freeze(1, 50)  # so that the first is not in force
         if operation.path == "/api/v1/keys/{key}":
             values["key"] = self.shop.call("POST", "/keys", 201, name="third", role="viewer")["id"]
         return operation.path.format(**(values | other))
@@ -499,7 +505,8 @@ class Place:
                 return [filled(each) for each in value]
             return value.format(**self.values) if isinstance(value, str) else value
 
-        return {name: filled(value) for name, value in BODIES[operation.name].items()}
+        body = {name: filled(value) for name, value in BODIES[operation.name].items()}
+        return body | ({"reference": self.zero} if "/fixtures/" in operation.path else {})
 
     def send(self, operation: Operation, content: bytes | str, **headers: str) -> httpx.Response:
         return self.shop.admin.request(

@@ -30,6 +30,7 @@ def align(
     The answer is the frame, how well it is known, which touches do not fit, and the text for the machine's control. Touches
     that leave the part free to move are refused with the reason, and with the touch to move.
     """
+    caller.must_somewhere("operator")
     machine = machine_named(session, given.machine)
     caller.must_at(machine.id, "operator")
     database: Database = request.app.state.database
@@ -47,6 +48,7 @@ def align(
 @router.post("/alignments/pallets", status_code=201, responses=problems(404, 409) | AGAIN)
 def compose_pallet(session: SessionDep, caller: AnyCaller, given: PalletIn, response: Response) -> AlignmentOut:
     """Compose the error of a pallet with that of a part on it: where the part lies on the machine."""
+    caller.must_somewhere("operator")
     made = actions.compose(session, given, caller)
     response.status_code = 200 if made.again else 201
     return alignment_out(session, made.alignment)

@@ -29,7 +29,7 @@ from app.core.spc.shewhart import Chart
 from app.statistics import queries as statistics
 from app.web.api import api_router, problems
 from app.web.choice import Chosen
-from app.web.deps import AnyCaller, Engineer, SessionDep
+from app.web.deps import AnyCaller, Engineer, SessionDep, require
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Limit, Page, page_of
 from app.web.i18n import _
 from app.web.theme import ThemeName
@@ -113,7 +113,9 @@ def freeze_baseline(
     return baseline_out(done.baseline, characteristic, _in_force(session, standing))
 
 
-@router.post("/characteristics/{characteristic}/baselines/preview", responses=problems(404))
+@router.post(
+    "/characteristics/{characteristic}/baselines/preview", responses=problems(404), dependencies=[require("viewer")]
+)
 def preview_baseline(
     session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, given: PeriodIn
 ) -> DraftAnswer:

@@ -89,6 +89,7 @@ def get_form_measurement(session: SessionDep, caller: AnyCaller, number: Number)
 @router.post("/forms/{number}/recompute", status_code=201, responses=problems(404))
 def recompute_form(session: SessionDep, caller: AnyCaller, number: Number, given: RecomputeIn) -> FormOut:
     """Evaluate the stored touches anew by the present code; what was found before stays on record."""
+    caller.must_somewhere("operator")
     row = queries.form(session, number)
     caller.must_at(row.measurement.machine_id, "operator")
     return _answer(session, actions.recompute(session, number, given.reason, caller))

@@ -119,6 +119,7 @@ def undo_kinematics_run(session: SessionDep, caller: Engineer, run: RunNumber, g
 @router.post("/kinematics/runs/{run}/recompute", responses=problems(404))
 def recompute_kinematics_run(session: SessionDep, caller: AnyCaller, run: RunNumber) -> RecomputedOut:
     """Evaluate it anew from what was sent, and say whether that comes to what is on record; nothing is changed."""
+    caller.must_somewhere("operator")
     _run(session, caller, run)
     row, found = actions.recompute(session, run)
     return RecomputedOut(

@@ -62,6 +62,11 @@ class Caller:
                 _("Use the key of the machine that this is about."),
             )
 
+    def must_somewhere(self, role: Role) -> None:
+        """Raises `NotAllowed` for a person without the role, before it is known which machine this is about."""
+        if self.machine_id is None:
+            self.must(role)
+
     @property
     def only_machine(self) -> int | None:
         """The machine to which lists are limited, or None for all."""

@@ -45,6 +45,7 @@ def find_work_zero(
     The answer holds the text that sets it on the machine's control, and how far the fixture has shifted. Touches that make
     no zero are refused with the reason, by their numbers. `characteristics` names what its results become readings of.
     """
+    caller.must_somewhere("operator")
     machine = machine_named(session, given.machine)
     caller.must_at(machine.id, "operator")
     database: Database = request.app.state.database

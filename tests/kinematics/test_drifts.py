@@ -7,6 +7,7 @@ import pytest
 
 from app.readings.actions import push_waiting
 from tests.kinematics.bench import RUNS, axis, plan, take
+from tests.loops import in_thread
 from tests.shop import Shop
 
 
@@ -71,7 +72,7 @@ class TestDrift:
         until = time.monotonic() + 20
         while not readings and time.monotonic() < until:  # the server's own round may be at it just now
             with shop.server.database.begin() as session:
-                push_waiting(session)
+                in_thread(lambda session=session: push_waiting(session))  # type: ignore[misc]
             readings = shop.call("GET", f"/readings?characteristic={shop.machine}-ex0c")["items"]
         assert [each["key"] for each in readings] == [f"kinematics:{run['run']}:EX0C"]
         assert readings[0]["measured"] == pytest.approx(run["axes"][0]["errors"]["EX0C"]["value"], abs=1e-9)

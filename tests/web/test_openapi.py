@@ -229,6 +229,10 @@ def send(client: httpx.Client, method: str, path: str, operation: Json, number: 
     return client.request(method, path, params=query, **body)  # type: ignore[arg-type]
 
 
+# What these ask for, the twenty readings of this server do not carry: a good request, and a refusal in words.
+OF_MANY_READINGS = ("/baselines", "/baselines/preview", "/gauge-studies/from-readings")
+
+
 class TestAgainstTheServer:
     def test_answers_to_readings_are_as_described(self, shop: Json) -> None:
         machine = shop["clients"]["machine"]
@@ -254,7 +258,8 @@ class TestAgainstTheServer:
                 may = operation["x-machine-key"] if role == "machine" else ROLES.index(role) >= ROLES.index(least)
                 answer = send(clients[role], method, path, operation, number=999_999)
                 refused = answer.status_code in {401, 403}
-                if refused is may or answer.status_code == 422 or answer.status_code >= 500:
+                too_few = answer.status_code == 422 and path.endswith(OF_MANY_READINGS)
+                if refused is may or (answer.status_code == 422 and not too_few) or answer.status_code >= 500:
                     wrong.append(f"{role}: {method} {path} answered {answer.status_code}")
         assert wrong == []
 

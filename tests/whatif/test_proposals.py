@@ -157,7 +157,7 @@ def test_from_the_map_to_a_new_version(shop: Shop, server: Server, page: Page) -
     engineer = Person(server, "engineer")
     engineer.sign_in(page)
     page.goto(f"/characteristics/{shop.characteristic}")
-    page.get_by_role("link", name="What if").click()
+    page.get_by_role("navigation", name="Pages of this characteristic").get_by_role("link", name="What if").click()
     expect(page.get_by_text("Do corrections act in full?")).to_be_visible()
     expect(page.locator("setting-map .at-today")).to_have_count(1)
     expect(page.locator("setting-map td a").nth(30)).to_be_visible()
