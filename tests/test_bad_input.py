@@ -149,7 +149,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/corrections/{machine}/{number}/rejected": WHY | {"although_fetched": False},
     "POST /api/v1/corrections/{machine}/{number}/approve": WHY,
     "POST /api/v1/corrections/{machine}/{number}/release": WHY,
-    "POST /api/v1/characteristics/{characteristic}/baselines": PERIOD | WHY | {"key": "bad-input", "seen_version": 1},
+    "POST /api/v1/characteristics/{characteristic}/baselines": PERIOD | WHY | {"key": "bad-input", "seen_version": 2},
     "POST /api/v1/characteristics/{characteristic}/baselines/preview": PERIOD,
     "POST /api/v1/characteristics/{characteristic}/baselines/{version}/retire": WHY,
     "POST /api/v1/characteristics/{characteristic}/baselines/{version}/put-in-force": WHY,
@@ -434,6 +434,7 @@ class Place:
         line = Line(shop)
         line.push([9.0])
         line.look()
+        line.freeze(1, 50)
         self.line = line
         proposals = f"/characteristics/{shop.characteristic}/proposals"
         proposal = shop.call("POST", proposals, 201, zero_range=0.003, reason="Fewer corrections")
@@ -493,8 +494,8 @@ class Place:
         values["run"] = self.runs.get(verb, values["run"])
         if "/baselines" in operation.path:
             values["characteristic"] = self.line.key
-        if operation.path.endswith("/put-in-force"):
-            self.line.freeze(1, 50)  # so that the first is not in force
+        if operation.path.endswith("/retire"):
+            values["version"] = 2  # the one in force
         if operation.path == "/api/v1/keys/{key}":
             values["key"] = self.shop.call("POST", "/keys", 201, name="third", role="viewer")["id"]
         return operation.path.format(**(values | other))

@@ -10,7 +10,7 @@ from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Body, Reason
 
 ChartName = Literal["individuals", "xbar_r", "xbar_s"]
 Grouping = Literal["consecutive", "pause", "part"]
-Place = Annotated[int, Field(ge=1, le=LARGEST_ID)]
+Place = Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID)]
 MOST_EXCLUDED = 100
 
 _PERIOD: dict[str, Any] = {
@@ -43,26 +43,31 @@ class PeriodIn(Body):
         None,
         description="For subgroups: so many readings one after the other, a pause that ends one, or the same part.",
     )
-    group_size: int | None = Field(None, ge=2, le=1000, description="Readings in a subgroup, for `consecutive`.")
+    group_size: int | None = Field(
+        None, strict=True, ge=2, le=1000, description="Readings in a subgroup, for `consecutive`."
+    )
     group_pause: float | None = Field(
-        None, gt=0, le=100_000, description="Minutes without a reading that end a subgroup, for `pause`."
+        None, strict=True, gt=0, le=100_000, description="Minutes without a reading that end a subgroup, for `pause`."
     )
-    ewma_lambda: float = Field(0.2, ge=0.001, le=1)
-    ewma_width: float = Field(3.0, gt=0, le=10, description="L: limits in standard deviations of the average.")
+    ewma_lambda: float = Field(0.2, strict=True, ge=0.001, le=1)
+    ewma_width: float = Field(
+        3.0, strict=True, gt=0, le=10, description="L: limits in standard deviations of the average."
+    )
     ewma_exact: bool = Field(
-        True, description="Exact limits, which widen from the first point on; else asymptotic ones."
+        True, strict=True, description="Exact limits, which widen from the first point on; else asymptotic ones."
     )
-    cusum_k: float = Field(0.5, ge=0, le=10, description="Half the shift that is to be found.")
-    cusum_h: float = Field(5.0, gt=0, le=100, description="A sum beyond it is a signal.")
-    cusum_headstart: float = Field(0.0, ge=0, lt=100, description="What both sums begin with: 0, or h/2.")
+    cusum_k: float = Field(0.5, strict=True, ge=0, le=10, description="Half the shift that is to be found.")
+    cusum_h: float = Field(5.0, strict=True, gt=0, le=100, description="A sum beyond it is a signal.")
+    cusum_headstart: float = Field(0.0, strict=True, ge=0, lt=100, description="What both sums begin with: 0, or h/2.")
     settle: int | None = Field(
         None,
+        strict=True,
         ge=20,
         le=10_000,
         description="For wear_residuals: readings in which an edge runs in; the last 20 of them set its level. Left out: as "
         "many as the edges of the period take.",
     )
-    average_span: int = Field(5, ge=2, le=1000, description="Readings in a moving average.")
+    average_span: int = Field(5, strict=True, ge=2, le=1000, description="Readings in a moving average.")
     excluded: list[ExcludedIn] = Field([], max_length=MOST_EXCLUDED, description="Left out, each run with a reason.")
 
 
