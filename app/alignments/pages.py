@@ -232,7 +232,9 @@ def _alignment(
         result=found.result,
         machine=machine,
         composed=composed,
-        texts=texts_by_control(machine.control, partial(program_of, found, machine)),
+        texts=texts_by_control(
+            machine.control, partial(program_of, found, machine), f"{machine.key}-alignment-{found.id}"
+        ),
         later=queries.recomputed_as(session, found),
         doubted={at for group in made.misfits for at in group},
         history=history_url(machine.key, found.name) if found.name else None,

@@ -12,7 +12,7 @@ from app.alignments.answers import TEXT, program_of
 from app.alignments.tables import Alignment
 from app.errors import NotFound
 from app.machines.queries import machine_named, machine_of
-from app.machines.wording import file_name
+from app.machines.wording import file_name, no_such_offset
 from app.web.api import api_router, plain, problems
 from app.web.deps import AnyCaller, SessionDep
 from app.web.downloads import download
@@ -70,10 +70,7 @@ def write_alignment(
     machine = machine_of(session, found.machine_id)
     text = program_of(found, machine, control)
     if text is None:
-        raise NotFound(
-            _("{offset} is no work offset of this control.").format(offset=found.given.get("work_offset", "")),
-            _("Choose the control that has it."),
-        )
+        raise no_such_offset(found.given.get("work_offset", ""))
     return download(text, file_name(control or machine.control, f"{machine.key}-alignment-{found.id}"))
 
 

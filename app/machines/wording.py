@@ -1,19 +1,43 @@
 """The words of machines: their controls by name, and texts for them."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
+from app.errors import NotFound
 from app.web.i18n import _
 
 CONTROLS = {"sinumerik": "Sinumerik", "fanuc": "Fanuc", "heidenhain": "Heidenhain"}
 
 
-def texts_by_control(own: str, write: Callable[[str | None], str | None]) -> list[tuple[str, str, str]]:
-    """Control, its name, and what is written for it: the machine's own first, then those that read program text.
+class Text(NamedTuple):
+    """Program text for one control: the control, its name, the text, and the name of the file that it is fetched as."""
 
-    write: for the control that is named, None for the machine's own; gives None where a control cannot have it.
+    control: str
+    name: str
+    text: str
+    file: str
+
+
+def texts_by_control(own: str, write: Callable[[str | None], str | None], what: str) -> list[Text]:
+    """What is written for each control: the machine's own first, then those that read program text.
+
+    write: for the control that is named, None for the machine's own; gives None where a control cannot have it. what: the
+    file's name without its ending.
     """
     written = [(own, write(None)), *((each, write(each)) for each in ("sinumerik", "fanuc") if each != own)]
-    return [(control, CONTROLS.get(control) or _("To type in"), text) for control, text in written if text is not None]
+    return [
+        Text(control, CONTROLS.get(control) or _("To type in"), text, file_name(control, what))
+        for control, text in written
+        if text is not None
+    ]
+
+
+def no_such_offset(offset: str) -> NotFound:
+    """What to say of a work offset that the chosen control does not have."""
+    return NotFound(
+        _("{offset} is no work offset of this control.").format(offset=offset),
+        _("Choose the control that has it."),
+    )
 
 
 def file_name(control: str, what: str) -> str:

@@ -6,15 +6,13 @@ from fastapi import Path, Query, Request, Response
 from fastapi.responses import PlainTextResponse
 
 from app.db.engine import Database
-from app.errors import NotFound
 from app.machines.queries import machine_named, machine_of
-from app.machines.wording import file_name
+from app.machines.wording import file_name, no_such_offset
 from app.readings import actions as readings
 from app.web.api import api_router, plain, problems
 from app.web.deps import AnyCaller, Engineer, Operator, SessionDep
 from app.web.downloads import download
 from app.web.fields import Control, Cursor, Limit, Page, Slug, page_of
-from app.web.i18n import _
 from app.web.theme import theme_from
 from app.zeros import actions, figures, queries
 from app.zeros.answers import TEXT, FixtureOut, ZeroOut, fixture_out, program_of, zero_out, zeros_out
@@ -147,10 +145,7 @@ def write_work_zero(
     machine = machine_of(session, zero.machine_id)
     text = program_of(zero, machine, control)
     if text is None:
-        raise NotFound(
-            _("{offset} is no work offset of this control.").format(offset=zero.work_offset),
-            _("Choose the control that has it."),
-        )
+        raise no_such_offset(zero.work_offset)
     return download(text, file_name(control or machine.control, f"{machine.key}-zero-{zero.id}"))
 
 

@@ -170,7 +170,7 @@ def _zero(
         machine=machine,
         touches=touches,
         picture=pictures.draw(zero.kind, touches, made.model_dump(), made.tip),
-        texts=texts_by_control(machine.control, partial(program_of, zero, machine)),
+        texts=texts_by_control(machine.control, partial(program_of, zero, machine), f"{machine.key}-zero-{zero.id}"),
         later=queries.recomputed_as(session, zero),
         form=form or {},
         errors=forms.at_fields(error) if error else {},
