@@ -6,6 +6,7 @@ is issued; whatever else happens to a correction makes it forgotten.
 """
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from datetime import datetime
 from itertools import islice
 from typing import NamedTuple, overload
@@ -123,10 +124,11 @@ def _cut(ground: Ground, tool: ToolState, in_effect: int | None) -> Cut:
     """What is known of parts that name this correction as the last one in effect, up to the newest correction."""
     last = None if in_effect is None else ground.named.get((tool.machine_id, in_effect))
     cut = tool.cuts.get(in_effect)
-    if cut is None or cut.last is not last or cut.seen > len(tool.corrections):
+    # By value, and a copy kept: a part of another tool may tell meanwhile when the named correction was applied.
+    if cut is None or cut.last != last or cut.seen > len(tool.corrections):
         if len(tool.cuts) >= MOST_CUTS:
             del tool.cuts[next(iter(tool.cuts))]
-        cut = tool.cuts[in_effect] = Cut(in_effect, last)
+        cut = tool.cuts[in_effect] = Cut(in_effect, copy(last))
     return cut if cut.seen == len(tool.corrections) else _extended(cut, tool, None)
 
 

@@ -80,6 +80,7 @@ class QuietReadings:
         self._stale = np.ones(len(self._kinds), np.bool_)
         self._now = np.zeros(len(self._kinds), np.int64)  # the circumstance of each kind
         self._of_stream = streams
+        self._named = np.array([kind.in_effect or 0 for kind in self._kinds])
         self._of_tool = np.array([0 if kind.stream.tool is None else id(kind.stream.tool) for kind in self._kinds])
         self._sequences = np.array([stream.sequence for _, stream in self._streams.values()], np.int64)
         self._averages = np.array([memory.average for _, memory in self._memories.values()] or [0.0])
@@ -155,6 +156,8 @@ class QuietReadings:
         stale = self._of_stream == index
         if judged.tool is not None:
             stale |= self._of_tool == id(judged.tool)
+        if (in_effect := self.wanted[at][1].correction_in_effect) is not None:
+            stale |= self._named == in_effect  # it may have told when that was applied
         self._stale |= stale
         self._lanes.silence(stale)
 
@@ -226,7 +229,7 @@ class QuietReadings:
         circumstances = [self._circumstances[number] for number in met.tolist()]
         streams = self.streams()
         readings = [self.wanted[position][1] for position in at.tolist()]
-        in_effect = np.array([kind.in_effect or 0 for kind in self._kinds])[self._kind_of[at]]
+        in_effect = self._named[self._kind_of[at]]
         named = np.array([kind.in_effect is None for kind in self._kinds])[self._kind_of[at]]
         null = always(None)
         compensated = np.array([np.nan if c.compensated is None else c.compensated for c in circumstances])[

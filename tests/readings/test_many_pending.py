@@ -9,7 +9,7 @@ import pytest
 from app.core.parameters import read
 from app.readings import cutting, quiet
 from app.readings.cutting import Firsts
-from app.readings.ground import AverageState, Ground, Named, StreamState, ToolState, Verdict
+from app.readings.ground import AverageState, Ground, IssuedCorrection, Named, StreamState, ToolState, Verdict
 from app.readings.judge import judge
 from app.readings.quiet import QuietReadings
 from app.readings.records import Entry, Record
@@ -113,3 +113,16 @@ def test_readings_share_the_numbers_and_each_keeps_its_own_count() -> None:
     assert array_of_int4(first) == array_of_int4([3, 5]) != array_of_int4(numbers)
     with pytest.raises(IndexError):
         _ = first[2]
+
+
+def test_what_another_tool_tells_of_the_named_correction_is_not_missed() -> None:
+    """17 is another tool's and pending; once a part there shows when it took effect, 5, approved later, was not in it."""
+    eight, nine, ten = (datetime(2026, 11, 22, hour, tzinfo=UTC) for hour in (8, 9, 10))
+    ground = ground_of()
+    tool = ground.tools[1, 3]
+    tool.corrections = [IssuedCorrection(1, 5, 3, -0.004, "applied", applied_at=ten, decided_at=nine)]
+    ground.named[1, 17] = Named(None, None)
+    reading = ReadingIn("shaft", measured=40.0, correction_in_effect=17)
+    assert list(cutting.cut_with(ground, tool, reading).outstanding) == []
+    ground.named[1, 17].applied_at = eight
+    assert list(cutting.cut_with(ground, tool, reading).outstanding) == [5]
