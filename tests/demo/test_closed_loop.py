@@ -87,27 +87,6 @@ def test_the_past_is_in_the_past_in_order_and_leaves_nothing_to_be_done(server: 
 
 
 @pytest.mark.slow
-def test_a_past_of_weeks_has_nights_and_changed_tools_and_stays_in_control(server: Server) -> None:
-    tools = tuple(replace(tool, life=60) for tool in plant.MILL_1.tools)
-    features = tuple(replace(feature, key=f"{feature.key}-weeks") for feature in plant.MILL_1.features)
-    spec = replace(plant.MILL_1, key="mill-weeks", name="Mill of weeks", tools=tools, features=features)
-    (line,) = lines(server.url, server.key("admin"), 1, threading.Event(), [spec])
-    line.fill(0, days=1.05)
-    found = readings(server, "plate-w20-weeks")
-    changes = line._tools()[12]
-    line.close()
-    times = [datetime.fromisoformat(reading["measured_at"]) for reading in found]
-    assert times[-1] - times[0] > timedelta(days=1)
-    assert max(later - earlier for earlier, later in pairwise(times)) > timedelta(hours=15), "no night in it"
-    assert len(found) > 160
-    assert changes["changed_at"] is not None
-    assert changes["parts"] < 61
-    assert "before_tool_change" not in {reading["reason"]["code"] for reading in found}
-    width = features[1].upper - features[1].lower
-    assert fmean([abs(reading["deviation"]) for reading in found[-100:]]) < width / 6
-
-
-@pytest.mark.slow
 def test_a_chipped_edge_stops_the_machine_until_somebody_replaces_the_tool(server: Server, filled: list[Line]) -> None:
     line = filled[0]
     thread = threading.Thread(target=line.live, args=(Pace(6000, datetime.now(UTC), line.machine.at),))
@@ -120,23 +99,28 @@ def test_a_chipped_edge_stops_the_machine_until_somebody_replaces_the_tool(serve
         line._operator.post(
             f"/alarms/{alarm['id']}/acknowledge", {"action": "tool_replaced", "comment": "insert changed"}
         )
-        wait_for(lambda: line.machine.serial > cut + 5)
+        wait_for(lambda: line.machine.serial > cut + 10)
         assert line.machine.edges[7].chip == 0
         assert line.machine.edges[7].parts < 40
     finally:
         line._ending.set()
         thread.join(20)
     assert not thread.is_alive()
-    after = [r for r in readings(server, "shaft-l120")[-3:] if r["reason"]["code"] != "before_tool_change"]
-    assert all(abs(reading["deviation"]) < 0.1 for reading in after)
-    server_offset = line_tools(server)[7]
+    changed_at = datetime.fromisoformat(line_tools(server)[7]["changed_at"])
+    measured_since = [
+        r for r in readings(server, "shaft-l120") if datetime.fromisoformat(r["measured_at"]) > changed_at
+    ]
+    of_the_new = [r["deviation"] for r in measured_since if r["reason"]["code"] != "before_tool_change"]
+    assert of_the_new
+    assert max(map(abs, of_the_new)) < 0.1
+    server_offset = line_tools(server)[7]["offset"]
     assert line.machine.edges[7].offset == pytest.approx(server_offset, abs=0.05)
 
 
-def line_tools(server: Server) -> dict[int, float]:
+def line_tools(server: Server) -> dict[int, dict[str, Any]]:
     with server.client(server.key("viewer")) as client:
         tools = client.get("/api/v1/machines/lathe-1/tools").json()["items"]
-    return {tool["tool_memory"]: tool["offset"] for tool in tools}
+    return {tool["tool_memory"]: tool for tool in tools}
 
 
 def wait_for(condition: Any, seconds: float = 30) -> Any:
@@ -238,8 +222,31 @@ def test_the_operator_steps_in_only_after_a_visitor_had_a_minute() -> None:
     assert running.PATIENCE[0] >= 60
 
 
+# --- the last ones: they set the plant up anew, and the keys of the lines above stop working
+
+
 @pytest.mark.slow
-# The last one: it sets the plant up anew, and the keys of the lines above stop working.
+def test_a_past_of_weeks_has_nights_and_changed_tools_and_stays_in_control(server: Server) -> None:
+    tools = tuple(replace(tool, life=60) for tool in plant.MILL_1.tools)
+    features = tuple(replace(feature, key=f"{feature.key}-weeks") for feature in plant.MILL_1.features)
+    spec = replace(plant.MILL_1, key="mill-weeks", name="Mill of weeks", tools=tools, features=features)
+    (line,) = lines(server.url, server.key("admin"), 1, threading.Event(), [spec])
+    line.fill(0, days=1.05)
+    found = readings(server, "plate-w20-weeks")
+    changes = line._tools()[12]
+    line.close()
+    times = [datetime.fromisoformat(reading["measured_at"]) for reading in found]
+    assert times[-1] - times[0] > timedelta(days=1)
+    assert max(later - earlier for earlier, later in pairwise(times)) > timedelta(hours=15), "no night in it"
+    assert len(found) > 160
+    assert changes["changed_at"] is not None
+    assert changes["parts"] < 61
+    assert "before_tool_change" not in {reading["reason"]["code"] for reading in found}
+    width = features[1].upper - features[1].lower
+    assert fmean([abs(reading["deviation"]) for reading in found[-100:]]) < width / 6
+
+
+@pytest.mark.slow
 def test_a_person_ends_it_when_part_after_part_is_not_accepted(server: Server) -> None:
     features = tuple(replace(feature, key=f"{feature.key}-stuck") for feature in plant.LATHE_3.features)
     spec = replace(plant.LATHE_3, key="lathe-stuck", name="Lathe", features=features)
