@@ -130,7 +130,7 @@ def get_histogram(
     theme: Theme = "light",
     width: Width = 300,  # noqa: ARG001 - every chart is asked with its width
 ) -> Response:
-    """How the deviations are spread, without excluded readings; of more than 100 000 the last 100 000."""
+    """How the deviations are spread, without excluded readings and probe faults; of more than 100 000 the last 100 000."""
     standing, window = _found(session, caller, characteristic, choice)
     parameters = standing.parameters
     counts = statistics.histogram_of(

@@ -18,7 +18,11 @@ router = api_router("statistics")
 
 
 class StatisticsOut(BaseModel):
-    """Deviations in mm. What cannot be said of so few readings is null; excluded readings are left out."""
+    """Deviations in mm. What cannot be said of so few readings is null; excluded readings are left out.
+
+    A probe fault (R36 reached) measured no part: it is in `count` and `zones`, and left out of mean, standard deviation,
+    minimum, maximum and share, as capability and control charts leave it out.
+    """
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -28,6 +32,7 @@ class StatisticsOut(BaseModel):
                 "last_sequence": 812,
                 "count": 199,
                 "excluded": 1,
+                "probe_faults": 0,
                 "mean": 0.00042,
                 "standard_deviation": 0.00193,
                 "minimum": -0.0061,
@@ -55,14 +60,15 @@ class StatisticsOut(BaseModel):
     characteristic: str
     first_sequence: int | None = Field(description="First reading that was looked at.")
     last_sequence: int | None
-    count: int
+    count: int = Field(description="Readings that nobody excluded, probe faults among them.")
     excluded: int
+    probe_faults: int = Field(description="Of `count`: left out of every number but `count` and `zones`.")
     mean: float | None
     standard_deviation: float | None = Field(description="Of the sample (n - 1); null for fewer than two readings.")
     minimum: float | None
     maximum: float | None
     in_tolerance: int = Field(description="Parts whose raw deviation was within the tolerance in force.")
-    share_in_tolerance: float | None
+    share_in_tolerance: float | None = Field(description="Of the parts measured: `count` less `probe_faults`.")
     corrections: int = Field(description="Readings that led to a correction.")
     rejected: int | None = Field(description="With acceptance n of m: parts that were not accepted; else null.")
     sections_outside: int | None = Field(
@@ -106,6 +112,7 @@ def get_statistics(
         last_sequence=window.last if window.count else None,
         count=numbers.count,
         excluded=numbers.excluded,
+        probe_faults=numbers.probe_faults,
         mean=numbers.mean,
         standard_deviation=numbers.standard_deviation,
         minimum=numbers.minimum,

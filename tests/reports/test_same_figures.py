@@ -49,6 +49,7 @@ def test_the_numbers_are_those_of_the_statistics(shop: Shop, period: str) -> Non
     said, found = facts(report(shop, period), "numbers"), of(shop, "statistics", period)
     assert said["count"]["value"] == found["count"] > 20
     assert said["excluded"]["value"] == found["excluded"]
+    assert said["probe_faults"]["value"] == found["probe_faults"]
     for name in ("mean", "standard_deviation", "minimum", "maximum"):
         assert said[name]["value"] == um(found[name])
     assert said["in_tolerance"]["value"] == found["in_tolerance"]
@@ -82,6 +83,9 @@ def test_capability_is_that_of_its_page(shop: Shop, period: str) -> None:
 def test_probe_faults_and_exclusions_are_left_out_and_named(shop: Shop) -> None:
     numbers = next(each for each in report(shop)["sections"] if each["key"] == "numbers")
     assert numbers["warnings"][0].startswith("1 of these readings is a probe fault")
+    counted = facts(report(shop), "numbers")
+    assert (counted["probe_faults"]["value"], counted["zone_probe_fault"]["value"]) == (1, 1)
+    assert counted["outside"]["value"] == facts(report(shop), "capability")["outside"]["value"]
     said = facts(report(shop), "capability")
     assert (said["excluded"]["value"], said["excluded"]["note"]) == (2, "17, 560")
     assert (said["faults"]["value"], said["faults"]["note"]) == (1, "601")

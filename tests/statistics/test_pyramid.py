@@ -149,10 +149,11 @@ class TestNumbers:
         found = large.numbers(large.window(), **bounds)
         row = large.session.execute(
             text(
-                "SELECT count(*), avg(deviation), stddev_samp(deviation), min(deviation), max(deviation), "
+                "SELECT count(*), avg(d), stddev_samp(d), min(d), max(d), "
                 "count(*) FILTER (WHERE abs(deviation) <= 0.008), count(correction), "
-                "count(*) FILTER (WHERE zone = 'zero'), count(*) FILTER (WHERE zone = 'undersize') "
-                "FROM reading r WHERE characteristic_id = :c AND measured_at BETWEEN :start AND :end AND NOT EXISTS "
+                "count(*) FILTER (WHERE zone = 'zero'), count(*) FILTER (WHERE zone = 'undersize'), "
+                "count(*) FILTER (WHERE zone = 'probe_fault') "
+                "FROM reading r, LATERAL (SELECT CASE WHEN abs(deviation) < 1 THEN deviation END) AS of_part(d) WHERE characteristic_id = :c AND measured_at BETWEEN :start AND :end AND NOT EXISTS "
                 "(SELECT FROM exclusion e WHERE e.characteristic_id = r.characteristic_id AND e.sequence = r.sequence)"
             ),
             {
@@ -167,6 +168,7 @@ class TestNumbers:
         assert (found.minimum, found.maximum) == (row[3], row[4])
         assert (found.in_tolerance, found.corrections) == (row[5], row[6])
         assert (found.zones["zero"], found.zones["undersize"]) == (row[7], row[8])
+        assert (found.probe_faults, found.measured) == (row[9], row[0] - row[9])
         assert sum(found.zones.values()) == found.count
         assert found.in_tolerance < found.count
 
@@ -188,7 +190,9 @@ def test_the_histogram_is_that_of_the_readings(large: Large) -> None:
         large.session, large.standing.characteristic, window, histogram_edges(limits), limits.tolerance_width / 2
     )
     deviations = large.session.scalars(
-        text("SELECT deviation FROM reading WHERE characteristic_id = :c AND sequence BETWEEN :f AND :l"),
+        text(
+            "SELECT deviation FROM reading WHERE characteristic_id = :c AND sequence BETWEEN :f AND :l AND abs(deviation) < 1"
+        ),
         {"c": large.standing.characteristic.id, "f": window.first, "l": COUNT - 1},  # the last is excluded
     ).all()
     assert sum(counts) == len(deviations)

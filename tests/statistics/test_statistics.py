@@ -85,6 +85,22 @@ def test_the_excluded_are_left_out(measured: Shop) -> None:
     assert found["share_in_tolerance"] == 1.0
 
 
+def test_a_probe_fault_is_counted_and_in_no_other_number(measured: Shop) -> None:
+    before = statistics(measured)
+    measured.read(1500.0)
+    found = statistics(measured)
+    assert (found["count"], found["probe_faults"], found["zones"]["probe_fault"]) == (6, 1, 1)
+    same = ("mean", "standard_deviation", "minimum", "maximum", "in_tolerance", "share_in_tolerance", "corrections")
+    assert [found[name] for name in same] == [before[name] for name in same]
+    only = statistics(measured, "?last=1")
+    assert (only["count"], only["probe_faults"], only["in_tolerance"]) == (1, 1, 0)
+    assert all(
+        only[name] is None for name in ("mean", "standard_deviation", "minimum", "maximum", "share_in_tolerance")
+    )
+    figure = measured.call("GET", f"/characteristics/{measured.characteristic}/figures/histogram")
+    assert sum(figure["data"][0]["x"]) == 5
+
+
 def test_a_part_counts_as_it_is_not_as_it_was_decided(shop: Shop) -> None:
     """The second part was cut before the correction of the first: decided as good, yet it is out of tolerance."""
     shop.read(20.0)

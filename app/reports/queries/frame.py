@@ -60,12 +60,12 @@ class Frame:
 
     @cached_property
     def history(self) -> History:
-        """The deviations of the period, without excluded ones. Raises `Invalid` for more than ten million."""
+        """The deviations of the period and their zones, without excluded ones. Raises `Invalid` for more than ten million."""
         return statistics.history_of(
             self.session,
             self.standing.characteristic,
             self.window,
-            ("deviation",),
+            ("deviation", "zone"),
             start=self.wishes.start,
             end=self.wishes.end,
         ).counted

@@ -13,6 +13,7 @@ from app.web.i18n import _, ngettext
 from app.web.theme import zone_name
 
 HISTOGRAM = (380, 400)
+FAULT = list(Zone).index(Zone.PROBE_FAULT)
 
 
 def numbers(frame: Frame) -> Section:
@@ -21,13 +22,14 @@ def numbers(frame: Frame) -> Section:
     facts = [
         Fact("count", _("Readings"), count(found.count)),
         Fact("excluded", _("Excluded"), count(found.excluded)),
+        Fact("probe_faults", _("Probe faults"), count(found.probe_faults)),
         Fact("mean", _("Mean deviation"), deviation(found.mean, 2)),
         Fact("standard_deviation", _("Standard deviation"), width(found.standard_deviation)),
         Fact("minimum", _("Smallest deviation"), deviation(found.minimum)),
         Fact("maximum", _("Largest deviation"), deviation(found.maximum)),
         Fact("in_tolerance", _("In tolerance"), count(found.in_tolerance)),
         Fact("share_in_tolerance", _("Share in tolerance"), share(found.share_in_tolerance)),
-        Fact("outside", _("Out of tolerance"), count(found.count - found.in_tolerance)),
+        Fact("outside", _("Out of tolerance"), count(found.outside)),
         Fact("corrections", _("Readings that led to a correction"), count(found.corrections)),
     ]
     if frame.parameters.accept_m > 1:
@@ -50,13 +52,13 @@ def numbers(frame: Frame) -> Section:
         warnings.append(
             _("No readings were measured in this period: choose a longer one, or the last so many readings.")
         )
-    elif found.count < 2:
+    elif found.measured == 1:
         warnings.append(_("One reading has no spread: a standard deviation takes two."))
-    if faults := found.zones[Zone.PROBE_FAULT.value]:
+    if faults := found.probe_faults:
         warnings.append(
             ngettext(
-                "%(num)d of these readings is a probe fault, which measures no part: it is in mean, spread and extremes here; capability and control charts leave it out.",
-                "%(num)d of these readings are probe faults, which measure no part: they are in mean, spread and extremes here; capability and control charts leave them out.",
+                "%(num)d of these readings is a probe fault, which measures no part: it is left out of mean, spread, extremes and share.",
+                "%(num)d of these readings are probe faults, which measure no part: they are left out of mean, spread, extremes and share.",
                 faults,
             )
             % {"num": faults}
@@ -88,7 +90,7 @@ def counts_of(frame: Frame) -> list[int]:
     """How many deviations of the period fall into each bar of the histogram, counted as the page counts them."""
     limits: HasLimits = frame.parameters
     half = limits.tolerance_width / 2
-    values = frame.history["deviation"]
+    values = frame.history["deviation"][frame.history["zone"] != FAULT]
     values = np.where(np.abs(values - half) < 5e-7, values - 1e-9, values)
     edges = np.array(histogram_edges(limits))
     bars = np.bincount(np.searchsorted(edges, values, side="right"), minlength=len(edges) + 1)

@@ -1,4 +1,7 @@
-"""The numbers of a run of readings, exact; excluded readings are left out."""
+"""The numbers of a run of readings, exact; excluded readings are left out.
+
+Probe faults (|D| ≥ R36) measure no part: they are counted as readings and in their zone, and in nothing else.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -19,39 +22,44 @@ MOST_ONE_BY_ONE = (
     50_000  # readings that are aggregated as they are; more are taken from the pyramid where it settles them
 )
 MOST_IN_HISTOGRAM = 100_000
+FAULT = list(Zone).index(Zone.PROBE_FAULT)
 
 # regr_sxx is the sum of squares about the mean, which PostgreSQL accumulates without cancellation (Youngs and Cramer).
 # A part is judged by its raw deviation and the tolerance of the version that was in force, in whole nanometres.
+_OF_A_PART = f"r.zone <> '{Zone.PROBE_FAULT.value}'"
 _PARTS = f"""
-SELECT count(*), avg(r.deviation), regr_sxx(r.deviation, r.deviation), min(r.deviation), max(r.deviation),
-    count(r.correction), count(*) FILTER (WHERE round(abs(r.deviation) * 1000000) <= v.tolerance),
+SELECT count(d), avg(d), regr_sxx(d, d), min(d), max(d), count(r.correction),
+    count(*) FILTER (WHERE round(abs(d) * 1000000) <= v.tolerance),
     {", ".join(f"count(*) FILTER (WHERE r.zone = '{zone.value}')" for zone in Zone)}
 FROM unnest(CAST(:firsts AS bigint[]), CAST(:lasts AS bigint[])) AS run(first, last)
 JOIN reading r ON r.machine_id = :machine AND r.characteristic_id = :characteristic
     AND r.sequence BETWEEN run.first AND run.last
 JOIN unnest(CAST(:versions AS int[]), CAST(:tolerances AS bigint[])) AS v(version, tolerance)
     ON v.version = r.parameters_version
+CROSS JOIN LATERAL (SELECT CASE WHEN {_OF_A_PART} THEN r.deviation END) AS part(d)
 WHERE (CAST(:start AS timestamptz) IS NULL OR r.measured_at >= :start)
   AND (CAST(:end AS timestamptz) IS NULL OR r.measured_at <= :end)
   AND NOT r.sequence = ANY(CAST(:excluded AS bigint[]))
 """  # noqa: S608 - made of the names of our zones
 
 # width_bucket counts as `histogram_counts` does: a value on an edge belongs to the upper bar, on the limit to the inner.
-_HISTOGRAM = """
+_HISTOGRAM = f"""
 SELECT width_bucket(CASE WHEN abs(deviation - :half) < 5e-7 THEN deviation - 1e-9 ELSE deviation END,
                     CAST(:edges AS float8[])) AS bar, count(*)
-FROM reading
+FROM reading r
 WHERE machine_id = :machine AND characteristic_id = :characteristic AND sequence BETWEEN :first AND :last
-  AND NOT sequence = ANY(CAST(:excluded AS bigint[]))
+  AND {_OF_A_PART} AND NOT sequence = ANY(CAST(:excluded AS bigint[]))
 GROUP BY bar
-"""
+"""  # noqa: S608 - made of the names of our zones
 
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
     """What the readings amount to; deviations in mm, None where there are too few readings to say.
 
-    in_tolerance counts parts by their raw deviation; zones are those by which was decided.
+    count: readings that nobody excluded, probe faults among them; `measured` are those that measured a part, and of them
+    are mean, spread, extremes and shares. in_tolerance counts parts by their raw deviation; zones are those by which was
+    decided.
     """
 
     count: int
@@ -65,17 +73,34 @@ class Numbers:
     zones: dict[str, int]
 
     @property
+    def probe_faults(self) -> int:
+        return self.zones[Zone.PROBE_FAULT.value]
+
+    @property
+    def measured(self) -> int:
+        return self.count - self.probe_faults
+
+    @property
+    def outside(self) -> int:
+        return self.measured - self.in_tolerance
+
+    @property
     def share_in_tolerance(self) -> float | None:
-        return self.in_tolerance / self.count if self.count else None
+        return self.in_tolerance / self.measured if self.measured else None
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
-    count: int
+class _Spread:
+    measured: int
     mean: float
     squares: float  # about the mean
     minimum: float
     maximum: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    spread: _Spread | None  # None: nothing but probe faults
     corrections: int
     in_tolerance: int
     zones: Sequence[int]
@@ -95,7 +120,8 @@ def numbers_of(
     parts: list[_Part] = []
     runs: list[Run] = [(window.first, window.last)]
     if window.count > MOST_ONE_BY_ONE:
-        # Where even the extremes are in the tightest tolerance there ever was, no part is outside.
+        # Where even the extremes are in the tightest tolerance there ever was, no part is outside. The sums of a block
+        # hold its probe faults, so one with any is looked into; they are outside as a rule, and few.
         tightest = min(tolerances.values()) / 1_000_000
         cover = cover_of(
             session,
@@ -105,7 +131,7 @@ def numbers_of(
             start=start,
             end=end,
             without=excluded,
-            settles=lambda block: -tightest <= block.minimum and block.maximum <= tightest,
+            settles=lambda block: -tightest <= block.minimum and block.maximum <= tightest and not block.zones[FAULT],
         )
         runs, parts = cover.runs, [_part(block) for block in cover.blocks]
     where = {"machine": characteristic.machine_id, "characteristic": characteristic.id, "excluded": list(excluded)}
@@ -122,44 +148,38 @@ def numbers_of(
                 "end": end,
             },
         ).one()
-        if row[0]:
-            count, mean, squares, minimum, maximum, corrections, in_tolerance, *zones = row
-            parts.append(_Part(count, mean, squares, minimum, maximum, corrections, in_tolerance, zones))
+        measured, mean, squares, minimum, maximum, corrections, in_tolerance, *zones = row
+        spread = _Spread(measured, mean, squares, minimum, maximum) if measured else None
+        parts.append(_Part(spread, corrections, in_tolerance, zones))
     return _total(parts, _excluded_in_time(session, characteristic, excluded, start, end))
 
 
 def _part(block: Block) -> _Part:
     squares = max(0.0, block.sum_squares - block.sum * block.sum / block.count)
-    return _Part(
-        block.count,
-        block.mean,
-        squares,
-        block.minimum,
-        block.maximum,
-        block.corrections,
-        block.count,
-        block.zones,
-    )
+    spread = _Spread(block.count, block.mean, squares, block.minimum, block.maximum)
+    return _Part(spread, block.corrections, block.count, block.zones)
 
 
 def _total(parts: Sequence[_Part], excluded: int) -> Numbers:
     """Put the parts together: the sum of squares about the common mean, without ever subtracting large numbers."""
-    count = sum(part.count for part in parts)
+    spreads = [part.spread for part in parts if part.spread is not None]
     zones = {zone.value: sum(part.zones[at] for part in parts) for at, zone in enumerate(Zone)}
-    if not count:
-        return Numbers(0, excluded, None, None, None, None, 0, 0, zones)
-    mean = fsum(part.count * part.mean for part in parts) / count
-    squares = fsum(part.squares + part.count * (part.mean - mean) ** 2 for part in parts)
+    mean = deviation = None
+    if measured := sum(each.measured for each in spreads):
+        mean = fsum(each.measured * each.mean for each in spreads) / measured
+        if measured > 1:
+            squares = fsum(each.squares + each.measured * (each.mean - mean) ** 2 for each in spreads)
+            deviation = sqrt(squares / (measured - 1))
     return Numbers(
-        count,
-        excluded,
-        mean,
-        sqrt(squares / (count - 1)) if count > 1 else None,
-        min(part.minimum for part in parts),
-        max(part.maximum for part in parts),
-        sum(part.in_tolerance for part in parts),
-        sum(part.corrections for part in parts),
-        zones,
+        count=sum(zones.values()),
+        excluded=excluded,
+        mean=mean,
+        standard_deviation=deviation,
+        minimum=min((each.minimum for each in spreads), default=None),
+        maximum=max((each.maximum for each in spreads), default=None),
+        in_tolerance=sum(part.in_tolerance for part in parts),
+        corrections=sum(part.corrections for part in parts),
+        zones=zones,
     )
 
 
@@ -208,7 +228,7 @@ def histogram_of(
 ) -> list[int]:
     """How many deviations fall between the edges (mm, ascending); one count more than edges. half: the tolerance limit, mm.
 
-    Of more than `MOST_IN_HISTOGRAM` readings the last ones count.
+    Without excluded readings and probe faults. Of more than `MOST_IN_HISTOGRAM` readings the last ones count.
     """
     counts = [0] * (len(edges) + 1)
     first = max(window.first, window.last - MOST_IN_HISTOGRAM + 1)
