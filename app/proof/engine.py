@@ -7,7 +7,7 @@ import numpy as np
 from app.core.compensation import Action, State, average_of, decide
 from app.core.parameters import mean_nominal, read
 from app.core.spc import chance, constants, cusum, ewma, shewhart
-from app.core.spc.capability import Limits, capability, percentile, ppk_of, spread_index, target_index
+from app.core.spc.capability import Limits, capability, of_percentiles, percentile, ppk_of, spread_index, target_index
 from app.core.spc.in_time import brown_forsythe, decompose, successive
 from app.core.spc.normality import anderson_darling, p_of, shapiro_wilk
 from app.core.spc.rules import RULES, Rule, RuleName, signals, signals_of_cusum
@@ -218,6 +218,12 @@ def by_percentile(given: Given) -> Got:
     return {"low": found.low, "median": found.median, "high": found.high, "pp": found.pp, "ppk": found.ppk}
 
 
+def indices_of_percentiles(given: Given) -> Got:
+    limits = Limits(given.get("lower"), given.get("upper"))
+    pp, ppk = of_percentiles(given["low"], given["median"], given["high"], limits)
+    return {"ppk": ppk} if pp is None else {"pp": pp, "ppk": ppk}
+
+
 def anderson(given: Given) -> Got:
     values = readings_of(given)
     return summed_up(given) | {"statistic": anderson_darling(values).statistic}
@@ -272,6 +278,7 @@ ENGINE: dict[str, Callable[[Given], Got]] = {
     "intervals": intervals,
     "one_sided_bounds": one_sided_bounds,
     "percentile": by_percentile,
+    "percentile_indices": indices_of_percentiles,
     "anderson_darling": anderson,
     "anderson_p": anderson_p,
     "shapiro_wilk": shapiro,

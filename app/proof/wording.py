@@ -36,6 +36,7 @@ def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
                 "intervals",
                 "one_sided_bounds",
                 "percentile",
+                "percentile_indices",
                 "anderson_darling",
                 "anderson_p",
                 "shapiro_wilk",

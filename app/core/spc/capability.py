@@ -308,6 +308,18 @@ class PercentileCapability:
     cautions: tuple[Caution, ...]
 
 
+def of_percentiles(low: float, median: float, high: float, limits: Limits) -> tuple[float | None, float]:
+    """Pp and Ppk of X0.135, X50 and X99.865; no Pp without both limits.
+
+    >>> of_percentiles(-1.0, 0.0, 3.0, Limits(-2.0, 3.0))
+    (1.25, 1.0)
+    """
+    upper = inf if limits.upper is None else (limits.upper - median) / (high - median)
+    lower = inf if limits.lower is None else (median - limits.lower) / (median - low)
+    both = None if limits.lower is None or limits.upper is None else (limits.upper - limits.lower) / (high - low)
+    return both, min(upper, lower)
+
+
 def percentile(values: ArrayLike, limits: Limits, *, minimum: int = ENOUGH_READINGS) -> PercentileCapability:
     """ISO 22514-2: Pp = (U - L)/(X99.865 - X0.135), Ppk = min((U - X50)/(X99.865 - X50), (X50 - L)/(X50 - X0.135)).
 
@@ -322,15 +334,14 @@ def percentile(values: ArrayLike, limits: Limits, *, minimum: int = ENOUGH_READI
     low, median, high = (float(each) for each in np.quantile(x, [BELOW, 0.5, ABOVE], method="median_unbiased"))
     if not low < median < high:
         raise Refused(Reason.NO_VARIATION)
-    upper = inf if limits.upper is None else (limits.upper - median) / (high - median)
-    lower = inf if limits.lower is None else (median - limits.lower) / (median - low)
+    pp, ppk = of_percentiles(low, median, high, limits)
     return PercentileCapability(
         readings=len(x),
         median=median,
         low=low,
         high=high,
-        pp=None if limits.lower is None or limits.upper is None else (limits.upper - limits.lower) / (high - low),
-        ppk=min(upper, lower),
+        pp=pp,
+        ppk=ppk,
         ppm_observed=observed_ppm(limits, x),
         cautions=(Caution.FEW_FOR_PERCENTILES,) if len(x) < ENOUGH_FOR_PERCENTILES else (),
     )
