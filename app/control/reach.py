@@ -19,6 +19,7 @@ ROOM = 0.08
 TOO_FAR = 4.0  # times as far as limits and most points reach
 WITH_VALUES = 8  # points beyond that are labelled
 CLOSE = 0.05  # of the width of the chart: of points closer than this the farthest is labelled, behind the last of them
+LATE = 0.12  # of the width of the chart: of points nearer to its right edge the label stands before them, not beyond the edge
 FEW = 8  # points of which none is far
 UNSIGNED = (Chart.MOVING_RANGE, Chart.RANGES, Chart.DEVIATIONS)
 
@@ -61,7 +62,9 @@ def beyond(
     above = values[far] > 0.5 * (low + high)
     said = [f"{value:.0f} µm" if view.kind in UNSIGNED else f"{signed(value, 0)} µm" for value in values[far].tolist()]
     x = view.last[drawn[far]]
-    labels = _spaced(said, np.abs(values[far]), x, above, CLOSE * (view.last[-1] - view.first[0]))
+    wide = view.last[-1] - view.first[0]
+    late = x > view.last[-1] - LATE * wide
+    labels = _spaced(said, np.abs(values[far]), x, above, late, CLOSE * wide)
     return [
         {
             "type": "scatter",
@@ -72,7 +75,7 @@ def beyond(
             "y": np.where(above, high - inset, low + inset).tolist(),
             "text": labels,
             "hovertext": said,
-            "textposition": "middle right",
+            "textposition": np.where(late, "middle left", "middle right").tolist(),
             "textfont": {"size": 12, "color": colours.ink},
             "customdata": [custom[at] for at in np.flatnonzero(far).tolist()],
             "marker": {
@@ -87,13 +90,19 @@ def beyond(
 
 
 def _spaced(
-    said: list[str], size: NDArray[np.float64], x: NDArray[np.int64], above: NDArray[np.bool_], close: float
+    said: list[str],
+    size: NDArray[np.float64],
+    x: NDArray[np.int64],
+    above: NDArray[np.bool_],
+    late: NDArray[np.bool_],
+    close: float,
 ) -> list[str]:
-    """The labels of points that lie too close to each other become one."""
+    """The labels of points that lie too close to each other become one: behind the last, late ones before the first."""
     labels = [""] * len(said)
-    ends = [*np.flatnonzero((np.diff(x) > close) | (above[1:] != above[:-1])).tolist(), len(said) - 1]
+    apart = (np.diff(x) > close) | (above[1:] != above[:-1]) | (late[1:] != late[:-1])
     start = 0
-    for end in ends:
-        labels[end] = "\N{NO-BREAK SPACE}" + said[start + int(np.argmax(size[start : end + 1]))]
+    for end in [*np.flatnonzero(apart).tolist(), len(said) - 1]:
+        label = said[start + int(np.argmax(size[start : end + 1]))] + "\N{NO-BREAK SPACE}"
+        labels[start if late[start] else end] = label if late[start] else "\N{NO-BREAK SPACE}" + label.strip()
         start = end + 1
     return labels

@@ -205,6 +205,12 @@ def test_of_points_beyond_that_are_neighbours_the_farthest_is_labelled() -> None
     assert [label.strip() for label in beyond["text"]] == ["", "", "+400 µm", "−380 µm"]
 
 
+def test_the_label_of_a_point_beyond_the_axis_stays_inside_the_chart() -> None:
+    beyond = traces(control_figure(seen([*([0.5, -0.5] * 100), 390.0, 400.0, 395.0]), key="shaft"))["beyond"]
+    assert [label.strip() for label in beyond["text"]] == ["+400 µm", "", ""], "before the first of them"
+    assert beyond["textposition"] == ["middle left"] * 3
+
+
 def test_limits_that_lie_close_together_are_named_in_one_line() -> None:
     figure = control_figure(seen(np.linspace(-90.0, 90.0, 50)), key="shaft")
     assert [each["text"] for each in figure["layout"]["annotations"]] == ["−3.0 to +3.0"]
