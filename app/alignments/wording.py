@@ -7,7 +7,7 @@ from typing import Any
 
 from app.core.geometry.layout import Loose, NotLaidOut
 from app.web.i18n import _, ngettext
-from app.web.numbers import MINUS, mm
+from app.web.numbers import MINUS
 
 GOOD, WEAK = 10.0, 100.0  # conditions
 WORTH_A_TOUCH = 1.05  # by less, a touch more makes nothing more certain that anybody would see
@@ -62,7 +62,8 @@ def motion(weakest: Sequence[float]) -> str:
     names = ("a", "b", "c", "lambda", "beta", "gamma")
     strongest = max(abs(each) for each in weakest) if weakest else 0.0
     said = [motion_word(name) for name, each in zip(names, weakest, strict=False) if abs(each) > 0.4 * strongest > 0]
-    return _(" with ").join(said)
+    others = ", ".join(said[1:])
+    return _("{motion} together with {others}").format(motion=said[0], others=others) if others else "".join(said)
 
 
 def condition(value: float) -> str:
@@ -126,7 +127,7 @@ def checked(touches: int, unknown: int) -> str:
 def difference(method: str, value: float) -> str:
     """What small angles leave out."""
     if method == "exact":
-        return _("Small angles would have put a touch {value} elsewhere.").format(value=mm(value, 6))
+        return _("Small angles would have put a touch {value} elsewhere.").format(value=f"{value * 1000:.1f} µm")
     return _("The exact solution is not the same: {method}.").format(method=method_word(method))
 
 
