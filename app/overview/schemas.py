@@ -43,7 +43,7 @@ class Overview(BaseModel):
                         "state": "correcting",
                         "reasons": [
                             {"code": "hunting", "text": "over-corrects"},
-                            {"code": "barely_capable", "text": "barely capable"},
+                            {"code": "barely_capable", "text": "Barely capable"},
                         ],
                         "ppk": 1.21,
                         "readings": 200,

@@ -42,9 +42,9 @@ def _reason(why: Why, ranked: Ranked) -> Reason:
             f"{page}/control",
             "attention",
         ),
-        Why.NOT_CAPABLE: (_("not capable"), f"{page}/capability", "attention"),
+        Why.NOT_CAPABLE: (_("Not capable"), f"{page}/capability", "attention"),
         Why.WEAR: (
-            ngettext("a limit in %(num)s part", "a limit in %(num)s parts", parts) % {"num": parts},
+            ngettext("Limit in %(num)s part", "Limit in %(num)s parts", parts) % {"num": parts},
             f"{page}#wear-curve",
             "wear",
         ),
@@ -53,8 +53,8 @@ def _reason(why: Why, ranked: Ranked) -> Reason:
             f"{page}/what-if",
             "attention",
         ),
-        Why.LOUD: (_("many alarms"), f"/alarms/history?machine={ranked.machine.key}", "waiting"),
-        Why.BARELY_CAPABLE: (_("barely capable"), f"{page}/capability", "waiting"),
-        Why.OLD: (_("no new readings"), page, "waiting"),
+        Why.LOUD: (_("Many alarms"), f"/alarms/history?machine={ranked.machine.key}", "waiting"),
+        Why.BARELY_CAPABLE: (_("Barely capable"), f"{page}/capability", "waiting"),
+        Why.OLD: (_("No new readings"), page, "waiting"),
     }[why]
     return Reason(why, text, href, tone)
