@@ -54,7 +54,7 @@ def result_figure(
             margin={"l": 78, "r": 20, "t": 12, "b": 48},
             xaxis={
                 "title": {"text": _("Reading number"), "font": {"size": 13, "color": colours.quiet}, "standoff": 6},
-                "tickformat": ",d",
+                "tickformat": "d",
                 "showgrid": False,
                 "showline": True,
                 "nticks": 9,

@@ -128,7 +128,7 @@ def zone_chart(
                 "range": list(span),
                 "anchor": "y3",
                 "title": {"text": _("Reading number"), "font": {"size": 13, "color": colours.quiet}, "standoff": 6},
-                "tickformat": ",d",
+                "tickformat": "d",
                 "showgrid": False,
                 "showline": True,
                 **({"dtick": 1} if last - first <= 12 else {"nticks": 9}),

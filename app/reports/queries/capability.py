@@ -10,6 +10,8 @@ from app.reports.queries.frame import Frame
 from app.statistics import wording as statistics
 from app.web.i18n import _
 
+FEW = 100  # of a million: more than these are told without decimals
+
 
 def capability(frame: Frame) -> Section:
     """Cp, Cpk, Pp, Ppk and Cpm with intervals; of a corrected process also of the tool without corrections."""
@@ -84,7 +86,7 @@ def _spread(study: Study) -> list[Fact]:
     ):
         if fallout is not None:
             note = "" if holds else _("not to be quoted here")
-            facts.append(Fact(key, name, number(fallout.total, 1), note=note))
+            facts.append(Fact(key, name, number(fallout.total, 1 if fallout.total < FEW else 0), note=note))
     for test in (study.anderson, study.shapiro):
         if not isinstance(test, Refused):
             facts.append(Fact(test.test, wording.normality_name(test.test), number(test.statistic, 4)))
