@@ -38,16 +38,14 @@ def course_figure(chart: CourseChart, *, theme: ThemeName = "light", width: int 
     edge = FAR * chart.half
     reach = [min(edge, abs(value)) for line in (chart.today, chart.other) for value in line.values]
     high = max([chart.half * 1.25, *reach]) * 1000 * 1.05
-    names = (_("Today's settings"), _("Other settings"))
-    looks = ((colours.faint, 1.25, "circle-open"), (colours.correction, 1.5, "circle"))
-    data = [
-        _course(line, name, look, edge, "y", alone=chart.readings <= 300)
-        for line, name, look in zip((chart.today, chart.other), names, looks, strict=True)
-    ]
-    data += [
-        _steps(line, name, look)
-        for line, name, look in zip((chart.today_taken, chart.other_taken), names, looks, strict=True)
-    ]
+    same = chart.other == chart.today and chart.other_taken == chart.today_taken  # nothing else is asked
+    today = colours.steady if same else colours.faint
+    drawn = [(chart.today, chart.today_taken, _("Today's settings"), (today, 1.25, "circle-open"))]
+    if not same:
+        drawn.append((chart.other, chart.other_taken, _("Other settings"), (colours.correction, 1.5, "circle")))
+    alone = chart.readings <= 300
+    data = [_course(line, name, look, edge, "y", alone=alone) for line, _taken, name, look in drawn]
+    data += [_steps(taken, name, look) for _line, taken, name, look in drawn]
     first, last = chart.today.sequence[0], chart.today.sequence[-1]
     return {
         "data": data,

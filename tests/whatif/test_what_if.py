@@ -197,6 +197,41 @@ def test_a_tool_that_two_characteristics_correct_is_replayed_with_both(server: S
     assert found["likeness"]["verdict"] in {"well", "roughly"}
 
 
+@pytest.mark.parametrize("serials", [True, False])
+def test_a_cutter_that_serves_outside_and_inside_is_replayed_as_it_went(server: Server, serials: bool) -> None:
+    """Each feature turns the offset into size in its own way, and either may be asked about, whichever is measured first."""
+    shop = Shop(server)
+    outside, inside = f"outside-{shop.machine}", f"inside-{shop.machine}"
+    factors = {outside: -0.5, inside: 0.5}
+    for memory, key in enumerate(factors, 6):
+        shop.add(key, factor=factors[key], average_memory=memory, max_step=0.002)
+    issued: list[tuple[int, int, float]] = []  # part, number, mm of offset
+    for part, free in enumerate(scatter(60, seed=7)):
+        effective = [each for each in issued if part > each[0] + 1]
+        offset = sum(amount for _part, _number, amount in effective) * 1000
+        for later, (key, factor) in enumerate(factors.items()):
+            more: dict[str, Any] = {"part": f"P{part:03d}"} if serials else {}
+            answer = shop.read(
+                round(free * (1 - 2 * later) - offset / factor, 3),
+                key,
+                correction_in_effect=effective[-1][1] if effective else 0,
+                measured_at=f"2026-09-01T06:{part:02d}:{5 + later * 9:02d}Z",
+                **more,
+            )
+            if answer["correction"]:
+                issued.append((part, answer["correction"]["number"], answer["correction"]["amount"]))
+    for key in factors:
+        path = f"/characteristics/{key}/what-if"
+        found = shop.call("POST", path, last=5000)
+        print(key, [(e["correction"] and e["correction"]["number"], e["sequence"]) for e in shop.call("GET", f"/readings?characteristic={key}&limit=1000")["items"]][:14], issued[:14])
+        assert found["delay"] == 1
+        assert (found["likeness"]["verdict"], found["likeness"]["same"]) == ("well", 1.0), key
+        assert (
+            found["truly"]["of_tool"] >= len(issued) - 2
+        )  # of the second all but what the first of the first part asked for
+        assert alike(found["truly"], found["likeness"]["replayed"])
+
+
 def test_the_figure_draws_both_courses(shop: Shop) -> None:
     path = f"/characteristics/{shop.characteristic}/figures/what-if?zero_range=0.0025&weighting_factor=2"
     figure = shop.call("GET", path)
@@ -204,3 +239,5 @@ def test_the_figure_draws_both_courses(shop: Shop) -> None:
     assert [len(each["y"]) for each in courses] == [PARTS, PARTS]
     truth = shop.call("GET", f"/readings?characteristic={shop.characteristic}&limit=1000")["items"]
     assert courses[0]["y"] == pytest.approx([each["deviation"] * 1000 for each in truth], abs=0.001)
+    as_today = shop.call("GET", f"/characteristics/{shop.characteristic}/figures/what-if")
+    assert [each["name"] for each in as_today["data"] if each["meta"] == "course"] == ["Today's settings"]
