@@ -38,8 +38,7 @@ def align(
         made = actions.align(own, machine, given, caller)
     found = queries.alignment(session, made.alignment.id)
     if any(sequence is None for _name, _key, sequence, _why in queries.pushed(session, found)):
-        with database.begin() as own:
-            readings.push_waiting(own)
+        readings.push_results(database)
     response.status_code = 200 if made.again else 201
     session.expire_all()
     return alignment_out(session, queries.alignment(session, made.alignment.id))

@@ -150,8 +150,7 @@ def align(request: Request, session: SessionDep, caller: Operator, form: FormDep
         error.errors = [FieldError("machine", error.detail)]
         return _new(request, session, form, error)
     if given.characteristics:
-        with database.begin() as own:
-            readings.push_waiting(own)
+        readings.push_results(database)
     return RedirectResponse(f"/alignments/{number}", 303)
 
 

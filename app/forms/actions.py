@@ -47,8 +47,7 @@ def measure_and_push(database: Database, machine: Machine, given: FormIn, caller
         waits = made.row.measurement.characteristic_id is not None
         number = made.row.measurement.id
     if waits:
-        with database.begin() as session:
-            readings.push_waiting(session)
+        readings.push_results(database)
     with database.begin() as session:
         row = queries.form(session, number)
         session.expunge_all()

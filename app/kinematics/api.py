@@ -2,9 +2,10 @@
 
 from typing import Annotated, Any, Literal
 
-from fastapi import Path, Query, Response
+from fastapi import Path, Query, Request, Response
 from pydantic import StringConstraints
 
+from app.db.engine import Database
 from app.errors import FieldError, Invalid
 from app.kinematics import actions, figures, looking, queries
 from app.kinematics.answers import RecomputedOut, RunOut, axis_out, run_out
@@ -20,6 +21,7 @@ from app.kinematics.drift_answers import (
 from app.kinematics.schemas import EnterIn, PlanIn, ReasonIn, RestoreIn, RunIn
 from app.kinematics.values import UNITS
 from app.machines.queries import machine_named
+from app.readings import actions as readings
 from app.web.api import api_router, problems
 from app.web.deps import AnyCaller, Caller, Engineer, Operator, SessionDep
 from app.web.fields import LARGEST_SERIAL, Cursor, Limit, Page, Text200, page_of
@@ -46,7 +48,9 @@ AGAIN: dict[int | str, dict[str, Any]] = {
 
 
 @router.post("/kinematics/runs", status_code=201, responses=problems(404, 409) | AGAIN)
-def take_kinematics_run(session: SessionDep, caller: AnyCaller, given: RunIn, response: Response) -> RunOut:
+def take_kinematics_run(
+    request: Request, session: SessionDep, caller: AnyCaller, given: RunIn, response: Response
+) -> RunOut:
     """Take a run of cycle 452: ball touches or centres (`axes`, `shift`), result parameters, or the control's protocol.
 
     A ball further off than maxDevCalBall makes a refused run: that is kept, and counts for nothing. A change larger than
@@ -54,9 +58,13 @@ def take_kinematics_run(session: SessionDep, caller: AnyCaller, given: RunIn, re
     """
     machine = machine_named(session, given.machine)
     caller.must_at(machine.id, "operator")
-    taken = actions.take(session, machine, given, caller)
+    database: Database = request.app.state.database
+    with database.begin() as own:
+        taken = actions.take(own, machine, given, caller)
+        number = taken.row.run.id
+    readings.push_results(database)
     response.status_code = 200 if taken.again else 201
-    return run_out(taken.row)
+    return run_out(queries.run(session, number))
 
 
 @router.get("/kinematics/runs", responses=problems(404))

@@ -9,6 +9,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import UploadFile
 from starlette.responses import RedirectResponse
 
+from app.db.engine import Database
 from app.errors import FieldError, Invalid, NotFound
 from app.kinematics import actions, forms, queries
 from app.kinematics.evaluation import evaluate
@@ -16,6 +17,7 @@ from app.kinematics.outcome import Evaluated
 from app.kinematics.schemas import MOST_PROTOCOL, RunIn
 from app.kinematics.showing import COMMON
 from app.machines.queries import machine_named, machines
+from app.readings import actions as readings
 from app.web.deps import Caller, Operator, SessionDep, require, texts
 from app.web.forms import parsed
 from app.web.i18n import _
@@ -86,11 +88,14 @@ def _send(request: Request, session: Session, caller: Caller, form: dict[str, st
         if form.get("do") == "look":
             limits = actions.limits_of(queries.plan(session, machine.id))
             return _form(request, session, form, found=evaluate(given, limits))
-        with session.begin_nested():
-            taken = actions.take(session, machine, given, caller)
+        database: Database = request.app.state.database
+        with database.begin() as own:
+            taken = actions.take(own, machine, given, caller)
+            number = taken.row.run.id
     except (Invalid, NotFound) as error:
         return _form(request, session, form, error)
-    return RedirectResponse(f"/kinematics/runs/{taken.row.run.id}?done={'again' if taken.again else 'taken'}", 303)
+    readings.push_results(database)
+    return RedirectResponse(f"/kinematics/runs/{number}?done={'again' if taken.again else 'taken'}", 303)
 
 
 def _given(form: Mapping[str, str]) -> RunIn:

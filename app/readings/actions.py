@@ -15,7 +15,7 @@ from app.readings.by_hand.actions import Found as FoundByHand
 from app.readings.by_hand.actions import measure as measure_by_hand
 from app.readings.by_hand.actions import measure_typed as measure_typed_by_hand
 from app.readings.records import Entry
-from app.readings.results import Source, ask_for, push_waiting
+from app.readings.results import Source, ask_for, push_results, push_waiting
 from app.readings.tables import Exclusion, Reading, Stream
 from app.web.i18n import _
 
@@ -27,6 +27,7 @@ __all__ = [
     "exclude_all",
     "measure_by_hand",
     "measure_typed_by_hand",
+    "push_results",
     "push_waiting",
 ]
 

@@ -13,7 +13,7 @@ from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.orm import Session
 
 from app.core.parameters import LARGEST_LENGTH
-from app.db.engine import psycopg_url
+from app.db.engine import Database, psycopg_url
 from app.errors import DatabaseAway, InbandError, OutcomeUnknown
 from app.readings import queries
 from app.readings.ground import Stored, Verdict
@@ -34,7 +34,7 @@ class Source(NamedTuple):
 
 
 def ask_for(session: Session, entries: Mapping[str, Entry], values: Mapping[str, float], source: Source) -> None:
-    """Ask for readings of these results, mm; `push_waiting` makes them after the commit."""
+    """Ask for readings of these results, mm; `push_results` makes them after the commit."""
     rows = [
         {
             "machine_id": entries[result].machine_id,
@@ -49,6 +49,12 @@ def ask_for(session: Session, entries: Mapping[str, Entry], values: Mapping[str,
     ]
     if rows:
         session.execute(insert(ResultReading).values(rows).on_conflict_do_nothing())
+
+
+def push_results(database: Database) -> None:
+    """Make what was asked for into readings at once, after the commit that asked; what cannot be now, the chore does."""
+    with database.begin() as own:
+        push_waiting(own)
 
 
 def push_waiting(session: Session) -> bool:

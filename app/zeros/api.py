@@ -59,8 +59,7 @@ def _push(database: Database, session: SessionDep, number: int) -> None:
     """What of a zero becomes readings is pushed once the zero is stored for good; what cannot be now, a chore does."""
     became = queries.pushed(session, [queries.work_zero(session, number)])[number]
     if any(each.sequence is None for each in became):
-        with database.begin() as own:
-            readings.push_waiting(own)
+        readings.push_results(database)
 
 
 @router.get("/work-zeros", responses=problems(404))

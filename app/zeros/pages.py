@@ -136,8 +136,7 @@ def find(request: Request, session: SessionDep, caller: Operator, form: FormDep)
     except NotFound as error:
         error.errors = [FieldError("machine", error.detail)]
         return _new(request, session, form, error=error)
-    with database.begin() as own:
-        readings.push_waiting(own)
+    readings.push_results(database)
     return RedirectResponse(f"/work-zeros/{number}", 303)
 
 
