@@ -89,8 +89,8 @@ class Figures(NamedTuple):
         return self.oversize + self.undersize + self.worn + self.faults + self.offset_limit
 
 
-def rebuilt(deviation: Floats, compensated: Floats, factor: float, effect: float = 1.0) -> Floats:
-    """The deviations that the parts would have had without any correction since the tool change.
+def rebuilt(deviation: Floats, compensated: Floats, factor: float | Floats, effect: float = 1.0) -> Floats:
+    """The deviations that the parts would have had without any correction since the tool change. factor: of all, or of each.
 
     >>> rebuilt(np.array([0.002, 0.001]), np.array([0.0, -0.006]), factor=-1.0).tolist()
     [0.002, 0.007]
@@ -98,21 +98,39 @@ def rebuilt(deviation: Floats, compensated: Floats, factor: float, effect: float
     return np.asarray(np.round(deviation + effect * compensated / factor, DECIMALS) + 0.0)
 
 
-def parts_of(lane: Whole) -> Whole:
-    """Numbers of parts: a part ends where a lane comes again.
+def parts_of(lane: Whole, serial: Whole | None = None, at: NDArray[np.datetime64] | None = None) -> Whole:
+    """Numbers of parts: a part ends where a lane comes again, where the serial number is another (-1: not known), and where the
+    long pause between parts lies, which readings that begin amid a part would tell of by nothing else.
 
     >>> parts_of(np.array([0, 1, 0, 1, 0, 0])).tolist()
     [0, 0, 1, 1, 2, 3]
+    >>> parts_of(np.array([1, 0, 1, 0, 1]), np.array([7, 8, 8, 9, 9])).tolist()
+    [0, 1, 1, 2, 2]
     """
-    seen: set[int] = set()
-    found, part = np.zeros(len(lane), np.int64), 0
     if len(lane) and not (lane != lane[0]).any():
         return np.arange(len(lane))
-    for at, which in enumerate(lane.tolist()):
-        if which in seen:
+    ends = np.zeros(len(lane), np.bool_) if at is None else _after_long_pauses(lane, at)
+    if serial is not None:
+        known = (serial[1:] >= 0) & (serial[:-1] >= 0)
+        ends[1:] = np.where(known, serial[1:] != serial[:-1], ends[1:])
+    seen: set[int] = set()
+    found, part = np.zeros(len(lane), np.int64), 0
+    for place, (which, ended) in enumerate(zip(lane.tolist(), ends.tolist(), strict=True)):
+        if seen and (ended or which in seen):
             part, seen = part + 1, set()
         seen.add(which)
-        found[at] = part
+        found[place] = part
+    return found
+
+
+def _after_long_pauses(lane: Whole, at: NDArray[np.datetime64]) -> NDArray[np.bool_]:
+    """Readings that follow upon the lane before them after a pause twice as long as any other two lanes that are neighbours."""
+    kind = lane[:-1] * (int(lane.max(initial=0)) + 1) + lane[1:]
+    pauses = np.diff(at).astype(np.float64)
+    usual = sorted((float(np.median(pauses[kind == each])), each) for each in np.unique(kind[lane[1:] != lane[:-1]]))
+    found = np.zeros(len(lane), np.bool_)
+    if len(usual) > 1 and usual[-1][0] > 2 * usual[-2][0]:
+        found[1:] = kind == usual[-1][1]
     return found
 
 

@@ -48,6 +48,7 @@ COLUMNS = (
 )
 FAULT = list(Zone).index(Zone.PROBE_FAULT)
 CODE = {code: place for place, code in enumerate(Code)}
+HELD = (CODE[Code.TOOL_WORN_HELD], CODE[Code.IMPLAUSIBLE])
 
 Values = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -59,7 +60,8 @@ class Past:
 
     then: each version as it was in force. unknown: readings left out. others: characteristics that correct the same tool.
     delay: parts between a correction and its effect, as it was most often; None where no correction has taken effect.
-    compensated: of every reading of `way`, mm of offset.
+    compensated: of every reading of `way`, mm of offset; factors: what its characteristic turns mm of size into mm of offset by.
+    of_tool: corrections of the tool, those of the others included.
     """
 
     standing: Standing
@@ -71,13 +73,15 @@ class Past:
     slots: dict[int, int]
     deviations: Values
     compensated: Values
+    factors: Values
+    of_tool: int
     unknown: int
     others: list[str]
     delay: int | None
 
     def with_effect(self, effect: float) -> Way:
         """The way, had corrections acted by this share."""
-        free = rebuilt(self.deviations, self.compensated, self.standing.parameters.factor, effect)
+        free = rebuilt(self.deviations, self.compensated, self.factors, effect)
         return self.way._replace(free=free)
 
     def policy(self, parameters: Parameters, delay: int, effect: float = 1.0) -> Policy:
@@ -149,9 +153,10 @@ def past_of(
             ),
             _("Choose a shorter period, or the last so many readings."),
         )
-    whole = statistics.history_of(session, standing.characteristic, window, COLUMNS, start=start, end=end)
-    own = whole.only(np.isfinite(whole["compensated"]))
     others = _others(session, standing)
+    columns = (*COLUMNS, "part") if others else COLUMNS
+    whole = statistics.history_of(session, standing.characteristic, window, columns, start=start, end=end)
+    own = whole.only(np.isfinite(whole["compensated"]))
     histories = [(standing, own)]
     if len(own):
         began, ended = (_moment(moment) for moment in (own["measured_at"].min(), own["measured_at"].max()))
@@ -159,7 +164,7 @@ def past_of(
             span = statistics.window_of(session, other.characteristic, start=began, end=ended)
             if span.count > LARGEST:
                 continue
-            found = statistics.history_of(session, other.characteristic, span, COLUMNS, start=began, end=ended)
+            found = statistics.history_of(session, other.characteristic, span, columns, start=began, end=ended)
             histories.append((other, found.only(np.isfinite(found["compensated"]))))
     return _joined(session, standing, window, histories, len(whole) - len(own))
 
@@ -198,15 +203,15 @@ def _joined(
             "whose": np.full(len(history), at),
             "restart": _changed(targets) | _changed(empirical),
             "excluded": history.excluded,
+            "factor": np.full(len(history), each.parameters.factor),
             "place": np.arange(len(history)),
-            **{name: history[name] for name in COLUMNS},
+            **history.columns,
         }.items():
             columns.setdefault(name, []).append(values)
     slots.setdefault(standing.parameters.average_memory, len(slots))
     joined = {name: np.concatenate(values) for name, values in columns.items()}
     order = np.lexsort((joined["whose"], joined["place"], joined["measured_at"], joined["received_at"]))
     joined = {name: values[order] for name, values in joined.items()}
-    own = histories[0][1]
     way = _way(session, standing, joined, len(slots), [known.memory for known in lanes])
     if not lanes:
         lanes.append(
@@ -215,16 +220,18 @@ def _joined(
     return Past(
         standing=standing,
         window=window,
-        history=own,
+        history=histories[0][1],
         mine=joined["whose"] == 0,
         way=way,
         then=Policy(tuple(lanes)),
         slots=slots,
         deviations=joined["deviation"],
         compensated=joined["compensated"],
+        factors=joined["factor"],
+        of_tool=int(((joined["correction"] >= 0) & ~np.isin(joined["code"], HELD) & ~joined["excluded"]).sum()),
         unknown=unknown,
         others=[each.characteristic.key for each, _history in histories[1:]],
-        delay=_delay(own),
+        delay=_delay(joined, way.part),
     )
 
 
@@ -256,12 +263,13 @@ def _way(session: Session, standing: Standing, joined: dict[str, NDArray[Any]], 
     offset = compensated[begins]
     pending, averages = np.zeros(len(offset)), np.zeros((len(offset), slots))
     if len(compensated):
-        pending[0] = round(-(joined["decided"][0] - joined["deviation"][0]) * parameters.factor, 9) + 0.0
+        pending[0] = round(-(joined["decided"][0] - joined["deviation"][0]) * joined["factor"][0], 9) + 0.0
         lanes, first = np.unique(joined["lane"], return_index=True)
         for at in np.argsort(-first):  # of lanes that share a memory the earliest tells what it held
             averages[0, memories[lanes[at]]] = joined["average_before"][first[at]]
-    free = rebuilt(joined["deviation"], compensated, parameters.factor)
-    return Way(free, joined["lane"], marks, parts_of(joined["whose"]), offset, pending, averages)
+    free = rebuilt(joined["deviation"], compensated, joined["factor"])
+    part = parts_of(joined["whose"], joined.get("part"), joined["measured_at"])
+    return Way(free, joined["lane"], marks, part, offset, pending, averages)
 
 
 def _beginnings(session: Session, standing: Standing, received_at: NDArray[np.datetime64]) -> Flags:
@@ -289,13 +297,14 @@ def _moment(moment: np.datetime64) -> datetime:
     return found.replace(tzinfo=UTC)
 
 
-def _delay(history: History) -> int | None:
-    """Parts that came out with the old offset after a correction was issued: the median, where machines tell."""
-    issued = np.flatnonzero(history["correction"] >= 0)
-    in_effect = np.maximum.accumulate(history["correction_in_effect"]) if len(history) else np.zeros(0)
+def _delay(joined: dict[str, NDArray[Any]], part: NDArray[np.int64]) -> int | None:
+    """Parts that came out with the old offset after a correction of the tool was issued: the median, where machines tell."""
+    issued = np.flatnonzero(joined["correction"] >= 0)
+    in_effect = np.maximum.accumulate(joined["correction_in_effect"]) if len(part) else np.zeros(0)
     if not len(issued) or (in_effect < 0).all():
         return None
-    seen = np.searchsorted(in_effect, history["correction"][issued])
-    between = seen - issued - 1
-    between = between[(seen < len(history)) & (between >= 0)]
+    seen = np.searchsorted(in_effect, joined["correction"][issued])
+    told = seen < len(part)
+    between = part[seen[told]] - part[issued[told]] - 1
+    between = between[between >= 0]
     return min(LONGEST_DELAY, int(np.median(between))) if len(between) else None

@@ -269,7 +269,7 @@ def truly_of(session: Session, past: Past) -> Figures:
         faults=int((fault & kept).sum()),
         offset_limit=int(((code == CODE[Code.OFFSET_LIMIT]) & kept).sum()),
         corrections=int((issued & ~held).sum()),
-        of_tool=int((issued & ~held).sum()),
+        of_tool=past.of_tool,
         held=int(held.sum()),
         mean_size=_mean_size(session, past),
         inner=len(inner),

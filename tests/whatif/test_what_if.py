@@ -223,7 +223,6 @@ def test_a_cutter_that_serves_outside_and_inside_is_replayed_as_it_went(server: 
     for key in factors:
         path = f"/characteristics/{key}/what-if"
         found = shop.call("POST", path, last=5000)
-        print(key, [(e["correction"] and e["correction"]["number"], e["sequence"]) for e in shop.call("GET", f"/readings?characteristic={key}&limit=1000")["items"]][:14], issued[:14])
         assert found["delay"] == 1
         assert (found["likeness"]["verdict"], found["likeness"]["same"]) == ("well", 1.0), key
         assert (

@@ -45,11 +45,13 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "parameters_version": ("int4send(r.parameters_version)", _SMALL),
     "correction_in_effect": ("int4send(coalesce(r.correction_in_effect, -1))", _SMALL),
     "correction": ("int4send(coalesce(r.correction, -1))", _SMALL),
+    "part": ("int8send(coalesce(hashtextextended(r.part, 0) & 9223372036854775807, -1))", _WHOLE),
     "paused": ("boolsend(r.paused_by IS NOT NULL)", _FLAG),
     "zone": (f"int4send(CASE r.zone {_ZONES} END)", _SMALL),
     "code": (f"int4send(CASE r.code {_CODES} END)", _SMALL),
 }
-"""Columns of `reading` by name; zone and code are the place of each in `Zone` and `Code` of the core."""
+"""Columns of `reading` by name; zone and code are the place of each in `Zone` and `Code` of the core, part is a number that
+equal serial numbers have in common, -1 without one."""
 MOMENTS = frozenset({"measured_at", "received_at", "machined_at"})
 POSTGRES_EPOCH = np.datetime64("2000-01-01T00:00:00", "us")
 
