@@ -4,11 +4,14 @@ Sinumerik has settable frames ``$P_UIFR[n]`` (1 to 4 are G54 to G57, 5 to 99 are
 a time, and the programmable frame ``$P_PFRAME``. Fanuc sets offsets with ``G10 L2`` (G54 to G59) and ``G10 L20`` (G54.1 Pn)
 and turns with ``G68``, in the plane or, with I, J, K, about any axis in space. Angles of a frame are taken about Z, then
 the new Y, then the new X. Heidenhain's datum shift and rotation are cycles 7 and 10. Lengths mm, angles degrees.
+
+Numbers are as fine as the control takes them: Fanuc stops at a word of more than eight digits (alarm 003), Heidenhain's
+cycles have four decimals.
 """
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from math import sqrt
+from math import degrees, sqrt
 from typing import NamedTuple
 
 from app.core.geometry.frames import angles_of, vector_of
@@ -18,6 +21,8 @@ from app.core.programs.lines import written
 
 PLACES = 6  # of a length: whole nanometres
 DEGREE_PLACES = 7  # of an angle: at a metre from the axis two nanometres
+FANUC_DIGITS = 8  # of a word, before and behind the point
+HEIDENHAIN_PLACES = 4
 _OFFSET = re.compile(r"G\s*(\d{2,3})(?:\s*\.\s*1\s*P\s*(\d{1,3}))?|PRESET\s*(\d{1,4})", re.IGNORECASE | re.ASCII)
 
 
@@ -114,7 +119,7 @@ def _fanuc_zero(zero: ZeroText) -> Iterator[str]:
     if zero.angle is not None:
         yield zero.offset.word
         yield "G69"
-        yield f"G68 X0. Y0. R{pointed(zero.angle)}"
+        yield f"G68 X0. Y0. R{_fanuc(zero.angle)}"
     yield "M99"
 
 
@@ -184,7 +189,7 @@ def _fanuc_frame(text: FrameText) -> Iterator[str]:
     yield f"({text.title})"
     if text.table is not None:
         yield "(RETRACT THE TOOL BEFORE THE TABLE TURNS)"
-        yield f"G90 G0 {text.table[0]}{pointed(round(text.table[1], DEGREE_PLACES) + 0.0)}"
+        yield f"G90 G0 {text.table[0]}{_fanuc(text.table[1])}"
     yield "G69"
     at = text.shift
     if text.base is not None:
@@ -194,15 +199,15 @@ def _fanuc_frame(text: FrameText) -> Iterator[str]:
     if text.tilted:
         vector = vector_of(text.motion[:3, :3])
         angle = sqrt(float(vector @ vector))
-        i, j, k = (round(float(each) / angle, 9) + 0.0 for each in vector)
-        degrees = round(angle * 57.29577951308232, DEGREE_PLACES)
+        # A direction has no length: a metre long, it is as exact as eight digits can say it.
+        i, j, k = (_fanuc(1000 * float(each) / angle) for each in vector)
         yield "(THREE-DIMENSIONAL COORDINATE CONVERSION)"
-        yield f"G68 {_words(at)} I{pointed(i)} J{pointed(j)} K{pointed(k)} R{pointed(degrees)}"
+        yield f"G68 {_words(at)} I{i} J{j} K{k} R{_fanuc(degrees(angle))}"
     else:
         if text.base is None:
             yield f"G52 {_words(at)}"
         if text.angles["Z"]:
-            yield f"G68 X0. Y0. R{pointed(text.angles['Z'])}"
+            yield f"G68 X0. Y0. R{_fanuc(text.angles['Z'])}"
     yield "M99"
 
 
@@ -210,7 +215,7 @@ def _heidenhain_frame(text: FrameText) -> Iterator[str]:
     yield f"; {text.title}"
     if text.table is not None:
         yield "; RETRACT THE TOOL BEFORE THE TABLE TURNS."
-        yield f"L {text.table[0]}{_signed(round(text.table[1], DEGREE_PLACES))} FMAX"
+        yield f"L {text.table[0]}{_signed(text.table[1])} FMAX"
     if text.base is not None:
         yield f"; {text.base[0].word.upper()} BECOMES"
         for name, value in text.shift.items():
@@ -249,11 +254,22 @@ def _g10(offset: Offset, axes: Mapping[str, float]) -> str:
 
 
 def _words(axes: Mapping[str, float]) -> str:
-    return " ".join(f"{name}{pointed(value)}" for name, value in axes.items())
+    return " ".join(f"{name}{_fanuc(value)}" for name, value in axes.items())
+
+
+def _fanuc(value: float) -> str:
+    """A word's number with as many decimals as eight digits leave room for; zeros in front count.
+
+    >>> _fanuc(-1143.7292341), _fanuc(0.0170453), _fanuc(12.34567891), _fanuc(-4.0)
+    ('-1143.7292', '0.0170453', '12.345679', '-4.')
+    """
+    places = FANUC_DIGITS - len(str(int(abs(value))))
+    return pointed(round(value, min(places, DEGREE_PLACES)) + 0.0)
 
 
 def _signed(value: float) -> str:
-    return f"{'-' if value < 0 else '+'}{written(abs(value))}"
+    rounded = round(value, HEIDENHAIN_PLACES) + 0.0
+    return f"{'-' if rounded < 0 else '+'}{written(abs(rounded))}"
 
 
 _ZEROS: dict[str, Callable[[ZeroText], Iterator[str]]] = {"sinumerik": _sinumerik_zero, "fanuc": _fanuc_zero}

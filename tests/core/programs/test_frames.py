@@ -102,8 +102,26 @@ def test_a_fanuc_conversion_turns_about_its_axis(a: float, b: float, c: float) -
     if turn:
         told = numbers(turn[0])
         axis = [told.get(name, 0.0) for name in "IJK"] if "I" in told else [0.0, 0.0, 1.0]
-        rotation = turned(np.radians(told["R"]) * np.array(axis))
-    assert np.abs(rotation - motion[:3, :3]).max() < 1e-8
+        rotation = turned(np.radians(told["R"]) * np.array(axis) / np.linalg.norm(axis))
+    assert np.abs(rotation - motion[:3, :3]).max() < 2e-7
+
+
+@given(angles, angles, angles, lengths, lengths, lengths)
+def test_each_control_takes_every_word(a: float, b: float, c: float, x: float, y: float, z: float) -> None:
+    """Fanuc: alarm 003 for more than eight digits in a word. Heidenhain: four decimals in cycles 7 and 10."""
+    place = offset_of("fanuc", "G54")
+    assert place is not None
+    for motion in (frame(from_angles(a, b, c), [x, y, z]), frame(from_angles(0, 0, c), [x, y, z])):
+        table = ("C", 10 * c)
+        frames = [FrameText("T", motion, base, table) for base in (None, (place, {"X": 4000.0, "Y": x, "Z": z}))]
+        texts = [
+            write_zero("fanuc", ZeroText("T", place, x, y, z, c)),
+            *(write_frame("fanuc", each) for each in frames),
+        ]
+        for word in re.findall(r"[A-Z](-?[\d.]+)", "\n".join(texts)):
+            assert sum(each.isdigit() for each in word) <= 8, word
+        for word in re.findall(r"[A-Z][+-](\d+\.?\d*)", write_frame("heidenhain", frames[0])):
+            assert len(word.partition(".")[2]) <= 4, word
 
 
 def test_in_the_plane_each_control_says_it_its_way() -> None:
