@@ -27,6 +27,7 @@ from app.paper.content import (
     words,
 )
 from app.web.i18n import _, ngettext
+from app.web.numbers import MINUS
 
 SETTINGS = {
     "Q407": "ball_radius",
@@ -120,7 +121,11 @@ def _axis(axis: Mapping[str, Any]) -> tuple[Section, ...]:
         Fact("points", _("Measuring points"), count(axis["points"])),
         Fact("radius", _("Measuring circle radius"), size(axis["radius"])),
         Fact("backlash", _("Backlash"), _degrees(backlash["value"]), note=_plus_minus(backlash["deviation"], "°")),
-        Fact("angles", _("Axis positions"), words(", ".join(f"{angle:g}°" for angle in axis["angles"]))),
+        Fact(
+            "angles",
+            _("Axis positions"),
+            words(", ".join(f"{angle:g}°".replace("-", MINUS) for angle in axis["angles"])),
+        ),
         Fact("scatter_before", _("Standard deviation, measured"), width(axis["scatter_before"])),
         Fact("scatter_after", _("Standard deviation, optimised"), width(axis["scatter_after"])),
         Fact("greatest_before", _("Greatest deviation, measured"), width(axis["greatest_before"])),

@@ -1,5 +1,6 @@
 """Figures of the pages on paper: what the legend shows is what is drawn."""
 
+from app.paper.drawing.axes import Axis
 from app.paper.drawing.marks import Area
 from app.paper.drawing.plot import drawing_of
 
@@ -23,3 +24,15 @@ def test_a_hollow_marker_is_seen_in_the_legend() -> None:
     ]
     edges = [(mark.edge, mark.width) for mark in squares if mark.edge is not None]
     assert edges == [("#1a7a3c", 2)] * 3  # two in the chart, one in its legend
+
+
+def test_ticks_say_what_they_say_on_the_page() -> None:
+    angles = {"tickvals": [-90.0, 0.0, 22.5], "range": [-100, 100]}
+    assert [text for _at, text in Axis(-100, 100, 0, 400, angles).ticks()] == ["−90", "0", "22.5"]
+    assert [text for _at, text in Axis(-10, 10, 0, 400, {"tickformat": "+.3~g", "dtick": 10}).ticks()] == [
+        "−10",
+        "+0",
+        "+10",
+    ]
+    of_many_angles = Axis(-10, 10, 0, 400, {"tickvals": None, "dtick": 10})
+    assert [text for _at, text in of_many_angles.ticks()] == ["−10", "0", "10"]

@@ -50,11 +50,9 @@ class Axis:
         """Where ticks stand (pixels) and what is written there."""
         if self.layout.get("showticklabels") is False or self.layout.get("visible") is False:
             return []
-        if "tickvals" in self.layout:
-            given = list(
-                zip(self.layout["tickvals"], self.layout.get("ticktext", self.layout["tickvals"]), strict=False)
-            )
-            found = [(self.place(value), str(text)) for value, text in given]
+        if given := self.layout.get("tickvals"):
+            said = self.layout.get("ticktext") or [f"{value:g}".replace("-", MINUS) for value in given]
+            found = [(self.place(value), str(text)) for value, text in zip(given, said, strict=False)]
             return [(at, text) for at, text in found if at is not None and self._inside(at)]
         if self.is_time:
             return [(self.share(part), self._moment(part)) for part in (0.02, 0.26, 0.5, 0.74, 0.98)]
@@ -75,7 +73,8 @@ class Axis:
         if shape.endswith("f"):
             return f"{value:{shape}}".replace("-", MINUS)
         decimals = max(0, -floor(log10(step) + 1e-9))
-        return f"{value:.{decimals}f}".replace("-", MINUS)
+        sign = "+" if shape.startswith("+") else ""
+        return f"{value:{sign}.{decimals}f}".replace("-", MINUS)
 
     def _moment(self, part: float) -> str:
         at = datetime.fromtimestamp(self.low + part * (self.high - self.low)).astimezone()
