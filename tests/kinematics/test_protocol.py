@@ -3,6 +3,7 @@
 import csv
 import io
 from datetime import UTC, datetime, timedelta
+from math import cos, pi, sin
 from typing import Any
 
 import openpyxl
@@ -42,8 +43,13 @@ class TestFiles:
         document = pypdf.PdfReader(io.BytesIO(file_of(shop, run, "pdf")))
         text = " ".join(" ".join(page.extract_text() for page in document.pages).split())
         assert [name for name in EVERYTHING if name not in text] == []
-        for value in ("TOUCH_PROBE", "MILL5_AC", "+12.3", "250.0123", "13.40", "-90°, 0°, 90°, 180°", "Huber"):
+        for value in ("TOUCH_PROBE", "MILL5_AC", "+12.3", "250.0123", "13.40", "−90°, 0°, 90°, 180°", "Huber"):
             assert value in text, value
+
+    def test_an_axis_of_twelve_angles_has_one_too(self, shop: Shop) -> None:
+        around = [{"angle": 30.0 * n, "centre": [180 * cos(pi * n / 6), 180 * sin(pi * n / 6), 40]} for n in range(12)]
+        run = take(shop, axes=[axis() | {"positions": around}])
+        assert len(pypdf.PdfReader(io.BytesIO(file_of(shop, run, "pdf"))).pages) > 1
 
     def test_spreadsheet_lines_and_json_say_the_same(self, shop: Shop) -> None:
         run = take(shop, axes=[axis(both=True, backlash=0.002)])
