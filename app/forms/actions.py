@@ -29,6 +29,8 @@ from app.readings import actions as readings
 from app.readings import queries as streams
 from app.web.i18n import _
 
+HELD = ("method", "tolerance", "repeatability", "part")  # what makes another measurement of the same touches
+
 
 class Made(NamedTuple):
     """A measurement; again: it was sent before with the same key, and nothing happened now."""
@@ -118,9 +120,14 @@ def found_in(
 ) -> Found:
     """What the core finds. Raises `Invalid` with what is wrong with which touches, and what to do."""
     try:
-        return find(kind, given, method, tolerance, repeatability)
+        found = find(kind, given, method, tolerance, repeatability)
     except (Degenerate, WrongSection, DatumRefused) as refusal:
         raise wording.refused(refusal, kind, given) from None
+    details = found.result["details"]
+    sections = [*details.get("sections", ()), *details.get("datum_sections", ())]
+    if any(section.get("diameter", 1.0) <= 0 for section in sections):
+        raise wording.tip_too_large()
+    return found
 
 
 def _sent_before(session: Session, machine: Machine, given: FormIn) -> Made | None:
@@ -128,10 +135,11 @@ def _sent_before(session: Session, machine: Machine, given: FormIn) -> Made | No
     if before is None:
         return None
     kept = before.measurement
-    if (kept.feature, kept.kind, kept.given) == (given.feature, given.kind, stored(given)):
+    wanted = (given.feature, given.kind, stored(given), *(getattr(given, name) for name in HELD))
+    if (kept.feature, kept.kind, kept.given, *(getattr(kept, name) for name in HELD)) == wanted:
         return Made(before, again=True)
     raise Conflict(
-        _("Form measurement {number} was sent with the key {key} already, and with other touches.").format(
+        _("Form measurement {number} was sent with the key {key} already, and with other values.").format(
             number=kept.id, key=repr(given.key)
         ),
         _("A key names one measurement for ever: use another one."),

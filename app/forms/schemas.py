@@ -23,6 +23,8 @@ Point = Annotated[list[Length], Field(min_length=2, max_length=3)]
 OF_SECTIONS = {Kind.ROUNDNESS, Kind.AXIS_STRAIGHTNESS, Kind.COAXIALITY, Kind.POSITION}
 OF_POINTS = {Kind.STRAIGHTNESS, Kind.FLATNESS}
 WITH_DATUM = {Kind.COAXIALITY, Kind.PARALLELISM, Kind.PERPENDICULARITY}
+WITH_LENGTH = {Kind.PARALLELISM, Kind.PERPENDICULARITY}
+ONLY_OF = {"datum": WITH_DATUM, "nominal": {Kind.POSITION}, "length": WITH_LENGTH}
 
 FORM: dict[str, JsonValue] = {
     "machine": "lathe-1",
@@ -154,6 +156,9 @@ class FormIn(Body):
                     count=count, most=MOST_TOUCHES
                 ),
             )
+        for name, kinds in ONLY_OF.items():  # a datum that is passed over would make a verdict of something else
+            if kind not in kinds and getattr(self, name) is not None:
+                raise PydanticCustomError("not_of_kind", _("{name} means nothing for this kind").format(name=name))
         if self.sections and self.points:
             raise PydanticCustomError("both", _("say either sections or points of the feature"))
         if kind in OF_SECTIONS and not self.sections:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from app.errors import FieldError, Invalid
-from app.forms.schemas import OF_POINTS, OF_SECTIONS, WITH_DATUM
+from app.forms.schemas import OF_POINTS, OF_SECTIONS, WITH_DATUM, WITH_LENGTH
 from app.web.forms import length
 from app.web.i18n import _
 
@@ -67,7 +67,9 @@ def fields(form: Mapping[str, str]) -> dict[str, Any]:
         name: form.get(name, "").strip()
         for name in ("machine", "feature", "kind", "method", "side", "part", "characteristic")
     }
-    given |= {name: length(form.get(name)) for name in ("length", "tip_diameter")}
+    given |= {"tip_diameter": length(form.get("tip_diameter"))}
+    if kind in WITH_LENGTH:
+        given["length"] = length(form.get("length"))
     for name in ("tolerance", "repeatability"):  # typed in µm
         micrometres = length(form.get(name))
         given[name] = round(micrometres / 1000, 9) if isinstance(micrometres, float) else micrometres
@@ -107,9 +109,13 @@ def written(given: Mapping[str, Any]) -> str:
     for section in given.get("sections", ()):
         rows = [_line(touch) for touch in section.get("touches") or [section["centre"]]]
         height = section.get("height")
-        blocks.append("\n".join([*([f"Z {height:g}"] if height is not None else []), *rows]))
+        blocks.append("\n".join([*([f"Z {_exact(height)}"] if height is not None else []), *rows]))
     return "\n\n".join(blocks)
 
 
 def _line(point: list[float]) -> str:
-    return " ".join(f"{value:.9g}" for value in point)
+    return " ".join(map(_exact, point))
+
+
+def _exact(value: float) -> str:
+    return f"{value:.15g}"

@@ -198,8 +198,20 @@ def refused(refusal: Degenerate | WrongSection | DatumRefused, kind: str, given:
     else:
         field = folder + ("sections" if touched.get("sections") else "points")
         where, reason = "", refusal
+    if folder:
+        where = _("Datum: ") + where
     why, what = _why(reason, kind, sections=field.endswith("sections"))
     return Invalid(where + why, what, errors=[FieldError(field, where + why)])
+
+
+def tip_too_large() -> Invalid:
+    """A tip that leaves no shaft: its centre cannot have gone round one on so small a circle."""
+    wrong = _("the tip is as large as the circle its centre went on, so there is no shaft left")
+    return Invalid(
+        f"tip_diameter: {wrong}.",
+        _("State the diameter of the tip in mm; for a bore choose the side inside."),
+        errors=[FieldError("tip_diameter", wrong)],
+    )
 
 
 def _why(reason: Degenerate, kind: str, *, sections: bool) -> tuple[str, str]:

@@ -32,6 +32,7 @@ PLATE: dict[str, Any] = {
     "points": [[x, y, 0.002 * ((x + y) % 2)] for x in (0.0, 1.0, 2.0) for y in (0.0, 1.0, 2.0)],
     "tolerance": 0.002,
 }
+HOLE: dict[str, Any] = {"height": 3.0, "touches": [[5.0, 0.0], [0.0, 5.0], [-5.0, 0.0], [0.0, -5.0]]}
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +126,7 @@ class TestKept:
         assert shop.machine in first["by"]
         assert shop.call("POST", "/forms", 200, shop.machine_client, **given) == first
         shop.call("POST", "/forms", 409, shop.machine_client, **(given | {"tip_diameter": 5.0}))
+        shop.call("POST", "/forms", 409, shop.machine_client, **(given | {"tolerance": 0.5}))
 
     def test_only_of_its_own_machine(self, server: Server, shop: Shop) -> None:
         other = Shop(server)
@@ -207,7 +209,21 @@ class TestRefused:
             ({"points": [[0, 0, 0], [1, 1, 0], [2, 2, 0], [3, 3, 0]]}, "points", "one straight line"),
             ({"points": [[0, 0, 0], [0, 0, 0], [1, 0, 0], [1, 0, 0]]}, "points", "same point"),
             ({"points": [[0, 0, 0], [1, 0, 0]]}, "points", "4 touches or more"),
+            ({"points": [[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 9, 0]]}, "points", "same point"),
             ({"points": [[0, 0], [1, 0]]}, "", "3 coordinates"),
+            ({"datum": {"points": [[0, 0, 0], [9, 0, 0], [0, 9, 0]]}}, "", "datum means nothing for this kind"),
+            ({"nominal": [0, 0]}, "", "nominal means nothing"),
+            ({"length": 5.0}, "", "length means nothing"),
+            (
+                {"kind": "coaxiality", "points": [], "datum": {"sections": [HOLE]}, "sections": [HOLE]},
+                "datum.sections",
+                "Datum: Coaxiality needs 2 sections",
+            ),
+            (
+                {"kind": "roundness", "points": [], "sections": [HOLE], "tip_diameter": 10.0, "side": "outside"},
+                "tip_diameter",
+                "no shaft left",
+            ),
             ({"kind": "roundness", "points": []}, "", "needs sections"),
             (
                 {

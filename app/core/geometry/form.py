@@ -33,7 +33,7 @@ from app.core.geometry.discs import circumscribed, inscribed
 from app.core.geometry.elements import Point, Section, WrongSection, axis_through, centres_of, heights_of
 from app.core.geometry.line import fit_line
 from app.core.geometry.plane import fit_plane
-from app.core.geometry.points import Degenerate, Floats, Reason, frame
+from app.core.geometry.points import Degenerate, Floats, Reason, frame, points_of
 from app.core.geometry.suspicion import Suspect, Suspicion, in_bore, in_line, in_plane, in_section
 from app.core.geometry.zones import minimum_zone_axis, minimum_zone_circle, minimum_zone_line, minimum_zone_plane
 from app.core.zones import nanometres
@@ -158,7 +158,7 @@ def roundness(feature: Touched) -> Form:
     suspects: list[Suspect] = []
     for number, section in enumerate(feature.sections, start=1):
         try:
-            _enough(section.touches, 4)
+            points_of(section.touches, 2, 4)
             values, circle, ring = _round(section)
         except Degenerate as reason:
             raise WrongSection(number, reason) from None
@@ -202,7 +202,7 @@ def _round(section: Section) -> tuple[list[Value], Circle, dict[str, Any]]:
 
 def straightness(feature: Touched) -> Form:
     """Of a profile: points along it and across it. Raises `Degenerate`."""
-    _enough(feature.points, 3)
+    points_of(feature.points, 2, 3)
     line, strip = fit_line(feature.points), minimum_zone_line(feature.points)
     points = np.asarray(feature.points, dtype=np.float64)
     jacobian = np.column_stack([line.along, np.ones(len(points))])
@@ -220,7 +220,7 @@ def straightness(feature: Touched) -> Form:
 
 def flatness(feature: Touched) -> Form:
     """Of a surface. Raises `Degenerate`."""
-    _enough(feature.points, 4)
+    points_of(feature.points, 3, 4)
     plane, slab = fit_plane(feature.points), minimum_zone_plane(feature.points)
     points = np.asarray(feature.points, dtype=np.float64)
     local = (points - plane.point) @ frame(plane.normal)[:2].T
@@ -261,6 +261,7 @@ def axis_straightness(feature: Touched) -> Form:
         if not printed:
             raise Degenerate(Reason.NO_DIRECTION)
         return Form(printed, in_bore(sections), details={"sections": told})
+    points_of(heights, 1, 3)  # two heights are always on a line, however often they are touched
     axis = axis_through(sections)
     zone = minimum_zone_axis(axis.points)
     away = across(axis.points, axis.point, axis.direction)
@@ -343,8 +344,3 @@ def replaced(feature: Touched, suspects: Sequence[Suspect]) -> Touched:
         ),
         tuple(points),
     )
-
-
-def _enough(points: Sequence[Point], needed: int) -> None:
-    if len(points) < needed:
-        raise Degenerate(Reason.TOO_FEW, have=len(points), needed=needed)

@@ -42,6 +42,27 @@ def by(form: Form) -> dict[Method, float]:
     return {value.method: value.value for value in form.values}
 
 
+RING = ((10.0, 0.0), (0.0, 10.0), (-10.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("kind", "feature"),
+    [
+        (Kind.ROUNDNESS, Touched((Section((*RING, RING[0])),))),
+        (Kind.FLATNESS, Touched(points=((0, 0, 0), (9, 0, 0.1), (0, 9, 0), (0, 9, 0)))),
+        (Kind.STRAIGHTNESS, Touched(points=((0, 0), (9, 0.1), (9, 0.1)))),
+        (Kind.AXIS_STRAIGHTNESS, Touched((Section(RING, 0.0), Section(RING, 20.0), Section(RING, 0.0)))),
+    ],
+)
+def test_a_touch_that_was_copied_is_no_further_touch(kind: Kind, feature: Touched) -> None:
+    """Three points lie on a circle and a plane, two on a line: the same again would make a perfect form."""
+    with pytest.raises((Degenerate, WrongSection)) as refused:
+        evaluate(Task(kind, feature))
+    reason = refused.value.reason if isinstance(refused.value, WrongSection) else refused.value
+    assert isinstance(reason, Degenerate)
+    assert reason.reason is Reason.COINCIDENT
+
+
 class TestByHand:
     def test_an_oval(self) -> None:
         oval = Touched((Section(((10.01, 0.0), (0.0, 9.99), (-10.01, 0.0), (0.0, -9.99))),))
