@@ -189,6 +189,10 @@ class TestWithoutScripts:
         assert 'value="-0.205"' in page
         assert len(shop.call("GET", f"/alignments?machine={shop.machine}&limit=1000")["items"]) == before
 
+    def test_the_cell_that_is_wrong_is_marked_and_no_other(self, shop: Shop, operator: Person) -> None:
+        page = operator.send("/alignments/new", 422, **(six(shop.machine) | {"z0": "zehn", "d2": "-"}))
+        assert re.findall(r'<input name="(\w+)"[^>]* aria-invalid', page) == ["z0", "d2"]
+
     def test_more_lines_keep_what_stands_there(self, shop: Shop, operator: Person) -> None:
         page = operator.send("/alignments/new", **six(shop.machine, do="grid"))
         assert 'name="x11"' in page
