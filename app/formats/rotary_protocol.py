@@ -22,9 +22,13 @@ _AXIS = re.compile(
     r"\b(?:[a-z]{0,20}achse|[a-z]{0,20}tisch|axis(?: of rotation)?|rotary table|os|osi|miza)\s+([abc])\b"
     r"|\b([abc])\s?(?:[a-z]{0,20}achse|axis|rotary axis|os|osi)\b"
 )
-_NUMBER = re.compile(r"(?<![\w.,])([+-]?\d{1,12}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm|°|deg|grad|inch|in|\")?(?![\w])")
-_COORDINATE = re.compile(r"\b([xyz])\s*[=:]?\s*([+-]?\d{1,12}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm)?", re.IGNORECASE)
+# 1.212,3344 with a mark for the thousands is no number here: half of it would be another one.
+_NUMBER = re.compile(
+    r"(?:(?<![\w.,])|(?<=,)(?=[+-]))([+-]?\d{1,12}(?:[.,]\d{1,12})?)(?![.,]?\d)\s*(mm|um|µm|μm|°|deg|grad|inch|in|\")?(?![\w])"
+)
+_COORDINATE = re.compile(r"\b([xyz])\s*[=:]?\s*([+-]?[\d.,]{1,26}(?<![.,]))\s*(mm|um|µm|μm)?", re.IGNORECASE)
 _DEVIATION = re.compile(r"\be([xyz])([abc])\b")
+_BLANKS = re.compile(r"\s*([^\d+\N{MINUS SIGN}]*[^\W\d]\)?)\s+([+\N{MINUS SIGN}-]?\d.*)")  # Startwinkel  -90,000 °
 _CLOCK = re.compile(r"\d{1,2}:\d{2}")
 _ALONE = re.compile(r"(?:[a-z]{1,20} ){0,2}(?:[a-z]{0,20}achse|axis|os)(?: of rotation)?")  # Vermessene Rotationsachse
 _LETTER = re.compile(r"\s*([abc])(?:[\s-]*(?:achse|axis|os))?\s*", re.IGNORECASE)
@@ -135,6 +139,8 @@ def _split(row: Row) -> tuple[str, list[str]]:
         at = text.find(mark)
         if at > 0 and not (mark == ":" and clock is not None and clock.start() < at < clock.end()):
             return text[:at].strip(), [text[at + 1 :].strip()] if text[at + 1 :].strip() else []
+    if (blanks := _BLANKS.fullmatch(text)) and _key(folded(blanks[1][:LONGEST_LABEL]), "") is not None:
+        return blanks[1], [blanks[2]]
     return text.strip(), []
 
 
@@ -226,8 +232,10 @@ def _number(made: Protocol, axis: AxisName | None, key: str, said: str, words: s
         return False
     kept = made.axes.setdefault(axis, AxisProtocol())
     if key == "angles":
+        if not numbers or re.search(r"\d", _NUMBER.sub("", said.replace("\N{MINUS SIGN}", "-"))):
+            return False  # a list of which only a part can be read is not read
         kept.angles = tuple(numbers)
-        return bool(numbers)
+        return True
     if key in VECTORS:
         letter = next((at for at, each in enumerate("xyz") if fits(words, f"={each}")), None)
         vector = _vector(said)
@@ -266,7 +274,7 @@ def _vector(said: str) -> Point | None:
     named = {letter.upper(): numbers_in(f"{number} {unit}")[:1] for letter, number, unit in _COORDINATE.findall(plain)}
     if named:
         x, y, z = ((named.get(letter) or [0.0])[0] for letter in "XYZ")
-        return x, y, z
+        return (x, y, z) if all(named.values()) else None
     numbers = numbers_in(plain)
     return (numbers[0], numbers[1], numbers[2]) if len(numbers) == 3 else None
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from app.core.kinematics.axis import AXES, ERRORS, AxisName
 from app.core.kinematics.results import MEASURED, OFFSETS, OPTIMISED, SCALARS, STRINGS, Results, read_results
+from app.core.programs.lines import written
 from app.errors import FieldError, Invalid
 from app.formats.rotary_protocol import AxisProtocol, Protocol, read_protocol
 from app.kinematics import wording
@@ -27,7 +28,7 @@ def results_of(given: Mapping[str, float | str]) -> Results:
             wrong = _("four numbers of ten characters, as text") if known in STRINGS else _("must be a number")
             errors.append(FieldError(f"results.{known}", wrong))
         else:
-            lines.append(f'{known} = "{value}"' if isinstance(value, str) else f"{known} = {value:.12f}")
+            lines.append(f'{known} = "{value}"' if isinstance(value, str) else f"{known} = {written(value)}")
     if errors:
         raise Invalid(
             f"{errors[0].field}: {errors[0].message}.", _("There are Q141 to Q149 and QS144 to QS146."), errors=errors
@@ -40,7 +41,8 @@ def of_parameters(read: Results, came_as: str) -> Evaluated:
     made.results["notes"] = [wording.flaw(each) for each in read.flaws[:MOST_NOTES]]
     _fill_in(made, read, {})
     if not made.results["axes"] and made.results["offsets"] is None:
-        wrong = _("no result parameter can be read: {notes}").format(notes="; ".join(made.results["notes"][:3]))
+        notes = "; ".join(made.results["notes"][:3])
+        wrong = _("no result parameter can be read: {notes}").format(notes=notes or _("it is empty"))
         raise Invalid(
             f"{came_as}: {wrong}.",
             _('Write a line for each, like Q143 = 0.0134 or QS146 = "0.01234567 -0.0123456 0.00123456 -0.0012345".'),

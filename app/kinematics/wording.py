@@ -133,6 +133,7 @@ def flaw(found: Flaw) -> str:
     return {
         Damage.COUNT: _("{name}: four numbers are needed, {text} came; nobody can tell which, so none is taken"),
         Damage.LENGTH: _("{name}: number {n} “{text}” does not have {width} characters; digits may be lost"),
+        Damage.CUT: _("{name}: number {n} “{text}” is cut short; too many digits are lost, so it is not taken"),
         Damage.SEPARATOR: _("{name}: the numbers are not separated by one space each"),
         Damage.COMMA: _("{name}: number {n} “{text}” has a decimal comma; it was read as a point"),
         Damage.NOT_A_NUMBER: _("{name}: number {n} “{text}” is not a number")

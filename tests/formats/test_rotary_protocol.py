@@ -141,3 +141,35 @@ def test_any_text_is_read(text: str) -> None:
     read_protocol(text)
     read_protocol(f"<p>C axis</p><table><tr><td>Backlash</td><td>{text}</td></tr></table>")
     numbers_in(text)
+
+
+def test_lines_of_a_text_with_blanks_between() -> None:
+    made = read_protocol(
+        "Achse C\nStartwinkel      -90,000 °\nStandardabweichung (optimiert)   1,2 µm\nMax. Abweichung 3,2 µm\nSeite 1 von 2\n"
+    )
+    assert made.axes["C"].numbers == {"start_angle": -90.0, "scatter_after": 0.0012, "greatest": 0.0032}
+    assert [each.text for each in made.unread] == ["Seite 1 von 2"]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "Messkreisradius: 1.212,3344 mm",
+        "Position vor: X=-1.345,6789 Y=0 Z=1",
+        "Achspositionen: -90,-30,30,90",
+        "Achspositionen: -90.000; 1.030,5",
+    ],
+)
+def test_half_of_a_number_is_none(line: str) -> None:
+    """With a mark for the thousands, or commas both in and between numbers: told, not read as something else."""
+    made = read_protocol(f"<h2>C-Achse</h2><p>Lose: 0,001 °</p><p>{line}</p>")
+    assert made.axes["C"].numbers == {"backlash": 0.001}
+    assert (made.axes["C"].vectors, made.axes["C"].angles) == ({}, ())
+    assert [each.text for each in made.unread] == [line]
+
+
+def test_angles_with_commas_between() -> None:
+    assert read_protocol("<h2>Axis C</h2><p>Axis positions: -90.0, -30.5,+30.0, 90.0</p>").axes["C"].angles == (
+        *(-90.0, -30.5),
+        *(30.0, 90.0),
+    )

@@ -14,6 +14,8 @@ from typing import NamedTuple
 from app.core.kinematics.axis import ERRORS, AxisName
 
 WIDTH, NUMBERS = 10, 4
+LEAST_DECIMALS = 4  # a tenth of a micrometre, of 0.001°
+NOT_MEASURED = -1.0  # what the control writes for the scatter of an axis that was left out
 STRINGS: dict[str, AxisName] = {"QS144": "A", "QS145": "B", "QS146": "C"}
 MEASURED: dict[str, AxisName] = {"Q141": "A", "Q142": "B", "Q143": "C"}
 OPTIMISED: dict[str, AxisName] = {"Q144": "A", "Q145": "B", "Q146": "C"}
@@ -31,6 +33,7 @@ class Damage(StrEnum):
 
     COUNT = "count"
     LENGTH = "length"
+    CUT = "cut"
     SEPARATOR = "separator"
     COMMA = "comma"
     NOT_A_NUMBER = "not_a_number"
@@ -77,7 +80,7 @@ def read_string(parameter: str, text: str) -> ResultString:
     """
     names = ERRORS[STRINGS[parameter]]
     flaws: list[Flaw] = []
-    text = text.strip()
+    text = text.strip().strip("\"'“”„«»").strip()
     parts = _APART.sub(" ", text).split()  # a sign begins a number, a separator or not
     if parts and text != " ".join(parts):
         flaws.append(Flaw(parameter, 0, Damage.SEPARATOR, text))
@@ -90,6 +93,9 @@ def read_string(parameter: str, text: str) -> ResultString:
         values[name] = value
         if damage is None and len(part) != WIDTH:
             damage = Damage.LENGTH
+            # Beside a number as the control writes it a short one is cut: what is left of "-0.0012345" may be "-0.00".
+            if WIDTH in map(len, parts) and len(part.partition(".")[2]) < LEAST_DECIMALS:
+                values[name], damage = None, Damage.CUT
         if damage is not None:
             flaws.append(Flaw(parameter, number, damage, part))
     return ResultString(values, tuple(flaws))
@@ -159,7 +165,9 @@ def read_results(text: str) -> Results:
             errors[STRINGS[name]] = read.values
         else:
             value, damage = read_number(found[2].removesuffix("mm").removesuffix("мм"))
-            if value is not None and value < 0 and name not in OFFSETS:
+            if value == NOT_MEASURED and name not in OFFSETS:
+                value, damage = None, None
+            elif value is not None and value < 0 and name not in OFFSETS:
                 value, damage = None, Damage.NEGATIVE  # a standard deviation is none
             if value is not None:
                 scalars[name] = value

@@ -83,3 +83,12 @@ def test_a_standard_deviation_is_never_negative() -> None:
     found = read_results("Q143 = -0.0134\nQ147 = -0.0134")
     assert found.scalars == {"Q147": -0.0134}
     assert [flaw.damage for flaw in found.flaws] == [Damage.NEGATIVE]
+
+
+def test_minus_one_is_an_axis_that_was_not_measured() -> None:
+    found = read_results(
+        "Q141 = -1\nQ144 = -1.0\nQ143 = 0.0134\nQ147 = -1\nQS146 = '0.01234567 -0.0123456 0.00123456 -0.0012345'"
+    )
+    assert found.scalars == {"Q143": 0.0134, "Q147": -1.0}
+    assert not found.flaws
+    assert read_string("QS146", '"0.01234567 -0.0123456 0.00123456 -0.0012345"').flaws == ()
