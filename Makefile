@@ -21,7 +21,7 @@ run: $(VENV)/installed
 	@$(BIN)/inband demo $(ARGS)
 
 test: lint $(VENV)/browser
-	@$(BIN)/pytest -n auto $(ARGS)
+	@$(BIN)/pytest -n auto --dist worksteal $(ARGS)
 
 lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check --quiet

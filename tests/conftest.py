@@ -34,6 +34,7 @@ from app.settings import HOUSE
 
 for name in [name for name in os.environ if name.startswith(("INBAND_", "PG"))]:
     del os.environ[name]  # no test may meet a real installation
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # hundreds of servers start; each would compile the whole house anew
 
 settings.register_profile("inband", deadline=None)  # a computer that is busy is no fault of what is tested
 settings.load_profile("inband")
