@@ -102,13 +102,15 @@ def history(session: Session, machine_id: int, name: str) -> list[Alignment]:
 
     Of touches that were computed again the last result counts.
     """
-    again = select(Alignment.recomputed_from).where(
-        Alignment.machine_id == machine_id, Alignment.recomputed_from.is_not(None)
+    here = Alignment.machine_id == machine_id
+    kept = (
+        select(Alignment.id, Alignment.id.label("touched"))
+        .where(here, Alignment.name == name, Alignment.recomputed_from.is_(None))
+        .cte("kept", recursive=True)
     )
+    kept = kept.union_all(select(Alignment.id, kept.c.touched).where(here, Alignment.recomputed_from == kept.c.id))
+    last = select(func.max(kept.c.id)).group_by(kept.c.touched)
     rows = session.scalars(
-        select(Alignment)
-        .where(Alignment.machine_id == machine_id, Alignment.name == name, Alignment.id.not_in(again))
-        .order_by(Alignment.id.desc())
-        .limit(SHOWN)
+        select(Alignment).where(here, Alignment.id.in_(last)).order_by(Alignment.id.desc()).limit(SHOWN)
     )
     return sorted(rows, key=lambda each: (each.aligned_at, each.id))

@@ -10,6 +10,7 @@ from app.core.kinematics.axis import ERRORS, AxisName
 from app.core.kinematics.results import MEASURED, OFFSETS, OPTIMISED, STRINGS, write_string
 from app.kinematics import wording
 from app.kinematics.queries import RunRow
+from app.kinematics.tables import KinematicsRun
 
 Status = Literal["refused", "to_confirm", "confirmed", "measured", "entered"]
 
@@ -57,6 +58,10 @@ RUN: dict[str, JsonValue] = {
     "machine": "lathe-1",
     "form": "centres",
     "head": None,
+    "program": "TNC:\\nc_prog\\preset_452.h",
+    "tool": "TOUCH_PROBE",
+    "kinematics": "MILL5_AC",
+    "mode": None,
     "status": "measured",
     "reason": {"code": "measured", "text": "C: scatter 13.4 µm → 2.1 µm."},
     "measured_at": "2026-11-21T06:42:10Z",
@@ -166,6 +171,10 @@ class RunOut(BaseModel):
     machine: str
     form: Annotated[str, Field(description="touches, centres, results or protocol.")]
     head: str | None
+    program: Annotated[str | None, Field(description="NC program; sent, or read from the protocol.")] = None
+    tool: Annotated[str | None, Field(description="Name of the touch probe.")] = None
+    kinematics: Annotated[str | None, Field(description="Name of the active kinematics.")] = None
+    mode: Annotated[str | None, Field(description="How the cycle was run.")] = None
     status: Annotated[
         Status,
         Field(
@@ -199,6 +208,7 @@ def run_out(row: RunRow) -> RunOut:
         machine=row.machine.key,
         form=run.form,
         head=run.head or None,
+        **{name: said_of(run).get(name) for name in ("program", "tool", "kinematics", "mode")},
         status=row.status,  # type: ignore[arg-type] # `RunRow.status` makes no others
         reason=ReasonOut(code=run.reason["code"], text=wording.sentence(run)),
         measured_at=run.measured_at,
@@ -217,6 +227,11 @@ def run_out(row: RunRow) -> RunOut:
         entered=_decided(row, "entered"),
         given=run.given,
     )
+
+
+def said_of(run: KinematicsRun) -> dict[str, str]:
+    """What was said of the cycle itself: sent, or read in the control's protocol."""
+    return dict(run.results.get("head") or {}) | {name: v for name, v in run.given.items() if isinstance(v, str)}
 
 
 def axis_out(axis: Mapping[str, Any]) -> AxisOut:

@@ -6,7 +6,7 @@ from typing import Any
 
 from app.core.kinematics.results import OFFSETS, STRINGS
 from app.kinematics import wording
-from app.kinematics.answers import parameters_of
+from app.kinematics.answers import parameters_of, said_of
 from app.kinematics.figures import LETTERS, diagram, greatest
 from app.kinematics.looking import in_order, surer
 from app.kinematics.queries import RunRow
@@ -66,7 +66,7 @@ def protocol_of(row: RunRow, made_at: datetime) -> Report:
 
 def _head(row: RunRow) -> tuple[Fact, ...]:
     run = row.run
-    said = dict(run.results.get("head") or {}) | {k: v for k, v in run.given.items() if isinstance(v, str)}
+    said = said_of(run)
     return (
         Fact("measured", _("Measured"), moment(run.measured_at)),
         Fact("program", _("NC program"), words(said.get("program"))),

@@ -1,5 +1,6 @@
 """Alignments by REST: found, refused with the touch to move, composed, computed again."""
 
+import re
 from math import degrees
 from typing import Any
 
@@ -8,7 +9,7 @@ import pytest
 
 from app.core.geometry.frames import from_angles
 from tests.conftest import Server
-from tests.shop import Shop
+from tests.shop import Person, Shop
 
 PLACES: list[tuple[list[float], str]] = [
     ([10.0, 10.0, 0.0], "+Z"),
@@ -129,6 +130,16 @@ class TestSix:
         made = post(shop, touches=SIX, characteristics={"c": "pallet-c"})
         assert made["readings"][0]["sequence"] == 1
         assert shop.call("GET", "/readings/pallet-c/1")["deviation"] == pytest.approx(0.0)
+
+    def test_of_touches_computed_again_the_last_result_counts(self, server: Server, shop: Shop) -> None:
+        """However often, and of which one: a trend has one point for each time the part was touched."""
+        one, other = (post(shop, touches=SIX, name="again")["id"] for _ in range(2))
+        for of, method in ((one, "small"), (one, "exact"), (one + 2, "printed"), (one, "small")):
+            last = shop.call("POST", f"/alignments/{of}/recompute", 201, method=method, reason="to compare")["id"]
+        figure = shop.call("GET", f"/machines/{shop.machine}/alignments/figure?name=again")
+        assert {len(trace["y"]) for trace in figure["data"]} == {2}
+        page = Person(server, "viewer").open(f"/alignments/history?machine={shop.machine}&name=again")
+        assert {int(each) for each in re.findall(r"/alignments/(\d+)", page)} == {last, other}
 
 
 class TestMore:

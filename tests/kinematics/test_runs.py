@@ -67,6 +67,7 @@ class TestForms:
         assert set(c["errors"]) == set(NAMES)
         if language == "de":
             assert run["measured_at"] == "2026-11-21T06:42:10Z"
+            assert (run["tool"], run["kinematics"]) == ("TOUCH_PROBE", "MILL5_AC")
             assert [note for note in run["not_understood"] if "Nachtschicht" in note]
             assert len(c["positions"]) == 4
             assert c["position_after"] == [250.0123, -0.0081, -120.0]
