@@ -59,7 +59,7 @@ def trend(marks: Sequence[Mark], *, theme: ThemeName = "light") -> dict[str, Any
         margin={"l": 72, "r": 16, "t": 36, "b": 48},
         showlegend=True,
         legend=legend(theme),
-        xaxis=date_axis() | {"anchor": "y2"},
+        xaxis=date_axis((mark.at for mark in marks), anchor="y2"),
         yaxis=titled(_("Shift, µm")) | {"domain": [0.54, 1], "tickformat": "+.4~g", "zerolinecolor": colours.faint},
     )
     frame["yaxis2"] = frame["yaxis"] | titled(_("Turn, °")) | {"domain": [0, 0.46]}

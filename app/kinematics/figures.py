@@ -7,7 +7,6 @@ well. Angles become what they come to over one metre, so that all position error
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from datetime import timedelta
 from math import isfinite
 from typing import Any
 
@@ -275,7 +274,7 @@ def course(drift: Drift, *, theme: ThemeName = "light") -> dict[str, Any]:
         "layout": layout(
             theme,
             margin={"l": 74, "t": 12},
-            xaxis=date_axis() | _days(drift),
+            xaxis=date_axis(point.at for point in drift.points),
             yaxis={
                 "title": {"text": f"{drift.name}, {unit}", "standoff": 6},
                 "range": [low - room, high + room],
@@ -286,14 +285,6 @@ def course(drift: Drift, *, theme: ThemeName = "light") -> dict[str, Any]:
             },
         ),
     }
-
-
-def _days(drift: Drift) -> dict[str, Any]:
-    """Half a day before and after, where all runs are of one hour: else the axis would count seconds."""
-    first, last = min(point.at for point in drift.points), max(point.at for point in drift.points)
-    if last - first > timedelta(hours=1):
-        return {}
-    return {"range": [(first - timedelta(hours=12)).isoformat(), (last + timedelta(hours=12)).isoformat()]}
 
 
 def _steps(at: list[str], values: list[float], name: str, line: dict[str, Any]) -> dict[str, Any]:

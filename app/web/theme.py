@@ -6,7 +6,9 @@ state has a shape and a word as well. The colours are those of `frontend/static/
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from typing import Any, Literal
 
 from app.web.i18n import _
@@ -163,9 +165,16 @@ def layout(theme: ThemeName, **more: Any) -> dict[str, Any]:
     return base
 
 
-def date_axis(**more: Any) -> dict[str, Any]:
-    """An axis of time: 24 hours, day before month. Moments carry their offset; plotly-chart.js shows them in local time."""
+def date_axis(moments: Iterable[datetime] = (), **more: Any) -> dict[str, Any]:
+    """An axis of time: 24 hours, day before month. Moments carry their offset; plotly-chart.js shows them in local time.
+
+    moments: of what is drawn. Where all are of one hour it shows half a day before and after: else it would count seconds.
+    """
     day = 86_400_000
+    known = sorted(moments)
+    if known and known[-1] - known[0] <= timedelta(hours=1):
+        half = timedelta(hours=12)
+        more = {"range": [(known[0] - half).isoformat(), (known[-1] + half).isoformat()]} | more
     return {
         "type": "date",
         "showgrid": False,

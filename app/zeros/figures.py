@@ -121,7 +121,7 @@ def shift_figure(
             margin={"l": 84, "t": 34},
             showlegend=True,
             legend=legend(theme),
-            xaxis=date_axis(),
+            xaxis=date_axis(mark.at for mark in marks),
             yaxis={
                 "range": [-reach, reach],
                 "tickformat": "+.4~g",

@@ -7,7 +7,7 @@ import pytest
 from app.web import i18n, numbers
 from app.web.assets import FOREVER, STATIC_DIR
 from app.web.templates import assets, environment
-from app.web.theme import PALETTES
+from app.web.theme import PALETTES, date_axis
 
 
 class TestNumbers:
@@ -147,3 +147,10 @@ def contrast(one: str, other: str) -> float:
 
     high, low = sorted((luminance(one), luminance(other)), reverse=True)
     return (high + 0.05) / (low + 0.05)
+
+
+def test_an_axis_of_time_of_one_moment_shows_the_day_about_it_and_no_seconds() -> None:
+    at = datetime(2026, 11, 22, 9, 30, tzinfo=UTC)
+    assert date_axis([at])["range"] == ["2026-11-21T21:30:00+00:00", "2026-11-22T21:30:00+00:00"]
+    assert "range" not in date_axis([at, at + timedelta(days=1)])
+    assert "range" not in date_axis()

@@ -51,12 +51,12 @@ def axis_figure(
     data += _above(offs, symbols, tones, tolerance, colours, "3" if side else "")
     legend_of = [_mark(colours.attention, "x", _("Section with a suspected touch"))] if doubted else []
     across = {"range": [-reach * 1000, reach * 1000], "nticks": 5, "tickformat": "+.4~g"}
-    wide = titled(_("X off, µm"), colours, **across, domain=[0, 0.26] if side else [0, 1])
+    wide = titled(_("X off, µm"), colours, **across, domain=[0, 0.24] if side else [0, 1])
     layout = framed(theme, xaxis=wide, yaxis=titled(_("Height Z, mm"), colours))
     if side:
-        layout["xaxis2"] = layout["xaxis"] | titled(_("Y off, µm"), colours, domain=[0.31, 0.57], anchor="y2")
+        layout["xaxis2"] = layout["xaxis"] | titled(_("Y off, µm"), colours, domain=[0.33, 0.57], anchor="y2")
         layout["yaxis2"] = layout["yaxis"] | {"matches": "y", "showticklabels": False, "anchor": "x2", "title": None}
-        layout["xaxis3"] = layout["xaxis"] | titled(_("from above: X off, µm"), colours, domain=[0.66, 1], anchor="y3")
+        layout["xaxis3"] = layout["xaxis"] | titled(_("from above: X off, µm"), colours, domain=[0.68, 1], anchor="y3")
         layout["yaxis3"] = layout["yaxis"] | titled(_("Y off, µm"), colours, **across, anchor="x3", scaleanchor="x3")
     else:
         layout["yaxis"] |= titled(_("Y off, µm"), colours, **across, scaleanchor="x")

@@ -91,7 +91,7 @@ def trend(marks: Sequence[Mark], *, theme: ThemeName = "light") -> dict[str, Any
         "data": data,
         "layout": framed(
             theme,
-            xaxis=date_axis(),
+            xaxis=date_axis(mark.at for mark in marks),
             yaxis=titled(_("Deviation, µm"), colours, range=[0, max(highest, 1e-6) * 1120], nticks=6),
         ),
     }

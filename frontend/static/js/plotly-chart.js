@@ -48,6 +48,7 @@ function wallClock(figure) {
     return new Date(date.getTime() - date.getTimezoneOffset() * 60_000).toISOString().slice(0, -1);
   };
   for (const trace of figure.data) trace.x = trace.x?.map(local);
+  if (figure.layout.xaxis.range) figure.layout.xaxis.range = figure.layout.xaxis.range.map(local);
   for (const shape of figure.layout.shapes ?? []) {
     if (shape.xref !== "paper") Object.assign(shape, { x0: local(shape.x0), x1: local(shape.x1) });
   }
