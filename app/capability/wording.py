@@ -4,7 +4,7 @@ from app.capability.queries import Study
 from app.core.spc.capability import Caution, Index
 from app.core.spc.in_time import ALPHA, InTime, Location, Model, Test
 from app.core.spc.normality import Normality
-from app.core.spc.refusal import Refused
+from app.core.spc.refusal import Reason, Refused
 from app.core.spc.stability import Fired, Stability
 from app.statistics import wording as statistics
 from app.web.i18n import _, ngettext
@@ -234,10 +234,12 @@ def cautions(study: Study) -> list[str]:
     if isinstance(study.found, Refused):
         return [statistics.refusal(study.found)]
     said = [
-        statistics.caution(each)
+        _not_normal(study) if each is Caution.NOT_NORMAL else statistics.caution(each)
         for each in study.found.cautions
         if each is not Caution.NOT_IN_CONTROL or study.stable is not False
     ]
+    if study.quote == "percentile" and not isinstance(study.by_percentile, Refused):
+        said += [statistics.caution(each) for each in study.by_percentile.cautions]
     if study.stable is False:
         said.insert(
             0, _("Cp and Cpk are not to be quoted: the process is not stable. Ppk says what was, not what will be.")
@@ -260,6 +262,19 @@ def cautions(study: Study) -> list[str]:
     elif study.targets_differ:
         said.append(_("The target changed in this time: every deviation is one from the target in force."))
     return said
+
+
+def _not_normal(study: Study) -> str:
+    """That no normal distribution carries the numbers, and what does, if anything."""
+    if not isinstance(study.by_percentile, Refused):
+        return statistics.caution(Caution.NOT_NORMAL)
+    if study.by_percentile.reason is Reason.TOO_FEW_READINGS:
+        return _(
+            "The readings are not normally distributed, and too few for percentiles ({have} of {needed}): no index here says what the tails hold, and the expected ppm do not hold."
+        ).format(have=study.by_percentile.have, needed=study.by_percentile.needed)
+    return _(
+        "The readings are not normally distributed, and take too few values for percentiles: no index here says what the tails hold, and the expected ppm do not hold."
+    )
 
 
 def named(sequences: list[int]) -> str:

@@ -62,6 +62,13 @@ def message(error: Mapping[str, Any]) -> str:
         return _("must be a time with its offset from UTC, for example 2026-11-21T08:15:02+01:00")
     if kind in {"enum", "literal_error"}:
         return _("must be one of {choices}").format(choices=str(context.get("expected", "")).replace("'", ""))
+    if kind == "string_pattern_mismatch" and "|all" in str(context.get("pattern")):
+        words = (
+            str(context["pattern"]).rstrip(")$").split("|")[1:]
+        )  # how all that ask for the last so many readings are made
+        return _("must be a number of readings from 1 on, such as 500, or one of: {words}").format(
+            words=", ".join(words)
+        )
     return _with_values(kind, context) or str(error.get("msg", kind))
 
 
@@ -78,6 +85,7 @@ def _with_values(kind: str, context: Mapping[str, Any]) -> str | None:
         "greater_than_equal": _("must be at least {ge}"),
         "less_than": _("must be less than {lt}"),
         "less_than_equal": _("must be at most {le}"),
+        "string_pattern_mismatch": _("must have the form {pattern}"),
         "too_long": _("must have at most {max_length} items, not {actual_length}"),
         "too_short": _("must have at least {min_length} items"),
     }

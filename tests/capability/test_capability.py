@@ -70,6 +70,26 @@ def test_what_too_few_readings_carry(shop: Shop) -> None:
     assert [each["p_value"] for each in equal["normality"]] == [None, None]
 
 
+def test_what_is_not_normal_says_whether_percentiles_carry_it(server: Server, shop: Shop) -> None:
+    for key, count in (("skew-few", 80), ("skew", 400)):
+        shop.add(key, mode="measure_only", tool_memory=0, wear_limit=0.9)
+        push(shop, [value**2 for value in quiet(count, seed=count)], key)
+    few, more = (" ".join(of(shop, characteristic=key)["cautions"]) for key in ("skew-few", "skew"))
+    assert "too few for percentiles (80 of 100)" in few
+    assert "take the percentile method" not in few
+    assert of(shop, characteristic="skew")["quote"] == "percentile"
+    assert "hardly more than the smallest and the largest" in more
+    sections = shop.call("GET", "/characteristics/skew/report.json?last=all&section=capability")["sections"]
+    assert "hardly more than the smallest" in " ".join(sections[0]["warnings"])
+    page = Person(server, "viewer").open("/characteristics/skew/capability?last=all")
+    assert page.count("hardly more than the smallest") == 1
+
+
+def test_a_number_of_readings_that_is_none_is_told_in_words(shop: Shop) -> None:
+    problem = of(shop, "last=0", status=422)
+    assert problem["detail"] == "last: must be a number of readings from 1 on, such as 500, or one of: all"
+
+
 def test_excluded_readings_and_probe_faults_are_named_and_left_out(shop: Shop) -> None:
     shop.add("named", mode="measure_only", tool_memory=0)
     push(shop, [*quiet(60), 7.9, 1500.0], "named")
