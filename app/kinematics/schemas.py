@@ -159,7 +159,7 @@ class RunIn(Body):
     axes: Annotated[list[AxisIn] | None, Field(min_length=1, max_length=3, description="Touches or centres.")] = None
     shift: Annotated[ShiftIn | None, Field(description="The ball alone: drift without rotary axes.")] = None
     results: Annotated[
-        dict[str, float | str] | None,
+        dict[str, Annotated[float, Field(strict=True)] | Annotated[str, Field(strict=True)]] | None,
         Field(
             max_length=12,
             description='Q141 to Q149 as numbers, QS144 to QS146 as text: {"Q143": 0.0134, "QS146": "…"}.',

@@ -164,7 +164,9 @@ def program_of(zero: WorkZero, machine: Machine, control: str | None = None) -> 
     if offset is None:
         return None
     title = f"INBAND WORK ZERO {zero.id} FOR {machine.key.upper()}"
-    return write_zero(control or machine.control, ZeroText(title, offset, zero.x, zero.y, zero.z, zero.rotation))
+    # Turned about a place along the other axis that nobody touched, the part would lie elsewhere than it was found.
+    rotation = None if zero.x is None or zero.y is None else zero.rotation
+    return write_zero(control or machine.control, ZeroText(title, offset, zero.x, zero.y, zero.z, rotation))
 
 
 def shift_out(compared: Compared, basis: str) -> ShiftOut:

@@ -56,6 +56,7 @@ class TestForms:
         assert "QS146" not in run["parameters"]
         assert "no position error" in enter(shop, run, 409)["detail"]
         take(shop, 422, results={"QS146": "0.01234567 -0.0123456 0.00123456"})
+        take(shop, 422, results={"Q143": True})
         one = take(shop, results={"QS146": "0.01234567 xxxxxxxxxx 0.00123456 -0.0012345"})
         assert set(one["axes"][0]["errors"]) == {"EX0C", "EA0C", "EB0C"}
 

@@ -1,5 +1,6 @@
 """Work zeros by REST: found, kept, idempotent, compared, made readings of."""
 
+from math import radians, tan
 from typing import Any
 
 import psycopg
@@ -75,6 +76,25 @@ class TestFound:
         two = post(shop, kind="bore", touches=POCKET["touches"][:2])
         assert (two["y"], two["diameter"]) == (None, 100.004)
         assert "$P_UIFR[1,X,TR]=-306.01\n" in two["program"]
+
+    def test_turned_about_a_place_that_nobody_touched(self, shop: Shop) -> None:
+        """1° turned, and Y stands 400 mm beside the touches: with the rotation the part would lie 7 mm off."""
+        slope = tan(radians(1.0))
+        jaws: list[dict[str, Any]] = [
+            {"x": -50.0 - 20 * slope, "y": 120.0, "approach": "-X"},
+            {"x": -50.0 + 20 * slope, "y": 80.0, "approach": "-X"},
+            {"x": 50.0, "y": 100.0, "approach": "+X"},
+        ]
+        made = post(shop, kind="pocket", touches=jaws)
+        assert (made["x"], made["y"]) == (pytest.approx(0.0, abs=1e-9), None)
+        assert made["rotation"] == pytest.approx(1.0)
+        assert [each["code"] for each in made["notices"]] == ["one_axis"]
+        assert "$P_UIFR[1,X,TR]=" in made["program"]
+        assert "RT]" not in made["program"]
+        ends = [{"y": 0.0, "x": 0.0, "approach": "-Y"}, {"y": 200.0, "x": 0.0, "approach": "+Y"}]
+        both = post(shop, kind="pocket", touches=[*jaws, *ends])
+        assert both["notices"] == []
+        assert "$P_UIFR[1,Z,RT]=1\n" in both["program"]
 
     def test_the_text_for_another_control(self, shop: Shop) -> None:
         made = post(shop)

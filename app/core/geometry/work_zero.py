@@ -11,7 +11,7 @@ touches, or, touched in opposite pairs, the middle and length of these. Z zero =
 angles degrees, counter-clockwise seen from +Z.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from math import hypot, isfinite, sqrt
@@ -57,6 +57,9 @@ class Notice(StrEnum):
 
     ONE_SIDED = "one_sided"  # touches on a short arc
     NOT_SQUARE = "not_square"  # the two sides of a corner are not at a right angle
+    ONE_AXIS = (
+        "one_axis"  # turned, and the other axis not touched: where the zero lies depends on where that one stands
+    )
     CHORDS = "chords"  # a bore or boss touched in pairs: beside the middle they are shorter than the diameter
 
 
@@ -118,9 +121,18 @@ def find_zero(
             **{name: _rounded(value) for name, value in values.items()},
             residuals=tuple(_rounded(each) for each in residuals),
             uncertainty=stated,
-            notices=(Notice.CHORDS,) if paired else (Notice.NOT_SQUARE,) if skew else (),
+            notices=tuple(_notices(values, paired=paired, skew=skew)),
         )
     return made if height is None else replace(made, z=zero_in_z(height))
+
+
+def _notices(values: Values, *, paired: bool, skew: bool) -> Iterator[Notice]:
+    if paired:
+        yield Notice.CHORDS
+    if skew:
+        yield Notice.NOT_SQUARE
+    if "rotation" in values and not {"x", "y"} <= set(values):
+        yield Notice.ONE_AXIS
 
 
 def zero_in_z(height: Height) -> float:
