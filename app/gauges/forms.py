@@ -90,6 +90,13 @@ def typed_grid(kind: str, form: Mapping[str, str]) -> Grid:
     return grid._replace(names=names, cells=cells)
 
 
+def stored_grid(kind: str, form: Mapping[str, str]) -> Grid:
+    """What is stored: the grid, or the table that was pasted while nothing stands in the grid. Raises `Invalid`."""
+    grid = typed_grid(kind, form)
+    empty = not any(text.strip() for line in grid.cells for text in line)
+    return pasted_grid(kind, form)[1] if empty and form.get("table", "").strip() else grid
+
+
 def pasted_grid(kind: str, form: Mapping[str, str]) -> tuple[dict[str, str], Grid]:
     """The grid that a pasted table makes, and the form with its shape. Raises `Invalid` that names row and column."""
     text = form.get("table", "")
@@ -109,7 +116,7 @@ def pasted_grid(kind: str, form: Mapping[str, str]) -> tuple[dict[str, str], Gri
         grid = shape(kind, typed | {"lines": str(lines)})
         texts = [written(value) for value in single] + [""] * (lines * PER_LINE - len(single))
         cells = [texts[at : at + PER_LINE] for at in range(0, len(texts), PER_LINE)]
-        return typed | {"lines": str(lines)}, grid._replace(cells=cells)
+        return typed | {"lines": str(lines), "table": ""}, grid._replace(cells=cells)
     columns = max(map(len, body))
     operators = operators_of(typed["operators"]) if kind == "grr" else []
     named = _has_names(kind, body, columns, max(1, len(operators)))
@@ -119,7 +126,7 @@ def pasted_grid(kind: str, form: Mapping[str, str]) -> tuple[dict[str, str], Gri
     if not width or width % max(1, len(operators)):
         words = _("has {columns} columns of values: they do not divide among {n} operators")
         raise _wrong("table", words.format(columns=width, n=len(operators)))
-    typed |= {"lines": str(len(body)), "trials": str(width // max(1, len(operators)))}
+    typed |= {"lines": str(len(body)), "trials": str(width // max(1, len(operators))), "table": ""}
     grid = shape(kind, typed)
     cells = [[written(value) for value in row] + [""] * (width - len(row)) for row in values]
     return typed, grid._replace(names=names or grid.names, cells=cells)
@@ -231,6 +238,12 @@ def grid_of(kind: str, rows: Sequence[Mapping[str, Any]]) -> tuple[dict[str, str
 
 def _filled(values: Sequence[float], trials: int) -> list[str]:
     return [written(value) for value in values] + [""] * (trials - len(values))
+
+
+def even(grid: Grid) -> Grid:
+    """The grid as one reads it: every value with as many decimals as the one that has most."""
+    most = max((len(text.partition(".")[2]) for line in grid.cells for text in line), default=0)
+    return grid._replace(cells=[[f"{float(text):.{most}f}" if text else "" for text in line] for line in grid.cells])
 
 
 def settings_of(form: Mapping[str, str]) -> dict[str, Any]:

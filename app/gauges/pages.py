@@ -9,7 +9,7 @@ from starlette.responses import RedirectResponse
 
 from app.characteristics import queries as characteristics
 from app.core.spc.refusal import Refused
-from app.errors import FieldError, InbandError, Invalid, NotFound
+from app.errors import Conflict, FieldError, InbandError, Invalid, NotFound
 from app.gauges import actions, forms, labels, queries, wording
 from app.gauges.forms import Grid
 from app.gauges.queries import Advice, StudyRow
@@ -102,7 +102,7 @@ def send_new(request: Request, session: SessionDep, caller: Operator, form: Form
             filled = _filled(session, kind, typed)
             if filled is not None:
                 return _form(request, session, kind, *filled)
-            fields = {"kind": kind, "rows": forms.rows_of(kind, forms.typed_grid(kind, typed))}
+            fields = {"kind": kind, "rows": forms.rows_of(kind, forms.stored_grid(kind, typed))}
             named = {"machine": typed.get("machine"), "characteristic": typed.get("characteristic")}
             given = parsed(StudyIn, forms.settings_of(typed) | named | fields)
             machine = machines.machine_named(session, given.machine)
@@ -215,7 +215,7 @@ def study_page(
         found=row.found,
         advice=advice if isinstance(advice, Advice) else None,
         verdicts=wording.verdicts(row.found, row.tolerance),
-        grid=forms.grid_of(row.study.kind, row.revision.rows)[1],
+        grid=forms.even(forms.grid_of(row.study.kind, row.revision.rows)[1]),
         heading=forms.heading,
         revisions=queries.revisions(session, row),
         refused=lambda value: isinstance(value, Refused),
@@ -233,7 +233,7 @@ def correct_page(request: Request, session: SessionDep, _caller: Engineer, numbe
     """The form with everything that is stored in it."""
     row = queries.study(session, number)
     fields, grid = forms.grid_of(row.study.kind, row.revision.rows)
-    typed = forms.typed_settings(row.settings) | fields | _named(row)
+    typed = forms.typed_settings(row.settings) | fields | _named(row) | {"seen_revision": str(row.newest)}
     return _form(request, session, row.study.kind, typed, grid, study=row)
 
 
@@ -251,10 +251,14 @@ def send_correction(request: Request, session: SessionDep, caller: Engineer, num
             filled = _filled(session, kind, typed)
             if filled is not None:
                 return _form(request, session, kind, *filled, study=row)
-            fields = {"rows": forms.rows_of(kind, forms.typed_grid(kind, typed)), "reason": typed.get("reason")}
+            seen = typed.get("seen_revision", "")
+            fields = {"rows": forms.rows_of(kind, forms.stored_grid(kind, typed)), "reason": typed.get("reason")}
+            fields |= {"seen_revision": int(seen) if seen.isdecimal() and len(seen) < 10 else seen or None}
             actions.correct_study(session, number, parsed(CorrectionIn, forms.settings_of(typed) | fields), caller)
     except InbandError as error:
         if not error.errors:
             raise
+        if isinstance(error, Conflict):  # who was told may store it all the same
+            typed |= {"seen_revision": str(queries.study(session, number).newest)}
         return _form(request, session, kind, typed, _grid_or_none(kind, typed), error=error, study=row)
     return RedirectResponse(f"/gauges/{number}?done=corrected", 303)

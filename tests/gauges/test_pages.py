@@ -121,6 +121,16 @@ class TestPasted:
         (anova,) = [each for each in newest(shop)["grr"] if each["method"] == "anova"]
         assert anova["components"][0]["percent"] == pytest.approx(27.86, abs=0.005)
 
+    def test_a_table_is_stored_as_it_was_pasted_while_nothing_stands_in_the_grid(
+        self, shop: Shop, operator: Person
+    ) -> None:
+        column = "\n".join(f"40,00{n % 4}" for n in range(27)) + "\n40,0012"
+        page = operator.send("/gauges/new", 200, **form(shop, "type_one", table=column))
+        assert re.search(r"40\.0030</td>", page), "as many decimals in every cell of the values"
+        assert "40.003</td>" not in page
+        page = operator.send("/gauges/new", 422, **form(shop, "type_one", table="40,00x"))
+        assert re.search(r"<details open><summary>Paste a table", page), "what is wrong is not folded away"
+
     def test_a_column_of_values_and_a_table_of_sizes(self, shop: Shop, operator: Person) -> None:
         column = "Meßwert\n" + "\n".join(f"40,000{n % 4}" for n in range(27))
         page = operator.send("/gauges/new", 200, **form(shop, "type_one", do="paste", table=column))
