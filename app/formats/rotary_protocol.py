@@ -116,7 +116,7 @@ def read_protocol(text: str) -> Protocol:
         if columns and axis is not None and _deviation(made, axis, columns, row):
             continue
         columns = []
-        if not values and (words in WORTHLESS or _CYCLE.search(words)):
+        if not values and (words in WORTHLESS or WORTHLESS.issuperset(words.split()) or _CYCLE.search(words)):
             continue
         if side_by_side and len(values) == len(side_by_side):
             taken = [_take(made, each, words, label, [value]) for each, value in zip(side_by_side, values, strict=True)]

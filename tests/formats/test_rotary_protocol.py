@@ -173,3 +173,10 @@ def test_angles_with_commas_between() -> None:
         *(-90.0, -30.5),
         *(30.0, 90.0),
     )
+
+
+def test_a_title_of_such_words_says_nothing_that_could_be_missed() -> None:
+    made = read_protocol(
+        "<title>Messprotokoll Kinematik</title><h2>C-Achse</h2><p>Lose: 0,001 °</p><p>Kinematik Huber</p>"
+    )
+    assert [each.text for each in made.unread] == ["Kinematik Huber"]
