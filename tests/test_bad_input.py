@@ -175,7 +175,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/gauge-studies/from-readings": {name: value for name, value in GAUGE.items() if name != "rows"}
     | {"kind": "type_one", "characteristic": "{characteristic}", "first": 1, "through": 5, "take": "readings"}
     | {"key": "bad-probing"},
-    "PUT /api/v1/gauge-studies/{study}": GAUGE | WHY,
+    "PUT /api/v1/gauge-studies/{study}": GAUGE | WHY | {"seen_revision": 1},
     "POST /api/v1/signals/{signal}/comment": {"cause": "material", "comment": "New batch, harder by 20 HB"},
     "POST /api/v1/characteristics/{characteristic}/what-if": WHAT_IF | {"weighting_factor": 3.0, "zero_range": 0.002},
     "POST /api/v1/characteristics/{characteristic}/what-if/map": WHAT_IF

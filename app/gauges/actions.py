@@ -111,10 +111,22 @@ def rows_from_readings(
 
 
 def correct_study(session: Session, number: int, given: CorrectionIn, caller: Caller) -> StudyRow:
-    """Put a study right, with a reason: a new revision. Nothing that was entered before is lost. Raises `NotFound`, `Invalid`."""
+    """Put a study right, with a reason: a new revision. Nothing that was entered before is lost.
+
+    Raises `NotFound`, `Invalid`; `Conflict` if another revision was made since the one that was seen.
+    """
     found = queries.study(session, number)
     lock_machines(session, [found.machine.id])
     found = queries.study(session, number)  # as it stands now that nobody else changes it
+    if given.seen_revision is not None and given.seen_revision != found.newest:
+        wrong = _("{who} has made revision {n} meanwhile: what it put right is not in yours").format(
+            who=found.revision.actor, n=found.newest
+        )
+        raise Conflict(
+            f"{wrong}.",
+            _("Look at it; store yours again if it is still to take its place."),
+            errors=[FieldError("seen_revision", wrong)],
+        )
     standing = _served(session, found.machine, found.characteristic)
     settings = _settings(given, standing, found.settings.get("source"))
     rows = [_row(row.model_dump()) for row in given.rows]

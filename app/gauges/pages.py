@@ -252,8 +252,11 @@ def send_correction(request: Request, session: SessionDep, caller: Engineer, num
             if filled is not None:
                 return _form(request, session, kind, *filled, study=row)
             seen = typed.get("seen_revision", "")
-            fields = {"rows": forms.rows_of(kind, forms.stored_grid(kind, typed)), "reason": typed.get("reason")}
-            fields |= {"seen_revision": int(seen) if seen.isdecimal() and len(seen) < 10 else seen or None}
+            fields = {
+                "rows": forms.rows_of(kind, forms.stored_grid(kind, typed)),
+                "reason": typed.get("reason"),
+                "seen_revision": int(seen) if seen.isdecimal() and len(seen) < 10 else seen or None,
+            }
             actions.correct_study(session, number, parsed(CorrectionIn, forms.settings_of(typed) | fields), caller)
     except InbandError as error:
         if not error.errors:

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field
 
 from app.core.parameters import LARGEST_LENGTH
-from app.web.fields import LARGEST_ID, Body, Reason, Slug, Text200
+from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Body, Reason, Slug, Text200
 
 Kind = Literal["type_one", "bias", "linearity", "grr"]
 Value = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
@@ -131,3 +131,6 @@ class CorrectionIn(SettingsIn):
 
     rows: list[RowIn] = Field(min_length=1, max_length=MOST_ROWS)
     reason: Reason
+    seen_revision: Annotated[int, Field(strict=True, ge=1, le=LARGEST_SERIAL)] | None = Field(
+        None, description="The revision that is put right: 409 if there is a newer one meanwhile."
+    )

@@ -10,7 +10,7 @@ import pytest
 
 from app.proof.cases import FOLDER
 from tests.conftest import Server
-from tests.shop import Shop
+from tests.shop import Person, Shop
 
 CASES = json.loads((FOLDER / "gauge.json").read_text())
 Rows = list[dict[str, Any]]
@@ -214,6 +214,32 @@ class TestKeeping:
         shop.call("GET", f"{path}?revision=3", 404)
         (change, *_rest) = shop.call("GET", f"/audit?subject=gauge-study/{study['id']}")["items"]
         assert change["after"]["rows"][0]["values"][0] == 0.3
+
+    def test_of_two_who_put_the_same_revision_right_the_second_is_told(self, server: Server, shop: Shop) -> None:
+        study = send(shop, "bias", single(), reference=40.0)
+        path, given = f"/gauge-studies/{study['id']}", {"gauge": "P", "reference": 40.0, "reason": "typed wrongly"}
+        with ThreadPoolExecutor(2) as pool:
+            bodies = [given | {"rows": single(seed=seed), "seen_revision": 1} for seed in (5, 6)]
+            answers = list(pool.map(lambda body: shop.admin.put(f"/api/v1{path}", json=body), bodies))
+        assert sorted(answer.status_code for answer in answers) == [200, 409]
+        told = next(answer.json() for answer in answers if answer.status_code == 409)
+        assert "has made revision 2 meanwhile" in told["detail"]
+        # On the page: what was typed stays, and whoever was told may store it all the same.
+        engineer = Person(server, "engineer")
+        form: dict[str, Any] = {
+            "gauge": "P",
+            "reference": "40.0",
+            "lines": "1",
+            "reason": "read wrongly",
+            "do": "store",
+        }
+        form |= {f"c_0_{at}": f"40.00{at}" for at in range(9)}
+        page = engineer.send(f"/gauges/{study['id']}/correct", 409, seen_revision="1", **form)
+        assert "has made revision 2 meanwhile" in page
+        assert 'value="40.007"' in page
+        assert 'name="seen_revision" value="2"' in page
+        engineer.send(f"/gauges/{study['id']}/correct", seen_revision="2", **form)
+        assert shop.call("GET", path)["revision"] == 3
 
     def test_who_may(self, server: Server, shop: Shop) -> None:
         study = send(shop, "bias", single(), reference=40.0)
