@@ -31,6 +31,7 @@ class OffsetChange:
 def offset_figure(changes: Sequence[OffsetChange], *, theme: ThemeName = "light") -> dict[str, Any]:
     """The offset over time as steps; every change a mark by its kind; tool changes as lines through the chart."""
     colours = palette(theme)
+    changes = sorted(changes, key=lambda change: change.at)  # what is told late would draw a line back in time
     kinds = {
         "correction": _("Correction"),
         "edit": _("Manual edit"),
