@@ -112,6 +112,10 @@ def refusal(refused: Refused) -> str:
                 "%(have)d subgroups with two readings or more, of the %(needed)d that this takes: %(num)d are missing.",
                 missing,
             ) % {"have": refused.have, "needed": refused.needed, "num": missing}
+        case Reason.NO_VARIATION if refused.what == "repeats":
+            return _(
+                "The repeats of every part are the same. That says that the gauge does not resolve them, not that it repeats without error."
+            )
         case Reason.NO_VARIATION:
             return _(
                 "All values are the same. That says that the gauge does not resolve them, not that they do not vary."

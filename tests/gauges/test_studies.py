@@ -200,6 +200,17 @@ class TestKeeping:
         assert sorted(answers) == [200, 200, 200, 201]
         assert len(shop.call("GET", f"/gauge-studies?machine={shop.machine}")["items"]) == 1
 
+    def test_parts_that_differ_and_repeats_that_do_not_are_told_apart(self, shop: Shop) -> None:
+        def rows(step: float) -> list[dict[str, Any]]:
+            return [
+                {"part": str(part), "operator": who, "values": [40 + step * part] * 3}
+                for part in range(5)
+                for who in "AB"
+            ]
+
+        assert send(shop, "grr", rows(0.001))["refused"].startswith("The repeats of every part are the same.")
+        assert send(shop, "grr", rows(0.0))["refused"].startswith("All values are the same.")
+
     def test_put_right_with_a_reason_and_nothing_lost(self, shop: Shop) -> None:
         study = send(shop, "grr", aiag())
         path, rows = f"/gauge-studies/{study['id']}", aiag()

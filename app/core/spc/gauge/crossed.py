@@ -84,7 +84,8 @@ def _block(readings: ArrayLike) -> Floats:
     if not np.isfinite(block).all():
         raise Refused(Reason.INCOMPLETE_STUDY, have=int(np.isfinite(block).sum()), needed=block.size, what="readings")
     if not np.ptp(block, axis=2).any():
-        raise Refused(Reason.NO_VARIATION)  # no cell knows what repeatability is: the gauge does not resolve it
+        # No cell knows what repeatability is: the gauge does not resolve it.
+        raise Refused(Reason.NO_VARIATION, what="repeats" if np.ptp(block) else "")
     return block - float(block.mean())
 
 
