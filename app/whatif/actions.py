@@ -138,12 +138,12 @@ def _open(session: Session, number: int) -> Row:
     """The proposal and its machine, held until the transaction ends."""
     row = proposals.proposal(session, number)
     machines.lock_machines(session, [row.machine.id])
-    session.execute(
+    session.scalars(  # read to the end: until a row is taken, what was loaded before the lock stays as it was
         select(ParameterProposal)
         .where(ParameterProposal.id == number)
         .with_for_update()
         .execution_options(populate_existing=True)
-    )
+    ).one()
     row = proposals.proposal(session, number)
     if row.proposal.status != "open":
         raise Conflict(

@@ -1,8 +1,10 @@
 """The life of a proposed change: by programs, by people without scripts, and as a story in a browser."""
 
+import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import psycopg
 import pytest
 from playwright.sync_api import Page, expect
 
@@ -121,6 +123,26 @@ def test_of_two_at_once_one_is_first(shop: Shop, server: Server) -> None:
         decided = list(pool.map(lambda client: client.post(at, json={"reason": "Yes"}), clients))
     assert sorted(each.status_code for each in decided) == [200, 409, 409, 409]
     assert standing(shop)["parameters_version"] == 3
+
+
+def test_what_one_approves_another_cannot_reject_at_the_same_moment(shop: Shop, server: Server) -> None:
+    made = propose(shop)
+    client = server.client(server.key("engineer"))
+
+    def send(verb: str) -> int:
+        path = f"/api/v1/proposals/{made['id']}/{verb}"
+        answer: int = client.post(path, json={"reason": verb}, timeout=30).status_code
+        return answer
+
+    with psycopg.connect(server.database.dsn) as holding, ThreadPoolExecutor(4) as pool:
+        holding.execute("SELECT 1 FROM machine_state FOR UPDATE")
+        sent = [pool.submit(send, verb) for verb in ("approve", "reject", "reject", "approve")]
+        time.sleep(1.5)  # all of them have looked, and wait for the machine
+        holding.rollback()
+        answers = [each.result() for each in sent]
+    assert sorted(answers) == [200, 409, 409, 409]
+    found = shop.call("GET", f"/proposals/{made['id']}")
+    assert (found["status"] == "approved") == (standing(shop)["parameters_version"] == found["from_version"] + 1)
 
 
 def test_a_form_keeps_what_was_typed(shop: Shop, server: Server) -> None:
