@@ -217,9 +217,15 @@ def _fixture(session: Session, machine: Machine, key: str | None) -> Fixture | N
 
 
 def _watch(session: Session, machine: Machine, zero: WorkZero) -> list[dict[str, Any]]:
-    """Raise *fixture shifted*, or end it when the fixture is back; what live pages are told of it."""
+    """Raise *fixture shifted*, or end it when the fixture is back; what live pages are told of it.
+
+    What came in late says nothing of today, and one part in its place nothing of another beside it.
+    """
     compared = queries.compared(session, zero)
     if compared is None:
+        return []
+    newest = queries.newest_by_offset(session, machine.id, zero.fixture or "")
+    if zero.id not in {each.id for each in newest}:
         return []
     about = {"memory": "fixture", "location": zero.fixture}
     if compared.state is Shift.ALARM:
@@ -231,6 +237,9 @@ def _watch(session: Session, machine: Machine, zero: WorkZero) -> list[dict[str,
             "reference": compared.reference,
         }
         return [alarms.news(machine.key, alarms.raise_for_place(session, machine.id, SHIFTED, data))]
+    others = (queries.compared(session, each) for each in newest if each.id != zero.id)
+    if any(each is not None and each.state is Shift.ALARM for each in others):
+        return []
     comment = _("Work zero {n} is within the limit").format(n=zero.id)
     outcome = {"code": "fixture_back", "number": zero.id}
     ended = alarms.settle_for_place(session, machine.id, SHIFTED, about, zero.actor, comment, outcome)
@@ -268,7 +277,8 @@ def set_fixture(session: Session, row: queries.FixtureRow, given: FixtureIn, cal
     session.flush()
     subject = f"fixture/{row.machine.key}/{row.key}"
     audit(session, caller.name, "fixture watched", subject, before, wanted, given.reason)
-    last = queries.fixture_of(session, row.machine.key, row.key).last.zero
-    told = {"kind": "work_zero", "machine": row.machine.key, "fixture": row.key}
-    publish(session, told, *_watch(session, row.machine, last))
+    told = [{"kind": "work_zero", "machine": row.machine.key, "fixture": row.key}]
+    for last in queries.newest_by_offset(session, row.machine.id, row.key):
+        told += _watch(session, row.machine, last)
+    publish(session, *told)
     return settings

@@ -5,7 +5,7 @@ from math import hypot
 from statistics import median
 from typing import NamedTuple
 
-from sqlalchemy import Select, func, select
+from sqlalchemy import ColumnElement, Select, func, select, true, tuple_
 from sqlalchemy.orm import Session, aliased
 
 from app.core.geometry.work_zero import Shift, judge_shift
@@ -104,10 +104,25 @@ def settings_of(session: Session, machine_id: int, key: str) -> Fixture:
 
 
 def _standing(machine_id: int, fixture: str) -> Select[WorkZero]:
-    """The zeros of a fixture that count: one that was computed again counts as that one."""
+    """The zeros of a fixture that count."""
+    return select(WorkZero).where(WorkZero.machine_id == machine_id, WorkZero.fixture == fixture, _counts())
+
+
+def _counts() -> ColumnElement[bool]:
+    """Whether it was not computed again: then that one stands in its place, since it was touched at the same time."""
     later = aliased(WorkZero)
     again = select(later.id).where(later.machine_id == WorkZero.machine_id, later.recomputed_from == WorkZero.id)
-    return select(WorkZero).where(WorkZero.machine_id == machine_id, WorkZero.fixture == fixture, ~again.exists())
+    return ~again.exists()
+
+
+OLDEST_FIRST = (WorkZero.touched_at, WorkZero.id)
+NEWEST_FIRST = (WorkZero.touched_at.desc(), WorkZero.id.desc())
+
+
+def newest_by_offset(session: Session, machine_id: int, fixture: str) -> list[WorkZero]:
+    """The zero of each work offset in a fixture that was touched last."""
+    wanted = _standing(machine_id, fixture).distinct(WorkZero.work_offset)
+    return list(session.scalars(wanted.order_by(WorkZero.work_offset, *NEWEST_FIRST)))
 
 
 def compared(session: Session, zero: WorkZero, settings: Fixture | None = None) -> Compared | None:
@@ -118,15 +133,16 @@ def compared(session: Session, zero: WorkZero, settings: Fixture | None = None) 
     if zero.fixture is None:
         return None
     settings = settings or settings_of(session, zero.machine_id, zero.fixture)
-    others = _standing(zero.machine_id, zero.fixture).where(WorkZero.work_offset == zero.work_offset)
+    same = WorkZero.work_offset == zero.work_offset
     if settings.basis == "frozen":
-        found = select(WorkZero).where(WorkZero.machine_id == zero.machine_id, WorkZero.id == settings.reference)
+        found = select(WorkZero).where(WorkZero.machine_id == zero.machine_id, WorkZero.id == settings.reference, same)
         before = list(session.scalars(found))
     else:
-        earlier = others.where(WorkZero.id < (zero.recomputed_from or zero.id))
-        order = WorkZero.id if settings.basis == "first" else WorkZero.id.desc()
-        limit = 1 if settings.basis == "first" else MOST_BEFORE
-        before = list(session.scalars(earlier.order_by(order).limit(limit)))
+        earlier = _standing(zero.machine_id, zero.fixture).where(
+            same, tuple_(*OLDEST_FIRST) < (zero.touched_at, zero.id)
+        )
+        order, limit = (OLDEST_FIRST, 1) if settings.basis == "first" else (NEWEST_FIRST, MOST_BEFORE)
+        before = list(session.scalars(earlier.order_by(*order).limit(limit)))
     return _against(zero, before, settings)
 
 
@@ -144,16 +160,25 @@ def _against(zero: WorkZero, before: Sequence[WorkZero], settings: Fixture) -> C
 def history(
     session: Session, machine: Machine, fixture: str, *, before: int | None = None, limit: int = 200
 ) -> list[Compared]:
-    """The last zeros of a fixture, oldest first, each against what it was, or would now be, compared with."""
+    """The last zeros of a fixture as they were touched, oldest first, each against what it is compared with now.
+
+    before: the number of the zero before which they were touched.
+    """
     settings = settings_of(session, machine.id, fixture)
-    wanted = _standing(machine.id, fixture)
-    newest = wanted if before is None else wanted.where(WorkZero.id < before)
-    shown = list(session.scalars(newest.order_by(WorkZero.id.desc()).limit(limit)))[::-1]
+    wanted, newest = _standing(machine.id, fixture), _standing(machine.id, fixture)
+    if before is not None:
+        then = work_zero(session, before, machine.id)
+        newest = newest.where(tuple_(*OLDEST_FIRST) < (then.touched_at, then.id))
+    shown = list(session.scalars(newest.order_by(*NEWEST_FIRST).limit(limit)))[::-1]
     if not shown:
         return []
     if settings.basis == "median":
         earlier = list(
-            session.scalars(wanted.where(WorkZero.id < shown[0].id).order_by(WorkZero.id.desc()).limit(MOST_BEFORE))
+            session.scalars(
+                wanted.where(tuple_(*OLDEST_FIRST) < (shown[0].touched_at, shown[0].id))
+                .order_by(*NEWEST_FIRST)
+                .limit(MOST_BEFORE)
+            )
         )[::-1]
         rows = [*earlier, *shown]
         found = []
@@ -161,44 +186,37 @@ def history(
             same = [each for each in rows[max(0, at - MOST_BEFORE) : at] if each.work_offset == zero.work_offset]
             found.append(_against(zero, same, settings))
         return found
-    frozen = settings.basis == "frozen"
     references = session.scalars(
         select(WorkZero).where(WorkZero.machine_id == machine.id, WorkZero.id == settings.reference)
-        if frozen
-        else _standing(machine.id, fixture).where(
-            WorkZero.id.in_(
-                select(func.min(WorkZero.id))
-                .where(WorkZero.machine_id == machine.id, WorkZero.fixture == fixture)
-                .group_by(WorkZero.work_offset)
-            )
-        )
+        if settings.basis == "frozen"
+        else wanted.distinct(WorkZero.work_offset).order_by(WorkZero.work_offset, *OLDEST_FIRST)
     ).all()
     return [
-        _against(zero, [each for each in references if frozen or each.work_offset == zero.work_offset], settings)
+        _against(zero, [each for each in references if each.work_offset == zero.work_offset], settings)
         for zero in shown
     ]
 
 
 def fixtures(session: Session, only: int | None = None) -> list[FixtureRow]:
     """Every fixture with its last zero, by machine and name."""
-    newest = select(func.max(WorkZero.id), func.count()).where(WorkZero.fixture.is_not(None))
-    if only is not None:
-        newest = newest.where(WorkZero.machine_id == only)
-    counts = dict(session.execute(newest.group_by(WorkZero.machine_id, WorkZero.fixture)).tuples().all())
+    mine = WorkZero.machine_id == only if only is not None else true()
+    place = (WorkZero.machine_id, WorkZero.fixture)
+    counted = select(*place, func.count()).where(WorkZero.fixture.is_not(None), mine).group_by(*place)
+    counts = {(machine, fixture): count for machine, fixture, count in session.execute(counted)}
     rows = []
     wanted = (
         select(WorkZero, Machine)
         .join(Machine, Machine.id == WorkZero.machine_id)
-        .where(WorkZero.id.in_(list(counts)))
-        .order_by(Machine.key, WorkZero.fixture)
+        .where(WorkZero.fixture.is_not(None), mine, _counts())
+        .distinct(*place)
+        .order_by(*place, *NEWEST_FIRST)
     )
-    for zero, machine in session.execute(wanted):
+    for zero, machine in sorted(session.execute(wanted).tuples(), key=lambda row: (row[1].key, row[0].fixture or "")):
         last = compared(session, zero)
         assert last is not None
         assert zero.fixture is not None
-        rows.append(
-            FixtureRow(machine, zero.fixture, counts[zero.id], last, settings_of(session, machine.id, zero.fixture))
-        )
+        settings = settings_of(session, machine.id, zero.fixture)
+        rows.append(FixtureRow(machine, zero.fixture, counts[machine.id, zero.fixture], last, settings))
     return rows
 
 
@@ -206,7 +224,7 @@ def fixture_of(session: Session, machine: str, fixture: str) -> FixtureRow:
     """One fixture. Raises `NotFound`."""
     found = machine_named(session, machine)
     last = session.scalars(
-        _standing(found.id, fixture[:64].replace("\0", "")).order_by(WorkZero.id.desc()).limit(1)
+        _standing(found.id, fixture[:64].replace("\0", "")).order_by(*NEWEST_FIRST).limit(1)
     ).one_or_none()
     if last is None:
         raise NotFound(

@@ -245,6 +245,44 @@ class TestFixtures:
         assert other["shift"]["shifts"] == {}
         assert post(shop, fixture="vice", work_offset="G55", touches=moved(200.01))["shift"]["shifts"]["x"] == 0.01
 
+    def test_one_part_in_its_place_says_nothing_of_the_other(self, server: Server) -> None:
+        shop = Shop(server)
+        path = f"/work-zeros/fixtures/{shop.machine}/vice"
+        frozen = post(shop, fixture="vice", work_offset="G54")["id"]
+        post(shop, fixture="vice", work_offset="G55", touches=moved(200.0))
+        shop.call("PUT", path, 200, basis="frozen", reference=frozen, alarm=0.03, reason="aligned anew")
+        assert shop.alarms() == []  # 200 mm beside it stands another part, not this one
+        post(shop, fixture="vice", work_offset="G54", touches=moved(0.05))
+        assert len(shop.alarms()) == 1
+        shop.call("PUT", path, 200, basis="first", alarm=0.03, reason="each by its own")
+        post(shop, fixture="vice", work_offset="G55", touches=moved(200.001))
+        assert len(shop.alarms()) == 1
+        post(shop, fixture="vice", work_offset="G54", touches=moved(0.001))
+        assert shop.alarms() == []
+
+    def test_the_first_one_computed_again_is_the_first_one_still(self, server: Server) -> None:
+        shop = Shop(server)
+        first, _second = (post(shop, fixture="vice", touches=moved(dx)) for dx in (0.0, 0.004))
+        again = shop.call("POST", f"/work-zeros/{first['id']}/recompute", 201, tip=5.9, reason="calibrated since")
+        assert again["shift"]["reference"] is None
+        third = post(shop, fixture="vice", touches=moved(0.009))
+        assert (third["shift"]["reference"], third["shift"]["total"]) == (again["id"], 0.009)
+        path = f"/work-zeros/fixtures/{shop.machine}/vice"
+        assert shop.call("GET", path)["last"] == third["id"]
+        assert moved_along(shop.call("GET", f"{path}/figure"), "x") == pytest.approx([4.0, 9.0])
+
+    def test_what_comes_in_late_says_nothing_of_today(self, server: Server) -> None:
+        shop = Shop(server)
+        path = f"/work-zeros/fixtures/{shop.machine}/vice"
+        for day, dx in ((1, 0.0), (20, 0.05)):
+            post(shop, fixture="vice", touches=moved(dx), touched_at=f"2026-11-{day:02}T06:00:00Z")
+        shop.call("PUT", path, 200, basis="first", alarm=0.03, reason="watched")
+        assert len(shop.alarms()) == 1
+        late = post(shop, fixture="vice", touches=moved(0.001), touched_at="2026-11-10T06:00:00Z")
+        assert len(shop.alarms()) == 1
+        assert shop.call("GET", path)["last"] != late["id"]
+        assert moved_along(shop.call("GET", f"{path}/figure"), "x") == pytest.approx([1.0, 50.0])
+
     def test_one_that_is_not_there(self, shop: Shop) -> None:
         shop.call("GET", f"/work-zeros/fixtures/{shop.machine}/nowhere", 404)
         shop.call("GET", "/work-zeros/fixtures/nowhere/vice", 404)
