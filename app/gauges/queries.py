@@ -217,7 +217,11 @@ def taken(session: Session, standing: Standing, first: int, through: int, take: 
     """
     newest = statistics.window_of(session, standing.characteristic).newest
     if first > through or first > newest:
-        wrong = _("there are readings 1 to {newest}").format(newest=newest) if newest else _("there is no reading yet")
+        wrong = _("there is no reading yet")
+        if newest and first > newest:
+            wrong = _("there are readings 1 to {newest}").format(newest=newest)
+        elif newest:
+            wrong = _("is beyond the last of them; exchange the two")
         raise Invalid(f"first: {wrong}.", _("Name other readings."), errors=[FieldError("first", wrong)])
     if min(through, newest) - first >= MOST_TAKEN:
         wrong = _("is too far from the first: a study takes {most} readings at most").format(most=MOST_TAKEN)
