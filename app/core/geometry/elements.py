@@ -13,7 +13,7 @@ import numpy as np
 from app.core.geometry.circle import Circle, fit_circle
 from app.core.geometry.line import fit_line
 from app.core.geometry.plane import fit_plane
-from app.core.geometry.points import Degenerate, Floats, Reason
+from app.core.geometry.points import Degenerate, Floats, Reason, surface_of
 
 Point = tuple[float, ...]
 
@@ -134,8 +134,8 @@ def axis_through(sections: Sequence[Section]) -> Element:
 
 def plane_through(points: Sequence[Point]) -> Element:
     """The least-squares plane through at least three touches. Raises `Degenerate`."""
-    plane = fit_plane(points)
-    array = np.asarray(points, dtype=np.float64)
+    array = surface_of(points, 3)
+    plane = fit_plane(array)
     about = array - plane.point
     _left, values, directions = np.linalg.svd(about, full_matrices=False)
     # A slope along a principal direction is as certain as the points reach far along it.

@@ -33,7 +33,7 @@ from app.core.geometry.discs import circumscribed, inscribed
 from app.core.geometry.elements import Point, Section, WrongSection, axis_through, centres_of, heights_of
 from app.core.geometry.line import fit_line
 from app.core.geometry.plane import fit_plane
-from app.core.geometry.points import Degenerate, Floats, Reason, frame, points_of
+from app.core.geometry.points import Degenerate, Floats, Reason, frame, points_of, surface_of
 from app.core.geometry.suspicion import Suspect, Suspicion, in_bore, in_line, in_plane, in_section
 from app.core.geometry.zones import minimum_zone_axis, minimum_zone_circle, minimum_zone_line, minimum_zone_plane
 from app.core.zones import nanometres
@@ -220,7 +220,7 @@ def straightness(feature: Touched) -> Form:
 
 def flatness(feature: Touched) -> Form:
     """Of a surface. Raises `Degenerate`."""
-    points_of(feature.points, 3, 4)
+    surface_of(feature.points, 4)
     plane, slab = fit_plane(feature.points), minimum_zone_plane(feature.points)
     points = np.asarray(feature.points, dtype=np.float64)
     local = (points - plane.point) @ frame(plane.normal)[:2].T

@@ -11,6 +11,7 @@ Floats = NDArray[np.float64]
 FARTHEST = 1e6  # mm: beyond a kilometre a float no longer holds a nanometre
 TELLING_APART = 1e-6  # mm: points nearer to each other than a nanometre are one point
 STRAIGHT = 1e-9  # points whose second extent is so small a share of their first lie on a line
+NARROW, NARROW_SHARE = 0.5, 0.01  # mm, and of their length: what is narrower in both ways is no surface
 
 
 class Reason(StrEnum):
@@ -73,6 +74,25 @@ def extents(points: Floats) -> tuple[Floats, Floats]:
     """
     _left, values, directions = np.linalg.svd(points, full_matrices=False)
     return values, directions
+
+
+def surface_of(points: ArrayLike, at_least: int) -> Floats:
+    """Points as rows that spread over a surface, as many different ones as are needed.
+
+    Touches in a row lie in many planes; which one is nearest is told by their scatter alone, and a bow along the row would
+    be flat in it. Raises `Degenerate` as `points_of` does, and for touches in a row.
+
+    >>> surface_of([(0, 5, 0.05), (50, 5.0004, 0), (100, 4.9997, 0.05), (25, 5, 0.01)], 4)
+    Traceback (most recent call last):
+    ...
+    app.core.geometry.points.Degenerate: collinear
+    """
+    array = points_of(points, 3, at_least)
+    about = array - array.mean(axis=0)
+    length, width = np.ptp(about @ extents(about)[1][:2].T, axis=0)
+    if width < min(NARROW, NARROW_SHARE * length):
+        raise Degenerate(Reason.COLLINEAR)
+    return array
 
 
 def unit(vector: ArrayLike) -> Floats:

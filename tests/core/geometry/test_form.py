@@ -63,6 +63,22 @@ def test_a_touch_that_was_copied_is_no_further_touch(kind: Kind, feature: Touche
     assert reason.reason is Reason.COINCIDENT
 
 
+def test_touches_in_a_row_are_no_surface() -> None:
+    """A bow of 50 µm along a row that scatters by half a micrometre: the plane on edge would hold it in 1 µm."""
+    aside = (0.0004, -0.0003, 0.0005, -0.0005, 0.0001, 0.0002)
+    row = tuple((20.0 * at, 5.0 + y, 0.05 * (at / 2.5 - 1) ** 2) for at, y in enumerate(aside))
+    tasks = (
+        Task(Kind.FLATNESS, Touched(points=row)),
+        Task(Kind.PARALLELISM, Touched(points=row), Touched(points=plate())),
+        Task(Kind.PERPENDICULARITY, Touched(points=plate()), Touched(points=row)),
+    )
+    for task in tasks:
+        with pytest.raises((Degenerate, DatumRefused), match="collinear"):
+            evaluate(task)
+    rail = tuple((x, y, z) for x, _y, z in row for y in (0.0, 2.0))
+    assert by(evaluate(Task(Kind.FLATNESS, Touched(points=rail))))[Method.MINIMUM_ZONE] == pytest.approx(0.048)
+
+
 class TestByHand:
     def test_an_oval(self) -> None:
         oval = Touched((Section(((10.01, 0.0), (0.0, 9.99), (-10.01, 0.0), (0.0, -9.99))),))
