@@ -128,7 +128,9 @@ class TriedOut(BaseModel):
 
     signals: int = Field(description="Runs of points; one that goes on counts once.")
     points: int = Field(description="Points that were looked at.")
-    points_inside: int = Field(description="Points that lie in a signal.")
+    points_inside: int = Field(
+        description="Points that lie in a signal; of several rules together each counts once for every signal it lies in."
+    )
     every: float | None = Field(description="Points from one signal to the next by chance alone; null: never.")
     per_1000: float = Field(description="Signals by chance alone on 1000 points.")
     expected: float = Field(description="Signals by chance alone on so many points.")
