@@ -301,9 +301,10 @@ def _without(
     """The same readings with what was corrected taken out again, tool life by tool life."""
     made = read_series(session, standing, _Rebuilt(standing.parameters.factor), window)
     series = made.series.only(np.isin(made.series.sequence, kept["sequence"]))
-    lives = np.split(series.values, np.flatnonzero(np.diff(series.edge)) + 1) if len(series) else []
     controlled = kept["deviation"][np.isin(kept["sequence"], series.sequence)]
-    found = _or_refused(lambda: uncompensated.uncompensated(lives, controlled, limits, confidence=confidence))
+    found = _or_refused(
+        lambda: uncompensated.uncompensated(series.values, series.begins, controlled, limits, confidence=confidence)
+    )
     return found, len(kept) - len(series)
 
 
@@ -315,6 +316,5 @@ def scatter_of_parts(session: Session, standing: Standing, last: int) -> tuple[f
     series = read_series(session, standing, _Rebuilt(standing.parameters.factor), window).series
     if len(series) < FEWEST_READINGS:
         return None, len(series)
-    lives = np.split(series.values, np.flatnonzero(np.diff(series.edge)) + 1)
-    found = _or_refused(lambda: uncompensated.scatter(lives))
+    found = _or_refused(lambda: uncompensated.scatter(series.values, series.begins))
     return (None if isinstance(found, Refused) else found.value), len(series)

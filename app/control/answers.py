@@ -72,7 +72,7 @@ def left_out(found: LeftOut | None) -> LeftOutOut:
 
 def signals_out(view: View, most: int) -> list[ChartSignalOut]:
     """The newest signals, newest first; their sequences are those of the readings."""
-    runs = sorted(view.signals or (), key=lambda run: run.end)[-most:]
+    runs = view.signals.newest(most) if view.signals else []
     return [
         ChartSignalOut(
             rule=run.rule.value,

@@ -86,10 +86,7 @@ NO_SIGNAL = 9
 
 def _sides(signals: Signals | None, count: int) -> NDArray[np.int8]:
     """Of each point the side of its signal, or `NO_SIGNAL`."""
-    sides = np.full(count, NO_SIGNAL, np.int8)
-    for run in signals or ():
-        sides[run.start : run.end + 1] = run.side
-    return sides
+    return np.full(count, NO_SIGNAL, np.int8) if signals is None else signals.sides(NO_SIGNAL)
 
 
 def _um(values: Any) -> Any:

@@ -30,7 +30,11 @@ def _extremes(
     """Of these points the lowest and the highest of each stretch."""
     if not len(some):
         return []
-    order = some[np.lexsort((points[some], stretch[some]))]
-    starts = np.flatnonzero(np.diff(stretch[order], prepend=-1))
-    ends = np.append(starts[1:], len(order)) - 1
-    return [order[starts], order[ends]]
+    values, within = points[some], stretch[some]
+    starts = np.flatnonzero(np.diff(within, prepend=-1))
+    sizes = np.diff(np.append(starts, len(some)))
+    chosen = []
+    for extreme in (np.fmin, np.fmax):
+        at = np.flatnonzero(values == np.repeat(extreme.reduceat(values, starts), sizes))
+        chosen.append(some[at[np.flatnonzero(np.diff(within[at], prepend=-1))]])
+    return chosen

@@ -15,7 +15,7 @@ from app.control import charts
 from app.control.figures import control_figure
 from app.control.queries import baseline_in_force, charted
 from app.control.tables import Baseline
-from app.control.thinning import MOST_POINTS, thinned
+from app.control.thinning import MOST_POINTS, STRETCHES, thinned
 from app.control.view import View
 from app.core.spc.quantity import Quantity
 from app.core.spc.rules import RULES, RuleName, signals
@@ -165,6 +165,21 @@ def test_thinning_keeps_the_ends_and_the_extremes(seed: int, more: int, place: f
     kept = thinned(values, wanted)
     assert {0, len(values) - 1, only, values.argmin(), values.argmax()} <= set(kept.tolist())
     assert len(kept) <= 2 * MOST_POINTS
+
+
+@given(seed=st.integers(0, 10**6), more=st.integers(1, 3_000), decimals=st.integers(0, 3))
+def test_thinning_keeps_the_extremes_of_every_stretch_and_of_its_signals(seed: int, more: int, decimals: int) -> None:
+    made = np.random.default_rng(seed)
+    values = made.normal(size=MOST_POINTS + more).round(decimals)
+    wanted = made.random(len(values)) < 0.1
+    stretch = np.arange(len(values)) * STRETCHES // len(values)
+    kept = np.zeros(len(values), np.bool_)
+    kept[thinned(values, wanted)] = True
+    for number in range(0, STRETCHES, 50):
+        for some in (stretch == number, (stretch == number) & wanted):
+            inside = values[some]
+            assert len(inside) == 0 or {inside.min(), inside.max()} <= set(values[some & kept].tolist())
+    assert kept.sum() <= 2 * MOST_POINTS
 
 
 def test_signals_differ_by_shape_and_colour_and_limits_are_named() -> None:

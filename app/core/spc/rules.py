@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from app.core.spc.cusum import Cusum
 from app.core.spc.refusal import Floats, checked
-from app.core.spc.scan import STATE, beyond_runs, equal_runs
+from app.core.spc.scan import STATE, beyond_runs, equal_runs, painted
 from app.core.spc.shewhart import Chart, ControlChart
 
 
@@ -141,6 +141,24 @@ class Signals:
     def count(self, name: RuleName) -> int:
         """How many signals of a rule there are; a run that goes on counts once."""
         return len(self.runs[name])
+
+    def newest(self, most: int) -> list[Run]:
+        """The last so many signals by where they end, the newest last; of those that end together the later rule."""
+        names = list(self.runs)
+        if not names:
+            return []
+        rows = np.concatenate(
+            [np.column_stack((np.full(len(self.runs[n]), at), self.runs[n])) for at, n in enumerate(names)]
+        )
+        order = np.argsort(rows[:, 3], kind="stable")[max(0, len(rows) - most) :]
+        return [Run(names[at], side, start, end, points) for at, side, start, end, points in rows[order].tolist()]
+
+    def sides(self, nowhere: int) -> NDArray[np.int8]:
+        """Of each point the side of its signal, of several that of the last rule; `nowhere` where there is none."""
+        found = np.full(self.length, nowhere, np.int8)
+        for rows in self.runs.values():
+            painted(found, rows)
+        return found
 
     def flagged(self, name: RuleName) -> NDArray[np.bool_]:
         """Which points lie inside a run of this rule."""

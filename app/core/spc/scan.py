@@ -106,3 +106,11 @@ def beyond_runs(z: Floats, offset: int, side: int, n: int, k: int, limit: float,
         bits |= int(beyond[n + len(z) - 1 - age]) << age
     state[0] = bits
     return rows[:count].copy()
+
+
+@compiled
+def painted(sides: NDArray[np.int8], rows: Rows) -> None:
+    """Write the side of each run at its points."""
+    for row in range(len(rows)):
+        for i in range(rows[row, 1], rows[row, 2] + 1):
+            sides[i] = rows[row, 0]

@@ -61,10 +61,10 @@ def stability(z: ArrayLike, rules: Iterable[RuleName] = WATCHED, *, frozen: bool
     """
     points = np.asarray(z, dtype=np.float64)
     watched = [name for name in rules if name in WATCHED]
-    found = list(signals(points, [RULES[name] for name in watched]))
+    found = signals(points, [RULES[name] for name in watched])
     fired = []
     for name in watched:
-        count = sum(run.rule is name for run in found)
+        count = found.count(name)
         expected = len(points) / _run_length(name)
         fired.append(Fired(name, count, expected, float(pdtrc(count - 1, expected)) if count else 1.0))
     return Stability(len(points), tuple(fired), frozen)

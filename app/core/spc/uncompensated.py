@@ -11,16 +11,18 @@ corrects, wear included; its scatter from part to part is what remains if wear w
     price        sigma_controlled / sigma_ideal: 1 is ideal, more is what the corrections leave or add
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from math import fsum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.core.spc.capability import FEWEST_READINGS, Caution, Index, Limits, capability, spread_index
 from app.core.spc.constants import d2
 from app.core.spc.refusal import Floats, Reason, Refused, checked
 from app.core.spc.spread import Estimator, Sigma, freedom_of_moving_ranges, overall
 
+Flags = NDArray[np.bool_]
 BEYOND = 4.0
 """Ranges of more than so many mean ranges are steps, not scatter: a new edge, an offset set by hand."""
 
@@ -45,26 +47,25 @@ class Uncompensated:
 
 
 def uncompensated(
-    lives: Sequence[Floats], controlled: Floats, limits: Limits, *, confidence: float = 0.95
+    values: Floats, begins: Flags, controlled: Floats, limits: Limits, *, confidence: float = 0.95
 ) -> Uncompensated:
-    """`lives`: wear curves, one per tool life, of the same readings whose deviations are `controlled`; mm.
+    """`values`: the wear curve, mm; a tool life begins where `begins`. `controlled`: deviations of the same readings.
 
     >>> rng = np.sin(np.arange(1, 201) ** 2) / 1000
-    >>> wearing = np.arange(200) / 10000 + rng
-    >>> found = uncompensated([wearing[:100] , wearing[:100]], rng, Limits(-0.01, 0.01))
+    >>> wearing = np.arange(200) % 100 / 10000 + rng
+    >>> found = uncompensated(wearing, np.arange(200) % 100 == 0, rng, Limits(-0.01, 0.01))
     >>> found.lives, found.gain > 3, found.price < 1.5
     (2, True, True)
     """
-    parts = [checked(life) for life in lives if len(life)]
-    whole = checked(np.concatenate(parts) if parts else [], at_least=FEWEST_READINGS)
-    ideal = scatter([*parts])
+    whole = checked(values, at_least=FEWEST_READINGS)
+    ideal = scatter(whole, begins)
     now, tool = overall(controlled), overall(whole)
     if not (now.value > 0 and tool.value > 0):
         raise Refused(Reason.NO_VARIATION)
     told = capability(whole, limits, confidence=confidence)
     return Uncompensated(
         readings=len(whole),
-        lives=len(parts),
+        lives=len(_lengths(begins)),
         mean=told.mean,
         tool=tool,
         ideal_sigma=ideal,
@@ -76,17 +77,29 @@ def uncompensated(
     )
 
 
-def scatter(lives: Sequence[Floats]) -> Sigma:
-    """Sigma from part to part within each life, steps left out.
+def scatter(values: Floats, begins: Flags) -> Sigma:
+    """Sigma from part to part within each life, steps left out. A life begins where `begins`, and with the first value.
 
-    >>> scatter([np.array([0.0, 1.128379, 0.0]), np.array([50.0, 51.128379])]).value.__round__(3)
+    >>> values = np.array([0.0, 1.128379, 0.0, 50.0, 51.128379])
+    >>> scatter(values, np.array([True, False, False, True, False])).value.__round__(3)
     1.0
     """
-    ranges = np.concatenate([np.abs(np.diff(life)) for life in lives] or [np.empty(0)])
+    ranges = np.abs(np.diff(values))[~begins[1:]]
     for _pass in range(2):
         if len(ranges):
             ranges = ranges[ranges <= BEYOND * ranges.mean()]
     if not len(ranges) or not ranges.mean() > 0:
         raise Refused(Reason.NO_VARIATION)
-    freedom = sum(freedom_of_moving_ranges(len(life)) for life in lives if len(life) > 1)
-    return Sigma(float(ranges.mean()) / d2(2), Estimator.MOVING_RANGE, sum(map(len, lives)), len(ranges), freedom)
+    lengths, lives = np.unique(_lengths(begins), return_counts=True)  # a million readings may be thousands of lives
+    freedom = fsum(
+        many * freedom_of_moving_ranges(length)
+        for length, many in zip(lengths.tolist(), lives.tolist(), strict=True)
+        if length > 1
+    )
+    return Sigma(float(ranges.mean()) / d2(2), Estimator.MOVING_RANGE, len(values), len(ranges), freedom)
+
+
+def _lengths(begins: Flags) -> NDArray[np.int64]:
+    """Readings of each life."""
+    starts = np.flatnonzero(begins[1:]) + 1
+    return np.diff(np.concatenate(([0], starts, [len(begins)]))) if len(begins) else starts

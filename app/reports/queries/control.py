@@ -1,6 +1,6 @@
 """The control charts as their page shows them – by the frozen baseline, never by the readings of the report – and their signals."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +34,7 @@ from app.web.i18n import _
 
 MOST_ROWS = 100
 MOST_POINTS = 10_000  # of a chart, in numbers
+NOWHERE = 9  # no side of any signal
 MOST_SIGNALS = 1_000  # kept ones that are looked through for what was said of a run
 WIDE = (940, 330)
 SPREAD = (Chart.MOVING_RANGE, Chart.RANGES, Chart.DEVIATIONS)
@@ -59,14 +60,14 @@ def control(frame: Frame) -> Section | None:
         through=frame.window.last,
         limit=MOST_SIGNALS,
     )
-    rows = list(_rows(views, on_record))
+    rows, of_all = _rows(views, on_record)
     return Section(
         "control",
         title,
         sentences=(_judged_by(baseline), *_left_out(views[0])),
         warnings=_warnings(frame, baseline),
         facts=(*_of_baseline(baseline), *(fact for view in views for fact in _of_view(view)), *_kept(on_record)),
-        table=_table(rows) if rows else None,
+        table=_table(rows, of_all) if rows else None,
         pictures=tuple(_picture(frame, baseline, view) for view in views if len(view.points)),
     )
 
@@ -156,41 +157,42 @@ class _Row(NamedTuple):
     kept: SignalRow | None
 
 
-def _rows(views: list[View], on_record: list[SignalRow]) -> Iterator[_Row]:
-    """Signals of the charts, each with the one on record that it is; then those on record of charts that are not shown here."""
+def _rows(views: list[View], on_record: list[SignalRow]) -> tuple[list[_Row], int]:
+    """Newest first the signals of the charts, each with the one on record that it is, and those on record of charts that are not shown.
+
+    Of very many the newest; the number is of all.
+    """
     used: set[int] = set()
+    found: list[_Row] = []
+    total = 0
     for view in views:
-        for run in view.signals or ():
-            first, last = int(view.first[run.start]), int(view.last[run.end])
-            told = {
-                "chart": view.kind.value,
-                "rule": run.rule.value,
-                "side": run.side,
-                "first": first,
-                "last": last,
-                "points": run.points,
-            }
-            same = next(
-                (
-                    row
-                    for row in on_record
-                    if (row.signal.chart, row.signal.rule, row.signal.side) == (view.kind, run.rule, run.side)
-                    and row.signal.first_sequence <= last
-                    and row.signal.last_sequence >= first
-                ),
-                None,
-            )
-            if same is not None:
-                used.add(same.signal.id)
-            yield _Row(view.kind, told, same)
-    for row in on_record:
-        if row.signal.id not in used:
-            yield _Row(Chart(row.signal.chart), signals.told(row.signal), row)
+        for name, runs in (view.signals.runs if view.signals else {}).items():
+            first, last = view.first[runs[:, 1]], view.last[runs[:, 2]]
+            same = np.full(len(runs), -1)
+            for at, row in enumerate(on_record):
+                kept = row.signal
+                if (kept.chart, kept.rule) == (view.kind, name):
+                    over = (kept.first_sequence <= last) & (kept.last_sequence >= first) & (runs[:, 0] == kept.side)
+                    same[over & (same < 0)] = at
+            used.update(on_record[at].signal.id for at in np.unique(same[same >= 0]).tolist())
+            total += len(runs)
+            for at in np.lexsort((-first, -last))[:MOST_ROWS].tolist():
+                told = {
+                    "chart": view.kind.value,
+                    "rule": name.value,
+                    "side": int(runs[at, 0]),
+                    "first": int(first[at]),
+                    "last": int(last[at]),
+                    "points": int(runs[at, 3]),
+                }
+                found.append(_Row(view.kind, told, on_record[same[at]] if same[at] >= 0 else None))
+    apart = [row for row in on_record if row.signal.id not in used]
+    found += [_Row(Chart(row.signal.chart), signals.told(row.signal), row) for row in apart]
+    found.sort(key=lambda row: (row.told["last"], row.told["first"]), reverse=True)
+    return found[:MOST_ROWS], total + len(apart)
 
 
-def _table(rows: list[_Row]) -> Table:
-    """Newest first."""
-    rows.sort(key=lambda row: (row.told["last"], row.told["first"]), reverse=True)
+def _table(rows: list[_Row], of_all: int) -> Table:
     return Table(
         (
             Column("chart", _("Chart"), 1.2),
@@ -215,9 +217,9 @@ def _table(rows: list[_Row]) -> Table:
                 words(signals.what(row.told)),
                 *_said(row.kept),
             )
-            for row in rows[:MOST_ROWS]
+            for row in rows
         ),
-        more=max(0, len(rows) - MOST_ROWS),
+        more=of_all - len(rows),
     )
 
 
@@ -249,11 +251,10 @@ def _data(view: View) -> Table:
     as_value = width if view.kind in SPREAD else deviation
     cut = max(0, len(view) - MOST_POINTS)
 
-    def column(values: float | Floats | None) -> list[float | None]:
-        if values is None:
-            return [None] * (len(view) - cut)
-        spread_out: list[float | None] = np.broadcast_to(np.asarray(values), len(view))[cut:].tolist()
-        return spread_out
+    def column(values: float | Floats | None) -> list[Value]:
+        if values is None or np.ndim(values) == 0:
+            return [as_value(values if values is None else float(values), 3)] * (len(view) - cut)
+        return [as_value(value, 3) for value in np.asarray(values)[cut:].tolist()]
 
     columns = (
         Column("reading", _("Reading")),
@@ -263,30 +264,19 @@ def _data(view: View) -> Table:
         Column("upper", _("Upper control limit")),
         Column("signal", _("Signal")),
     )
-    signalled = np.zeros(len(view), np.bool_)
-    for run in view.signals or ():
-        signalled[run.start : run.end + 1] = True
+    signalled = np.zeros(len(view), np.bool_) if view.signals is None else view.signals.sides(NOWHERE) != NOWHERE
+    yes, no = words(_("yes")), words("")
     rows = zip(
-        view.last[cut:].tolist(),
-        view.points[cut:].tolist(),
+        map(count, view.last[cut:].tolist()),
+        column(view.points),
         column(view.lower),
         column(view.centre),
         column(view.upper),
-        signalled[cut:].tolist(),
+        [yes if signal else no for signal in signalled[cut:].tolist()],
         strict=True,
     )
     return Table(
         columns,
-        tuple(
-            (
-                count(last),
-                as_value(value, 3),
-                as_value(lower, 3),
-                as_value(centre, 3),
-                as_value(upper, 3),
-                words(_("yes") if signal else ""),
-            )
-            for last, value, lower, centre, upper, signal in rows
-        ),
+        tuple(rows),
         more=cut,
     )

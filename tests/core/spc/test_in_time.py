@@ -12,6 +12,7 @@ from app.core.spc.capability import Limits, expected, expected_ppm, observed
 from app.core.spc.in_time import FEWEST, Location, Model, brown_forsythe, decompose, in_time, successive
 from app.core.spc.refusal import Floats, Reason, Refused
 from app.core.spc.rules import RuleName
+from app.core.spc.spread import freedom_of_moving_ranges
 from app.core.spc.stability import of_readings, stability
 from app.core.spc.uncompensated import scatter, uncompensated
 
@@ -122,8 +123,8 @@ class TestWithoutCorrections:
     def test_wear_is_put_back_and_scatter_is_not(self) -> None:
         """0.2 µm of wear a part over lives of 100 parts: sd 100 x 0.2/sqrt(12) = 5.8 µm, scatter 1 µm."""
         noise = white(7, 500) * 0.001
-        lives = [noise[at : at + 100] + np.arange(100) * 0.0002 for at in range(0, 500, 100)]
-        found = uncompensated(lives, noise, Limits(-0.008, 0.008))
+        wearing = noise + np.arange(500) % 100 * 0.0002
+        found = uncompensated(wearing, np.arange(500) % 100 == 0, noise, Limits(-0.008, 0.008))
         assert found.lives == 5
         assert found.tool.value == pytest.approx(0.0059, rel=0.05)
         assert found.ideal_sigma.value == pytest.approx(0.001, rel=0.1)
@@ -135,11 +136,14 @@ class TestWithoutCorrections:
     def test_steps_and_changes_of_tool_are_no_scatter(self) -> None:
         calm = white(8, 200)
         stepped = calm + np.where(np.arange(200) >= 100, 500.0, 0.0)
-        assert scatter([stepped]).value == pytest.approx(scatter([calm]).value, rel=0.02)
-        assert scatter([calm[:100], calm[100:] + 9]).groups <= 198
+        one, two = np.arange(200) == 0, np.arange(200) % 100 == 0
+        assert scatter(stepped, one).value == pytest.approx(scatter(calm, one).value, rel=0.02)
+        found = scatter(calm + 9 * (np.arange(200) >= 100), two)
+        assert found.groups <= 198
+        assert found.degrees_of_freedom == pytest.approx(2 * freedom_of_moving_ranges(100))
 
     def test_too_few_or_equal_readings_are_refused(self) -> None:
         with pytest.raises(Refused):
-            uncompensated([], white(1, 30), Limits(-1, 1))
+            uncompensated(np.empty(0), np.empty(0, np.bool_), white(1, 30), Limits(-1, 1))
         with pytest.raises(Refused):
-            uncompensated([np.zeros(30)], white(1, 30), Limits(-1, 1))
+            uncompensated(np.zeros(30), np.arange(30) == 0, white(1, 30), Limits(-1, 1))

@@ -89,6 +89,18 @@ def test_pieces_give_what_the_whole_gives(z: list[float], cuts: list[int]) -> No
     assert list(watching.signals()) == list(signals(z, RULES.values()))
 
 
+@given(z=POINTS, most=st.integers(0, 20))
+@settings(max_examples=100, deadline=None)
+def test_the_newest_and_the_sides_are_those_of_the_runs_one_by_one(z: list[float], most: int) -> None:
+    found = signals(z, RULES.values())
+    runs = list(found)
+    assert found.newest(most) == sorted(runs, key=lambda run: run.end)[len(runs) - min(most, len(runs)) :]
+    sides = [9] * len(z)
+    for run in runs:
+        sides[run.start : run.end + 1] = [run.side] * (run.end + 1 - run.start)
+    assert found.sides(9).tolist() == sides
+
+
 @given(z=POINTS)
 @settings(max_examples=100, deadline=None)
 def test_turned_over_they_change_sides_and_nothing_else(z: list[float]) -> None:
