@@ -65,11 +65,33 @@ def test_every_column_says_what_the_rows_say(server: Server, filled: str) -> Non
             assert [codes[number].value for number in history[name]] == [row.code for row in rows]
         elif name == "paused":
             assert history[name].tolist() == [row.paused_by is not None for row in rows]
+        elif name == "part":
+            numbers = dict(zip([row.part for row in rows], history[name].tolist(), strict=True))
+            assert len(set(numbers.values())) == len(numbers) == len(rows)
+            assert min(numbers.values()) >= 0
         elif name == "compensated":
             expected = np.array([np.nan if row.compensated is None else row.compensated for row in rows])
             np.testing.assert_array_equal(history[name], expected)
         else:
             assert history[name].tolist() == [-1 if getattr(row, name) is None else getattr(row, name) for row in rows]
+
+
+def test_what_a_session_has_read_it_does_not_read_again(server: Server, filled: str) -> None:
+    """And it is the same as read by another one, whatever was asked for before."""
+    asked = [(1, COUNT, ["deviation", "zone"]), (1, COUNT, ["measured", "zone"]), (9, 60, ["zone", "measured"]),
+             (9, 60, ["received_at"]), (1, COUNT, []), (1, COUNT + 5, ["zone"]), (40, 39, ["zone"])]  # fmt: skip
+    with server.database.begin() as session:
+        characteristic = characteristics.characteristic_named(session, filled).characteristic
+        found = [queries.history_of(session, characteristic, Window(a, b, COUNT), names) for a, b, names in asked]
+    for (first, last, names), history in zip(asked, found, strict=True):
+        with server.database.begin() as session:
+            alone = queries.history_of(session, characteristic, Window(first, last, COUNT), names)
+        assert history.columns.keys() == alone.columns.keys() == {"sequence", *names}
+        for name, values in alone.columns.items():
+            np.testing.assert_array_equal(history[name], values)
+        assert history.excluded.tolist() == alone.excluded.tolist()
+    assert np.shares_memory(found[2]["zone"], found[0]["zone"]), "read once"
+    assert np.shares_memory(found[2]["measured"], found[1]["measured"])
 
 
 def test_excluded_readings_are_marked_and_left_out_when_counted(server: Server, filled: str) -> None:

@@ -7,7 +7,7 @@ it as it is. Row by row it would be ten times as long, nearly all of it spent on
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from app.web.i18n import _
 
 BLOCK = 8_192  # readings in one string
 MOST_AT_ONCE = 10_000_000  # readings: 80 MB a column
+MOST_KEPT = 2_000_000  # for a session that asks for them again
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -104,11 +105,47 @@ def history_of(
         )
     every = start is None and end is None  # then they are numbered without a gap
     names = [name for name in dict.fromkeys(["sequence", *columns]) if name != "sequence" or not every]
-    found = _columns(session, characteristic, window, names or ["sequence"], start, end)
     if every:
+        found = _whole(session, characteristic, window, names or ["sequence"])
         found["sequence"] = np.arange(window.first, window.first + max(map(len, found.values())))
+    else:
+        found = _columns(session, characteristic, window, names, start, end)
     left_out = excluded_of(session, characteristic, window.first, window.last) if window.count else ()
     return History(found, np.isin(found["sequence"], np.array(left_out, np.int64)))
+
+
+class _Kept(NamedTuple):
+    """Columns of a run of readings that a session has read, every one of them stored."""
+
+    machine: int
+    characteristic: int
+    first: int
+    last: int
+    columns: dict[str, NDArray[Any]]
+
+
+def _whole(
+    session: Session, characteristic: Characteristic, window: Window, names: list[str]
+) -> dict[str, NDArray[Any]]:
+    """Columns of the window. A report asks for the same readings again and again: what its session read last is kept, since
+    readings are never changed. Not to be written to.
+    """
+    here = (characteristic.machine_id, characteristic.id)
+    kept: _Kept | None = session.info.get(_Kept)
+    if kept is None or kept[:2] != here or not kept.first <= window.first <= window.last <= kept.last:
+        kept = _Kept(*here, window.first, window.last, {})
+    missing = [name for name in names if name not in kept.columns]
+    many = kept.last - kept.first + 1
+    if many > MOST_KEPT or (missing and many > 2 * window.count):
+        return _columns(session, characteristic, window, names, None, None)
+    if missing:
+        found = _columns(session, characteristic, Window(kept.first, kept.last, window.newest), missing, None, None)
+        kept.columns.update(found)
+        if any(len(values) != many for values in found.values()):  # not all of them are stored yet
+            return found
+        session.info[_Kept] = kept
+    at = slice(window.first - kept.first, window.last - kept.first + 1)
+    return {name: kept.columns[name][at] for name in names}
 
 
 def _columns(
