@@ -29,6 +29,8 @@ from app.statistics.queries import History, Window
 from app.web.i18n import _
 
 LARGEST = 1_000_000  # readings in one replay
+MOST_FOLLOWED = 2_000  # corrections that tell of the delay by the offset
+SAME_OFFSET = 5e-7  # mm
 BREAK = 5.0  # times the usual time between two parts
 COLUMNS = (
     "measured",
@@ -298,13 +300,32 @@ def _moment(moment: np.datetime64) -> datetime:
 
 
 def _delay(joined: dict[str, NDArray[Any]], part: NDArray[np.int64]) -> int | None:
-    """Parts that came out with the old offset after a correction of the tool was issued: the median, where machines tell."""
+    """Parts that came out with the old offset after a correction of the tool was issued: the median, where machines tell.
+
+    They tell by number; else (by time, or by confirming) by the offset with which a part was known to be cut.
+    """
     issued = np.flatnonzero(joined["correction"] >= 0)
     in_effect = np.maximum.accumulate(joined["correction_in_effect"]) if len(part) else np.zeros(0)
-    if not len(issued) or (in_effect < 0).all():
+    if not len(issued):
         return None
-    seen = np.searchsorted(in_effect, joined["correction"][issued])
+    if (in_effect < 0).all():
+        seen = _with_its_offset(joined, issued := issued[-MOST_FOLLOWED:])
+    else:
+        seen = np.searchsorted(in_effect, joined["correction"][issued])
     told = seen < len(part)
     between = part[seen[told]] - part[issued[told]] - 1
     between = between[between >= 0]
     return min(LONGEST_DELAY, int(np.median(between))) if len(between) else None
+
+
+def _with_its_offset(joined: dict[str, NDArray[Any]], issued: NDArray[np.int64]) -> NDArray[np.int64]:
+    """For each correction the first reading cut with all up to it in effect and none behind it; the end where there is none."""
+    compensated, end = joined["compensated"], len(joined["compensated"])
+    # What is not in effect yet is the difference between the deviation and the one that decided.
+    asked = compensated - (joined["decided"] - joined["deviation"]) * joined["factor"]
+    seen = np.full(len(issued), end)
+    for place, at in enumerate(issued.tolist()):
+        if at + 1 < end and abs(asked[at + 1] - asked[at]) > SAME_OFFSET:
+            ahead = np.abs(compensated[at + 1 : at + 2 + LONGEST_DELAY] - asked[at + 1]) <= SAME_OFFSET
+            seen[place] = at + 1 + int(ahead.argmax()) if ahead.any() else end
+    return seen

@@ -1,6 +1,7 @@
 """What if, over HTTP: a loop that ran is replayed as it ran, other settings are told apart, and nothing is asked in vain."""
 
 from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
 from typing import Any
 
 import pytest
@@ -229,6 +230,25 @@ def test_a_cutter_that_serves_outside_and_inside_is_replayed_as_it_went(server: 
             found["truly"]["of_tool"] >= len(issued) - 2
         )  # of the second all but what the first of the first part asked for
         assert alike(found["truly"], found["likeness"]["replayed"])
+
+
+def test_a_machine_that_tells_by_time_has_its_pipeline_too(server: Server) -> None:
+    """Three parts lie between cutting and measuring; which corrections they were cut with is told by the time alone."""
+    shop = Shop(server)
+    changed = {"zero_range": 0.0003, "weighting_factor": 1}
+    shop.call("PATCH", f"/characteristics/{shop.characteristic}", parameters=changed, reason="As found")
+    offset, cut_parts = 0.0, []
+    for free in scatter(50, 11):
+        for pending in shop.call("GET", f"/machines/{shop.machine}/corrections?status=pending")["items"]:
+            shop.correction(pending["number"], "applied")
+            offset += pending["amount"] * 1000
+        cut_parts.append((round(free + offset, 3), datetime.now(UTC).isoformat()))
+        if len(cut_parts) > 3:
+            size, at = cut_parts.pop(0)
+            shop.read(size, machined_at=at)
+    found = ask(shop)
+    assert found["delay"] == 3
+    assert (found["likeness"]["verdict"], found["likeness"]["same"]) == ("well", 1.0)
 
 
 def test_the_figure_draws_both_courses(shop: Shop) -> None:
