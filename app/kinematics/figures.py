@@ -126,21 +126,22 @@ def comparison(
                 "layer": "below",
             }
         )
-        enter = entered.get(each.name)
-        if enter is not None:
-            notes.append(
-                {
-                    "x": 1.0,
-                    "xref": "paper",
-                    "xanchor": "right",
-                    "y": row,
-                    "yref": "y",
-                    "showarrow": False,
-                    "text": f"{_moved(each)}<b>{_('enter {value}').format(value=told(each.name, enter))}</b>",
-                    "font": {"size": 14, "color": colours.ink},
-                    "align": "right",
-                }
-            )
+        said = [_moved(each)]
+        if (enter := entered.get(each.name)) is not None:
+            said.append(f"<b>{_('enter {value}').format(value=told(each.name, enter))}</b>")
+        notes.append(
+            {
+                "x": 1.0,
+                "xref": "paper",
+                "xanchor": "right",
+                "y": row,
+                "yref": "y",
+                "showarrow": False,
+                "text": " · ".join(said),
+                "font": {"size": 14, "color": colours.ink},
+                "align": "right",
+            }
+        )
     return {
         "data": [
             _key(_("then"), "circle-open", colours),
@@ -204,10 +205,10 @@ def _tone(each: Compared, colours: Palette) -> str:
 
 def _moved(each: Compared) -> str:
     if each.change.moved is None:
-        return f"{difference(each.name, each.change.difference)} · "
+        return difference(each.name, each.change.difference)
     if not each.change.moved:
-        return _("within scatter · ")
-    return _("moved {by} · ").format(by=difference(each.name, each.change.difference))
+        return _("within scatter")
+    return _("moved {by}").format(by=difference(each.name, each.change.difference))
 
 
 def _ticks(largest: float) -> list[float]:

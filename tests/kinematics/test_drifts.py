@@ -51,6 +51,12 @@ class TestDrift:
         assert abs(y["difference"]) < 0.001
         figure = shop.call("GET", f"{RUNS}/{old['run']}/comparison-figure?with={new['run']}&theme=dark")
         assert len(figure["layout"]["annotations"]) == 4
+        assert "enter" in figure["layout"]["annotations"][0]["text"]
+        shop.call("POST", f"{RUNS}/{new['run']}/enter", reason="Monthly")
+        figure = shop.call("GET", f"{RUNS}/{old['run']}/comparison-figure?with={new['run']}")
+        (said, *_others) = (each["text"] for each in figure["layout"]["annotations"])
+        assert said.startswith("moved +")  # what moved is seen also when there is nothing left to enter
+        assert "enter" not in said
         other = Shop(shop.server)
         foreign = take(other, axes=[axis()])
         shop.call("GET", f"{RUNS}/{old['run']}/comparison?with={foreign['run']}", 422)
