@@ -240,6 +240,16 @@ def advice(found: Advice) -> list[str]:
             sigma=um(s.sigma, 3), governs=statistics.governs(s.governs)
         )
     )
+    p = found.standing.parameters
+    if (
+        p.average_memory and p.weighting_factor > 1
+    ):  # an EWMA of chance: its variance is lambda / (2 - lambda) of one value's
+        averaged = s.sigma / (2 * p.weighting_factor - 1) ** 0.5
+        said.append(
+            _(
+                "With k = {k} chance moves the running average by {sigma} only: a smaller R33 may do, a replay shows it."
+            ).format(k=f"{p.weighting_factor:g}", sigma=um(averaged, 3))
+        )
     if s.fits is False:
         said.append(_("That is not below R34: first the probe or the process must scatter less, or R34 be raised."))
     return said

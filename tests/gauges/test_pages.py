@@ -181,6 +181,15 @@ def test_a_way_from_capability_and_set_up_to_the_studies_and_back(shop: Shop, en
     assert f"/gauges?characteristic={key}" in engineer.open(f"/setup/characteristics/{key}")
     listed = engineer.open(f"/gauges?characteristic={key}")
     assert "R33 is too small" in listed
+    one, averaged = (
+        float(found[1])
+        for found in map(
+            re.compile(r"([0-9.]+)\W+µm").search,
+            (listed.partition("Three of")[2], listed.partition("With k = 2 chance moves the running average by")[2]),
+        )
+        if found
+    )
+    assert averaged == pytest.approx(one / 3**0.5, abs=0.001), "an EWMA with k = 2 scatters by 1/√3 of one value"
     assert f"/characteristics/{key}/capability" in listed
     assert "R33 is too small" not in engineer.open("/gauges")
     engineer.open("/gauges?characteristic=nobody", 404)
