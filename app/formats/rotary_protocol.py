@@ -91,7 +91,7 @@ def read_protocol(text: str) -> Protocol:
     {'backlash': 0.0021}
     """
     made = Protocol()
-    rows, broken = rows_of(text)
+    rows, broken = rows_of(text.removeprefix("\ufeff"))
     made.unread += [Unread(line, "<") for line in broken]
     axis: AxisName | None = None
     columns: list[tuple[str, int]] = []

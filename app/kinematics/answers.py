@@ -137,7 +137,9 @@ class AxisOut(BaseModel):
     angles: list[float]
     ball: list[float] | None
     shift: Annotated[list[EstimateOut] | None, Field(description="How far the ball lies from its nominal centre.")]
-    correction: Annotated[list[float], Field(description="Where the axis has to go, X Y Z.")]
+    correction: Annotated[
+        list[float] | None, Field(description="Where the axis has to go, X Y Z; none where the run does not say it.")
+    ]
     position_before: list[float] | None
     position_after: list[float] | None
     positions: list[PositionOut]

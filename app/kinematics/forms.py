@@ -20,6 +20,7 @@ SETTINGS = ("ball_radius", "tip_radius", "clearance", "retract_height", "feed", 
 LINES, MOST_LINES, MOST_PASTED = 12, 120, 2_000
 FEWEST_TOUCHES = 4
 CHARSETS = {"windows-1250": "cp1250", "cp1250": "cp1250", "iso-8859-2": "iso8859-2", "latin2": "iso8859-2"}
+_SLOVENE = re.compile(rb"Za\xe8etn|Kon\xe8n|to\xe8k|zra\xe8nost|na\xe8in|Povpre\xe8n", re.IGNORECASE)  # with \xe8 for č
 _CHARSET = re.compile(rb"charset\s*=\s*[\"']?\s*([A-Za-z0-9_-]{1,20})", re.IGNORECASE)
 _POSITION = re.compile(r"positions\[(\d+)\]")
 SIGNS = {"": None, "+": "positive", "-": "negative", "\N{MINUS SIGN}": "negative"}
@@ -34,7 +35,7 @@ class Line(NamedTuple):
 
 
 def decoded(content: bytes) -> str:
-    """A protocol as text: UTF-8, UTF-16 with its mark, as it says itself, else as Western European controls write."""
+    """A protocol as text: UTF-8, UTF-16 with its mark, as it says itself, else as controls of its language write."""
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16", errors="replace").replace("\0", "")
     try:
@@ -42,7 +43,8 @@ def decoded(content: bytes) -> str:
     except UnicodeDecodeError:
         said = _CHARSET.search(content[:2048])
         name = said[1].decode("ascii").lower() if said else ""
-        return content.decode(CHARSETS.get(name, "cp1252"), errors="replace").replace("\0", "")
+        likely = "cp1250" if _SLOVENE.search(content) else "cp1252"
+        return content.decode(CHARSETS.get(name, likely), errors="replace").replace("\0", "")
 
 
 def way(form: Mapping[str, str]) -> str:

@@ -138,7 +138,7 @@ def unrecorded(before: KinematicsRun, after: KinematicsRun, only: str | None = N
         if not any(abs(move) > SAME_PLACE for move in moves):
             continue
         asked = then["correction"]
-        taken = all(abs(move - wanted) <= SAME_PLACE for move, wanted in zip(moves, asked, strict=True))
+        taken = asked is not None and all(abs(a - b) <= SAME_PLACE for a, b in zip(moves, asked, strict=True))
         for place, name in enumerate(ERRORS[letter]):
             if place < 2:
                 found[name] = round(moves["XYZ".index(name[1])], 9)

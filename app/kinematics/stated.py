@@ -101,7 +101,7 @@ def _said_axis(
         "angles": list(said.angles) or sorted({each.angle for each in said.deviations}),
         "ball": None,
         "shift": None,
-        "correction": list(place) if place is not None else correction(axis, known),
+        "correction": list(place) if place is not None else _asked(axis, known),
         "position_before": list(vectors["before"]) if "before" in vectors else None,
         "position_after": list(vectors["after"]) if "after" in vectors else None,
         "positions": [
@@ -118,6 +118,11 @@ def _said_axis(
         "freedom": None,
         "noise": None,
     }
+
+
+def _asked(axis: AxisName, known: Mapping[str, float | None]) -> list[float] | None:
+    """Where the axis has to go; None where nothing was said of where it stands: that is no correction by zero."""
+    return None if all(known[name] is None for name in ERRORS[axis][:2]) else correction(axis, known)
 
 
 def _moved(said: AxisProtocol) -> tuple[float, float, float] | None:

@@ -180,3 +180,7 @@ def test_a_title_of_such_words_says_nothing_that_could_be_missed() -> None:
         "<title>Messprotokoll Kinematik</title><h2>C-Achse</h2><p>Lose: 0,001 °</p><p>Kinematik Huber</p>"
     )
     assert [each.text for each in made.unread] == ["Kinematik Huber"]
+
+
+def test_a_mark_of_the_byte_order_is_no_line() -> None:
+    assert read_protocol("\ufeff<html><h2>Axis C</h2><p>Backlash: 0.001</p></html>").unread == []

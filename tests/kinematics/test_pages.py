@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from app.kinematics.forms import decoded
 from tests.conftest import Server
 from tests.kinematics.bench import NAMES, RADIUS, TRUE, axis, protocol, touched
 from tests.kinematics.walking import QS, grid, machine, runs, take, words
@@ -54,6 +55,11 @@ class TestEntering:
         [run] = runs(shop)
         assert run["form"] == "protocol"
         assert run["axes"][0]["errors"]["EX0C"]["value"] == 0.0123
+
+    def test_an_old_slovene_file_that_does_not_say_how_it_is_written(self) -> None:
+        text = protocol("sl").replace("\N{MINUS SIGN}", "-")
+        assert decoded(text.encode("cp1250")) == text
+        assert decoded("Prüfen".encode("cp1252")) == "Prüfen"
 
     def test_ball_centres_in_the_grid(self, shop: Shop, operator: Person) -> None:
         typed = grid(axis(both=True, backlash=0.002))

@@ -73,6 +73,14 @@ class TestForms:
             assert len(c["positions"]) == 4
             assert c["position_after"] == [250.0123, -0.0081, -120.0]
 
+    def test_what_is_not_said_is_no_correction_by_zero(self, shop: Shop) -> None:
+        (axis,) = take(shop, protocol="<h2>Axis C</h2><p>Backlash: 0.001</p>")["axes"]
+        assert (axis["errors"], axis["correction"]) == ({}, None)
+        (axis,) = take(shop, results={"Q143": 0.01})["axes"]
+        assert axis["correction"] is None
+        number = take(shop, protocol="<h2>Axis C</h2><p>EX0C: 0.004</p>")["run"]
+        assert shop.call("GET", f"{RUNS}/{number}")["axes"][0]["correction"] == [0.004, 0.0, 0.0]
+
     def test_the_clock_of_the_control(self, shop: Shop) -> None:
         run = take(shop, protocol=protocol("de"), timezone="Europe/Ljubljana")
         assert run["measured_at"] == "2026-11-21T05:42:10Z"
