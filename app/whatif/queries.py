@@ -7,12 +7,12 @@ from functools import cached_property
 from math import isfinite, sqrt
 
 import numpy as np
-from sqlalchemy import func, select
+from sqlalchemy import all_, func, select
 from sqlalchemy.orm import Session
 
 from app.characteristics import wording
 from app.characteristics.queries import Standing
-from app.core.closed_loop import Course
+from app.core.closed_loop import Course, Whole
 from app.core.compensation import Code
 from app.core.effect import Effect, measured_effect
 from app.core.parameters import ParameterError, Parameters, read
@@ -271,7 +271,7 @@ def truly_of(session: Session, past: Past) -> Figures:
         corrections=int((issued & ~held).sum()),
         of_tool=past.of_tool,
         held=int(held.sum()),
-        mean_size=_mean_size(session, past),
+        mean_size=_mean_size(session, past, history["sequence"][held | ((history["correction"] >= 0) & ~kept)]),
         inner=len(inner),
         mean=mean,
         spread=spread,
@@ -280,15 +280,15 @@ def truly_of(session: Session, past: Past) -> Figures:
     )
 
 
-def _mean_size(session: Session, past: Past) -> float | None:
-    """Mean size error that the corrections of these readings removed, mm."""
+def _mean_size(session: Session, past: Past, but: Whole) -> float | None:
+    """Mean size error that the corrections of these readings removed, mm; not those of the readings `but`."""
     sequence = past.history["sequence"]
     return session.scalar(
         select(func.avg(func.abs(Correction.size_error))).where(
             Correction.machine_id == past.standing.machine.id,
             Correction.characteristic_id == past.standing.characteristic.id,
             Correction.sequence.between(int(sequence[0]), int(sequence[-1])),
-            func.abs(Correction.size_error) < past.standing.parameters.wear_limit,
+            Correction.sequence != all_(but.tolist()),
         )
     )
 

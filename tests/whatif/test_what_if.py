@@ -92,6 +92,30 @@ def test_a_map_of_another_averaging_limit(shop: Shop) -> None:
     assert len(made["cells"]) >= 300
 
 
+def test_what_was_held_and_what_was_excluded_removed_nothing(server: Server) -> None:
+    shop = Shop(server)
+    shop.call(
+        "PATCH",
+        f"/characteristics/{shop.characteristic}",
+        parameters={"plausible_jump": 0.006},
+        reason="Chips are seen",
+    )
+    course = scatter(60, 5)
+    course[30] += 40
+    answers = cut(shop, course)
+    assert answers[30]["correction"]["status"] == "held"
+    made = [each for each in answers if each["correction"] and each["correction"]["status"] == "pending"]
+    sizes = {each["sequence"]: abs(each["correction"]["amount"]) for each in made}
+    assert len(sizes) > 5
+    gone = next(iter(sizes))
+    shop.call("POST", f"/readings/{shop.characteristic}/{gone}/exclude", reason="Chip on the stylus")
+    sizes = {sequence: size for sequence, size in sizes.items() if sequence != gone}
+    found = ask(shop)
+    assert found["truly"]["corrections"] == len(sizes)
+    assert found["truly"]["mean_size"] == pytest.approx(sum(sizes.values()) / len(sizes))
+    assert alike(found["truly"], found["likeness"]["replayed"])
+
+
 def test_excluded_readings_and_probe_faults_are_left_out_and_named(server: Server) -> None:
     shop = Shop(server)
     cut(shop, scatter(40))
