@@ -21,7 +21,9 @@ class RankedOut(BaseModel):
     machine: str
     state: str
     reasons: list[ReasonOut] = Field(description="The most urgent first; empty where nobody is needed.")
-    ppk: float | None = Field(description="Of the last 200 readings at most; null of fewer than 20.")
+    ppk: float | None = Field(
+        description="Of the last 200 readings at most, as if normally distributed; null of fewer than 20. Which index may be quoted, the capability of each says."
+    )
     readings: int = Field(description="How many readings that is told of.")
     parts_left: float | None = Field(description="Parts until wear comes to the first limit, as foretold.")
     signals: list[int] = Field(description="Numbers of the open signals.")
