@@ -20,6 +20,7 @@ TOO_FAR = 4.0  # times as far as limits and most points reach
 WITH_VALUES = 8  # points beyond that are labelled
 CLOSE = 0.05  # of the width of the chart: of points closer than this the farthest is labelled, behind the last of them
 LATE = 0.12  # of the width of the chart: of points nearer to its right edge the label stands before them, not beyond the edge
+MOST = 0.04  # of the points on either side may lie beyond: a broken insert is seen on a few parts before it is changed
 FEW = 8  # points of which none is far
 UNSIGNED = (Chart.MOVING_RANGE, Chart.RANGES, Chart.DEVIATIONS)
 
@@ -31,7 +32,7 @@ def reach(view: View) -> tuple[float, float]:
     whole = _ends([*limits, *points])
     if view.kind is Chart.CUSUM or len(view) < FEW:
         return _open(*whole)
-    most = [np.quantile(part, (0.02, 0.98)) for part in points]
+    most = [np.quantile(part, (MOST, 1 - MOST)) for part in points]
     low, high = _ends([*limits, *most])
     if whole[1] - whole[0] <= TOO_FAR * (high - low):
         return _open(*whole)

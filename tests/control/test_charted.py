@@ -214,6 +214,12 @@ def test_a_broken_insert_does_not_press_the_limits_into_a_line() -> None:
     assert "beyond" not in traces(control_figure(seen([0.5, -0.5] * 20), key="shaft"))
 
 
+def test_an_insert_that_broke_for_three_parts_twice_in_two_hundred_presses_nothing_either() -> None:
+    values = [*([0.5, -0.5] * 48), 410.0, 405.0, 400.0, *([0.5, -0.5] * 48), 410.0, 405.0, 400.0]
+    low, high = control_figure(seen(values), key="shaft")["layout"]["yaxis"]["range"]
+    assert high - low < 20
+
+
 def test_of_points_beyond_that_are_neighbours_the_farthest_is_labelled() -> None:
     values = [*([0.5, -0.5] * 50), 390.0, 400.0, 395.0, -380.0, *([0.5, -0.5] * 50)]
     beyond = traces(control_figure(seen(values), key="shaft"))["beyond"]
