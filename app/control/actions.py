@@ -74,9 +74,13 @@ def put_in_force(session: Session, standing: Standing, version: int, reason: str
     _lock(session, standing)
     old = queries.baseline_of(session, standing.characteristic, version)
     now = queries.baseline_in_force(session, standing.characteristic)
-    if now is not None and now.version == version:
+    if now is not None and version in {now.version, now.repeats}:  # sent twice, or by two at once
         raise Conflict(
-            _("Baseline {version} is in force already.").format(version=version),
+            _("Baseline {version} is in force already.").format(version=version)
+            if now.version == version
+            else _("Baseline {version} is in force already: its numbers are those of version {now}.").format(
+                version=version, now=now.version
+            ),
             _("Choose another version, or freeze a new one."),
         )
     names = {column.key for column in inspect(Baseline).column_attrs} - OF_ITS_TIME

@@ -124,6 +124,8 @@ class TestFrozen:
         again = shop.call("POST", f"{path}/1/put-in-force", 201, reason="The new one was too wide")
         assert (again["version"], again["repeats"], again["sigma"]) == (3, 1, first["sigma"])
         shop.call("POST", f"{path}/3/put-in-force", 409, reason="Again")
+        told = shop.call("POST", f"{path}/1/put-in-force", 409, reason="Pressed twice")
+        assert "its numbers are those of version 3" in told["detail"]
         shop.call("POST", f"{path}/2/retire", 409, reason="It is not in force")
         gone = shop.call("POST", f"{path}/3/retire", reason="Rebuilt spindle")
         assert (gone["retired_why"], gone["in_force"]) == ("Rebuilt spindle", False)
