@@ -159,6 +159,9 @@ def notice(which: str) -> str:
         Notice.CHORDS.value: _(
             "Touched in pairs: X and Y are right, the diameter only if the tip went through the middle. A third place beside them would show it."
         ),
+        Notice.MISFIT.value: _(
+            "More is left at a touch than the probe's repeatability explains: a chip, a burr, a slip, or no such shape. The stated uncertainty does not hold then: touch again, or compute again without that touch."
+        ),
         Notice.ONE_AXIS.value: _(
             "The part lies turned and was touched along one axis alone: the zero is right in the middle between these touches, and nowhere else, so the text leaves the rotation out. Touch the other axis too."
         ),

@@ -52,6 +52,9 @@ class Height(NamedTuple):
     tool_length: float = 0.0
 
 
+MISFIT = 5.0  # standard deviations of a touch; of a million good touches not one leaves more
+
+
 class Notice(StrEnum):
     """What a zero should not be used without looking at."""
 
@@ -60,6 +63,7 @@ class Notice(StrEnum):
     ONE_AXIS = (
         "one_axis"  # turned, and the other axis not touched: where the zero lies depends on where that one stands
     )
+    MISFIT = "misfit"  # more is left at a touch than the probe's repeatability explains
     CHORDS = "chords"  # a bore or boss touched in pairs: beside the middle they are shorter than the diameter
 
 
@@ -123,6 +127,8 @@ def find_zero(
             uncertainty=stated,
             notices=tuple(_notices(values, paired=paired, skew=skew)),
         )
+    if repeatability and max(map(abs, made.residuals), default=0.0) > MISFIT * repeatability:
+        made = replace(made, notices=(Notice.MISFIT, *made.notices))
     return made if height is None else replace(made, z=zero_in_z(height))
 
 
