@@ -166,8 +166,8 @@ def history(
     """
     settings = settings_of(session, machine.id, fixture)
     wanted, newest = _standing(machine.id, fixture), _standing(machine.id, fixture)
-    if before is not None:
-        then = work_zero(session, before, machine.id)
+    then = None if before is None else session.get(WorkZero, (machine.id, before))
+    if then is not None:
         newest = newest.where(tuple_(*OLDEST_FIRST) < (then.touched_at, then.id))
     shown = list(session.scalars(newest.order_by(*NEWEST_FIRST).limit(limit)))[::-1]
     if not shown:
