@@ -115,6 +115,13 @@ def _check(given: PeriodIn, newest: int) -> None:
         for at, run in enumerate(given.excluded)
         if run.first > run.last
     ]
+    errors += [
+        FieldError(f"excluded[{at}].first", _("lies outside of the period: there is nothing of it to leave out"))
+        for at, run in enumerate(given.excluded)
+        if given.first_sequence <= given.last_sequence
+        and run.first <= run.last
+        and (run.last < given.first_sequence or run.first > given.last_sequence)
+    ]
     if errors:
         raise Invalid(
             _("This period cannot be made a baseline: {field}: {message}.").format(

@@ -192,6 +192,7 @@ class TestRefused:
             ({"excluded": [{"first": 1, "last": 40, "reason": "All"}]}, "last_sequence"),
             ({"excluded": [{"first": 9, "last": 2, "reason": "Backwards"}]}, "excluded[0].first"),
             ({"excluded": [{"first": 9, "last": 12, "reason": " "}]}, "excluded[0].reason"),
+            ({"last_sequence": 30, "excluded": [{"first": 31, "last": 32, "reason": "Chip"}]}, "excluded[0].first"),
             ({"chart": "xbar_r"}, "grouping"),
             ({"chart": "xbar_r", "grouping": "consecutive"}, "group_size"),
             ({"chart": "xbar_s", "grouping": "pause"}, "group_pause"),
