@@ -169,7 +169,9 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
     if settings.database_url is None:
         raise RuntimeError("no database: `inband serve` starts one, or set INBAND_DATABASE_URL")
     database = Database(settings.database_url, pool_size=settings.pool_size)
-    keys, directory = KeyRing(database), Directory(database)
+    # Readings are let in by connections of their own: requests that work for seconds may hold all the others.
+    letting_in = Database(settings.database_url, pool_size=1)
+    keys, directory = KeyRing(letting_in), Directory(letting_in)
     writer, live, rounds = Writer(database.dsn), Live(database.dsn), Rounds(database, CHORES)
     reporter = Reporter(database)
 
@@ -191,6 +193,7 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
         await rounds.stop()
         await reporter.stop()
         await writer.stop()
+        letting_in.close()
         database.close()
 
     app = FastAPI(title="Inband", version="1", lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)

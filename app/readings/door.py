@@ -4,6 +4,7 @@ It does what the documented route `POST /api/v1/readings` (in `api.py`) says, fo
 of a web framework between the socket and the writer. Everything else goes on to the application.
 """
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from datetime import UTC, datetime
 from typing import Any
@@ -118,7 +119,7 @@ async def take(
     """Decide and store one reading: status and answer. Raises `InbandError`."""
     entry = directory.known(reading.characteristic)
     if entry is None:
-        entry = await run_in_threadpool(directory.look_up, reading.characteristic)
+        entry = await asyncio.to_thread(directory.look_up, reading.characteristic)
     caller.must_at(entry.machine_id, "operator")
     outcome = await writer.submit(entry, reading)
     return await said(outcome, database)

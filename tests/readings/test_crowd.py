@@ -48,6 +48,27 @@ def test_sixty_four_clients_on_one_characteristic_are_decided_one_after_the_othe
     must_hold(shop.server.database.dsn)
 
 
+def test_readings_are_let_in_while_every_other_request_is_busy(shop: Shop) -> None:
+    """More of them than the server has connections and threads; the keys that call and a new characteristic are looked up."""
+    other = f"{shop.characteristic}-n"
+    shop.add(other)
+    machine = shop.server.client(shop.server.key(machine=shop.machine))
+    slow = [shop.server.client(shop.server.key()) for _ in range(48)]
+    path = f"/api/v1/characteristics/{shop.characteristic}/baselines"
+    with psycopg.connect(shop.server.database.dsn) as holding, ThreadPoolExecutor(len(slow)) as pool:
+        holding.execute("LOCK TABLE baseline IN ACCESS EXCLUSIVE MODE")
+        waiting = [pool.submit(client.get, path) for client in slow]
+        time.sleep(2)
+        assert not any(each.done() for each in waiting)
+        begun = time.monotonic()
+        for characteristic in (shop.characteristic, other):
+            answer = machine.post("/api/v1/readings", json={"characteristic": characteristic, "measured": 40.001})
+            assert answer.status_code == 201, answer.text
+        assert time.monotonic() - begun < 3
+        holding.rollback()
+        assert {each.result().status_code for each in waiting} == {200}
+
+
 def test_two_servers_on_one_database_decide_like_one(run_server: RunServer, parameters: Parameters) -> None:
     with run_server() as one, run_server(one.database.dsn) as other:
         shop = Shop(one)
