@@ -34,7 +34,7 @@ FROM (SELECT %(machine)s::int AS m, %(characteristic)s::int AS c, %(target)s::fl
         timestamptz '2026-01-05 06:00+00' + s * interval '1 second' AS at,
         coalesce(%(extremes)s::jsonb ->> s::text,
             CASE WHEN s %% {OUTSIDE} = 0 THEN '0.0093' END)::float8 AS put,
-        round((0.002 * sin(s / 30000.0) + 0.00002 * (s %% {CORRECTED}) - 0.001 + 0.003 * (random() + random() - 1))::numeric, 7)
+        round((0.002 * sin(s / 30000.0) + 0.00002 * (s %% {CORRECTED}) - 0.001 + 0.003 * (random() + random() - 1))::numeric, 6)
             ::float8 AS made
       FROM generate_series(%(first)s::bigint, %(last)s::bigint) AS s) AS g,
      LATERAL (SELECT coalesce(put, made) AS d) AS deviation
