@@ -169,8 +169,9 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
     if settings.database_url is None:
         raise RuntimeError("no database: `inband serve` starts one, or set INBAND_DATABASE_URL")
     database = Database(settings.database_url, pool_size=settings.pool_size)
-    # Readings are let in by connections of their own: requests that work for seconds may hold all the others.
-    letting_in = Database(settings.database_url, pool_size=1)
+    # Readings are let in by connections of their own: requests that work for seconds may hold all the others. There are as
+    # many as threads that look up: where the database is away, nobody waits half a minute for a connection of somebody else.
+    letting_in = Database(settings.database_url, pool_size=4, overflow=-1)
     keys, directory = KeyRing(letting_in), Directory(letting_in)
     writer, live, rounds = Writer(database.dsn), Live(database.dsn), Rounds(database, CHORES)
     reporter = Reporter(database)
@@ -211,4 +212,4 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
         app.include_router(router)
     app.openapi = partial(document, app, readings.SCHEMAS)  # type: ignore[method-assign]
     app.mount("/static", assets())
-    return ReadingsDoor(SecurityHeaders(app), keys.lookup, directory, writer, database)
+    return ReadingsDoor(SecurityHeaders(app), keys.lookup, directory, writer, letting_in)

@@ -23,12 +23,15 @@ class Database:
     Not to be carried across a fork: make one per process and ``close()`` it at the end.
     """
 
-    def __init__(self, url: str | URL, *, pool_size: int = 10, application_name: str = "inband") -> None:
+    def __init__(
+        self, url: str | URL, *, pool_size: int = 10, overflow: int | None = None, application_name: str = "inband"
+    ) -> None:
+        """pool_size: connections kept open. overflow: how many more there may be at once; as many again if left out, -1: any."""
         self.url = psycopg_url(url)
         self.engine = create_engine(
             self.url,
             pool_size=pool_size,
-            max_overflow=pool_size,
+            max_overflow=pool_size if overflow is None else overflow,
             pool_pre_ping=True,  # a restarted database costs one retry here, not one failed page per connection
             connect_args={"options": LIMITS, "connect_timeout": 5, "application_name": application_name},
         )

@@ -10,7 +10,6 @@ from datetime import UTC, datetime
 from typing import Any
 
 import msgspec
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -130,7 +129,7 @@ async def said(outcome: Outcome, database: Database) -> tuple[int, dict[str, Any
     if isinstance(outcome, InbandError):
         raise outcome
     if isinstance(outcome, Stored):
-        return 200, await run_in_threadpool(_stored, database, outcome)
+        return 200, await asyncio.to_thread(_stored, database, outcome)
     assert isinstance(outcome, Verdict)  # columns are made of batches only
     return 201, answer_of(outcome)
 

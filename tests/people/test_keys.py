@@ -1,14 +1,20 @@
 """The ring that knows keys without asking the database each time."""
 
 import asyncio
+import socket
+import threading
 import time
+from contextlib import suppress
+from typing import Any
 
 import pytest
 from sqlalchemy.exc import OperationalError
 
 from app.db.engine import Database
+from app.main import create_app
 from app.people import actions
 from app.people.keys import KEPT, KeyRing
+from app.settings import Settings
 from tests.loops import run
 
 
@@ -74,3 +80,24 @@ def test_without_a_database_a_key_is_not_taken_for_unknown(secret: str) -> None:
     with pytest.raises(OperationalError):
         run(KeyRing(away).lookup(secret))
     away.close()
+
+
+def test_of_many_keys_none_waits_for_another_while_the_database_hangs() -> None:
+    """One that takes a second to hang up: whoever waits for a connection of somebody else waits thirty."""
+
+    def hang_up() -> None:
+        with suppress(OSError):
+            while True:
+                threading.Timer(1, silent.accept()[0].close).start()
+
+    async def look() -> list[Any]:
+        return await asyncio.gather(*(door.lookup(f"inband_{n}") for n in range(5)), return_exceptions=True)
+
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        threading.Thread(target=hang_up, daemon=True).start()
+        where = f"postgresql://nobody@127.0.0.1:{silent.getsockname()[1]}/none?sslmode=disable&gssencmode=disable"
+        door: Any = create_app(Settings(database_url=where))
+        begun = time.monotonic()
+        assert {type(answer) for answer in run(look())} == {OperationalError}
+        assert time.monotonic() - begun < 10
+        silent.shutdown(socket.SHUT_RDWR)
