@@ -151,14 +151,17 @@ def _looked_up(directory: Directory, readings: list[ReadingIn]) -> list[tuple[En
             _("Send it in several batches. Nothing of this one was stored."),
         )
     entries: dict[str, Entry] = {}
-    errors: list[FieldError] = []
-    for at, reading in enumerate(readings):
-        if reading.characteristic in entries:
-            continue
+    missing: dict[str, str] = {}
+    for key in dict.fromkeys(reading.characteristic for reading in readings):  # each is looked up once
         try:
-            entries[reading.characteristic] = directory.look_up(reading.characteristic)
+            entries[key] = directory.look_up(key)
         except NotFound as error:
-            errors.append(FieldError(f"[{at}].characteristic", error.detail))
+            missing[key] = error.detail
+    errors = [
+        FieldError(f"[{at}].characteristic", missing[reading.characteristic])
+        for at, reading in enumerate(readings)
+        if reading.characteristic in missing
+    ]
     if errors:
         raise NotFound(
             errors[0].message,

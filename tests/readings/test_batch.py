@@ -8,6 +8,12 @@ import httpx
 import pytest
 
 from app.core.parameters import read
+from app.db.engine import Database
+from app.errors import NotFound
+from app.readings.api import _looked_up
+from app.readings.door import Directory
+from app.readings.records import Entry
+from app.readings.schemas import ReadingIn
 from tests.readings.load import ndjson, scattered
 from tests.readings.record import counts, history, must_hold, must_replay
 from tests.shop import PARAMETERS, Shop
@@ -156,6 +162,18 @@ class TestAllOrNothing:
             "[3].characteristic",
             "[4].characteristic",
         ]
+
+    def test_one_that_is_not_there_is_looked_up_once(self, database: Database) -> None:
+        asked: list[str] = []
+
+        class Counting(Directory):
+            def look_up(self, characteristic: str) -> Entry:
+                asked.append(characteristic)
+                return super().look_up(characteristic)
+
+        with pytest.raises(NotFound):
+            _looked_up(Counting(database), [ReadingIn(characteristic="no", measured=1.0)] * 1000)
+        assert asked == ["no"]
 
     def test_a_broken_line_is_named(self, shop: Shop) -> None:
         body = ndjson(good(shop)) + b'\n{"characteristic": '
