@@ -302,16 +302,19 @@ def _moment(moment: np.datetime64) -> datetime:
 def _delay(joined: dict[str, NDArray[Any]], part: NDArray[np.int64]) -> int | None:
     """Parts that came out with the old offset after a correction of the tool was issued: the median, where machines tell.
 
-    They tell by number; else (by time, or by confirming) by the offset with which a part was known to be cut.
+    They tell by number; until they do (by time, or by confirming) by the offset with which a part was known to be cut.
     """
     issued = np.flatnonzero(joined["correction"] >= 0)
-    in_effect = np.maximum.accumulate(joined["correction_in_effect"]) if len(part) else np.zeros(0)
     if not len(issued):
         return None
-    if (in_effect < 0).all():
-        seen = _with_its_offset(joined, issued := issued[-MOST_FOLLOWED:])
-    else:
+    in_effect = np.maximum.accumulate(joined["correction_in_effect"])
+    by_number = issued[in_effect[issued] >= 0]
+    if len(by_number):
+        issued = by_number
         seen = np.searchsorted(in_effect, joined["correction"][issued])
+    else:
+        issued = issued[-MOST_FOLLOWED:]
+        seen = _with_its_offset(joined, issued)
     told = seen < len(part)
     between = part[seen[told]] - part[issued[told]] - 1
     between = between[between >= 0]

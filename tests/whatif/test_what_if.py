@@ -4,8 +4,10 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from typing import Any
 
+import numpy as np
 import pytest
 
+from app.whatif.past import _delay
 from tests.conftest import Server
 from tests.shop import Shop
 from tests.whatif.loop import cut, scatter
@@ -273,6 +275,23 @@ def test_a_machine_that_tells_by_time_has_its_pipeline_too(server: Server) -> No
     found = ask(shop)
     assert found["delay"] == 3
     assert (found["likeness"]["verdict"], found["likeness"]["same"]) == ("well", 1.0)
+
+
+def test_a_machine_that_begins_to_tell_by_number_has_the_pipeline_that_it_has() -> None:
+    """What was issued long before it began was not in effect only when it was told."""
+    part, delay = np.arange(60), 1
+    number = np.where(part % 2 == 0, part // 2 + 1, -1)
+    in_effect = (part - delay + 1) // 2  # the last correction with which a part was cut
+    joined = {
+        "correction": number,
+        "correction_in_effect": np.where(part < 40, -1, in_effect),
+        "compensated": -0.001 * in_effect,
+        "deviation": np.zeros(60),
+        "decided": -0.001 * ((part + 1) // 2 - in_effect),
+        "factor": np.full(60, -1.0),
+    }
+    assert _delay(joined, part) == delay
+    assert _delay(joined | {"correction_in_effect": np.full(60, -1)}, part) == delay
 
 
 def test_the_figure_draws_both_courses(shop: Shop) -> None:
