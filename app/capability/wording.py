@@ -40,17 +40,6 @@ def between(found: Index | None) -> str:
     return _("{low} to {high}").format(low=index(found.low), high=index(found.high))
 
 
-def interval_method(name: str | None) -> str:
-    """How the interval was come by."""
-    return {
-        "chi_square": _("chi-square, exact for a standard deviation"),
-        "bissell": _("Bissell 1990"),
-        "noncentral_t": _("non-central t, exact for one limit"),
-        "boyles": _("Boyles 1991"),
-        None: "",
-    }.get(name, name or "")
-
-
 def ppm(value: float | None) -> str:
     """Parts per million, with no more digits than can be meant."""
     if value is None:

@@ -25,8 +25,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.closed_loop import CODES, ZONES, Count, Course, Floats, Mark, Total, Way, Whole, follow, follow_each
-from app.core.compensation import DECIMALS, Action, Code, State, decide, outstanding_effect
+from app.core.closed_loop import Count, Course, Floats, Mark, Total, Way, Whole, follow, follow_each
+from app.core.compensation import DECIMALS, Action, State, decide, outstanding_effect
 from app.core.parameters import Parameters, WearPolicy
 from app.core.zones import nanometres
 
@@ -288,16 +288,6 @@ def _figures(counts: Whole, sums: Floats, half: float) -> Figures:
         ppk=ppk,
         largest=float(sums[Total.LARGEST]) if inner else None,
     )
-
-
-def zone_of(course: Course, at: int) -> str:
-    """The zone of one reading."""
-    return str(ZONES[course.zone[at]])
-
-
-def code_of(course: Course, at: int) -> Code:
-    """Why it was decided so."""
-    return CODES[course.code[at]]
 
 
 def agreement(mine: NDArray[np.float64], true: NDArray[np.float64]) -> tuple[float, float]:

@@ -53,16 +53,6 @@ def verb(word: str) -> Verb:
     raise NotFound(_("The form does not say what to do with the correction."), _("Go back to the tool memory."))
 
 
-def verb_word(verb: str) -> str:
-    """What stands on the button."""
-    return {
-        "approve": _("Approve"),
-        "release": _("Release"),
-        "rejected": _("Reject"),
-        "applied": _("Mark applied"),
-    }.get(verb, verb)
-
-
 def about_correction(row: CorrectionRow, verb: str, counting_on: list[int], came_from: str | None = None) -> Question:
     """Asks before a correction is approved, released, rejected or marked applied. counting_on: see the query of that name."""
     c = row.correction

@@ -4,7 +4,6 @@ A point r of the part lies at ``R r + t``. Angles are those of the frames of the
 the new Y, then about the new X, so R = Rz Ry Rx. Lengths mm, angles degrees.
 """
 
-from collections.abc import Sequence
 from math import atan2, degrees, hypot
 
 import numpy as np
@@ -93,14 +92,3 @@ def on_pallet(pallet: Floats, part: Floats, pose: Floats | None = None) -> Float
     if pose is None:
         return pallet @ part
     return pallet @ pose @ part @ inverse(pose)
-
-
-def is_rigid(rows: Sequence[Sequence[float]]) -> bool:
-    """Whether these rows are a motion at all."""
-    made = np.asarray(rows, dtype=np.float64)
-    return (
-        made.shape == (4, 4)
-        and bool(np.isfinite(made).all())
-        and bool(np.abs(made[:3, :3] @ made[:3, :3].T - np.eye(3)).max() < 1e-6)
-        and made[3].tolist() == [0.0, 0.0, 0.0, 1.0]
-    )
