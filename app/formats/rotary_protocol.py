@@ -29,6 +29,7 @@ _NUMBER = re.compile(
 _COORDINATE = re.compile(r"\b([xyz])\s*[=:]?\s*([+-]?[\d.,]{1,26}(?<![.,]))\s*(mm|um|µm|μm)?", re.IGNORECASE)
 _DEVIATION = re.compile(r"\be([xyz])([abc])\b")
 _BLANKS = re.compile(r"\s*([^\d+\N{MINUS SIGN}]*[^\W\d]\)?)\s+([+\N{MINUS SIGN}-]?\d.*)")  # Startwinkel  -90,000 °
+_THOUSANDS = re.compile(r"\d[ '’]\d{3}(?!\d)")
 _CLOCK = re.compile(r"\d{1,2}:\d{2}")
 _ALONE = re.compile(r"(?:[a-z]{1,20} ){0,2}(?:[a-z]{0,20}achse|axis|os)(?: of rotation)?")  # Vermessene Rotationsachse
 _LETTER = re.compile(r"\s*([abc])(?:[\s-]*(?:achse|axis|os))?\s*", re.IGNORECASE)
@@ -220,6 +221,8 @@ def _key(words: str, everything: str) -> str | None:
 
 def _number(made: Protocol, axis: AxisName | None, key: str, said: str, words: str) -> bool:
     numbers = numbers_in(said)
+    if _THOUSANDS.search(said) and key != "angles" and not (key in VECTORS and len(numbers) == 3):
+        return False
     if key == "ball_radius":
         if not numbers:
             return False

@@ -42,7 +42,7 @@ def of_parameters(read: Results, came_as: str) -> Evaluated:
     _fill_in(made, read, {})
     if not made.results["axes"] and made.results["offsets"] is None:
         notes = "; ".join(made.results["notes"][:3])
-        wrong = _("no result parameter can be read: {notes}").format(notes=notes or _("it is empty"))
+        wrong = _("no result parameter can be read: {notes}").format(notes=notes or _("no axis was measured"))
         raise Invalid(
             f"{came_as}: {wrong}.",
             _('Write a line for each, like Q143 = 0.0134 or QS146 = "0.01234567 -0.0123456 0.00123456 -0.0012345".'),

@@ -155,6 +155,9 @@ def test_lines_of_a_text_with_blanks_between() -> None:
     "line",
     [
         "Messkreisradius: 1.212,3344 mm",
+        "Messkreisradius: 1 212,3344 mm",
+        "Messkreisradius: 1'212.3344 mm",
+        "Position vor: X 1 345,6789 Y 0 Z 1",
         "Position vor: X=-1.345,6789 Y=0 Z=1",
         "Achspositionen: -90,-30,30,90",
         "Achspositionen: -90.000; 1.030,5",
@@ -166,6 +169,11 @@ def test_half_of_a_number_is_none(line: str) -> None:
     assert made.axes["C"].numbers == {"backlash": 0.001}
     assert (made.axes["C"].vectors, made.axes["C"].angles) == ({}, ())
     assert [each.text for each in made.unread] == [line]
+
+
+def test_blanks_between_numbers_part_them() -> None:
+    axis = read_protocol("<h2>Axis C</h2><p>Axis positions: 0 120 240</p><p>Position before: 1 200 300</p>").axes["C"]
+    assert (axis.angles, axis.vectors) == ((0.0, 120.0, 240.0), {"before": (1.0, 200.0, 300.0)})
 
 
 def test_angles_with_commas_between() -> None:

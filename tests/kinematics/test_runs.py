@@ -57,6 +57,7 @@ class TestForms:
         assert "no position error" in enter(shop, run, 409)["detail"]
         take(shop, 422, results={"QS146": "0.01234567 -0.0123456 0.00123456"})
         take(shop, 422, results={"Q143": True})
+        assert "no axis was measured" in take(shop, 422, results={"Q141": -1.0, "Q144": -1})["detail"]
         one = take(shop, results={"QS146": "0.01234567 xxxxxxxxxx 0.00123456 -0.0012345"})
         assert set(one["axes"][0]["errors"]) == {"EX0C", "EA0C", "EB0C"}
 

@@ -91,10 +91,10 @@ def read_string(parameter: str, text: str) -> ResultString:
     for number, (name, part) in enumerate(zip(names, parts, strict=False), start=1):
         value, damage = read_number(part)
         values[name] = value
-        if damage is None and len(part) != WIDTH:
-            damage = Damage.LENGTH
+        if value is not None and len(part) != WIDTH:
+            damage = damage or Damage.LENGTH
             # Beside a number as the control writes it a short one is cut: what is left of "-0.0012345" may be "-0.00".
-            if WIDTH in map(len, parts) and len(part.partition(".")[2]) < LEAST_DECIMALS:
+            if WIDTH in map(len, parts) and len(part.replace(",", ".").partition(".")[2]) < LEAST_DECIMALS:
                 values[name], damage = None, Damage.CUT
         if damage is not None:
             flaws.append(Flaw(parameter, number, damage, part))
