@@ -31,16 +31,13 @@ def align(
     that leave the part free to move are refused with the reason, and with the touch to move.
     """
     caller.must_somewhere("operator")
-    machine = machine_named(session, given.machine)
-    caller.must_at(machine.id, "operator")
     database: Database = request.app.state.database
     with database.begin() as own:
+        machine = machine_named(own, given.machine)
+        caller.must_at(machine.id, "operator")
         made = actions.align(own, machine, given, caller)
-    found = queries.alignment(session, made.alignment.id)
-    if any(sequence is None for _name, _key, sequence, _why in queries.pushed(session, found)):
-        readings.push_results(database)
+    readings.push_results(database)
     response.status_code = 200 if made.again else 201
-    session.expire_all()
     return alignment_out(session, queries.alignment(session, made.alignment.id))
 
 

@@ -49,9 +49,10 @@ def measure_form(
     refused with the reason. With `characteristic` the result becomes a reading of it, so that control charts, alarms and
     reports work on it.
     """
-    machine = machine_named(session, given.machine)
-    caller.must_at(machine.id, "operator")
     database: Database = request.app.state.database
+    with database.begin() as own:
+        machine = machine_named(own, given.machine)
+        caller.must_at(machine.id, "operator")
     made = actions.measure_and_push(database, machine, given, caller)
     response.status_code = 200 if made.again else 201
     return _answer(session, made.row)

@@ -56,10 +56,10 @@ def take_kinematics_run(
     A ball further off than maxDevCalBall makes a refused run: that is kept, and counts for nothing. A change larger than
     maxModification waits to be confirmed (`"status": "to_confirm"`). What of a protocol was not understood is answered.
     """
-    machine = machine_named(session, given.machine)
-    caller.must_at(machine.id, "operator")
     database: Database = request.app.state.database
     with database.begin() as own:
+        machine = machine_named(own, given.machine)
+        caller.must_at(machine.id, "operator")
         taken = actions.take(own, machine, given, caller)
         number = taken.row.run.id
     readings.push_results(database)

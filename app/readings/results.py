@@ -4,6 +4,7 @@ A result is asked for in the transaction that stores it, and pushed after its co
 answered. Its key, e.g. `work-zero:12:x`, makes pushing it again harmless, so what a crash has left is pushed by a chore.
 """
 
+import logging
 from collections.abc import Mapping
 from datetime import datetime
 from typing import NamedTuple
@@ -21,6 +22,8 @@ from app.readings.keeper import store_batch
 from app.readings.records import Entry
 from app.readings.schemas import ReadingIn
 from app.readings.tables import ResultReading
+
+log = logging.getLogger(__name__)
 
 MOST_AT_ONCE = 100
 
@@ -52,9 +55,16 @@ def ask_for(session: Session, entries: Mapping[str, Entry], values: Mapping[str,
 
 
 def push_results(database: Database) -> None:
-    """Make what was asked for into readings at once, after the commit that asked; what cannot be now, the chore does."""
-    with database.begin() as own:
-        push_waiting(own)
+    """Make what was asked for into readings at once, after the commit that asked; what cannot be now, the chore does.
+
+    Never raises: what asked is stored, and an error in its place would say that it is not. The request that calls it
+    should hold no connection: many that each wait for a second one wait for each other.
+    """
+    try:
+        with database.begin() as own:
+            push_waiting(own)
+    except Exception:
+        log.exception("results are not readings yet; that is tried again within a minute")
 
 
 def push_waiting(session: Session) -> bool:

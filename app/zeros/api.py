@@ -44,22 +44,14 @@ def find_work_zero(
     no zero are refused with the reason, by their numbers. `characteristics` names what its results become readings of.
     """
     caller.must_somewhere("operator")
-    machine = machine_named(session, given.machine)
-    caller.must_at(machine.id, "operator")
     database: Database = request.app.state.database
     with database.begin() as own:
+        machine = machine_named(own, given.machine)
+        caller.must_at(machine.id, "operator")
         made = actions.find(own, machine, given, caller)
-    _push(database, session, made.zero.id)
-    session.expire_all()
+    readings.push_results(database)
     response.status_code = 200 if made.again else 201
     return zero_out(session, queries.work_zero(session, made.zero.id))
-
-
-def _push(database: Database, session: SessionDep, number: int) -> None:
-    """What of a zero becomes readings is pushed once the zero is stored for good; what cannot be now, a chore does."""
-    became = queries.pushed(session, [queries.work_zero(session, number)])[number]
-    if any(each.sequence is None for each in became):
-        readings.push_results(database)
 
 
 @router.get("/work-zeros", responses=problems(404))

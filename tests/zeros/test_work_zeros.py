@@ -1,5 +1,7 @@
 """Work zeros by REST: found, kept, idempotent, compared, made readings of."""
 
+import time
+from concurrent.futures import ThreadPoolExecutor
 from math import radians, tan
 from typing import Any
 
@@ -11,40 +13,12 @@ from sqlalchemy.exc import DBAPIError
 from app.zeros.tables import WorkZero
 from tests.conftest import Server
 from tests.shop import Shop
-
-POCKET: dict[str, Any] = {
-    "kind": "pocket",
-    "tip": 6.0,
-    "touches": [
-        {"x": -353.012, "approach": "-X"},
-        {"x": -259.008, "approach": "+X"},
-        {"y": -181.254, "approach": "-Y"},
-        {"y": -127.246, "approach": "+Y"},
-    ],
-}
+from tests.zeros.bench import POCKET, moved, post
 
 
 @pytest.fixture(scope="module")
 def shop(server: Server) -> Shop:
     return Shop(server)
-
-
-def post(shop: Shop, status: int = 201, **more: Any) -> Any:
-    return shop.call("POST", "/work-zeros", status, machine=shop.machine, **(POCKET | more))
-
-
-def moved(dx: float, dy: float = 0.0) -> list[dict[str, Any]]:
-    touches: list[dict[str, Any]] = []
-    for touch in POCKET["touches"]:
-        name, by = ("x", dx) if "x" in touch else ("y", dy)
-        touches.append(touch | {name: round(touch[name] + by, 6)})
-    return touches
-
-
-def moved_along(figure: Any, axis: str) -> list[float]:
-    (trace,) = [each for each in figure["data"] if each["meta"] == axis]
-    found: list[float] = trace["y"]
-    return found
 
 
 class TestFound:
@@ -192,103 +166,24 @@ class TestRefused:
         assert len(shop.call("GET", f"/work-zeros?machine={shop.machine}&limit=1000")["items"]) == before
 
 
-class TestFixtures:
-    def test_a_shifting_vice_is_seen_and_told(self, server: Server) -> None:
-        shop = Shop(server)
-        first = post(shop, fixture="vice")
-        assert first["shift"]["state"] == "unknown"
-        path = f"/work-zeros/fixtures/{shop.machine}/vice"
-        limits: dict[str, Any] = {
-            "basis": "first",
-            "warning": 0.01,
-            "alarm": 0.03,
-            "reason": "a vice that is known to move",
-        }
-        shop.call("PUT", path, 200, **limits)
-        near = post(shop, fixture="vice", touches=moved(0.012, -0.004))
-        assert near["shift"]["shifts"] == {"x": 0.012, "y": -0.004}
-        assert (near["shift"]["state"], near["shift"]["reference"]) == ("warning", first["id"])
-        assert shop.alarms() == []
-        far = post(shop, fixture="vice", touches=moved(0.05))
-        assert far["shift"]["state"] == "alarm"
-        (alarm,) = shop.alarms()
-        assert alarm["kind"] == "fixture_shifted"
-        assert "vice has shifted by X +50.0" in alarm["text"] if "text" in alarm else True
-        post(shop, fixture="vice", touches=moved(0.06))
-        (alarm,) = shop.alarms()
-        assert alarm["count"] == 2
-        post(shop, fixture="vice", touches=moved(0.001))
-        assert shop.alarms() == []
-        figure = shop.call("GET", f"{path}/figure?theme=dark")
-        assert moved_along(figure, "x") == pytest.approx([12.0, 50.0, 60.0, 1.0])
-
-    def test_against_a_frozen_one_and_the_median(self, server: Server) -> None:
-        shop = Shop(server)
-        numbers = [post(shop, fixture="vice", touches=moved(dx))["id"] for dx in (0.0, 0.010, 0.012, 0.5, 0.011)]
-        path = f"/work-zeros/fixtures/{shop.machine}/vice"
-        frozen = shop.call("PUT", path, 200, basis="frozen", reference=numbers[1], reason="aligned anew")
-        assert frozen["shift"]["shifts"]["x"] == pytest.approx(0.001)
-        median = shop.call("PUT", path, 200, basis="median", reason="no better one")
-        assert median["shift"]["shifts"]["x"] == pytest.approx(0.0)  # of 0, 10, 12 and 500 µm: 11
-        assert median["shift"]["reference"] is None
-        shop.call("PUT", path, 422, basis="frozen", reason="x")
-        shop.call("PUT", path, 422, basis="frozen", reference=10**9, reason="x")
-        told = shop.call("PUT", path, 422, basis="first", warning=0.1, alarm=0.01, reason="x")
-        assert told["errors"][0]["field"] == "warning"
-        figure = shop.call("GET", f"{path}/figure")
-        assert len(moved_along(figure, "x")) == 4  # the first has nothing before it
-
-    def test_two_parts_in_one_fixture_are_kept_apart(self, server: Server) -> None:
-        shop = Shop(server)
-        post(shop, fixture="vice", work_offset="G54")
-        other = post(shop, fixture="vice", work_offset="G55", touches=moved(200.0))
-        assert other["shift"]["shifts"] == {}
-        assert post(shop, fixture="vice", work_offset="G55", touches=moved(200.01))["shift"]["shifts"]["x"] == 0.01
-
-    def test_one_part_in_its_place_says_nothing_of_the_other(self, server: Server) -> None:
-        shop = Shop(server)
-        path = f"/work-zeros/fixtures/{shop.machine}/vice"
-        frozen = post(shop, fixture="vice", work_offset="G54")["id"]
-        post(shop, fixture="vice", work_offset="G55", touches=moved(200.0))
-        shop.call("PUT", path, 200, basis="frozen", reference=frozen, alarm=0.03, reason="aligned anew")
-        assert shop.alarms() == []  # 200 mm beside it stands another part, not this one
-        post(shop, fixture="vice", work_offset="G54", touches=moved(0.05))
-        assert len(shop.alarms()) == 1
-        shop.call("PUT", path, 200, basis="first", alarm=0.03, reason="each by its own")
-        post(shop, fixture="vice", work_offset="G55", touches=moved(200.001))
-        assert len(shop.alarms()) == 1
-        post(shop, fixture="vice", work_offset="G54", touches=moved(0.001))
-        assert shop.alarms() == []
-
-    def test_the_first_one_computed_again_is_the_first_one_still(self, server: Server) -> None:
-        shop = Shop(server)
-        first, _second = (post(shop, fixture="vice", touches=moved(dx)) for dx in (0.0, 0.004))
-        again = shop.call("POST", f"/work-zeros/{first['id']}/recompute", 201, tip=5.9, reason="calibrated since")
-        assert again["shift"]["reference"] is None
-        third = post(shop, fixture="vice", touches=moved(0.009))
-        assert (third["shift"]["reference"], third["shift"]["total"]) == (again["id"], 0.009)
-        path = f"/work-zeros/fixtures/{shop.machine}/vice"
-        assert shop.call("GET", path)["last"] == third["id"]
-        assert moved_along(shop.call("GET", f"{path}/figure"), "x") == pytest.approx([4.0, 9.0])
-
-    def test_what_comes_in_late_says_nothing_of_today(self, server: Server) -> None:
-        shop = Shop(server)
-        path = f"/work-zeros/fixtures/{shop.machine}/vice"
-        for day, dx in ((1, 0.0), (20, 0.05)):
-            post(shop, fixture="vice", touches=moved(dx), touched_at=f"2026-11-{day:02}T06:00:00Z")
-        shop.call("PUT", path, 200, basis="first", alarm=0.03, reason="watched")
-        assert len(shop.alarms()) == 1
-        late = post(shop, fixture="vice", touches=moved(0.001), touched_at="2026-11-10T06:00:00Z")
-        assert len(shop.alarms()) == 1
-        assert shop.call("GET", path)["last"] != late["id"]
-        assert moved_along(shop.call("GET", f"{path}/figure"), "x") == pytest.approx([1.0, 50.0])
-
-    def test_one_that_is_not_there(self, shop: Shop) -> None:
-        shop.call("GET", f"/work-zeros/fixtures/{shop.machine}/nowhere", 404)
-        shop.call("GET", "/work-zeros/fixtures/nowhere/vice", 404)
-
-
 class TestReadings:
+    def test_many_at_once_do_not_wait_for_each_other(self, server: Server) -> None:
+        """More of them than the server has connections: each holds one while it looks for its machine."""
+        shop = Shop(server)
+        senders = [server.client(server.key()) for _ in range(48)]
+        given = POCKET | {"machine": shop.machine}
+        with psycopg.connect(server.database.dsn) as holding, ThreadPoolExecutor(len(senders)) as pool:
+            for client in senders:
+                assert client.get("/api/v1/machines").status_code == 200  # its key is known from now on
+            holding.execute("LOCK TABLE machine IN ACCESS EXCLUSIVE MODE")
+            waiting = [pool.submit(client.post, "/api/v1/work-zeros", json=given) for client in senders]
+            time.sleep(2)
+            assert not any(each.done() for each in waiting)
+            begun = time.monotonic()
+            holding.rollback()
+            assert {each.result().status_code for each in waiting} == {201}
+            assert time.monotonic() - begun < 15
+
     def test_a_zero_becomes_readings(self, server: Server) -> None:
         shop = Shop(server)
         limits = {"tolerance_width": 0.02, "zero_range": 0.002, "averaging_limit": 0.006, "mode": "measure_only"}
