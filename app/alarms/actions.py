@@ -73,7 +73,7 @@ def raise_for_place(session: Session, machine_id: int, kind: str, data: dict[str
 
     While it is active, one more counts on it.
     """
-    active = _of_place(session, machine_id, kind, data)
+    active = active_of_place(session, machine_id, kind, data)
     return _raised(session, active or Alarm(machine_id=machine_id, kind=kind), data)
 
 
@@ -81,7 +81,7 @@ def settle_for_place(
     session: Session, machine_id: int, kind: str, data: dict[str, Any], by: str, comment: str, outcome: dict[str, Any]
 ) -> Alarm | None:
     """End an alarm about this location, because what it asked for has been done; None if there is none."""
-    active = _of_place(session, machine_id, kind, data)
+    active = active_of_place(session, machine_id, kind, data)
     if active is None:
         return None
     active.acknowledged_at, active.acknowledged_by = datetime.now(UTC), by
@@ -98,7 +98,8 @@ def news(machine: str, alarm: Alarm) -> dict[str, Any]:
     return told | {"alarm": alarm.kind, "state": "acknowledged", "action": alarm.action}
 
 
-def _of_place(session: Session, machine_id: int, kind: str, data: dict[str, Any]) -> Alarm | None:
+def active_of_place(session: Session, machine_id: int, kind: str, data: dict[str, Any]) -> Alarm | None:
+    """The alarm about this location that nobody has ended."""
     return session.scalars(
         select(Alarm)
         .where(

@@ -12,7 +12,7 @@ from app.alarms import actions as alarms
 from app.audit.actions import record as audit
 from app.core.geometry.edges import Approach, Kind, Touch, Unfit
 from app.core.geometry.points import Degenerate
-from app.core.geometry.work_zero import Height, Shift, Zero, find_zero, four_records
+from app.core.geometry.work_zero import Height, Shift, Zero, find_zero, four_records, judge_shift
 from app.core.programs.frames import offset_of
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
@@ -55,13 +55,14 @@ def find(session: Session, machine: Machine, given: ZeroIn, caller: Caller) -> M
     kept = given.model_dump(exclude=ASKED_ONCE, exclude_none=True)
     if (before := _sent_before(session, machine, given, offset.word, kept)) is not None:
         return before
+    now = datetime.now(UTC)
     made = WorkZero(
         machine_id=machine.id,
         kind=given.kind,
         fixture=given.fixture,
         work_offset=offset.word,
         part=given.part,
-        touched_at=given.touched_at or datetime.now(UTC),
+        touched_at=min(given.touched_at or now, now),  # by a clock that is ahead it would stay the newest for hours
         actor=caller.name,
         key=given.key,
         given=kept,
@@ -219,29 +220,33 @@ def _fixture(session: Session, machine: Machine, key: str | None) -> Fixture | N
 def _watch(session: Session, machine: Machine, zero: WorkZero) -> list[dict[str, Any]]:
     """Raise *fixture shifted*, or end it when the fixture is back; what live pages are told of it.
 
-    What came in late says nothing of today, and one part in its place nothing of another beside it.
+    The zero that was touched last tells. One that came in late or was computed again says nothing of today, but may take
+    away what today's was too far from; one part in its place says nothing of another beside it, nor one axis of another.
     """
-    compared = queries.compared(session, zero)
-    if compared is None:
+    if zero.fixture is None:
         return []
-    newest = queries.newest_by_offset(session, machine.id, zero.fixture or "")
-    if zero.id not in {each.id for each in newest}:
-        return []
+    settings = queries.settings_of(session, machine.id, zero.fixture)
+    newest = queries.newest_by_offset(session, machine.id, zero.fixture)
+    standing = {each.work_offset: queries.against(session, each, settings) for each in newest}
+    last = standing[zero.work_offset]
     about = {"memory": "fixture", "location": zero.fixture}
-    if compared.state is Shift.ALARM:
-        settings = queries.settings_of(session, machine.id, zero.fixture or "")
+    if last.state is Shift.ALARM and last.zero.id == zero.id:
         data = about | {
-            "shifts": compared.shifts,
+            "shifts": last.shifts,
             "limit": settings.alarm,
             "zero": zero.id,
-            "reference": compared.reference,
+            "reference": last.reference,
         }
         return [alarms.news(machine.key, alarms.raise_for_place(session, machine.id, SHIFTED, data))]
-    others = (queries.compared(session, each) for each in newest if each.id != zero.id)
-    if any(each is not None and each.state is Shift.ALARM for each in others):
+    active = alarms.active_of_place(session, machine.id, SHIFTED, about)
+    if active is None or any(each.state is Shift.ALARM for each in standing.values()):
         return []
-    comment = _("Work zero {n} is within the limit").format(n=zero.id)
-    outcome = {"code": "fixture_back", "number": zero.id}
+    if last.reference != last.zero.id:  # an axis that was not touched again is where it was
+        there = active.data["shifts"] | last.shifts
+        if judge_shift(list(there.values()), None, settings.alarm) is Shift.ALARM:
+            return []
+    comment = _("Work zero {n} is within the limit").format(n=last.zero.id)
+    outcome = {"code": "fixture_back", "number": last.zero.id}
     ended = alarms.settle_for_place(session, machine.id, SHIFTED, about, zero.actor, comment, outcome)
     return [] if ended is None else [alarms.news(machine.key, ended)]
 

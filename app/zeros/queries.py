@@ -132,13 +132,17 @@ def compared(session: Session, zero: WorkZero, settings: Fixture | None = None) 
     """
     if zero.fixture is None:
         return None
-    settings = settings or settings_of(session, zero.machine_id, zero.fixture)
+    return against(session, zero, settings or settings_of(session, zero.machine_id, zero.fixture))
+
+
+def against(session: Session, zero: WorkZero, settings: Fixture) -> Compared:
+    """A zero of this fixture against what it is compared with."""
     same = WorkZero.work_offset == zero.work_offset
     if settings.basis == "frozen":
         found = select(WorkZero).where(WorkZero.machine_id == zero.machine_id, WorkZero.id == settings.reference, same)
         before = list(session.scalars(found))
     else:
-        earlier = _standing(zero.machine_id, zero.fixture).where(
+        earlier = _standing(zero.machine_id, settings.key).where(
             same, tuple_(*OLDEST_FIRST) < (zero.touched_at, zero.id)
         )
         order, limit = (OLDEST_FIRST, 1) if settings.basis == "first" else (NEWEST_FIRST, MOST_BEFORE)
@@ -173,18 +177,20 @@ def history(
     if not shown:
         return []
     if settings.basis == "median":
-        earlier = list(
-            session.scalars(
-                wanted.where(tuple_(*OLDEST_FIRST) < (shown[0].touched_at, shown[0].id))
-                .order_by(*NEWEST_FIRST)
-                .limit(MOST_BEFORE)
-            )
-        )[::-1]
-        rows = [*earlier, *shown]
+        earlier = wanted.where(tuple_(*OLDEST_FIRST) < (shown[0].touched_at, shown[0].id))
+        before_it = {
+            offset: list(
+                session.scalars(
+                    earlier.where(WorkZero.work_offset == offset).order_by(*NEWEST_FIRST).limit(MOST_BEFORE)
+                )
+            )[::-1]
+            for offset in {each.work_offset for each in shown}
+        }
         found = []
-        for at, zero in enumerate(rows[len(earlier) :], len(earlier)):
-            same = [each for each in rows[max(0, at - MOST_BEFORE) : at] if each.work_offset == zero.work_offset]
-            found.append(_against(zero, same, settings))
+        for zero in shown:
+            same = before_it[zero.work_offset]
+            found.append(_against(zero, same[-MOST_BEFORE:], settings))
+            same.append(zero)
         return found
     references = session.scalars(
         select(WorkZero).where(WorkZero.machine_id == machine.id, WorkZero.id == settings.reference)

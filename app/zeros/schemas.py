@@ -113,7 +113,7 @@ class ZeroIn(Body):
     tool_length: Annotated[Length, Field(description="Of the tool that touched in Z.")] = 0.0
     repeatability: Repeatability | None = None
     characteristics: Characteristics | None = None
-    touched_at: Annotated[LatelyOrNow | None, Field(description="When; if left out, now.")] = None
+    touched_at: Annotated[LatelyOrNow | None, Field(description="When; if left out or still to come, now.")] = None
     key: Key | None = None
 
     @model_validator(mode="before")
