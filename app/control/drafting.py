@@ -116,7 +116,12 @@ def _check(given: PeriodIn, newest: int) -> None:
         if run.first > run.last
     ]
     errors += [
-        FieldError(f"excluded[{at}].first", _("lies outside of the period: there is nothing of it to leave out"))
+        FieldError(
+            f"excluded[{at}].first",
+            _("{first} to {last} lies outside of the period: there is nothing of it to leave out").format(
+                first=run.first, last=run.last
+            ),
+        )
         for at, run in enumerate(given.excluded)
         if given.first_sequence <= given.last_sequence
         and run.first <= run.last

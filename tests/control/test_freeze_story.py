@@ -5,6 +5,11 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.control.drafting import _check
+from app.control.forms import at_fields
+from app.control.schemas import ExcludedIn, PeriodIn
+from app.core.spc.quantity import Quantity
+from app.errors import Invalid
 from tests.control.line import Line
 from tests.shop import Person, Shop
 
@@ -120,3 +125,13 @@ def test_too_little_says_how_much_is_missing_and_keeps_what_was_typed(
     expect(page.get_by_text("there are 121 readings so far").first).to_be_visible()
     assert all("422" in each for each in complaints)
     complaints.clear()
+
+
+def test_of_several_runs_outside_of_the_period_each_is_named() -> None:
+    """All of them stand in one field."""
+    runs = [ExcludedIn(first=first, last=last, reason="Chip") for first, last in ((3, 5), (31, 32), (40, 41))]
+    period = PeriodIn(quantity=Quantity.DEVIATION, first_sequence=1, last_sequence=30, excluded=runs)
+    with pytest.raises(Invalid) as refused:
+        _check(period, 100)
+    wrong = "lies outside of the period: there is nothing of it to leave out"
+    assert at_fields(refused.value) == {"excluded": f"31 to 32 {wrong}. 40 to 41 {wrong}"}
