@@ -26,6 +26,7 @@ import pytest
 from hypothesis import settings
 from playwright.sync_api import Browser, Page, Playwright, Request, sync_playwright
 from sqlalchemy.orm import Session
+from xdist import plugin as xdist_plugin
 
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
@@ -38,6 +39,12 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # hundreds of servers start; ea
 
 settings.register_profile("inband", deadline=None)  # a computer that is busy is no fault of what is tested
 settings.load_profile("inband")
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """One more than usual: a third of the time tests wait, for a browser or for a server that starts."""
+    return int(xdist_plugin.pytest_xdist_auto_num_workers(config)) + 1
+
 
 TEMPLATE = "template_inband"
 BROWSER_OPTIONS = [
