@@ -5,7 +5,7 @@ from math import hypot
 from statistics import median
 from typing import NamedTuple
 
-from sqlalchemy import ColumnElement, Select, func, select, true, tuple_
+from sqlalchemy import Select, func, select, tuple_
 from sqlalchemy.orm import Session, aliased
 
 from app.core.geometry.work_zero import Shift, judge_shift
@@ -104,15 +104,10 @@ def settings_of(session: Session, machine_id: int, key: str) -> Fixture:
 
 
 def _standing(machine_id: int, fixture: str) -> Select[WorkZero]:
-    """The zeros of a fixture that count."""
-    return select(WorkZero).where(WorkZero.machine_id == machine_id, WorkZero.fixture == fixture, _counts())
-
-
-def _counts() -> ColumnElement[bool]:
-    """Whether it was not computed again: then that one stands in its place, since it was touched at the same time."""
+    """The zeros of a fixture that count: one computed again stands in place of the first, touched at the same time."""
     later = aliased(WorkZero)
     again = select(later.id).where(later.machine_id == WorkZero.machine_id, later.recomputed_from == WorkZero.id)
-    return ~again.exists()
+    return select(WorkZero).where(WorkZero.machine_id == machine_id, WorkZero.fixture == fixture, ~again.exists())
 
 
 OLDEST_FIRST = (WorkZero.touched_at, WorkZero.id)
@@ -121,8 +116,12 @@ NEWEST_FIRST = (WorkZero.touched_at.desc(), WorkZero.id.desc())
 
 def newest_by_offset(session: Session, machine_id: int, fixture: str) -> list[WorkZero]:
     """The zero of each work offset in a fixture that was touched last."""
-    wanted = _standing(machine_id, fixture).distinct(WorkZero.work_offset)
-    return list(session.scalars(wanted.order_by(WorkZero.work_offset, *NEWEST_FIRST)))
+    here = select(WorkZero.work_offset).where(WorkZero.machine_id == machine_id, WorkZero.fixture == fixture)
+    newest = _standing(machine_id, fixture).order_by(*NEWEST_FIRST).limit(1)  # by the index, however many there are
+    return [
+        session.scalars(newest.where(WorkZero.work_offset == offset)).one()
+        for offset in sorted(session.scalars(here.distinct()))
+    ]
 
 
 def compared(session: Session, zero: WorkZero, settings: Fixture | None = None) -> Compared | None:
@@ -205,48 +204,36 @@ def history(
 
 def fixtures(session: Session, only: int | None = None) -> list[FixtureRow]:
     """Every fixture with its last zero, by machine and name."""
-    mine = WorkZero.machine_id == only if only is not None else true()
     place = (WorkZero.machine_id, WorkZero.fixture)
-    counted = select(*place, func.count()).where(WorkZero.fixture.is_not(None), mine).group_by(*place)
-    counts = {(machine, fixture): count for machine, fixture, count in session.execute(counted)}
-    rows = []
-    wanted = (
-        select(WorkZero, Machine)
-        .join(Machine, Machine.id == WorkZero.machine_id)
-        .where(WorkZero.fixture.is_not(None), mine, _counts())
-        .distinct(*place)
-        .order_by(*place, *NEWEST_FIRST)
-    )
-    for zero, machine in sorted(session.execute(wanted).tuples(), key=lambda row: (row[1].key, row[0].fixture or "")):
-        last = compared(session, zero)
-        assert last is not None
-        assert zero.fixture is not None
-        settings = settings_of(session, machine.id, zero.fixture)
-        rows.append(FixtureRow(machine, zero.fixture, counts[machine.id, zero.fixture], last, settings))
-    return rows
+    counted = select(*place, func.count()).where(WorkZero.fixture.is_not(None)).group_by(*place)
+    if only is not None:
+        counted = counted.where(WorkZero.machine_id == only)
+    rows = [
+        _fixture_row(session, session.get_one(Machine, machine_id), key or "", count)
+        for machine_id, key, count in session.execute(counted).tuples()
+    ]
+    return sorted(rows, key=lambda row: (row.machine.key, row.key))
 
 
 def fixture_of(session: Session, machine: str, fixture: str) -> FixtureRow:
     """One fixture. Raises `NotFound`."""
-    found = machine_named(session, machine)
-    last = session.scalars(
-        _standing(found.id, fixture[:64].replace("\0", "")).order_by(*NEWEST_FIRST).limit(1)
-    ).one_or_none()
-    if last is None:
+    found, key = machine_named(session, machine), fixture[:64].replace("\0", "")
+    counted = select(func.count()).where(WorkZero.machine_id == found.id, WorkZero.fixture == key)
+    count = session.scalar(counted)
+    if not count:
         raise NotFound(
             _("Machine {machine} has no work zero of a fixture {fixture}.").format(
                 machine=found.key, fixture=repr(fixture[:64])
             ),
             _("Name the fixture with a work zero: that makes it known. GET /api/v1/work-zeros/fixtures lists them."),
         )
-    count = session.scalar(
-        select(func.count())
-        .select_from(WorkZero)
-        .where(WorkZero.machine_id == found.id, WorkZero.fixture == last.fixture)
-    )
-    mine = compared(session, last)
-    assert mine is not None
-    return FixtureRow(found, fixture, count or 0, mine, settings_of(session, found.id, fixture))
+    return _fixture_row(session, found, key, count)
+
+
+def _fixture_row(session: Session, machine: Machine, key: str, count: int) -> FixtureRow:
+    settings = settings_of(session, machine.id, key)
+    last = max(newest_by_offset(session, machine.id, key), key=lambda zero: (zero.touched_at, zero.id))
+    return FixtureRow(machine, key, count, against(session, last, settings), settings)
 
 
 def pushed(session: Session, zeros: Sequence[WorkZero]) -> dict[int, list[Pushed]]:

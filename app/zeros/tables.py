@@ -20,6 +20,13 @@ class WorkZero(Base):
         CheckConstraint("kind IN ('bore', 'boss', 'pocket', 'web', 'corner')", name="kind"),
         Index("work_zero_id_key", "id"),
         Index("work_zero_fixture_idx", "machine_id", "fixture", "id"),
+        Index("work_zero_touched_idx", "machine_id", "fixture", "work_offset", "touched_at", "id"),
+        Index(
+            "work_zero_recomputed_idx",
+            "machine_id",
+            "recomputed_from",
+            postgresql_where=text("recomputed_from IS NOT NULL"),
+        ),
         Index("work_zero_key_key", "machine_id", "key", unique=True, postgresql_where=text("key IS NOT NULL")),
     )
 

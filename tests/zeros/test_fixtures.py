@@ -1,8 +1,10 @@
 """Fixtures: how far their zeros have shifted, and the alarm of it."""
 
+import time
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
+import psycopg
 import pytest
 from sqlalchemy import select
 
@@ -164,6 +166,23 @@ class TestFixtures:
         shop.call("PUT", path, 200, basis="first", alarm=0.03, reason="watched")
         assert post(shop, fixture="vice", touches=moved(0.05))["shift"]["state"] == "alarm"
         assert len(shop.alarms()) == 1
+
+    def test_years_of_zeros_are_compared_in_no_time(self, server: Server) -> None:
+        """Each with the first one; looked for among all of them, a page of the list took half a minute."""
+        shop = Shop(server)
+        first = post(shop, fixture="vice")
+        with psycopg.connect(server.database.dsn, autocommit=True) as connection:
+            connection.execute(
+                "INSERT INTO work_zero (machine_id, kind, fixture, work_offset, touched_at, actor, given, x, y, result) "
+                "SELECT machine_id, kind, fixture, work_offset, touched_at + n * interval '1 millisecond', actor, given, "
+                "x + 0.004, y, result FROM work_zero, generate_series(1, 60000) AS n WHERE id = %s",
+                (first["id"],),
+            )
+            connection.execute("ANALYZE work_zero")
+        begun = time.monotonic()
+        zeros = shop.call("GET", f"/work-zeros?machine={shop.machine}&fixture=vice&limit=100&after={first['id']}")
+        assert {zero["shift"]["shifts"]["x"] for zero in zeros["items"]} == {0.004}
+        assert time.monotonic() - begun < 4
 
     def test_one_that_is_not_there(self, shop: Shop) -> None:
         shop.call("GET", f"/work-zeros/fixtures/{shop.machine}/nowhere", 404)
