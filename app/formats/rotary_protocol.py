@@ -22,9 +22,9 @@ _AXIS = re.compile(
     r"\b(?:[a-z]{0,20}achse|[a-z]{0,20}tisch|axis(?: of rotation)?|rotary table|os|osi|miza)\s+([abc])\b"
     r"|\b([abc])\s?(?:[a-z]{0,20}achse|axis|rotary axis|os|osi)\b"
 )
-# 1.212,3344 with a mark for the thousands is no number here: half of it would be another one.
+# 1.212,3344 with a mark for the thousands and 1.2e-05 are no numbers here: half of one would be another one.
 _NUMBER = re.compile(
-    r"(?:(?<![\w.,])|(?<=,)(?=[+-]))([+-]?\d{1,12}(?:[.,]\d{1,12})?)(?![.,]?\d)\s*(mm|um|µm|μm|°|deg|grad|inch|in|\")?(?![\w])"
+    r"(?:(?<![\w.,+-])|(?<=,)(?=[+-]))([+-]?\d{1,12}(?:[.,]\d{1,12})?)(?![.,]?\d)\s*(mm|um|µm|μm|°|deg|grad|inch|in|\")?(?![\w])"
 )
 _COORDINATE = re.compile(r"\b([xyz])\s*[=:]?\s*([+-]?[\d.,]{1,26}(?<![.,]))\s*(mm|um|µm|μm)?", re.IGNORECASE)
 _DEVIATION = re.compile(r"\be([xyz])([abc])\b")

@@ -156,6 +156,7 @@ def test_lines_of_a_text_with_blanks_between() -> None:
     [
         "Messkreisradius: 1.212,3344 mm",
         "Messkreisradius: 1 212,3344 mm",
+        "Messkreisradius: 1.2e-05 mm",
         "Messkreisradius: 1'212.3344 mm",
         "Position vor: X 1 345,6789 Y 0 Z 1",
         "Position vor: X=-1.345,6789 Y=0 Z=1",
