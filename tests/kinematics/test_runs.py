@@ -171,6 +171,10 @@ class TestDoor:
         first = shop.call("POST", RUNS, 201, **run)
         assert shop.call("POST", RUNS, 200, **run) == first
         assert shop.call("POST", RUNS, 409, **run | {"axes": [axis(seed=3)]})["run"] == first["run"]
+        timed: dict[str, Any] = {"machine": shop.machine, "results": {"Q143": 1.0}, "key": "452:3"}
+        first = shop.call("POST", RUNS, 201, **timed, measured_at="2026-11-21T06:00:00Z")
+        timed["results"] = {"Q143": 1}
+        assert shop.call("POST", RUNS, 200, **timed, measured_at="2026-11-21T07:00:00+01:00") == first
 
     def test_of_the_same_sent_at_once_one_is_kept(self, shop: Shop) -> None:
         body = {"machine": shop.machine, "axes": [axis()], "key": "452:2"}
