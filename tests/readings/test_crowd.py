@@ -60,12 +60,11 @@ def test_readings_are_let_in_while_every_other_request_is_busy(shop: Shop) -> No
         waiting = [pool.submit(client.get, path) for client in slow]
         time.sleep(2)
         assert not any(each.done() for each in waiting)
-        begun = time.monotonic()
         for characteristic, status in ((shop.characteristic, 201), (other, 201), (other, 200)):
             reading = {"characteristic": characteristic, "measured": 40.001, "key": characteristic}
             answer = machine.post("/api/v1/readings", json=reading)
             assert answer.status_code == status, answer.text
-        assert time.monotonic() - begun < 3
+        assert not any(each.done() for each in waiting)
         holding.rollback()
         assert {each.result().status_code for each in waiting} == {200}
 
