@@ -10,6 +10,8 @@ import pytest
 from sqlalchemy import delete, update
 from sqlalchemy.exc import DBAPIError
 
+from app.db.engine import Database
+from app.readings.actions import push_results
 from app.zeros.tables import WorkZero
 from tests.conftest import Server
 from tests.shop import Shop
@@ -167,6 +169,11 @@ class TestRefused:
 
 
 class TestReadings:
+    def test_what_cannot_become_readings_now_is_no_error(self, caplog: pytest.LogCaptureFixture) -> None:
+        """The zero is stored by then: an answer that says it is not would have it sent twice."""
+        push_results(Database("postgresql://nobody@127.0.0.1:9/none"))
+        assert "tried again within a minute" in caplog.text
+
     def test_many_at_once_do_not_wait_for_each_other(self, server: Server) -> None:
         """More of them than the server has connections: each holds one while it looks for its machine."""
         shop = Shop(server)
