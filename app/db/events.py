@@ -12,14 +12,14 @@ from sqlalchemy.orm import Session
 
 CHANNEL = "inband"
 
-# The end of a statement that writes: `changes` is an SQL expression for the list of changes. The writer of readings
-# puts it behind its own inserts, so that telling costs it no statement.
+# The end of a statement that writes: `changes` is an SQL expression for the list of changes, `after` what the lock waits for.
+# The writer of readings puts it behind its own inserts, so that telling costs it no statement.
 PUBLISHED = f"""
-held AS MATERIALIZED (SELECT pg_advisory_xact_lock(7291, 1)),
+held AS MATERIALIZED (SELECT pg_advisory_xact_lock(7291, 1) {{after}}),
 written AS (INSERT INTO event (changes) SELECT {{changes}}::jsonb FROM held RETURNING id)
 SELECT pg_notify('{CHANNEL}', id::text) FROM written
 """  # noqa: S608 - the channel is our own constant
-_PUBLISH = text("WITH " + PUBLISHED.format(changes="CAST(:changes AS text)"))
+_PUBLISH = text("WITH " + PUBLISHED.format(changes="CAST(:changes AS text)", after=""))
 
 
 def publish(session: Session, *changes: dict[str, Any]) -> None:

@@ -1,8 +1,7 @@
 """Prepared statements sent together and answered together: one round trip, one wake-up of the event loop.
 
 psycopg's own pipelines wait for every statement by itself, which costs the writer of readings more than the database
-does. This speaks libpq through `psycopg.pq`, on a connection that psycopg has made: every statement has one text
-parameter or none, and rows come as text.
+does. This speaks libpq through `psycopg.pq`, on a connection that psycopg has made: parameters go and rows come as text.
 """
 
 import asyncio
@@ -15,8 +14,8 @@ from psycopg.errors import error_from_result
 from psycopg.pq import ExecStatus
 from psycopg.pq.abc import PGresult
 
-Step = tuple[str, str | None]
-"""A statement and its parameter."""
+Step = tuple[str, *tuple[str, ...]]
+"""A statement and its parameters."""
 Rows = list[tuple[bytes | None, ...]]
 
 _names = count()
@@ -47,19 +46,20 @@ class Pipeline:
     async def run(self, steps: Sequence[Step]) -> list[Rows]:
         """Run the statements in their order; the rows of each.
 
-        The first one that fails ends it: what comes after is not run. Raises psycopg's errors.
+        The first one that fails ends it: what comes after is not run. They are a transaction of their own where none has
+        begun. Raises psycopg's errors.
         """
         pgconn = self.connection.pgconn
         kept: list[bool] = []  # whether the answer is one that was asked for, or that of a preparation
         preparing: dict[str, bytes] = {}
         pgconn.enter_pipeline_mode()
-        for statement, parameter in steps:
+        for statement, *parameters in steps:
             name = self._prepared.get(statement) or preparing.get(statement)
             if name is None:
                 name = preparing[statement] = b"inband_%d" % next(_names)
                 pgconn.send_prepare(name, statement.encode())
                 kept.append(False)
-            pgconn.send_query_prepared(name, None if parameter is None else [parameter.encode()])
+            pgconn.send_query_prepared(name, [parameter.encode() for parameter in parameters])
             kept.append(True)
         pgconn.pipeline_sync()
         results = await self._results(len(kept))

@@ -128,7 +128,7 @@ class Keeper:
         if self.untold and self._pipeline is not None:
             self.untold, self._told_at = False, monotonic()
             with suppress(psycopg.Error):  # nobody listens to a database that is away
-                await self._pipeline.run(((TELL, None),))
+                await self._pipeline.run(((TELL,),))
 
     async def _roll_back(self) -> None:
         self._ground = Ground()

@@ -54,62 +54,53 @@ async def save(
     touched = list({id(verdict.stream): verdict.stream for verdict in ground.verdicts}.values())
     if quiet is not None:
         touched = quiet.streams()  # of all readings of the batch
-    opening = [*_opening(ground, {stream.entry.machine_id for stream in touched}, begun=begun)]
+    machines = {stream.entry.machine_id for stream in touched}
+    versions = as_json([{"machine_id": machine_id, "version": ground.versions[machine_id]} for machine_id in machines])
+    copying = len(ground.verdicts) >= COPY_FROM
+    locking: list[Step] = [(LOCK, array(machines))] if len(machines) > 1 and not begun else []
+    if copying or quiet is not None or ground.raised:  # something must be done before the last round trip
+        await pipeline.run([*([] if begun else [("BEGIN",)]), *locking, (GUARD, versions)])
+        begun, locking, versions = True, [], "[]"
     if ground.raised:
-        await _number_alarms(pipeline, ground, opening)
-        opening = []
+        await _number_alarms(pipeline, ground)
     records = [verdict.record() for verdict in ground.verdicts]
-    copying = len(records) >= COPY_FROM
-    averages = {id(stream.average): stream.average for stream in touched}.values()
-    document = {
-        "streams": [_stream_row(stream) for stream in touched],
-        "averages": [
-            {"machine_id": a.machine_id, "location": a.location, "average": a.average}
-            for a in averages
-            if a is not None and a.changed
-        ],
-        "readings": [] if copying else [record._asdict() for record in records],
-        "changes": _changes(ground, touched),
-        "tell": tell,
-    }
-    if copying or quiet is not None:
-        await pipeline.run(opening)
-        opening = []
     if quiet is not None:
         async with pipeline.connection.cursor() as cursor, cursor.copy(COPY) as copy:
             await copy.write(quiet.rows())
     if copying:
         await _copy(pipeline, records)
+    averages = {id(stream.average): stream.average for stream in touched}.values()
     await pipeline.run(
         (
-            *opening,
+            *locking,
+            (
+                SAVE,
+                versions,
+                as_json([_stream_row(stream) for stream in touched]),
+                as_json(
+                    [
+                        {"machine_id": a.machine_id, "location": a.location, "average": a.average}
+                        for a in averages
+                        if a is not None and a.changed
+                    ]
+                ),
+                as_json([] if copying else [record._asdict() for record in records]),
+                as_json(_changes(ground, touched)),
+                str(tell),
+            ),
             *((statement, as_json(rows)) for statement, rows in _rarer(ground) if rows),
-            (SAVE, as_json(document)),
             *(
                 (statement, as_json(blocks))
                 for statement, blocks in full_blocks([(s.entry, s.before, s.sequence) for s in touched])
             ),
-            ("COMMIT", None),
+            *([("COMMIT",)] if begun else []),
         )
     )
 
 
-def _opening(ground: Ground, machines: set[int], *, begun: bool) -> Iterable[Step]:
-    """What makes sure that the ground is true, and stays so until the commit."""
-    if not begun:
-        yield "BEGIN", None
-        if len(machines) > 1:
-            yield LOCK, array(machines)
-    yield (
-        GUARD,
-        as_json([{"machine_id": machine_id, "version": ground.versions[machine_id]} for machine_id in machines]),
-    )
-
-
-async def _number_alarms(pipeline: Pipeline, ground: Ground, opening: list[Step]) -> None:
+async def _number_alarms(pipeline: Pipeline, ground: Ground) -> None:
     """Find the alarms that are active for the same trouble already, and draw numbers for the others."""
-    machines = {alarm.machine_id for alarm in ground.raised}
-    *_opened, rows = await pipeline.run([*opening, (ACTIVE_ALARMS, array(machines))])
+    (rows,) = await pipeline.run(((ACTIVE_ALARMS, array({alarm.machine_id for alarm in ground.raised})),))
     active = {
         (int(machine or 0), _number(characteristic), _number(tool), (kind or b"").decode()): _number(alarm)
         for machine, characteristic, tool, kind, alarm in rows

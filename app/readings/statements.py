@@ -1,4 +1,4 @@
-"""The SQL of the writer. Each statement has one parameter: an array of numbers, or a JSON document of rows.
+"""The SQL of the writer. Parameters are arrays of numbers and JSON documents of rows.
 
 Rows travel as JSON because the server takes it apart with `json_to_recordset`, which measured faster than arrays for one row
 and for sixty-four.
@@ -33,14 +33,15 @@ WHERE machine_id = ANY($1::int[]) ORDER BY machine_id FOR UPDATE
 """
 # Ends the transaction (by a division by zero) unless every machine is still at the version that its readings were decided
 # on; moves the versions on. With several machines LOCK comes first, because an update takes rows in any order.
-GUARD = """
-WITH moved AS (
+_GUARD = """
+current AS (
     UPDATE machine_state m SET version = m.version + 1
     FROM json_to_recordset($1) AS w(machine_id int, version bigint)
     WHERE m.machine_id = w.machine_id AND m.version = w.version RETURNING 1
-)
-SELECT 1 / (count(*) = json_array_length($1))::int FROM moved
+),
+guard AS MATERIALIZED (SELECT 1 / (count(*) = json_array_length($1))::int FROM current)
 """
+GUARD = f"WITH {_GUARD} SELECT * FROM guard"  # noqa: S608 - made of constants
 # One statement for all that is needed, as one JSON document, because each statement costs more than what it reads here.
 # Corrections of a tool: the open ones, and those applied since the oldest correction or time that a reading names; `named`
 # are the corrections that readings name as the last ones in effect.
@@ -117,22 +118,22 @@ MOVE_STREAMS = """
 UPDATE stream s SET sequence = n.sequence, paused_by = n.paused_by, last_measured_at = n.last_measured_at,
     last_received_at = n.last_received_at, last_measured = n.last_measured, last_deviation = n.last_deviation,
     last_average = n.last_average, last_zone = n.last_zone
-FROM json_to_recordset((SELECT d -> 'streams' FROM doc)) AS n(machine_id int, characteristic_id int, sequence bigint,
+FROM json_to_recordset($2) AS n(machine_id int, characteristic_id int, sequence bigint,
     paused_by bigint, last_measured_at timestamptz, last_received_at timestamptz, last_measured float8,
     last_deviation float8, last_average float8, last_zone text)
 WHERE s.machine_id = n.machine_id AND s.characteristic_id = n.characteristic_id
 """
 MOVE_AVERAGES = """
 UPDATE average_memory a SET average = n.average, updated_at = now()
-FROM json_to_recordset((SELECT d -> 'averages' FROM doc)) AS n(machine_id int, location int, average float8)
+FROM json_to_recordset($3) AS n(machine_id int, location int, average float8)
 WHERE a.machine_id = n.machine_id AND a.location = n.location
 """
+# All that an ordinary reading needs, in one statement, because each costs more than what it writes. Parameters: versions (see
+# GUARD; none, if that has been asked), streams, averages, readings, changes, and whether to wake who listens.
 SAVE = f"""
-WITH doc AS MATERIALIZED (SELECT $1::json AS d), moved AS ({MOVE_STREAMS}), averaged AS ({MOVE_AVERAGES}),
-stored AS (
-    INSERT INTO reading ({_COLUMNS})
-    SELECT {_COLUMNS} FROM json_to_recordset((SELECT d -> 'readings' FROM doc)) AS r({_READING})
-), {PUBLISHED.format(changes="(SELECT d -> 'changes' FROM doc)")} WHERE (SELECT (d ->> 'tell')::bool FROM doc)
+WITH {_GUARD}, moved AS ({MOVE_STREAMS}), averaged AS ({MOVE_AVERAGES}),
+stored AS (INSERT INTO reading ({_COLUMNS}) SELECT {_COLUMNS} FROM json_to_recordset($4) AS r({_READING})),
+{PUBLISHED.format(changes="$5", after="FROM guard")} WHERE $6::bool
 """  # noqa: S608 - made of constants
 # What was not told with the transaction; whoever is woken reads on in the journal from where it was.
 TELL = f"NOTIFY {CHANNEL}"

@@ -21,7 +21,7 @@ from app.readings.saving import save
 from app.readings.schemas import MOST_ERRORS, ReadingIn
 from app.web.i18n import _
 
-ROLLBACK = (("ROLLBACK", None),)
+ROLLBACK = (("ROLLBACK",),)
 Outcome = Verdict | QuietReadings | Stored | InbandError
 """What became of a reading; `QuietReadings` hold it by its place in the batch."""
 

@@ -182,7 +182,7 @@ def test_a_transaction_that_was_asked_after_cannot_commit_later(database: Databa
         assert await committed(pipeline, CommitLost(outcomes))
         with pytest.raises(psycopg.errors.DivisionByZero):
             await transact(pipeline, {}, made, reading, trusting=True)
-        await pipeline.run((("ROLLBACK", None),))
+        await pipeline.run((("ROLLBACK",),))
         verdict.sequence = 3
         assert not await committed(pipeline, CommitLost(outcomes))
         await pipeline.connection.close()
