@@ -62,7 +62,7 @@ class Pipeline:
             pgconn.send_query_prepared(name, [parameter.encode() for parameter in parameters])
             kept.append(True)
         pgconn.pipeline_sync()
-        results = await self._results(len(kept))
+        results = await self._results()
         pgconn.exit_pipeline_mode()
         for result in results:
             if result.status not in (ExecStatus.TUPLES_OK, ExecStatus.COMMAND_OK):
@@ -70,7 +70,8 @@ class Pipeline:
         self._prepared |= preparing
         return [_rows(result) for result, asked in zip(results, kept, strict=True) if asked]
 
-    async def _results(self, expected: int) -> list[PGresult]:
+    async def _results(self) -> list[PGresult]:
+        """One result for each thing sent, and one more where only the commit at the end of them failed."""
         pgconn = self.connection.pgconn
         results: list[PGresult] = []
         unsent = bool(pgconn.flush())
@@ -80,7 +81,7 @@ class Pipeline:
                 if result is None:
                     continue  # the end of one statement's answer
                 if result.status == ExecStatus.PIPELINE_SYNC:
-                    return results[:expected]
+                    return results
                 results.append(result)
             await _ready(pgconn.socket, write=unsent)
             pgconn.consume_input()

@@ -166,7 +166,28 @@ class TestConnection:
         assert [reading["key"] for reading in history(server.database.dsn, shop.characteristic)] == ["k"]
         must_hold(server.database.dsn)
 
+    def test_a_commit_that_fails_is_not_answered_as_one(self, shop: Shop, server: Server) -> None:
+        """Readings that are decided from memory are a transaction without BEGIN and COMMIT: it ends by itself."""
+        assert push(shop).status_code == 201
+        with psycopg.connect(server.database.dsn, autocommit=True) as connection:
+            connection.execute(FAILING_COMMIT)
+            try:
+                problem = push(shop, key="l", measured=40.0065)
+            finally:
+                connection.execute(WORKING_COMMIT)
+        assert problem.status_code == 500, problem.text
+        assert "It was not stored" in problem.json()["detail"]
+        assert push(shop, key="l", measured=40.0065).json()["sequence"] == 2
+        assert [reading["key"] for reading in history(server.database.dsn, shop.characteristic)] == ["k", "l"]
+        must_hold(server.database.dsn)
 
+
+FAILING_COMMIT = """
+CREATE FUNCTION fail() RETURNS trigger LANGUAGE plpgsql AS 'BEGIN RAISE ''not today''; END';
+CREATE CONSTRAINT TRIGGER fail AFTER INSERT ON reading DEFERRABLE INITIALLY DEFERRED
+    FOR EACH ROW EXECUTE FUNCTION fail()
+"""
+WORKING_COMMIT = "DROP TRIGGER fail ON reading; DROP FUNCTION fail"
 SLOW_COMMIT = """
 CREATE FUNCTION slow() RETURNS trigger LANGUAGE plpgsql AS 'BEGIN PERFORM pg_sleep(3); RETURN NULL; END';
 CREATE CONSTRAINT TRIGGER slow AFTER INSERT ON reading DEFERRABLE INITIALLY DEFERRED
