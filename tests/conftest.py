@@ -32,6 +32,7 @@ from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
 from app.settings import HOUSE
+from tests.forked import Forked
 
 for name in [name for name in os.environ if name.startswith(("INBAND_", "PG"))]:
     del os.environ[name]  # no test may meet a real installation
@@ -149,14 +150,25 @@ def session(rolled_back_database: Database) -> Iterator[Session]:
 # --- the server
 
 
+Process = subprocess.Popen[bytes] | Forked
+
+
+def begun(command: list[str], stderr: Path) -> Process:
+    """``inband …`` as everybody starts it."""
+    with stderr.open("ab") as log:
+        return subprocess.Popen(
+            [sys.executable, "-m", "app", *command], cwd=HOUSE, stdout=log, stderr=log, stdin=subprocess.DEVNULL
+        )
+
+
 @dataclass
 class Server:
     """A running ``inband serve`` with a database of its own."""
 
     url: str
     database: Database
-    process: subprocess.Popen[bytes]
-    start: Callable[[], subprocess.Popen[bytes]]
+    process: Process
+    start: Callable[[], Process]
     stderr: Path
     _clients: list[httpx.Client] = field(default_factory=list)
 
@@ -206,7 +218,7 @@ class Server:
             self.process.terminate()
             try:
                 self.process.wait(15)
-            except subprocess.TimeoutExpired:
+            except (TimeoutError, subprocess.TimeoutExpired):
                 self.kill()
 
 
@@ -218,7 +230,7 @@ def free_port() -> int:
         return port
 
 
-def wait_ready(url: str, process: subprocess.Popen[bytes], stderr: Path, seconds: float = 180) -> None:
+def wait_ready(url: str, process: Process, stderr: Path, seconds: float = 180) -> None:
     """Until ``/health/ready`` says 200."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
@@ -246,13 +258,12 @@ def run_server(new_database: NewDatabase, tmp_path_factory: pytest.TempPathFacto
         own = database_url is None
         url = new_database() if database_url is None else database_url
         stderr, port = tmp_path_factory.mktemp("server") / "stderr", free_port()
-        command = [sys.executable, "-m", "app", "serve", "--port", str(port), "--database-url", url]
+        command = ["serve", "--port", str(port), "--database-url", url]
         for option, value in options.items():
             command += [f"--{option.replace('_', '-')}", str(value)]
 
-        def start() -> subprocess.Popen[bytes]:
-            with stderr.open("ab") as log:
-                process = subprocess.Popen(command, cwd=HOUSE, stdout=log, stderr=log, stdin=subprocess.DEVNULL)
+        def start() -> Process:
+            process = Forked(command, stderr) if not options else begun(command, stderr)
             wait_ready(f"http://127.0.0.1:{port}", process, stderr)
             return process
 
