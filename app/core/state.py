@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 from enum import StrEnum
 
 from app.core.parameters import Parameters
-from app.core.zones import nanometres
+from app.core.zones import nanometres, within_tolerance
 
 DRIFT = 7  # readings in a row on one side, beyond the zero range, are a drift
 QUIET = timedelta(minutes=15)  # nobody expects a reading sooner
@@ -52,7 +52,7 @@ class Known:
 
     paused: by a probe fault; tool_paused: nobody knows which offset its tool has.
     alarms: kinds of the active ones. corrections: statuses of the open ones. trend: the last deviations, oldest first, mm;
-    since: when the first of them arrived.
+    since: when the first of them arrived. excluded: the last reading was taken out of the statistics.
     """
 
     parameters: Parameters
@@ -66,6 +66,16 @@ class Known:
     since: datetime | None
     last_at: datetime | None
     tool_paused: bool = False
+    excluded: bool = False
+
+    @property
+    def tells_of_the_part(self) -> bool:
+        """Whether the last reading is a size of the last part: neither declared false nor beyond R36."""
+        return (
+            not self.excluded
+            and self.deviation is not None
+            and abs(nanometres(self.deviation)) < self.parameters.limits.confidence
+        )
 
     @property
     def old_from(self) -> datetime | None:
@@ -91,15 +101,14 @@ def state_of(known: Known) -> State:
     if known.readings == 0 or known.deviation is None:
         return State.NO_DATA
     # The part itself: a reading that counts outstanding corrections may be decided in a milder zone.
-    if abs(nanometres(known.deviation)) > known.parameters.limits.tolerance:
+    if known.tells_of_the_part and not within_tolerance(known.deviation, known.parameters.limits):
         return State.OVERSIZE if known.deviation > 0 else State.UNDERSIZE
     if "awaiting_approval" in known.corrections:
         return State.AWAITING_APPROVAL
     if "pending" in known.corrections:
         return State.CORRECTING
-    return drift(known.trend, known.parameters) or (
-        State.MEASURE_ONLY if known.parameters.measures_only else State.IN_BAND
-    )
+    trend = known.trend if known.tells_of_the_part else known.trend[:-1]
+    return drift(trend, known.parameters) or (State.MEASURE_ONLY if known.parameters.measures_only else State.IN_BAND)
 
 
 def drift(trend: Sequence[float], parameters: Parameters) -> State | None:

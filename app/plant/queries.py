@@ -15,7 +15,7 @@ from app.core.state import CALM, NEED_SOMEONE, Known, State, state_of
 from app.machines.queries import machine_named
 from app.machines.tables import Machine
 from app.offsets.tables import OPEN, AverageMemory, Correction, Tool
-from app.readings.tables import Stream
+from app.readings.tables import Exclusion, Stream
 from app.statistics import queries as statistics
 from app.statistics.queries import Rejects
 from app.wear.queries import OVERCORRECTS
@@ -100,7 +100,9 @@ def plant(session: Session, *, machine: str | None = None, trends: bool = True) 
     courses = _trends(session, only) if trends else {}
     rejects = statistics.rejects_by_characteristic(session, only)
     rows: dict[int, list[Row]] = defaultdict(list)
-    for characteristic, stored, stream, average, offset, tool_paused_by, outlook in session.execute(_standing(only)):
+    for characteristic, stored, stream, average, offset, tool_paused_by, outlook, excluded in session.execute(
+        _standing(only)
+    ):
         number = characteristic.id
         parameters = Parameters.from_dict(stored)
         trend, since = courses.get(number, ([], None))
@@ -116,6 +118,7 @@ def plant(session: Session, *, machine: str | None = None, trends: bool = True) 
             since=since,
             last_at=stream.last_received_at,
             tool_paused=tool_paused_by is not None,
+            excluded=excluded is not None,
         )
         rows[characteristic.machine_id].append(
             Row(
@@ -152,6 +155,7 @@ def _standing(machine_id: int | None) -> Any:
             Tool.offset,
             Tool.paused_by,
             Outlook,
+            Exclusion.sequence,
         )
         .join(
             Stream,
@@ -171,6 +175,12 @@ def _standing(machine_id: int | None) -> Any:
         .outerjoin(
             Outlook,
             (Outlook.machine_id == Stream.machine_id) & (Outlook.characteristic_id == Stream.characteristic_id),
+        )
+        .outerjoin(
+            Exclusion,
+            (Exclusion.machine_id == Stream.machine_id)
+            & (Exclusion.characteristic_id == Stream.characteristic_id)
+            & (Exclusion.sequence == Stream.sequence),
         )
         .order_by(Characteristic.key)
     )

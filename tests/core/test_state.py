@@ -43,6 +43,11 @@ def known(**other: Any) -> Known:
         ({"deviation": 0.0081}, State.OVERSIZE),
         ({"deviation": -0.0081, "zone": "zero"}, State.UNDERSIZE),
         ({"deviation": 0.008}, State.IN_BAND),
+        ({"deviation": 0.0081, "excluded": True}, State.IN_BAND),  # declared false: no part was so large
+        ({"deviation": 1.0, "zone": "probe_fault"}, State.IN_BAND),  # acknowledged: it was no size at all
+        ({"deviation": 0.9999}, State.OVERSIZE),
+        ({"deviation": 1.2, "trend": [-0.002] * 7 + [1.2]}, State.DRIFTING_DOWN),
+        ({"deviation": 0.0081, "excluded": True, "corrections": {"held"}}, State.HELD),
         ({"corrections": {"awaiting_approval", "pending"}}, State.AWAITING_APPROVAL),
         ({"corrections": {"pending"}}, State.CORRECTING),
         ({"trend": [0.0011] * 7}, State.DRIFTING_UP),

@@ -48,6 +48,18 @@ class TestWithoutScripts:
         shop.read(deviation)
         assert f"<span>{words}</span>" in viewer.open(f"/plant/{shop.machine}")
 
+    @pytest.mark.parametrize(("action", "said"), [("false_reading", "excluded"), ("noted", "In band")])
+    def test_a_reading_that_was_no_size_makes_no_part_oversize(
+        self, shop: Shop, viewer: Person, action: str, said: str
+    ) -> None:
+        shop.read(0.4)
+        shop.acknowledge(shop.read(1200.0)["alarms"][0]["id"], action)
+        for path in (f"/plant/{shop.machine}", f"/characteristics/{shop.characteristic}"):
+            text = viewer.open(path)
+            assert "<span>In band</span>" in text
+            assert "<span>Oversize</span>" not in text
+            assert said in text
+
     def test_a_machine_without_characteristics_says_what_to_do(self, shop: Shop, viewer: Person) -> None:
         shop.call("POST", "/machines", 201, key=f"{shop.machine}-new", name="New", control="other")
         assert "Nothing is measured on this machine yet" in viewer.open(f"/plant/{shop.machine}-new")
