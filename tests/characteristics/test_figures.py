@@ -144,6 +144,17 @@ class TestZoneChart:
         assert offset["y"] == [-6, -8, -8]
         assert not traces(figure, "events")
 
+    @pytest.mark.parametrize("last", [1, 4, 30, 200])
+    def test_a_tool_change_after_the_last_reading_is_on_it(self, last: int, scale: Any) -> None:
+        figure = zone_chart(
+            [point(n, 0.0) for n in range(1, last + 1)],
+            SHAFT,
+            marks=[Mark(last + 1, "tool_change", "T3 changed")],
+            scale=scale,
+        )
+        assert [event["x"] for event in traces(figure, "events")] == [[last + 1]]
+        assert figure["layout"]["xaxis"]["range"][1] > last + 1
+
     def test_alarms_and_tool_changes_are_shapes_with_words(self, scale: Any) -> None:
         marks = [Mark(10, "oversize", "Oversize", "/alarms/1"), Mark(50, "tool_change", "Tool T3 changed")]
         figure = zone_chart([point(1, 0.0), point(100, 0.0)], SHAFT, marks=marks, scale=scale)

@@ -79,7 +79,7 @@ def zone_chart(
     first = min([block.first for block in blocks] + [point.sequence for point in points], default=1)
     last = max([block.last for block in blocks] + [point.sequence for point in points], default=first + 9)
     room = max((last - first) * 0.02, 0.6)
-    span = (first - room, last + room * 1.5)
+    span = (first - room, last + max(room * 1.5, 1.2))  # what came after the last reading stands at the next number
 
     traces = [
         *envelope(blocks, ruler, Limits.of(limits), colours),
