@@ -59,10 +59,9 @@ async def save(
     copying = len(ground.verdicts) >= COPY_FROM
     locking: list[Step] = [(LOCK, array(machines))] if len(machines) > 1 and not begun else []
     if copying or quiet is not None or ground.raised:  # something must be done before the last round trip
-        await pipeline.run([*([] if begun else [("BEGIN",)]), *locking, (GUARD, versions)])
+        opening: list[Step] = [*([] if begun else [("BEGIN",)]), *locking, (GUARD, versions)]
+        await (_number_alarms(pipeline, ground, opening) if ground.raised else pipeline.run(opening))
         begun, locking, versions = True, [], "[]"
-    if ground.raised:
-        await _number_alarms(pipeline, ground)
     records = [verdict.record() for verdict in ground.verdicts]
     if quiet is not None:
         async with pipeline.connection.cursor() as cursor, cursor.copy(COPY) as copy:
@@ -98,9 +97,10 @@ async def save(
     )
 
 
-async def _number_alarms(pipeline: Pipeline, ground: Ground) -> None:
+async def _number_alarms(pipeline: Pipeline, ground: Ground, opening: list[Step]) -> None:
     """Find the alarms that are active for the same trouble already, and draw numbers for the others."""
-    (rows,) = await pipeline.run(((ACTIVE_ALARMS, array({alarm.machine_id for alarm in ground.raised})),))
+    machines = {alarm.machine_id for alarm in ground.raised}
+    *_opened, rows = await pipeline.run([*opening, (ACTIVE_ALARMS, array(machines))])
     active = {
         (int(machine or 0), _number(characteristic), _number(tool), (kind or b"").decode()): _number(alarm)
         for machine, characteristic, tool, kind, alarm in rows
