@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from app.core.parameters import BY_NAME, Kind, Problem
+from app.core.parameters import BY_NAME, Field, Kind, Problem, Variant
 from app.errors import FieldError
 from app.web.i18n import _
 
@@ -288,7 +288,15 @@ def worded(name: str, parameters: Mapping[str, Any]) -> str:
     if field is not None and field.choices:
         return choice(name, str(value))
     text = f"{value:.10g}" if isinstance(value, float) else str(value)
-    return text.replace("-", "\N{MINUS SIGN}") + (" mm" if field is not None and field.kind is Kind.LENGTH else "")
+    return text.replace("-", "\N{MINUS SIGN}") + _unit(name, field, parameters)
+
+
+def _unit(name: str, field: Field | None, parameters: Mapping[str, Any]) -> str:
+    if name == "index":  # R26 is an angle, or along the part a distance
+        return " mm" if parameters.get("variant") == Variant.ALONG else "°"
+    if name == "wait":
+        return " s"
+    return " mm" if field is not None and field.kind is Kind.LENGTH else ""
 
 
 def history(versions: Sequence[Version]) -> list[tuple[Version, list[Difference]]]:

@@ -49,3 +49,17 @@ def test_target_and_drawing_that_disagree() -> None:
     assert error.message == (
         "R32 target 10.0000 mm does not agree with nominal and deviations, which give 9.9980 mm; say only one of the two"
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "words"),
+    [
+        ("index", {"index": 90.0, "variant": "round"}, "90°"),
+        ("index", {"index": -25.5, "variant": "along"}, "−25.5 mm"),
+        ("wait", {"wait": 1.5}, "1.5 s"),
+        ("zero_range", {"zero_range": 0.001}, "0.001 mm"),
+        ("path_factor", {"path_factor": 2.0}, "2"),
+    ],
+)
+def test_a_value_has_its_unit(name: str, values: dict[str, object], words: str) -> None:
+    assert wording.worded(name, values) == words
