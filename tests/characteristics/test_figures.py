@@ -218,6 +218,11 @@ class TestHistogram:
         assert counts[lower + 1] == 1
         assert (counts[0], counts[-1], sum(counts)) == (1, 1, 5)
 
+    @pytest.mark.parametrize(("readings", "ticks"), [(0, {"dtick": 1}), (1, {"dtick": 1}), (40, {"nticks": 4})])
+    def test_few_readings_are_counted_by_ones(self, readings: int, ticks: dict[str, int]) -> None:
+        axis = histogram_figure(histogram_counts([0.003] * readings, SHAFT), SHAFT)["layout"]["xaxis"]
+        assert {name: axis[name] for name in ("dtick", "nticks") if name in axis} == ticks
+
     def test_bars_outside_the_tolerance_are_marked(self) -> None:
         counts = histogram_counts([0.003] * 5 + [0.009], SHAFT)
         (bars,) = histogram_figure(counts, SHAFT)["data"]

@@ -15,6 +15,7 @@ from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, date_axis, layout, p
 
 BARS_PER_SIDE = 15  # whole bars between target and tolerance limit, so that the limits fall between bars
 REACH = 1.4  # the histogram ends at so many times the tolerance; what lies further out is in the two end bars
+FEW = 4  # readings in the longest bar up to which they are counted by ones: there are no half readings
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,8 @@ def histogram_figure(counts: Sequence[int], limits: HasLimits, *, theme: ThemeNa
         "layout": layout(
             theme,
             bargap=0,
-            xaxis={"rangemode": "tozero", "nticks": 4, "tickformat": "d", "showgrid": True, "fixedrange": True}
+            xaxis={"rangemode": "tozero", "tickformat": "d", "showgrid": True, "fixedrange": True}
+            | ({"nticks": 4} if max(counts) > FEW else {"dtick": 1})
             | _title(_("Readings"), colours),
             yaxis={
                 "range": [-extent, extent],
