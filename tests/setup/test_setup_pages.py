@@ -186,7 +186,9 @@ class TestCharacteristics:
         assert values(engineer.get("/setup/characteristics/own-factor"))["factor_other"] == "0.25"
 
     def test_no_factor_is_asked_for(self, engineer: Browser, shop: Shop) -> None:
-        assert "The factor is missing" in errors(self.new(engineer, shop, "none", 422, factor="").text)[0]
+        page = self.new(engineer, shop, "none", 422, factor="").text
+        assert "The factor is missing" in errors(page)[0]
+        assert re.search(r'name="factor" value="-1" aria-invalid="true"', page), "the browser goes there"
 
     def test_change_with_reason_and_history(self, engineer: Browser, shop: Shop) -> None:
         self.new(engineer, shop, "changed")
