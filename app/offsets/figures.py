@@ -114,7 +114,7 @@ def offset_figure(changes: Sequence[OffsetChange], *, theme: ThemeName = "light"
                     "yref": "paper",
                     "x": 0.5,
                     "y": 0.5,
-                    "text": f"<b>{_('No offset known yet')}</b>",
+                    "text": f"<b>{_('No correction or tool change yet')}</b>",
                     "showarrow": False,
                     "font": {"size": 15, "color": colours.quiet},
                 }
