@@ -93,8 +93,6 @@ def judged(session: Session, standing: Standing, choice: Asked) -> Study:
         session,
         standing,
         window,
-        start=choice.start,
-        end=choice.end,
         side=choice.side,
         confidence=choice.confidence,
     )

@@ -167,14 +167,12 @@ def capability_of(
     standing: Standing,
     window: Window,
     *,
-    start: datetime | None = None,
-    end: datetime | None = None,
     side: Side = "both",
     confidence: float = CONFIDENCE,
 ) -> Study:
-    """Judge the readings of the window, those measured from `start` to `end`. Raises `Invalid` for more than ten million."""
+    """Judge the readings of the window. Raises `Invalid` for more than ten million."""
     columns = ("deviation", "parameters_version", "zone", "measured_at", "compensated")
-    history = statistics.history_of(session, standing.characteristic, window, columns, start=start, end=end)
+    history = statistics.history_of(session, standing.characteristic, window, columns)
     faulty = history["zone"] == FAULT
     kept = history.only(~history.excluded & ~faulty)
     values: Floats = kept["deviation"]

@@ -127,7 +127,7 @@ def run_of(session: Session, standing: Standing, window: Window) -> list[RunPoin
     """The measured sizes of these readings; of very many the last ones."""
     key = standing.characteristic.key
     first = max(window.first, window.last - MOST_RUN + 1)
-    course = statistics.course_of(session, standing.characteristic, Window(first, window.last, window.newest))
+    course = statistics.course_of(session, standing.characteristic, replace(window, first=first))
     return [
         RunPoint(
             reading.sequence,

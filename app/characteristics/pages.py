@@ -4,6 +4,7 @@ The live parts of the page are fetched one by one (header `X-Live-Part`), so not
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cached_property
 from typing import Annotated, Any, Literal
@@ -76,7 +77,7 @@ class Shown:
     def counted(self) -> Window:
         """The readings whose numbers are shown: of very many the last ones."""
         first = max(self.window.first, self.window.last - MOST_IN_HISTOGRAM + 1)
-        return Window(first, self.window.last, self.window.newest)
+        return replace(self.window, first=first)
 
     @cached_property
     def numbers(self) -> Numbers:

@@ -19,7 +19,7 @@ from app.control.queries import LOOK_BACK, Charted, charted, judged_by
 from app.control.rules_queries import rules_in_force
 from app.control.series_queries import read
 from app.control.tables import Baseline
-from app.control.view import Marked, View, since
+from app.control.view import Marked, View, only, since
 from app.control.watching import Place
 from app.core.spc import cusum, ewma, rules, shewhart
 from app.core.spc.quantity import Quantity, Series
@@ -28,6 +28,7 @@ from app.core.spc.rules import RULES, RuleName, Signals
 from app.core.spc.shewhart import Chart, ControlChart
 from app.core.spc.spread import Subgroups
 from app.errors import FieldError, Invalid
+from app.statistics import queries as statistics
 from app.statistics.queries import Window
 from app.web.i18n import _
 
@@ -67,7 +68,13 @@ def view(
             errors=[FieldError("chart", wrong)],
         )
     made = _drawn(session, standing, baseline, window, kind, watched)
-    return replace(made, left_out=made.left_out and made.left_out.within(window.first, window.last))
+    made = replace(made, left_out=made.left_out and made.left_out.within(window.first, window.last))
+    if not window.timed:
+        return made
+    # What a point is does not depend on the period; whether it is shown does.
+    measured = statistics.history_of(session, standing.characteristic, window, ())["sequence"]
+    made = only(made, np.isin(made.last, measured))
+    return replace(made, left_out=made.left_out and made.left_out.among(measured))
 
 
 def _drawn(
@@ -105,7 +112,11 @@ def _settling(points: Charted, window: Window) -> int:
     """Readings of the window that set the level of an edge."""
     if points.baseline.quantity != Quantity.WEAR_RESIDUALS:
         return 0
-    return int((points.read.series.sequence >= window.first).sum() - (points.series.sequence >= window.first).sum())
+    read, judged = (
+        int(((series.sequence >= window.first) & window.holds(at)).sum())
+        for series, at in ((points.read.series, points.read.measured_at), (points.series, points.series_at))
+    )
+    return read - judged
 
 
 def marked_by(baseline: Baseline) -> Marked:

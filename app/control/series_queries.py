@@ -58,8 +58,15 @@ class LeftOut:
 
     def within(self, first: int, last: int) -> "LeftOut":
         """Those of a window."""
-        each = (self.excluded, self.by_baseline, self.faults, self.unknown)
-        return LeftOut(*(numbers[(numbers >= first) & (numbers <= last)] for numbers in each))
+        return LeftOut(*(numbers[(numbers >= first) & (numbers <= last)] for numbers in self._each))
+
+    def among(self, sequence: Whole) -> "LeftOut":
+        """Those of these readings."""
+        return LeftOut(*(numbers[np.isin(numbers, sequence)] for numbers in self._each))
+
+    @property
+    def _each(self) -> tuple[Whole, Whole, Whole, Whole]:
+        return self.excluded, self.by_baseline, self.faults, self.unknown
 
     def __len__(self) -> int:
         """How many there are."""

@@ -56,32 +56,37 @@ class Marked:
 
 def since(view: View, first: int) -> View:
     """Without the points that end before this reading; a signal that goes on over the edge is cut there."""
-    cut = int(np.searchsorted(view.last, first))
-    if cut == 0:
+    return only(view, view.last >= first)
+
+
+def only(view: View, wanted: NDArray[np.bool_]) -> View:
+    """Those points; a signal goes from its first to its last point that is left."""
+    if wanted.all():
         return view
 
     def rest(values: float | Floats | None) -> float | Floats | None:
-        return values if values is None or np.ndim(values) == 0 else np.asarray(values)[cut:]
+        return values if values is None or np.ndim(values) == 0 else np.asarray(values)[wanted]
 
     return replace(
         view,
-        first=view.first[cut:],
-        last=view.last[cut:],
-        sizes=view.sizes[cut:],
-        points=view.points[cut:],
-        begins=view.begins[cut:],
+        first=view.first[wanted],
+        last=view.last[wanted],
+        sizes=view.sizes[wanted],
+        points=view.points[wanted],
+        begins=view.begins[wanted],
         centre=rest(view.centre),
         lower=rest(view.lower),
         upper=rest(view.upper),
-        below=None if view.below is None else view.below[cut:],
-        signals=None if view.signals is None else _rest_of(view.signals, cut),
+        below=None if view.below is None else view.below[wanted],
+        signals=None if view.signals is None else _rest_of(view.signals, wanted),
     )
 
 
-def _rest_of(signals: Signals, cut: int) -> Signals:
+def _rest_of(signals: Signals, wanted: NDArray[np.bool_]) -> Signals:
     runs = {}
+    before = np.concatenate(([0], np.cumsum(wanted)))  # points left before each
     for name, rows in signals.runs.items():
-        kept = rows[rows[:, 2] >= cut].copy()
-        kept[:, 1:3] = np.maximum(kept[:, 1:3] - cut, 0)
-        runs[name] = kept
-    return Signals(signals.length - cut, runs)
+        moved = rows.copy()
+        moved[:, 1], moved[:, 2] = before[rows[:, 1]], before[rows[:, 2] + 1] - 1
+        runs[name] = moved[moved[:, 1] <= moved[:, 2]]
+    return Signals(int(before[-1]), runs)

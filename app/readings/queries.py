@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from sqlalchemy import func, select, tuple_
+from sqlalchemy import ColumnElement, func, select, tuple_
 from sqlalchemy.orm import Session
 
 from app.alarms.tables import Alarm
@@ -278,10 +278,12 @@ def page(session: Session, entry: Entry, after: int, limit: int) -> list[Record]
     return [Record(*row) for row in rows]
 
 
-def latest(session: Session, entry: Entry, before: int | None, limit: int) -> list[Record]:
-    """Readings before a sequence number (or the last ones), newest first."""
+def latest(
+    session: Session, entry: Entry, before: int | None, limit: int, *of_those: ColumnElement[bool]
+) -> list[Record]:
+    """Readings before a sequence number (or the last ones), of those for which all of this holds; newest first."""
     query = select(*COLUMNS).where(
-        Reading.machine_id == entry.machine_id, Reading.characteristic_id == entry.characteristic_id
+        Reading.machine_id == entry.machine_id, Reading.characteristic_id == entry.characteristic_id, *of_those
     )
     if before is not None:
         query = query.where(Reading.sequence < before)

@@ -1,5 +1,6 @@
 """JSON route: the numbers of a run of readings."""
 
+from dataclasses import replace
 from datetime import datetime
 from typing import Annotated
 
@@ -99,11 +100,11 @@ def get_statistics(
     check_order(start, end)
     standing = characteristics.characteristic_named(session, characteristic)
     caller.must_at(standing.machine.id, "viewer")
-    window = queries.window_of(session, standing.characteristic, last=last)
-    numbers = queries.numbers_of(session, standing.characteristic, window, start=start, end=end)
+    window = replace(queries.window_of(session, standing.characteristic, last=last), start=start, end=end)
+    numbers = queries.numbers_of(session, standing.characteristic, window)
     rejects = of_tool = None
     if standing.parameters.accept_m > 1:
-        rejects = queries.rejects_of(session, standing.characteristic, window, start=start, end=end)
+        rejects = queries.rejects_of(session, standing.characteristic, window)
         since_change = queries.since_tool_change(session, standing.characteristic)
         of_tool = queries.rejects_of(session, standing.characteristic, since_change)
     return StatisticsOut(

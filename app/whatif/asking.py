@@ -90,4 +90,4 @@ def _past(session: Session, standing: Standing, given: PeriodIn) -> Past:
         message = _("is later than `to`; exchange the two moments")
         raise Invalid(f"from: {message}.", errors=[FieldError("from", message)])
     window = statistics.window_of(session, standing.characteristic, last=given.newest, start=given.start, end=given.end)
-    return queries.load(session, standing, window, given.start, given.end)
+    return queries.load(session, standing, window)

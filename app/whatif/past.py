@@ -139,14 +139,7 @@ def replace_lane(lane: Lane, effect: float, parameters: Parameters, slot: int | 
     return Lane(parameters, lane.response * effect, lane.memory if slot is None else slot, lane.counts)
 
 
-def past_of(
-    session: Session,
-    standing: Standing,
-    window: Window,
-    *,
-    start: datetime | None = None,
-    end: datetime | None = None,
-) -> Past:
+def past_of(session: Session, standing: Standing, window: Window) -> Past:
     """Load it. Raises `Invalid` for more than a million readings."""
     if window.count > LARGEST:
         raise Invalid(
@@ -157,7 +150,7 @@ def past_of(
         )
     others = _others(session, standing)
     columns = (*COLUMNS, "part") if others else COLUMNS
-    whole = statistics.history_of(session, standing.characteristic, window, columns, start=start, end=end)
+    whole = statistics.history_of(session, standing.characteristic, window, columns)
     own = whole.only(np.isfinite(whole["compensated"]))
     histories = [(standing, own)]
     if len(own):
@@ -166,7 +159,7 @@ def past_of(
             span = statistics.window_of(session, other.characteristic, start=began, end=ended)
             if span.count > LARGEST:
                 continue
-            found = statistics.history_of(session, other.characteristic, span, columns, start=began, end=ended)
+            found = statistics.history_of(session, other.characteristic, span, columns)
             histories.append((other, found.only(np.isfinite(found["compensated"]))))
     return _joined(session, standing, window, histories, len(whole) - len(own))
 

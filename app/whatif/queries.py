@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from functools import cached_property
 from math import isfinite, sqrt
 
@@ -122,11 +121,9 @@ class Map:
     region: Region
 
 
-def load(
-    session: Session, standing: Standing, window: Window, start: datetime | None = None, end: datetime | None = None
-) -> Past:
+def load(session: Session, standing: Standing, window: Window) -> Past:
     """The past, and a refusal in words where there is nothing that could be replayed. Raises `Invalid`."""
-    past = past_of(session, standing, window, start=start, end=end)
+    past = past_of(session, standing, window)
     if len(past.history) < 2:
         raise Invalid(
             _("This period holds {count} readings that can be replayed; a loop needs two at least.").format(

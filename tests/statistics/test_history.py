@@ -1,5 +1,6 @@
 """A history as columns is what the readings are, one by one."""
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -108,9 +109,11 @@ def test_a_period_takes_what_was_measured_in_it(server: Server, filled: str) -> 
         whole = Window(1, COUNT, COUNT)
         every = queries.history_of(session, characteristic, whole, ["measured_at"])
         start = every["measured_at"][9].item().replace(tzinfo=UTC)
-        found = queries.history_of(session, characteristic, whole, start=start, end=start + timedelta(seconds=4))
+        period = replace(whole, start=start, end=start + timedelta(seconds=4))
+        found = queries.history_of(session, characteristic, period)
         assert found["sequence"].tolist() == [10, 11, 12, 13, 14]
-        nothing = queries.history_of(session, characteristic, whole, COLUMNS, start=datetime(2099, 1, 1, tzinfo=UTC))
+        never = replace(whole, start=datetime(2099, 1, 1, tzinfo=UTC))
+        nothing = queries.history_of(session, characteristic, never, COLUMNS)
         empty = queries.history_of(session, characteristic, Window(1, 0, COUNT), COLUMNS)
     assert len(nothing) == len(empty) == 0
     assert nothing["measured_at"].dtype == POSTGRES_EPOCH.dtype

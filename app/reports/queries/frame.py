@@ -6,8 +6,8 @@ from datetime import UTC, datetime
 from functools import cached_property
 from typing import NamedTuple
 
-from sqlalchemy import select
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, select
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from app.characteristics import queries as characteristics
 from app.characteristics.queries import Standing
@@ -46,7 +46,7 @@ class Frame:
 
     @cached_property
     def window(self) -> Window:
-        """From the first to the last reading measured in the period."""
+        """The readings measured in the period."""
         wishes = self.wishes
         return statistics.window_of(
             self.session, self.standing.characteristic, last=wishes.newest, start=wishes.start, end=wishes.end
@@ -54,21 +54,32 @@ class Frame:
 
     @cached_property
     def numbers(self) -> Numbers:
-        return statistics.numbers_of(
-            self.session, self.standing.characteristic, self.window, start=self.wishes.start, end=self.wishes.end
-        )
+        return statistics.numbers_of(self.session, self.standing.characteristic, self.window)
 
     @cached_property
     def history(self) -> History:
         """The deviations of the period and their zones, without excluded ones. Raises `Invalid` for more than ten million."""
         return statistics.history_of(
-            self.session,
-            self.standing.characteristic,
-            self.window,
-            ("deviation", "zone"),
-            start=self.wishes.start,
-            end=self.wishes.end,
+            self.session, self.standing.characteristic, self.window, ("deviation", "zone")
         ).counted
+
+    def holds(self, sequence: InstrumentedAttribute[int] | InstrumentedAttribute[int | None]) -> ColumnElement[bool]:
+        """Whether what stands beside a reading, by its sequence, is of a reading of the period."""
+        inside = sequence.between(self.window.first, self.window.last)
+        if not self.window.timed:
+            return inside
+        return (
+            inside
+            & select(Reading.sequence)
+            .where(
+                Reading.machine_id == self.standing.machine.id,
+                Reading.characteristic_id == self.standing.characteristic.id,
+                Reading.sequence == sequence,
+                self.window.in_time,
+            )
+            .correlate_except(Reading)
+            .exists()
+        )
 
     @cached_property
     def ends(self) -> tuple[End, End] | None:

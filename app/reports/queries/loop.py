@@ -21,7 +21,7 @@ def corrections(frame: Frame) -> Section:
     here = (
         Correction.machine_id == frame.standing.machine.id,
         Correction.characteristic_id == frame.standing.characteristic.id,
-        Correction.sequence.between(frame.window.first, frame.window.last),
+        frame.holds(Correction.sequence),
     )
     grouped = frame.session.execute(select(Correction.status, func.count()).where(*here).group_by(Correction.status))
     counted = {status: number for status, number in grouped}  # noqa: C416 - rows are no pairs to mypy

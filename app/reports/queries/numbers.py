@@ -33,8 +33,7 @@ def numbers(frame: Frame) -> Section:
         Fact("corrections", _("Readings that led to a correction"), count(found.corrections)),
     ]
     if frame.parameters.accept_m > 1:
-        wishes, characteristic = frame.wishes, frame.standing.characteristic
-        rejects = statistics.rejects_of(frame.session, characteristic, frame.window, start=wishes.start, end=wishes.end)
+        rejects = statistics.rejects_of(frame.session, frame.standing.characteristic, frame.window)
         facts += [
             Fact("rejected", _("Parts rejected"), count(rejects.parts)),
             Fact("sections_outside", _("Sections outside"), count(rejects.sections), "#513"),

@@ -22,9 +22,7 @@ MOST_DECISIONS = 50
 def alarms(frame: Frame) -> Section:
     """Alarms of the readings of the period, and of their tool in that time, with what was said to them; newest first."""
     tools = {int(version.parameters.get("tool_memory") or 0) for version in frame.versions_used} - {0}
-    own = (Alarm.characteristic_id == frame.standing.characteristic.id) & Alarm.sequence.between(
-        frame.window.first, frame.window.last
-    )
+    own = (Alarm.characteristic_id == frame.standing.characteristic.id) & frame.holds(Alarm.sequence)
     which = [own]
     if frame.span is not None:
         in_time = Alarm.raised_at.between(*frame.span)
@@ -130,7 +128,6 @@ def parameters(frame: Frame) -> Section:
 
 def excluded(frame: Frame) -> Section | None:
     """Readings of the period that were taken out of the statistics, and why; nothing where none was."""
-    session, wishes = frame.session, frame.wishes
     query = (
         select(
             Exclusion.sequence, Reading.measured_at, Reading.deviation, Exclusion.at, Exclusion.actor, Exclusion.reason
@@ -144,14 +141,10 @@ def excluded(frame: Frame) -> Section | None:
         .where(
             Exclusion.machine_id == frame.standing.machine.id,
             Exclusion.characteristic_id == frame.standing.characteristic.id,
-            Exclusion.sequence.between(frame.window.first, frame.window.last),
+            frame.holds(Exclusion.sequence),
         )
     )
-    if wishes.start is not None:
-        query = query.where(Reading.measured_at >= wishes.start)
-    if wishes.end is not None:
-        query = query.where(Reading.measured_at <= wishes.end)
-    rows = session.execute(query.order_by(Exclusion.sequence.desc()).limit(MOST_ROWS)).all()
+    rows = frame.session.execute(query.order_by(Exclusion.sequence.desc()).limit(MOST_ROWS)).all()
     if not rows:
         return None
     table = Table(
@@ -179,8 +172,10 @@ def decisions(frame: Frame) -> Section | None:
         return None
     entry = readings.entry_of(frame.session, frame.standing.characteristic.key)
     assert entry is not None
-    newest = readings.latest(frame.session, entry, frame.window.last + 1, MOST_DECISIONS)
-    records = [each for each in newest if each.sequence >= frame.window.first]
+    records = readings.latest(
+        frame.session, entry, frame.window.last + 1, MOST_DECISIONS,
+        Reading.sequence >= frame.window.first, frame.window.in_time,
+    )  # fmt: skip
     answers = readings.answers(frame.session, entry, records)
     table = Table(
         (
@@ -208,7 +203,7 @@ def decisions(frame: Frame) -> Section | None:
             )
             for each in answers
         ),
-        more=frame.window.count - len(records),
+        more=frame.numbers.count + frame.numbers.excluded - len(records),
     )
     sentence = _("Newest first; the export of readings holds all of them.")
     return Section("decisions", _("Decisions"), sentences=(sentence,), table=table)

@@ -1,6 +1,7 @@
 """The course of a run of readings, thin enough to draw: single readings, or blocks of them with their extremes."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
 from typing import NamedTuple
 
@@ -75,30 +76,36 @@ def plan(window: Window) -> tuple[list[tuple[int, int, int]], list[Run]]:
 
 
 def course_of(session: Session, characteristic: Characteristic, window: Window) -> Course:
-    """Every reading of the window, in no more rows than can be drawn."""
+    """Every reading of the window, in no more rows than can be drawn. A block of which a part is meant is drawn whole."""
     pieces, runs = plan(window)
     blocks: list[Block] = []
     for level, low, high in pieces:
         blocks += blocks_of(session, characteristic, level, range(low, high + 1))
-    blocks.sort(key=lambda block: block.first)
+    blocks = [
+        block
+        for block in sorted(blocks, key=lambda block: block.first)
+        if (window.end is None or block.first_at <= window.end)
+        and (window.start is None or block.last_at >= window.start)
+    ]
     readings: list[Drawn] = []
     excluded: set[int] = set()
     for first, last in runs:
         if first > last:
             continue
-        readings += readings_of(session, characteristic, first, last)
+        readings += readings_of(session, characteristic, replace(window, first=first, last=last))
         excluded.update(excluded_of(session, characteristic, first, last))
     return Course(blocks, readings, frozenset(excluded))
 
 
-def readings_of(session: Session, characteristic: Characteristic, first: int, last: int) -> list[Drawn]:
+def readings_of(session: Session, characteristic: Characteristic, window: Window) -> list[Drawn]:
     """These readings, ascending."""
     rows = session.execute(
         select(*_DRAWN)
         .where(
             Reading.machine_id == characteristic.machine_id,
             Reading.characteristic_id == characteristic.id,
-            Reading.sequence.between(first, last),
+            Reading.sequence.between(window.first, window.last),
+            window.in_time,
         )
         .order_by(Reading.sequence)
     )

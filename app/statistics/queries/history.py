@@ -6,7 +6,6 @@ it as it is. Row by row it would be ten times as long, nearly all of it spent on
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -88,11 +87,8 @@ def history_of(
     characteristic: Characteristic,
     window: Window,
     columns: Iterable[str] = ("deviation",),
-    *,
-    start: datetime | None = None,
-    end: datetime | None = None,
 ) -> History:
-    """The readings of the window, those measured from `start` to `end` where these are given; excluded ones are marked.
+    """The readings of the window; excluded ones are marked.
 
     columns: names of `COLUMNS`; `sequence` comes in any case. Raises `Invalid` for more than ten million readings.
     """
@@ -103,13 +99,12 @@ def history_of(
             ),
             _("Choose a shorter period, or the last so many readings."),
         )
-    every = start is None and end is None  # then they are numbered without a gap
-    names = [name for name in dict.fromkeys(["sequence", *columns]) if name != "sequence" or not every]
-    if every:
+    names = [name for name in dict.fromkeys(["sequence", *columns]) if name != "sequence" or window.timed]
+    if window.timed:
+        found = _columns(session, characteristic, window, names)
+    else:  # they are numbered without a gap
         found = _whole(session, characteristic, window, names or ["sequence"])
         found["sequence"] = np.arange(window.first, window.first + max(map(len, found.values())))
-    else:
-        found = _columns(session, characteristic, window, names, start, end)
     left_out = excluded_of(session, characteristic, window.first, window.last) if window.count else ()
     return History(found, np.isin(found["sequence"], np.array(left_out, np.int64)))
 
@@ -137,9 +132,9 @@ def _whole(
     missing = [name for name in names if name not in kept.columns]
     many = kept.last - kept.first + 1
     if many > MOST_KEPT or (missing and many > 2 * window.count):
-        return _columns(session, characteristic, window, names, None, None)
+        return _columns(session, characteristic, window, names)
     if missing:
-        found = _columns(session, characteristic, Window(kept.first, kept.last, window.newest), missing, None, None)
+        found = _columns(session, characteristic, Window(kept.first, kept.last, window.newest), missing)
         kept.columns.update(found)
         if any(len(values) != many for values in found.values()):  # not all of them are stored yet
             return found
@@ -149,12 +144,7 @@ def _whole(
 
 
 def _columns(
-    session: Session,
-    characteristic: Characteristic,
-    window: Window,
-    names: list[str],
-    start: datetime | None,
-    end: datetime | None,
+    session: Session, characteristic: Characteristic, window: Window, names: list[str]
 ) -> dict[str, NDArray[Any]]:
     """The columns, ascending by sequence. Block by block by the index: grouped, the server would sort what lies in order."""
     packed = ", ".join(f"string_agg({COLUMNS[name][0]}, ''::bytea ORDER BY r.sequence)" for name in names)
@@ -163,16 +153,17 @@ def _columns(
             SELECT {packed} FROM reading r
             WHERE machine_id = %(machine)s AND characteristic_id = %(characteristic)s
                 AND sequence BETWEEN greatest(at * {BLOCK}, %(first)s) AND least(at * {BLOCK} + {BLOCK - 1}, %(last)s)
-                {"AND measured_at >= %(start)s" if start is not None else ""}
-                {"AND measured_at <= %(end)s" if end is not None else ""}
+                {"AND measured_at >= %(start)s" if window.start is not None else ""}
+                {"AND measured_at <= %(end)s" if window.end is not None else ""}
         ) AS block
     """  # noqa: S608 - made of our own names
-    bounds = {"machine": characteristic.machine_id, "characteristic": characteristic.id, "start": start, "end": end}
+    bounds: dict[str, Any] = {"machine": characteristic.machine_id, "characteristic": characteristic.id}
+    bounds |= {"first": window.first, "last": window.last, "start": window.start, "end": window.end}
     rows: list[Any] = []
     if window.count:
         # As bytes, not as the text that bytes are written in: half of what travels, and nothing to decode.
         cursor = session.connection().connection.cursor(binary=True)
-        cursor.execute(query, bounds | {"first": window.first, "last": window.last})
+        cursor.execute(query, bounds)
         rows = sorted(cursor.fetchall(), key=lambda row: row[-1])
         cursor.close()
     found: dict[str, NDArray[Any]] = {}

@@ -5,7 +5,6 @@ Probe faults (|D| ≥ R36) measure no part: they are counted as readings and in 
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from math import fsum, sqrt
 from typing import Any
 
@@ -49,6 +48,8 @@ SELECT width_bucket(CASE WHEN abs(deviation - :half) < 5e-7 THEN deviation - 1e-
 FROM reading r
 WHERE machine_id = :machine AND characteristic_id = :characteristic AND sequence BETWEEN :first AND :last
   AND {_OF_A_PART} AND NOT sequence = ANY(CAST(:excluded AS bigint[]))
+  AND (CAST(:start AS timestamptz) IS NULL OR measured_at >= :start)
+  AND (CAST(:end AS timestamptz) IS NULL OR measured_at <= :end)
 GROUP BY bar
 """  # noqa: S608 - made of the names of our zones
 
@@ -106,15 +107,8 @@ class _Part:
     zones: Sequence[int]
 
 
-def numbers_of(
-    session: Session,
-    characteristic: Characteristic,
-    window: Window,
-    *,
-    start: datetime | None = None,
-    end: datetime | None = None,
-) -> Numbers:
-    """Exact for any number of readings. Within the window, those measured from `start` to `end` count."""
+def numbers_of(session: Session, characteristic: Characteristic, window: Window) -> Numbers:
+    """Exact for any number of readings."""
     excluded = excluded_of(session, characteristic, window.first, window.last) if window.count else ()
     tolerances = _tolerances(session, characteristic)
     parts: list[_Part] = []
@@ -128,8 +122,8 @@ def numbers_of(
             characteristic,
             window.first,
             window.last,
-            start=start,
-            end=end,
+            start=window.start,
+            end=window.end,
             without=excluded,
             settles=lambda block: -tightest <= block.minimum and block.maximum <= tightest and not block.zones[FAULT],
         )
@@ -144,14 +138,14 @@ def numbers_of(
                 "lasts": [last for _first, last in runs],
                 "versions": list(tolerances),
                 "tolerances": list(tolerances.values()),
-                "start": start,
-                "end": end,
+                "start": window.start,
+                "end": window.end,
             },
         ).one()
         measured, mean, squares, minimum, maximum, corrections, in_tolerance, *zones = row
         spread = _Spread(measured, mean, squares, minimum, maximum) if measured else None
         parts.append(_Part(spread, corrections, in_tolerance, zones))
-    return _total(parts, _excluded_in_time(session, characteristic, excluded, start, end))
+    return _total(parts, _excluded_in_time(session, characteristic, excluded, window))
 
 
 def _part(block: Block) -> _Part:
@@ -195,14 +189,8 @@ def _tolerances(session: Session, characteristic: Characteristic) -> dict[int, i
     return {version: nanometres(width / 2) for version, width in rows}
 
 
-def _excluded_in_time(
-    session: Session,
-    characteristic: Characteristic,
-    excluded: Sequence[int],
-    start: datetime | None,
-    end: datetime | None,
-) -> int:
-    if not excluded or (start is None and end is None):
+def _excluded_in_time(session: Session, characteristic: Characteristic, excluded: Sequence[int], window: Window) -> int:
+    if not excluded or not window.timed:
         return len(excluded)
     return int(
         session.execute(
@@ -216,8 +204,8 @@ def _excluded_in_time(
                 "machine": characteristic.machine_id,
                 "characteristic": characteristic.id,
                 "excluded": list(excluded),
-                "start": start,
-                "end": end,
+                "start": window.start,
+                "end": window.end,
             },
         ).scalar_one()
     )
@@ -244,6 +232,8 @@ def histogram_of(
             "excluded": list(excluded_of(session, characteristic, first, window.last)),
             "half": half,
             "edges": list(edges),
+            "start": window.start,
+            "end": window.end,
         },
     )
     for bar, count in rows:

@@ -1,14 +1,13 @@
 """What the measuring variants have yielded: its course over the readings, and how many parts were rejected."""
 
 from collections.abc import Sequence
-from datetime import datetime
 from typing import NamedTuple
 
-from sqlalchemy import Float, Integer, func, select, text
+from sqlalchemy import ColumnElement, Float, Integer, func, select, text
 from sqlalchemy.orm import Session
 
 from app.characteristics.tables import Characteristic
-from app.readings.tables import ReadingResults, Stream
+from app.readings.tables import Reading, ReadingResults, Stream
 from app.statistics.queries.course import MOST_BLOCKS, MOST_READINGS, excluded_of
 from app.statistics.queries.window import Window
 
@@ -51,12 +50,20 @@ def results_of(session: Session, characteristic: Characteristic, window: Window,
     """The course of one result (a field of `app.core.variants.Results`); no extreme is thinned away."""
     value = getattr(ReadingResults, name)
     first = max(window.first, window.last - MOST_RESULTS + 1)
-    here = (
+    here: tuple[ColumnElement[bool], ...] = (
         ReadingResults.machine_id == characteristic.machine_id,
         ReadingResults.characteristic_id == characteristic.id,
         ReadingResults.sequence.between(first, window.last),
         value.is_not(None),
     )
+    if window.timed:
+        measured = select(Reading.sequence).where(
+            Reading.machine_id == characteristic.machine_id,
+            Reading.characteristic_id == characteristic.id,
+            Reading.sequence.between(first, window.last),
+            window.in_time,
+        )
+        here = (*here, ReadingResults.sequence.in_(measured))
     if window.last - first < MOST_READINGS:
         rows = session.execute(select(ReadingResults.sequence, value).where(*here).order_by(ReadingResults.sequence))
         excluded = excluded_of(session, characteristic, first, window.last) if window.count else ()
@@ -89,14 +96,7 @@ WHERE o.machine_id = :machine AND o.characteristic_id = :characteristic AND o.se
 """
 
 
-def rejects_of(
-    session: Session,
-    characteristic: Characteristic,
-    window: Window,
-    *,
-    start: datetime | None = None,
-    end: datetime | None = None,
-) -> Rejects:
+def rejects_of(session: Session, characteristic: Characteristic, window: Window) -> Rejects:
     """Rejected parts and sections outside among these readings, without excluded ones."""
     excluded: Sequence[int] = excluded_of(session, characteristic, window.first, window.last) if window.count else ()
     found = session.execute(
@@ -107,8 +107,8 @@ def rejects_of(
             "first": window.first,
             "last": window.last,
             "excluded": list(excluded),
-            "start": start,
-            "end": end,
+            "start": window.start,
+            "end": window.end,
         },
     ).one()
     return Rejects(int(found[0]), int(found[1]))

@@ -1,9 +1,11 @@
 """Which readings are meant: by number, or by when they were measured."""
 
-from dataclasses import dataclass
-from datetime import datetime
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 
-from sqlalchemy import func, select
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import ColumnElement, and_, func, select, true
 from sqlalchemy.orm import Session
 
 from app.characteristics.tables import Characteristic
@@ -13,11 +15,17 @@ from app.statistics.queries.pyramid import Run, cover_of
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """A run of readings, first and last included; empty if last < first. `newest` is the stream's last sequence."""
+    """A run of readings, first and last included; empty if last < first. `newest` is the stream's last sequence.
+
+    start, end: of the run only those measured from … to are meant. A reading that came late lies between others of another
+    time; so whoever counts, counts by these too.
+    """
 
     first: int
     last: int
     newest: int
+    start: datetime | None = None
+    end: datetime | None = None
 
     @property
     def count(self) -> int:
@@ -26,6 +34,34 @@ class Window:
     @property
     def reaches_now(self) -> bool:
         return self.last == self.newest
+
+    @property
+    def timed(self) -> bool:
+        return self.start is not None or self.end is not None
+
+    @property
+    def in_time(self) -> ColumnElement[bool]:
+        """Measured from start to end, as a condition on `Reading`."""
+        asked = []
+        if self.start is not None:
+            asked.append(Reading.measured_at >= self.start)
+        if self.end is not None:
+            asked.append(Reading.measured_at <= self.end)
+        return and_(true(), *asked)
+
+    def holds(self, measured_at: NDArray[np.datetime64]) -> NDArray[np.bool_]:
+        """Which of these moments (UTC) lie from start to end."""
+        held = np.ones(len(measured_at), np.bool_)
+        if self.start is not None:
+            held &= measured_at >= moment_of(self.start)
+        if self.end is not None:
+            held &= measured_at <= moment_of(self.end)
+        return held
+
+
+def moment_of(at: datetime) -> np.datetime64:
+    """As NumPy keeps it, in UTC."""
+    return np.datetime64(at.astimezone(UTC).replace(tzinfo=None), "us")
 
 
 def newest_of(session: Session, characteristic: Characteristic) -> int:
@@ -50,7 +86,7 @@ def window_of(
     start: datetime | None = None,
     end: datetime | None = None,
 ) -> Window:
-    """The readings first … through; of them the `last` so many; of them from the first to the last measured in start … end."""
+    """The readings first … through; of them the `last` so many; of them those measured in start … end."""
     newest = newest_of(session, characteristic)
     low, high = max(1, first or 1), min(newest, newest if through is None else through)
     if last is not None:
@@ -58,25 +94,21 @@ def window_of(
     window = Window(low, high, newest)
     if start is None and end is None:
         return window
+    window = replace(window, start=start, end=end)
     cover = cover_of(session, characteristic, low, high, start=start, end=end)
     ends = [end for block in cover.blocks for end in (block.first, block.last)]
-    ends += _ends_in_time(session, characteristic, cover.runs, start, end)
-    return Window(min(ends), max(ends), newest) if ends else Window(1, 0, newest)
+    ends += _ends_in_time(session, characteristic, cover.runs, window)
+    return replace(window, first=min(ends, default=1), last=max(ends, default=0))
 
 
-def _ends_in_time(
-    session: Session, characteristic: Characteristic, runs: list[Run], start: datetime | None, end: datetime | None
-) -> list[int]:
+def _ends_in_time(session: Session, characteristic: Characteristic, runs: list[Run], window: Window) -> list[int]:
     ends: list[int] = []
     for low, high in runs:
         query = select(func.min(Reading.sequence), func.max(Reading.sequence)).where(
             Reading.machine_id == characteristic.machine_id,
             Reading.characteristic_id == characteristic.id,
             Reading.sequence.between(low, high),
+            window.in_time,
         )
-        if start is not None:
-            query = query.where(Reading.measured_at >= start)
-        if end is not None:
-            query = query.where(Reading.measured_at <= end)
         ends += [found for found in session.execute(query).one() if found is not None]
     return ends
