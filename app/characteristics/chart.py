@@ -84,11 +84,12 @@ def chart_of(session: Session, standing: Standing, window: Window) -> Chart:
                 block.last,
                 block.minimum,
                 block.maximum,
-                block.mean,
+                mean.value,
                 block.average if has_memory else None,
                 f"/characteristics/{key}?first={block.first}&through={block.last}",
+                mean.left_out,
             )
-            for block in course.blocks
+            for block, mean in zip(course.blocks, course.means, strict=True)
         ],
         points=[
             Point(

@@ -120,6 +120,13 @@ class TestZoneChart:
         assert traces(figure, "maximum")[0]["y"] == [ruler.position(0.0031), ruler.position(1.2)]
         assert traces(figure, "extremes")[0]["marker"]["symbol"] == ["hexagon2", "x"]
 
+    def test_a_block_of_nothing_but_probe_faults_has_extremes_and_no_mean(self, scale: Any) -> None:
+        blocks = [Block(1, 32, -0.0004, 0.0031, 0.001), Block(33, 64, 1.1, 1.2, None, left_out=32)]
+        (mean,) = traces(zone_chart([], SHAFT, blocks=blocks, scale=scale), "mean")
+        assert [y is None for y in mean["y"]] == [False, True]
+        assert "mean" not in mean["text"][1]
+        assert "without 32 that are probe faults or excluded" in mean["text"][1]
+
     def test_the_average_has_a_gap_where_there_is_no_memory(self, scale: Any) -> None:
         points = [point(1, 0.003, average=0.001), point(2, 0.003), point(3, 0.003, average=0.0)]
         (average,) = traces(zone_chart(points, SHAFT, scale=scale), "average")

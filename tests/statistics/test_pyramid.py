@@ -97,6 +97,31 @@ class TestCourse:
             (block,) = [block for block in course.blocks if block.first <= sequence <= block.last]
             assert deviation in {block.minimum, block.maximum}
 
+    def test_the_means_are_of_the_parts_alone(self, large: Large) -> None:
+        course = queries.course_of(large.session, large.standing.characteristic, large.window())
+        rows = large.session.execute(
+            text(
+                "SELECT b.first, avg(deviation) FILTER (WHERE counts), count(*) FILTER (WHERE NOT counts) "
+                "FROM unnest(CAST(:firsts AS bigint[]), CAST(:lasts AS bigint[])) AS b(first, last) "
+                "JOIN reading r ON characteristic_id = :c AND sequence BETWEEN b.first AND b.last, "
+                "LATERAL (SELECT zone <> 'probe_fault' AND NOT EXISTS (SELECT FROM exclusion e "
+                "WHERE e.characteristic_id = r.characteristic_id AND e.sequence = r.sequence) AS counts) AS part "
+                "GROUP BY b.first ORDER BY b.first"
+            ),
+            {
+                "c": large.standing.characteristic.id,
+                "firsts": [block.first for block in course.blocks],
+                "lasts": [block.last for block in course.blocks],
+            },
+        ).all()
+        assert [mean.value for mean in course.means] == pytest.approx([row[1] for row in rows], abs=1e-12)
+        assert [mean.left_out for mean in course.means] == [row[2] for row in rows]
+        fault = next(at for at, block in enumerate(course.blocks) if block.maximum > 1)
+        assert course.means[fault].left_out == 1
+        block, mean = course.blocks[fault], course.means[fault].value or 0.0
+        assert block.mean == pytest.approx((mean * (block.count - 1) + 1.7019) / block.count, abs=1e-12)
+        assert sum(mean.left_out for mean in course.means) == 4  # the fault, and three that are excluded
+
     def test_a_window_between_blocks(self, large: Large) -> None:
         window = large.window(first=12_345, through=56_789)
         course = queries.course_of(large.session, large.standing.characteristic, window)
@@ -117,6 +142,8 @@ class TestFigure:
     def test_every_extreme_is_on_it_and_opens_its_block(self, large: Large, figure: dict[str, Any]) -> None:
         words = " ".join(figure["extremes"]["text"])
         assert all(f"{abs(deviation) * 1000:.1f}" in words for deviation in large.extremes.values())
+        (faulty,) = [said for said in figure["mean"]["text"] if "701.9" in said]
+        assert faulty.endswith("<br>without 1 that are probe faults or excluded<br>smallest −4.6 µm")
         assert re.fullmatch(r"/characteristics/large\?first=\d+&through=\d+", figure["extremes"]["customdata"][0])
 
     def test_of_thousands_of_corrections_some_are_shown_with_the_sum_of_all(

@@ -15,15 +15,20 @@ from app.web.theme import ZONE_SYMBOLS, Palette, zone_colour, zone_name
 
 @dataclass(frozen=True)
 class Block:
-    """Many readings in one: for charts of more than can be drawn. `link` opens its part of the chart; mm."""
+    """Many readings in one: for charts of more than can be drawn. `link` opens its part of the chart; mm.
+
+    minimum, maximum: of all of them. mean: without probe faults and excluded readings, of which there are `left_out`; None
+    where there are no others.
+    """
 
     first: int
     last: int
     minimum: float
     maximum: float
-    mean: float
+    mean: float | None
     average: float | None = None
     link: str | None = None
+    left_out: int = 0
 
     @property
     def middle(self) -> float:
@@ -40,7 +45,7 @@ def envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits, colours: Pale
             (
                 f"<b>{_('Readings {first} to {last}').format(first=block.first, last=block.last)}</b>",
                 _("largest {value}").format(value=um(block.maximum)),
-                _("mean {value}").format(value=um(block.mean)),
+                *_mean(block),
                 _("smallest {value}").format(value=um(block.minimum)),
             )
         )
@@ -64,7 +69,7 @@ def envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits, colours: Pale
         "meta": "maximum",
     }
     mean = common | {
-        "y": [ruler.position(b.mean) for b in blocks],
+        "y": [None if b.mean is None else ruler.position(b.mean) for b in blocks],
         "line": {"width": 1.5, "color": colours.average},
         "name": _("Mean"),
         "meta": "mean",
@@ -93,6 +98,13 @@ def envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits, colours: Pale
         "cliponaxis": False,
     }
     return [lower, upper, mean, *([marks] if extremes else [])]
+
+
+def _mean(block: Block) -> list[str]:
+    words = [] if block.mean is None else [_("mean {value}").format(value=um(block.mean))]
+    if block.left_out:
+        words.append(_("without {n} that are probe faults or excluded").format(n=block.left_out))
+    return words
 
 
 def see_through(colour: str, share: float = 0.28) -> str:

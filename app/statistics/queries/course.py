@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from app.characteristics.tables import Characteristic
 from app.readings.tables import Exclusion, Reading
-from app.statistics.queries.pyramid import BASE_LEVEL, FAN, TOP_LEVEL, Block, Run, blocks_of
+from app.statistics.queries.pyramid import BASE_LEVEL, FAN, TOP_LEVEL, Block, Mean, Run, blocks_of, means_of
 from app.statistics.queries.window import Window
 
 MOST_READINGS = 2_500  # drawn one by one
@@ -30,9 +30,10 @@ class Drawn(NamedTuple):
 
 
 class Course(NamedTuple):
-    """Blocks and then single readings, ascending; together they are every reading of the window, once."""
+    """Blocks and then single readings, ascending; together they are every reading of the window, once. means: of each block."""
 
     blocks: list[Block]
+    means: list[Mean]
     readings: list[Drawn]
     excluded: frozenset[int]
 
@@ -94,7 +95,7 @@ def course_of(session: Session, characteristic: Characteristic, window: Window) 
             continue
         readings += readings_of(session, characteristic, replace(window, first=first, last=last))
         excluded.update(excluded_of(session, characteristic, first, last))
-    return Course(blocks, readings, frozenset(excluded))
+    return Course(blocks, means_of(session, characteristic, blocks), readings, frozenset(excluded))
 
 
 def readings_of(session: Session, characteristic: Characteristic, window: Window) -> list[Drawn]:

@@ -14,14 +14,13 @@ from sqlalchemy.orm import Session
 from app.characteristics.tables import Characteristic, ParametersVersion
 from app.core.zones import Zone, nanometres
 from app.statistics.queries.course import excluded_of
-from app.statistics.queries.pyramid import Block, Run, cover_of
+from app.statistics.queries.pyramid import FAULT, Block, Run, cover_of
 from app.statistics.queries.window import Window
 
 MOST_ONE_BY_ONE = (
     50_000  # readings that are aggregated as they are; more are taken from the pyramid where it settles them
 )
 MOST_IN_HISTOGRAM = 100_000
-FAULT = list(Zone).index(Zone.PROBE_FAULT)
 
 # regr_sxx is the sum of squares about the mean, which PostgreSQL accumulates without cancellation (Youngs and Cramer).
 # A part is judged by its raw deviation and the tolerance of the version that was in force, in whole nanometres.

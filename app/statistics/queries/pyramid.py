@@ -1,17 +1,21 @@
 """Reading the pyramid: which full blocks, and which single readings beside them, make up a run of readings."""
 
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from math import fsum
+from typing import NamedTuple
 
-from sqlalchemy import select
+from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.characteristics.tables import Characteristic
+from app.core.zones import Zone
 from app.readings.tables import ReadingSummary
 
 BASE_LEVEL, TOP_LEVEL, FAN = 5, 23, 2  # blocks of 32, 128, 512 … 8 388 608 readings, as the writer makes them
+FAULT = list(Zone).index(Zone.PROBE_FAULT)
 
 Run = tuple[int, int]
 """Sequences from the first to the last, both included."""
@@ -64,6 +68,62 @@ def blocks_of(session: Session, characteristic: Characteristic, level: int, numb
     else:
         query = query.where(ReadingSummary.block.in_(numbers))
     return [Block(*row) for row in session.execute(query.order_by(ReadingSummary.block))]
+
+
+class Mean(NamedTuple):
+    """Of a block those readings that measured a part and that nobody excluded: their mean (mm), and how many are left out."""
+
+    value: float | None
+    left_out: int
+
+
+# Down the pyramid to the smallest blocks that hold a probe fault. The readings are found block by block, never by a scan.
+_LEFT_OUT = f"""
+WITH RECURSIVE faulty AS (
+    SELECT level, block FROM unnest(CAST(:levels AS int[]), CAST(:blocks AS bigint[])) AS asked(level, block)
+    UNION ALL
+    SELECT s.level, s.block FROM faulty f, LATERAL (
+        SELECT CAST(level AS int), block FROM reading_summary
+        WHERE machine_id = :machine AND characteristic_id = :characteristic AND level = f.level - {FAN}
+            AND block >= f.block << {FAN} AND block < (f.block + 1) << {FAN} AND zones[{FAULT + 1}] > 0 OFFSET 0
+    ) s WHERE f.level > {BASE_LEVEL}
+)
+SELECT r.sequence, r.deviation FROM faulty f, LATERAL (
+    SELECT sequence, deviation FROM reading
+    WHERE machine_id = :machine AND characteristic_id = :characteristic AND zone = '{Zone.PROBE_FAULT.value}'
+        AND sequence > f.block << {BASE_LEVEL} AND sequence <= (f.block + 1) << {BASE_LEVEL} OFFSET 0
+) r WHERE f.level = {BASE_LEVEL}
+UNION
+SELECT r.sequence, r.deviation FROM exclusion e JOIN reading r USING (machine_id, characteristic_id, sequence)
+WHERE e.machine_id = :machine AND e.characteristic_id = :characteristic AND e.sequence BETWEEN :first AND :last
+ORDER BY 1
+"""  # noqa: S608 - made of constants
+
+
+def means_of(session: Session, characteristic: Characteristic, blocks: Sequence[Block]) -> list[Mean]:
+    """The mean of each of these blocks, ascending: their sums are the record, and hold what no statistic counts."""
+    if not blocks:
+        return []
+    faulty = [block for block in blocks if block.zones[FAULT]]
+    rows = session.execute(
+        text(_LEFT_OUT),
+        {
+            "machine": characteristic.machine_id,
+            "characteristic": characteristic.id,
+            "levels": [block.level for block in faulty],
+            "blocks": [block.block for block in faulty],
+            "first": blocks[0].first,
+            "last": blocks[-1].last,
+        },
+    ).all()
+    sequences = [row.sequence for row in rows]
+    means = []
+    for block in blocks:
+        low, high = bisect_left(sequences, block.first), bisect_right(sequences, block.last)
+        measured = block.count - (high - low)
+        rest = fsum([block.sum, *(-row.deviation for row in rows[low:high])])
+        means.append(Mean(rest / measured if measured else None, high - low))
+    return means
 
 
 @dataclass(frozen=True)
