@@ -50,7 +50,8 @@ GUARD = f"WITH {_GUARD} SELECT * FROM guard"  # noqa: S608 - made of constants
 LOAD = """
 WITH doc AS MATERIALIZED (SELECT $1::json AS d),
 named AS MATERIALIZED (
-    SELECT c.machine_id, c.number, c.applied_at, c.decided_at, c.fetched_at
+    SELECT c.machine_id, c.number, c.applied_at, c.fetched_at,
+        CASE WHEN c.status IN ('pending', 'applied') THEN c.decided_at END AS decided_at  -- not when it was dropped
     FROM json_to_recordset((SELECT d -> 'named' FROM doc)) AS w(machine_id int, number int)
     JOIN correction c ON c.machine_id = w.machine_id AND c.number = w.number
 )

@@ -193,6 +193,21 @@ class TestWhatIsOutstanding:
         assert (answer["action"], answer["reason"]["code"]) == ("none", "before_tool_change")
         assert shop.read(7.0, machined_at=datetime.now(UTC).isoformat())["action"] == "correct"
 
+    @pytest.mark.parametrize("dropped", ["tool changed", "rejected"])
+    def test_a_part_that_names_one_dropped_since_was_cut_without_later_ones(self, shop: Shop, dropped: str) -> None:
+        """When a correction was dropped says nothing of when it took effect."""
+        other = f"{shop.characteristic}-o"
+        shop.add(other, tool_memory=4, average_memory=6)
+        shop.read(6.0)
+        shop.read(6.0, other)
+        shop.correction(2, "applied")
+        if dropped == "rejected":
+            shop.correction(1, "rejected", reason="Typed in by hand")
+        else:
+            shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="Worn")
+        answer = shop.read(6.0, other, correction_in_effect=1)
+        assert (answer["outstanding"], answer["action"]) == ([2], "none")
+
 
 class TestByMachinedAt:
     def test_what_was_applied_after_the_part_was_cut_is_outstanding(self, shop: Shop) -> None:
