@@ -8,7 +8,7 @@ imported, or from before that was kept) are left out, and counted.
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,12 +56,20 @@ Values = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
+class Delays(NamedTuple):
+    """Parts that came out with the old offset after a correction: the median, and from where to where nine of ten lie."""
+
+    usual: int
+    low: int
+    high: int
+
+
 @dataclass(frozen=True)
 class Past:
     """The readings of a period. mine: those of `way` that are of the characteristic, whose columns `history` holds.
 
     then: each version as it was in force. unknown: readings left out. others: characteristics that correct the same tool.
-    delay: parts between a correction and its effect, as it was most often; None where no correction has taken effect.
+    delays: parts between a correction and its effect; None where no correction has taken effect.
     compensated: of every reading of `way`, mm of offset; factors: what its characteristic turns mm of size into mm of offset by.
     of_tool: corrections of the tool, those of the others included.
     """
@@ -79,7 +87,12 @@ class Past:
     of_tool: int
     unknown: int
     others: list[str]
-    delay: int | None
+    delays: Delays | None
+
+    @property
+    def delay(self) -> int | None:
+        """As it was most often: the one that a replay takes for all corrections."""
+        return self.delays.usual if self.delays else None
 
     def with_effect(self, effect: float) -> Way:
         """The way, had corrections acted by this share."""
@@ -226,7 +239,7 @@ def _joined(
         of_tool=int(((joined["correction"] >= 0) & ~np.isin(joined["code"], HELD) & ~joined["excluded"]).sum()),
         unknown=unknown,
         others=[each.characteristic.key for each, _history in histories[1:]],
-        delay=_delay(joined, way.part),
+        delays=_delays(joined, way.part),
     )
 
 
@@ -292,8 +305,8 @@ def _moment(moment: np.datetime64) -> datetime:
     return found.replace(tzinfo=UTC)
 
 
-def _delay(joined: dict[str, NDArray[Any]], part: NDArray[np.int64]) -> int | None:
-    """Parts that came out with the old offset after a correction of the tool was issued: the median, where machines tell.
+def _delays(joined: dict[str, NDArray[Any]], part: NDArray[np.int64]) -> Delays | None:
+    """Parts that came out with the old offset after a correction of the tool was issued, where machines tell.
 
     They tell by number; until they do (by time, or by confirming) by the offset with which a part was known to be cut.
     """
@@ -311,7 +324,10 @@ def _delay(joined: dict[str, NDArray[Any]], part: NDArray[np.int64]) -> int | No
     told = seen < len(part)
     between = part[seen[told]] - part[issued[told]] - 1
     between = between[between >= 0]
-    return min(LONGEST_DELAY, int(np.median(between))) if len(between) else None
+    if not len(between):
+        return None
+    low, usual, high = np.quantile(between, (0.05, 0.5, 0.95)).astype(np.int64).tolist()
+    return Delays(min(LONGEST_DELAY, usual), low, high)
 
 
 def _with_its_offset(joined: dict[str, NDArray[Any]], issued: NDArray[np.int64]) -> NDArray[np.int64]:

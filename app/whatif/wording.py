@@ -164,7 +164,14 @@ def cautions(past: Past) -> list[str]:
             )
         )
     if parameters.mode.value == "approval":
-        found.append(_("Corrections wait for a person here; in the replay they are released at once."))
+        found.append(_("Corrections wait for a person here; in the replay all of them wait equally long."))
+    if past.delays and (past.delays.high > past.delays.usual + 1 or past.delays.low < past.delays.usual - 1):
+        found.append(
+            _(
+                "Corrections did not take effect equally soon: nine of ten after {low} to {high} more parts with the old "
+                "offset. The replay takes one delay for all of them, so not every part is as it was."
+            ).format(low=past.delays.low, high=past.delays.high)
+        )
     return found
 
 

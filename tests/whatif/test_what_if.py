@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.whatif.past import _delay
+from app.whatif.past import Delays, _delays
 from tests.conftest import Server
 from tests.shop import Shop
 from tests.whatif.loop import cut, scatter
@@ -290,8 +290,27 @@ def test_a_machine_that_begins_to_tell_by_number_has_the_pipeline_that_it_has() 
         "decided": -0.001 * ((part + 1) // 2 - in_effect),
         "factor": np.full(60, -1.0),
     }
-    assert _delay(joined, part) == delay
-    assert _delay(joined | {"correction_in_effect": np.full(60, -1)}, part) == delay
+    assert _delays(joined, part) == Delays(delay, delay, delay)
+    assert _delays(joined | {"correction_in_effect": np.full(60, -1)}, part) == Delays(delay, delay, delay)
+
+
+def test_corrections_that_waited_unequally_long_are_told(server: Server, shop: Shop) -> None:
+    """Somebody lets what has gathered take effect every ten parts; the record says so, and why the replay differs."""
+    made = Shop(server)
+    changed = {"zero_range": 0.0003, "weighting_factor": 1}
+    made.call("PATCH", f"/characteristics/{made.characteristic}", parameters=changed, reason="As found")
+    number, offset, newest = 0, 0.0, (0, 0.0)
+    for at, free in enumerate(scatter(120, 5)):
+        if at % 10 == 0:
+            number, offset = newest
+        correction = made.read(round(free + offset, 3), correction_in_effect=number)["correction"]
+        if correction is not None:
+            newest = (correction["number"], round(newest[1] + correction["amount"] * 1000, 6))
+    found = ask(made)
+    (said,) = [each for each in found["cautions"] if "equally soon" in each]
+    assert "nine of ten after 0 to 9 more parts" in said
+    assert found["likeness"]["same"] < 0.95
+    assert not [each for each in ask(shop)["cautions"] if "equally soon" in each]  # there all waited for one part
 
 
 def test_the_figure_draws_both_courses(shop: Shop) -> None:
