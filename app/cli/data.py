@@ -2,7 +2,7 @@
 
 import getpass
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from enum import StrEnum
 from pathlib import Path
@@ -19,7 +19,10 @@ from app.readings import exporting, queries
 from app.readings.importing.actions import import_readings
 from app.readings.importing.history import Flawed, Summary
 from app.readings.importing.layout import Layout, Wishes, look
+from app.readings.importing.lines import Flaw
 from app.web.i18n import _, ngettext
+
+ALIKE = 3  # lines in a row with the same flaw that are named one by one
 
 
 class Unit(StrEnum):
@@ -188,12 +191,34 @@ def _bar(file: Path) -> Iterator[Any]:
 
 
 def report(refusal: Flawed, *, stored: bool = True) -> None:
-    for flaw in refusal.flaws:
-        say(str(flaw))
+    """Every line with what is wrong with it; where line after line is wrong in the same way, the first ones and how far."""
+    for column, reason, flaws in _alike(refusal.flaws):
+        shown = flaws if len(flaws) <= ALIKE + 1 else flaws[:ALIKE]
+        for flaw in shown:
+            say(str(flaw))
+        if len(shown) < len(flaws):
+            lines = _("lines {first} to {last}").format(first=flaws[ALIKE].line, last=flaws[-1].line)
+            say(f"{lines}{f', {column}' if column else ''}: {reason}")
     more = refusal.count - len(refusal.flaws)
     if more > 0:
         say(_("… and {more} more.").format(more=more))
     say(f"{refusal.detail} {refusal.what_to_do if stored else ''}", style="bold red")
+
+
+def _alike(flaws: Iterable[Flaw]) -> Iterator[tuple[str, str, list[Flaw]]]:
+    """Flaws of neighbouring lines with the same column and reason, together."""
+    together: list[Flaw] = []
+    for flaw in flaws:
+        if together and (flaw.column, flaw.reason, flaw.line) != (
+            together[-1].column,
+            together[-1].reason,
+            together[-1].line + 1,
+        ):
+            yield together[0].column, together[0].reason, together
+            together = []
+        together.append(flaw)
+    if together:
+        yield together[0].column, together[0].reason, together
 
 
 def _sum_up(summary: Summary, characteristic: str, *, live: bool, dry_run: bool) -> None:

@@ -107,6 +107,19 @@ def test_import_names_every_bad_line_and_fails_with_1(plant: Database, tmp_path:
     assert count(plant) == 0
 
 
+def test_what_is_wrong_with_every_line_is_not_said_for_every_line(plant: Database, tmp_path: Path) -> None:
+    file = tmp_path / "no-zone.csv"
+    times = [f"2026-03-{day:02} 06:00{'Z' if day == 20 else ''}" for day in range(1, 29)]
+    file.write_text("Durchmesser,Zeit\n" + "".join(f"39.99,{time}\n" for time in times))
+    done = inband("import", file, "--characteristic", "shaft-d40", database=plant, folder=tmp_path)
+    said = [line.partition(":")[0] for line in done.stderr.splitlines() if line.startswith("line")]
+    assert said == [
+        "line 2, Zeit", "line 3, Zeit", "line 4, Zeit", "lines 5 to 20, Zeit",
+        "line 22, Zeit", "line 23, Zeit", "line 24, Zeit", "lines 25 to 29, Zeit",
+    ]  # fmt: skip
+    assert "27 things are wrong with the file." in done.stderr
+
+
 @pytest.mark.parametrize(
     ("options", "words", "status"),
     [

@@ -16,8 +16,9 @@ from app.web.i18n import _
 NAMES: dict[str, tuple[str, ...]] = {
     "measured": (
         "measured", "measured value", "measurement", "value", "actual", "actual value", "size", "diameter",
-        "messwert", "wert", "istwert", "ist", "istmass", "mass", "gemessen",
+        "messwert", "wert", "istwert", "ist", "istmass", "mass", "gemessen", "durchmesser",
         "izmereno", "izmerena vrednost", "vrednost", "mera", "izmerjeno", "izmerjena vrednost", "meritev", "mere",
+        "precnik", "premer", "пречник", "диаметр",
         "измерено", "измерена вредност", "вредност", "мера", "значение", "измеренное значение", "размер", "результат",
     ),
     "measured_at": (
