@@ -1,4 +1,4 @@
-"""The demonstration plant: two lathes and a milling machine that wear, warm up, scatter and now and then break something.
+"""The demonstration plant: three lathes and a milling machine that wear, warm up, scatter and now and then break something.
 
     plant.py       which machines, tools and features there are, and how a feature answers to its tool's offset
     simulation.py  the physics: pure, seeded, without a clock; it knows nothing of the server

@@ -41,7 +41,7 @@ def demo(
         ),
     ] = None,
 ) -> None:
-    """Run the server with a simulated plant: two lathes and a milling machine that call its public API."""
+    """Run the server with a simulated plant: three lathes and a milling machine that call its public API."""
     settings = settings_from(host=host, port=port, data_dir=data_dir, database_url=database_url)
     plant_key: list[str] = []
 
