@@ -201,7 +201,7 @@ FIELDS: tuple[Field, ...] = (
     Field("rejected_may_correct", None, Kind.YES_NO, default=False),
     Field("mode", None, Kind.CHOICE, default="automatic", choices=_choices(Mode)),
     Field("wear_policy", None, Kind.CHOICE, default="hold", choices=_choices(WearPolicy)),
-    Field("max_step", None, Kind.LENGTH, lowest=0),
+    Field("max_step", None, Kind.LENGTH, lowest=0.000001),
     Field("max_total", None, Kind.LENGTH, lowest=0),
     Field("plausible_jump", None, Kind.LENGTH, lowest=0.000001),
 )

@@ -97,7 +97,9 @@ def revoke_key(session: Session, key_id: int, actor: str, machine: str | None = 
         select(ApiKey).outerjoin(Machine, Machine.id == ApiKey.machine_id).where(ApiKey.id == key_id, owner)
     ).one_or_none()
     if key is None:
-        raise NotFound(_("There is no key {id} here.").format(id=key_id))
+        raise NotFound(
+            _("There is no key {id} here.").format(id=key_id), _("Look at the list of keys, which names their numbers.")
+        )
     if key.revoked_at is None:
         key.revoked_at = session.scalar(select(func.now()))
         session.flush()

@@ -58,6 +58,8 @@ def local_path(path: str | None, default: str = "/") -> str:
 
 def answer(request: Request, error: InbandError) -> Response:
     """The answer for an error of ours, as a document or as a page."""
+    if isinstance(error, Invalid) and error.what_to_do is None:
+        error.what_to_do = _("Correct the named fields and send it again.")
     if is_for_programs(request.url.path):
         return JSONResponse(error.as_problem(), error.status, error.headers, media_type=PROBLEM_JSON)
     if isinstance(error, NotSignedIn):

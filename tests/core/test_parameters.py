@@ -113,6 +113,13 @@ def test_the_sign_of_a_correction_is_never_guessed() -> None:
     read(values | {"mode": "measure_only"})
 
 
+def test_a_step_of_nothing_is_no_step() -> None:
+    """It would issue corrections of 0 mm without end."""
+    assert problems(SHAFT | {"max_step": 0}) == {"max_step": "range"}
+    read(SHAFT | {"max_step": None})
+    read(SHAFT | {"max_step": 0.001})
+
+
 def test_a_tolerance_needs_a_width() -> None:
     assert problems(SHAFT | {"upper_deviation": -0.016}) == {"upper_deviation": "tolerance_sign"}
     assert problems(SHAFT | {"upper_deviation": -0.02}) == {"upper_deviation": "tolerance_sign"}

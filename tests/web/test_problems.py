@@ -16,7 +16,7 @@ from app.web.limits import LARGER, MEGABYTE, BodyLimit, limit_of
 from app.web.problems import add_problem_handlers
 from app.web.validation import field_path
 from tests.loops import run
-from tests.shop import Shop
+from tests.shop import PARAMETERS, Shop
 
 JSON = {"Content-Type": "application/json"}
 
@@ -37,6 +37,13 @@ def refused(answer: httpx.Response, status: int) -> dict[str, Any]:
     assert isinstance(problem["errors"], list)
     assert "Traceback" not in answer.text
     return problem
+
+
+def test_what_is_wrong_by_what_is_stored_says_what_to_do_too(shop: Shop) -> None:
+    body = {"key": "seat", "name": "Seat", "machine": "nowhere", "parameters": PARAMETERS}
+    problem = refused(shop.admin.post("/api/v1/characteristics", json=body), 422)
+    assert [error["field"] for error in problem["errors"]] == ["machine"]
+    assert problem["what_to_do"]
 
 
 class TestBodies:
