@@ -18,7 +18,7 @@ PYTHON ?= $(shell for each in python3 python3.14 python3.13 python3.12 python3.1
 	$$each -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$each; break; }; done)
 
 run: $(VENV)/installed
-	@$(BIN)/inband demo $(ARGS)
+	@exec $(BIN)/inband demo $(ARGS)
 
 test: lint $(VENV)/browser
 	@$(BIN)/pytest -n auto --dist worksteal $(ARGS)
