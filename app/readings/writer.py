@@ -8,6 +8,7 @@ import asyncio
 import logging
 
 from app.errors import DatabaseAway, OutcomeUnknown
+from app.readings.ground import Stored, Verdict
 from app.readings.keeper import TELL_EVERY, Keeper
 from app.readings.loading import Book
 from app.readings.records import Entry
@@ -71,9 +72,15 @@ class Writer:
             except Exception:
                 log.exception("the writer met what nobody foresaw")
                 outcomes = [OutcomeUnknown()] * len(batch)
-            for (_entry, _reading, future), outcome in zip(batch, outcomes, strict=True):
+            answered: set[int] = set()
+            for (entry, _reading, future), outcome in zip(batch, outcomes, strict=True):
+                told = outcome
+                if isinstance(outcome, Verdict):
+                    if id(outcome) in answered:  # the same key, sent at the same time
+                        told = Stored(entry, outcome.sequence)
+                    answered.add(id(outcome))
                 if not future.done():  # the client may be gone; what it sent is stored all the same
-                    future.set_result(outcome)
+                    future.set_result(told)
             if self._keeper.untold and self._telling is None:
                 self._telling = asyncio.get_running_loop().call_later(TELL_EVERY, self._tell)
 

@@ -151,6 +151,21 @@ def test_what_cannot_be_taken_fails_alone_in_its_commit(shop: Shop) -> None:
     must_hold(dsn)
 
 
+def test_one_key_sent_by_many_at_once_is_new_once(shop: Shop) -> None:
+    reading = {"characteristic": shop.characteristic, "measured": 40.006, "key": "one"}
+    with locked(shop.server.database.dsn), ThreadPoolExecutor(9) as pool:
+        first = pool.submit(shop.read, 0.0)  # takes the writer, so that the others gather behind it
+        time.sleep(0.3)
+        sent = [pool.submit(shop.machine_client.post, "/api/v1/readings", json=reading) for _client in range(8)]
+        time.sleep(0.5)
+        release.set()
+        assert first.result()["sequence"] == 1
+        answers = [each.result() for each in sent]
+    assert sorted(answer.status_code for answer in answers) == [200] * 7 + [201]
+    assert all(answer.json() == answers[0].json() for answer in answers)
+    assert len(history(shop.server.database.dsn, shop.characteristic)) == 2
+
+
 def test_what_the_database_refuses_fails_alone_in_its_commit(run_server: RunServer) -> None:
     """Nothing that passes our own checks should be refused there; if it is, it is not its neighbours' fault."""
     with run_server() as server:
