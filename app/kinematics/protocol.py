@@ -193,7 +193,7 @@ def _diagrams(axis: Mapping[str, Any]) -> Section:
             diagram(axis, direction, height=tall),
             WIDE,
             TALL,
-            table,
+            lambda: table,
         )
         for name, direction in zip(names, LETTERS, strict=True)
     )

@@ -4,6 +4,7 @@ A report is a head and sections; a section holds sentences, facts, a table, and 
 same sections, so that page, PDF, XLSX, CSV and JSON cannot say different things.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -187,7 +188,8 @@ class Table:
 class Picture:
     """A chart as its page draws it: a Plotly figure for a light ground, `width` × `height` pixels; `says` it in words.
 
-    data: the same in numbers; its first column lies across, every other one that holds numbers is a course of the chart.
+    data: makes the same in numbers; its first column lies across, every other one that holds numbers is a course of the
+    chart. Only spreadsheets ask for them: they are tens of thousands of values.
     """
 
     key: str
@@ -196,7 +198,7 @@ class Picture:
     figure: dict[str, Any]
     width: int
     height: int
-    data: Table
+    data: Callable[[], Table]
 
     @property
     def beside(self) -> bool:

@@ -6,7 +6,7 @@ itself. Pages that show statistics ask `failing()`, which never waits.
 
 import logging
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -127,9 +127,17 @@ def begin() -> threading.Thread:
         return _begun
 
 
-def begin_later() -> threading.Timer:
-    """Start the proof once the server has settled, so that its first requests are not slowed down; to be cancelled at its end."""
-    timer = threading.Timer(SETTLED_AFTER, begin)
+def begin_later(then: Callable[[], object] = lambda: None) -> threading.Timer:
+    """Start the proof once the server has settled, so that its first requests are not slowed down; to be cancelled at its end.
+
+    then: what follows upon the proof, which has called everything that computes.
+    """
+
+    def prove() -> None:
+        begin().join()
+        then()
+
+    timer = threading.Timer(SETTLED_AFTER, prove)
     timer.daemon = True
     timer.start()
     return timer

@@ -1,5 +1,7 @@
 """The proof says so when something does not come out: the comparison, the command, the API, the page, the warning."""
 
+import asyncio
+import gc
 import json
 import subprocess
 import sys
@@ -11,12 +13,14 @@ import pytest
 from playwright.sync_api import Page, expect
 from starlette.requests import Request
 
+from app import main
 from app.proof import queries, wording
 from app.proof.cases import Case, Value, case_from, cases
 from app.proof.pages import proof_page
 from app.proof.queries import Proof, run
-from app.settings import HOUSE
+from app.settings import HOUSE, Settings
 from app.web.templates import environment
+from tests import loops
 from tests.conftest import Server
 from tests.shop import Person
 
@@ -109,6 +113,37 @@ class TestOncePerProcess:
         queries.begin().join()
         assert [result.case.name for result in queries.failing()] == ["10 with 0/-0.004"]
         assert "not as published: 10 with 0/-0.004" in caplog.text
+
+    def test_a_server_keeps_for_good_what_is_there_at_its_start_and_after_the_proof(
+        self, monkeypatch: pytest.MonkeyPatch, server: Server
+    ) -> None:
+        """The proof brings in the compiler: a hundred thousand objects that every full round of the collector would walk."""
+        kept: list[bool] = []
+        monkeypatch.setattr(main, "keep_for_good", lambda: kept.append(queries._proof is not None))
+        monkeypatch.setattr(queries, "cases", lambda: (l75(),))
+        monkeypatch.setattr(queries, "SETTLED_AFTER", 0.5)
+        app: Any = main.create_app(Settings(database_url=server.database.dsn))
+        while not hasattr(app, "router"):
+            app = app.app
+
+        async def served() -> None:
+            async with app.router.lifespan_context(app):
+                assert kept == [False]
+                for _moment in range(200):
+                    if len(kept) == 2:
+                        break
+                    await asyncio.sleep(0.05)
+
+        loops.run(served())
+        assert kept == [False, True]
+
+    def test_what_is_kept_is_walked_no_more(self) -> None:
+        chained: list[Any] = [[] for _one in range(10_000)]
+        try:
+            main.keep_for_good()
+            assert len(gc.get_objects()) < 5_000 < len(chained) < gc.get_freeze_count()
+        finally:
+            gc.unfreeze()
 
     def test_a_server_that_ends_soon_does_not_begin(self) -> None:
         timer = queries.begin_later()

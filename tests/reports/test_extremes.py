@@ -10,7 +10,22 @@ from hypothesis import strategies as st
 from openpyxl import load_workbook
 from pypdf import PdfReader
 
-from app.paper.content import Column, Fact, Format, Paper, Report, Section, Table, count, deviation, moment, words
+from app.characteristics.figures import histogram_counts, histogram_figure
+from app.core.parameters import Parameters
+from app.paper.content import (
+    Column,
+    Fact,
+    Format,
+    Paper,
+    Picture,
+    Report,
+    Section,
+    Table,
+    count,
+    deviation,
+    moment,
+    words,
+)
 from app.paper.files import file_of
 from app.paper.files.letters import MISSING
 from tests.conftest import Server
@@ -55,6 +70,31 @@ def test_a_period_in_which_nothing_was_measured(shop: Shop) -> None:
     pages, text = pdf(file(shop, "pdf", "from=2001-01-01T00:00:00Z&to=2001-12-31T00:00:00Z", "long-ago"))
     assert "No readings were measured" in text
     assert pages <= 3
+
+
+def test_only_a_spreadsheet_asks_for_the_numbers_of_the_charts() -> None:
+    """Of a million readings they are tens of thousands of values, and everybody waits while garbage is looked for among them."""
+    asked: list[str] = []
+
+    def table() -> Table:
+        asked.append("table")
+        return Table((Column("reading", "Reading"), Column("value", "Value")), ((count(1), deviation(0.001)),))
+
+    limits = Parameters(
+        target=40, tolerance_width=0.016, zero_range=0.001, averaging_limit=0.005, wear_limit=0.3, confidence_limit=1.0,
+        weighting_factor=2, factor=-1, tool_memory=1, average_memory=1,
+    )  # fmt: skip
+    figure = histogram_figure(histogram_counts([0.001, 0.003], limits), limits)
+    picture = Picture("histogram", "Histogram", "says", figure, 400, 300, table)
+    at = moment(datetime(2026, 11, 22, tzinfo=UTC))
+    sections = (Section("numbers", "Numbers", pictures=(picture,)),)
+    head = (Fact("x", "X", words("y")),)
+    made = Report("key", "name", "machine", "part", "period", "UTC", at, head, sections)
+    for form in (Format.PDF, Format.CSV):
+        file_of(made, form)
+    assert asked == []
+    file_of(made, Format.XLSX)
+    assert asked
 
 
 def test_one_reading(shop: Shop) -> None:

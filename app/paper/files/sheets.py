@@ -203,12 +203,13 @@ class _Writing:
     def picture(self, picture: Picture, zone: ZoneInfo) -> None:
         """The data of a chart as cells, and the chart that the spreadsheet draws of them."""
         sheet = self.sheet(picture.title)
-        self.table(sheet, 0, picture.data, zone, alone=True)
-        rows = picture.data.rows
+        data = picture.data()
+        self.table(sheet, 0, data, zone, alone=True)
+        rows = data.rows
         bars = picture.key == "histogram"
         chart = self.book.add_chart({"type": "column"} if bars else {"type": "scatter", "subtype": "straight"})
         assert isinstance(chart, Chart)
-        for at, column in list(enumerate(picture.data.columns))[1:]:
+        for at, column in list(enumerate(data.columns))[1:]:
             if not any(row[at].number is not None for row in rows):
                 continue
             dots = at == 1
@@ -220,13 +221,13 @@ class _Writing:
                 **({} if bars else {"line": {"none": True} if dots else {"width": 1}}),
                 **({} if bars else {"marker": {"type": "circle" if dots else "none", "size": 3}}),
             })  # fmt: skip
-        across, up = picture.data.columns[0], picture.data.columns[1]
+        across, up = data.columns[0], data.columns[1]
         chart.set_x_axis({"name": _titled(across.name, rows, 0), "label_position": "low"})
         chart.set_y_axis({"name": _titled(up.name, rows, 1)})
         if bars:
             chart.set_legend({"none": True})
         chart.set_size({"width": 980, "height": 480})
-        sheet.insert_chart(1, len(picture.data.columns) + 1, chart, {"description": picture.says})
+        sheet.insert_chart(1, len(data.columns) + 1, chart, {"description": picture.says})
 
 
 def _titled(name: str, rows: Sequence[Sequence[Value]], at: int) -> str:

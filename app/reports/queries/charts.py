@@ -1,5 +1,7 @@
 """The charts of the pages, for the period of the report."""
 
+from functools import partial
+
 from app.characteristics.chart import Chart, chart_of
 from app.characteristics.figures import zone_chart
 from app.paper.content import Column, Picture, Section, Table, count, deviation, moment, words
@@ -33,7 +35,7 @@ def chart(frame: Frame) -> Section | None:
     sentences = [_("Judged by the limits in force now; every band is equally tall, linear inside.")]
     if found.blocks:
         sentences.append(_("Of so many readings blocks are drawn with their extremes; none is thinned away."))
-    picture = Picture("zones", _("Zone chart"), says, figure, *WIDE, data=_data(found))
+    picture = Picture("zones", _("Zone chart"), says, figure, *WIDE, partial(_data, found))
     return Section("chart", _("Zone chart"), sentences=tuple(sentences), pictures=(picture,))
 
 

@@ -1,6 +1,7 @@
 """The control charts as their page shows them – by the frozen baseline, never by the readings of the report – and their signals."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from app.control.charts import View
 from app.control.figures import control_figure
 from app.control.signals_queries import SignalRow
 from app.control.tables import Baseline
+from app.control.view import only
 from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Floats
 from app.core.spc.rules import RuleName
@@ -243,18 +245,19 @@ def _picture(frame: Frame, baseline: Baseline, view: View) -> Picture:
     says = _("{chart} of readings {first} to {last}, with centre and limits of baseline {version}.").format(
         chart=name, first=int(view.first[0]), last=int(view.last[-1]), version=baseline.version
     )
-    return Picture(f"control-{view.kind.value}", name, says, figure, *WIDE, data=_data(view))
-
-
-def _data(view: View) -> Table:
-    """The points in numbers with the limits of each; the newest of very many."""
-    as_value = width if view.kind in SPREAD else deviation
     cut = max(0, len(view) - MOST_POINTS)
+    newest = only(view, np.arange(len(view)) >= cut)  # a million points are not kept for them
+    return Picture(f"control-{view.kind.value}", name, says, figure, *WIDE, partial(_data, newest, cut))
+
+
+def _data(view: View, cut: int) -> Table:
+    """The points in numbers with the limits of each, without the older ones that are cut."""
+    as_value = width if view.kind in SPREAD else deviation
 
     def column(values: float | Floats | None) -> list[Value]:
         if values is None or np.ndim(values) == 0:
-            return [as_value(values if values is None else float(values), 3)] * (len(view) - cut)
-        return [as_value(value, 3) for value in np.asarray(values)[cut:].tolist()]
+            return [as_value(values if values is None else float(values), 3)] * len(view)
+        return [as_value(value, 3) for value in np.asarray(values).tolist()]
 
     columns = (
         Column("reading", _("Reading")),
@@ -267,12 +270,12 @@ def _data(view: View) -> Table:
     signalled = np.zeros(len(view), np.bool_) if view.signals is None else view.signals.sides(NOWHERE) != NOWHERE
     yes, no = words(_("yes")), words("")
     rows = zip(
-        map(count, view.last[cut:].tolist()),
+        map(count, view.last.tolist()),
         column(view.points),
         column(view.lower),
         column(view.centre),
         column(view.upper),
-        [yes if signal else no for signal in signalled[cut:].tolist()],
+        [yes if signal else no for signal in signalled.tolist()],
         strict=True,
     )
     return Table(

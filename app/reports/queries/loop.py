@@ -1,5 +1,7 @@
 """What the loop has done: corrections, the tools they went into, and the wear behind them."""
 
+from functools import partial
+
 from sqlalchemy import func, select
 
 from app.offsets import wording as offsets
@@ -142,7 +144,7 @@ def wear(frame: Frame) -> Section | None:
         )
         drawn = chart_of(found)
         pictures = (
-            Picture("wear", _("Wear curve"), says, wear_figure(drawn, width=WIDE[0]), *WIDE, data=_data(drawn)),
+            Picture("wear", _("Wear curve"), says, wear_figure(drawn, width=WIDE[0]), *WIDE, partial(_data, drawn)),
         )
     return Section(
         "wear",

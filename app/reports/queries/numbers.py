@@ -1,5 +1,6 @@
 """The numbers of the readings, and how they are spread."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -74,7 +75,8 @@ def numbers(frame: Frame) -> Section:
         counts = counts_of(frame)
         figure = histogram_figure(counts, frame.parameters)
         says = _("Histogram of {n} deviations, with tolerance, R34 and R33.").format(n=sum(counts))
-        pictures = (Picture("histogram", _("Histogram"), says, figure, *HISTOGRAM, data=_bars(figure["data"][0])),)
+        data = partial(_bars, figure["data"][0])
+        pictures = (Picture("histogram", _("Histogram"), says, figure, *HISTOGRAM, data),)
     return Section("numbers", _("Numbers"), warnings=tuple(warnings), facts=tuple(facts), pictures=pictures)
 
 
