@@ -108,8 +108,8 @@ def confirm(ground: Ground, stream: StreamState, tool: ToolState, in_effect: int
         actor = f"reading {stream.entry.characteristic} {stream.sequence + 1}"
         correction.status, correction.applied_at, correction.applied_by = "applied", at, actor
         correction.offset_after, correction.changed = tool.offset, True
-        if last is not None and correction.number == in_effect:
-            last.applied_at = at
+        if (named := ground.named.get((tool.machine_id, correction.number))) is not None:
+            named.applied_at = at
         ground.steps.append(Step(tool.machine_id, tool.number, at, before, tool.offset, correction.number, actor))
         ground.touched_machines.add(tool.machine_id)
     tool.forget()

@@ -271,6 +271,22 @@ class TestApproval:
         assert (with_both["outstanding"], with_both["decided_deviation"]) == ([], 0.0)
         assert not any(reading["correction"] for reading in (with_second, still, late, with_both))
 
+    def test_one_confirmed_on_the_way_to_a_later_one_is_known_to_be(self, shop: Shop) -> None:
+        """In the batch that confirms it as in readings after it: by a clock that is behind, the second came before the first."""
+        other = f"{shop.characteristic}-o"
+        shop.add(other, average_memory=6)
+        shop.read(6.0)
+        behind = datetime.now(UTC).isoformat()
+        shop.correction(1, "approve", reason="Good")
+        shop.read(13.0, other)
+        shop.read(20.0, other)
+        named: list[dict[str, Any]] = [{"correction_in_effect": 3, "machined_at": behind}, {"correction_in_effect": 2}]
+        batch = [{"characteristic": other, "measured": 40.0} | each for each in named]
+        answer = shop.machine_client.post("/api/v1/readings/batch?decisions=true", json=batch)
+        assert answer.json()["items"][1]["outstanding"][:2] == [1, 3]
+        assert shop.correction(1)["status"] == "applied"
+        assert shop.read(0.0, other, correction_in_effect=2)["outstanding"][:2] == [1, 3]
+
 
 def test_order_of_arrival_decides_and_late_readings_count_what_came_before_them(shop: Shop) -> None:
     shop.read(6.0, measured_at="2026-11-21T08:00:00Z")
