@@ -167,9 +167,8 @@ def keep_for_good() -> None:
     """What has been made so far stays: the collector, for which everybody waits, need not walk it again.
 
     At the start, which halves the p99; and when the proof has brought in the compiler, where a full round would take a
-    tenth of a second at best, and half a second while pages compute.
+    tenth of a second at best, and half a second while pages compute. So nothing is collected before: that is such a round.
     """
-    gc.collect()
     gc.freeze()
 
 
@@ -194,6 +193,7 @@ def create_app(settings: Settings | None = None) -> ASGIApp:
         reporter.start()
         compiling = asyncio.get_running_loop().run_in_executor(None, compile_now)
         proving = proofs.begin_later(keep_for_good)
+        gc.collect()
         keep_for_good()
         yield
         proving.cancel()
