@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from typing import Any
 
 import numpy as np
 import psycopg
@@ -101,6 +102,27 @@ def test_excluded_readings_are_marked_and_left_out_when_counted(server: Server, 
         history = queries.history_of(session, characteristic, Window(70, 80, COUNT))
     assert history["sequence"][history.excluded].tolist() == [78]
     assert history.counted["sequence"].tolist() == [70, 71, 72, 73, 74, 75, 76, 77, 79, 80]
+
+
+def test_no_more_than_a_block_is_taken_over_at_once(
+    server: Server, filled: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While the driver copies its rows nothing else in the process goes on: no reading is let in."""
+    fetched: list[int] = []
+    at_once = psycopg.Cursor.fetchall
+
+    def fetchall(cursor: psycopg.Cursor[Any]) -> list[Any]:
+        rows = at_once(cursor)
+        fetched.append(sum(len(value) for row in rows for value in row if isinstance(value, bytes)))
+        return rows
+
+    monkeypatch.setattr(psycopg.Cursor, "fetchall", fetchall)
+    with server.database.begin() as session:
+        characteristic = characteristics.characteristic_named(session, filled).characteristic
+        history = queries.history_of(session, characteristic, Window(1, COUNT, COUNT), COLUMNS)
+    assert len(history) == COUNT
+    assert fetched, "other rows are fetched all at once: the measure is taken"
+    assert max(fetched) <= BLOCK * 8
 
 
 def test_a_period_takes_what_was_measured_in_it(server: Server, filled: str) -> None:

@@ -162,9 +162,10 @@ def _columns(
     rows: list[Any] = []
     if window.count:
         # As bytes, not as the text that bytes are written in: half of what travels, and nothing to decode.
-        cursor = session.connection().connection.cursor(binary=True)
+        cursor: Any = session.connection().connection.cursor(binary=True)
         cursor.execute(query, bounds)
-        rows = sorted(cursor.fetchall(), key=lambda row: row[-1])
+        # One by one: fetched at once, they are a hundred megabytes that are copied while nothing else in the process goes on.
+        rows = sorted(cursor, key=lambda row: row[-1])
         cursor.close()
     found: dict[str, NDArray[Any]] = {}
     for at, name in enumerate(names):
