@@ -43,8 +43,8 @@ guard AS MATERIALIZED (SELECT 1 / (count(*) = json_array_length($1))::int FROM c
 """
 GUARD = f"WITH {_GUARD} SELECT * FROM guard"  # noqa: S608 - made of constants
 # One statement for all that is needed, as one JSON document, because each statement costs more than what it reads here.
-# Corrections of a tool: the open ones, and those applied since the oldest correction or time that a reading names; `named`
-# are the corrections that readings name as the last ones in effect.
+# Corrections of a tool: the open ones, and those applied since the oldest correction or time that a reading names, or with it if
+# they had waited for a person; `named` are the corrections that readings name as the last ones in effect.
 # The row comparison with the keys can only be had from their own index; plain equalities the planner may also answer by
 # walking the primary key through every reading of the characteristic.
 LOAD = """
@@ -73,9 +73,9 @@ SELECT json_build_object(
                     UNION ALL
                     SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
                     WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
-                        AND applied_at > least(
+                        AND (applied_at, decided_at IS NOT NULL) >= (least(
                             w.since, (SELECT min(n.applied_at) FROM named n WHERE n.machine_id = t.machine_id)
-                        ) AND (number <= w.number OR w.number IS NULL)
+                        ), true) AND (number <= w.number OR w.number IS NULL)
                 ) c
             ) END))
         FROM json_to_recordset((SELECT d -> 'streams' FROM doc))
