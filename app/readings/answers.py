@@ -157,7 +157,11 @@ class ReadingAnswer(BaseModel):
         float, Field(description="What it would have been with the outstanding corrections; decided by this.")
     ]
     outstanding: Annotated[
-        list[int], Field(description="Numbers of the corrections that were not in effect yet when the part was cut.")
+        list[int],
+        Field(
+            description="Numbers of the corrections that were not in effect yet when the part was cut; of more than a "
+            "hundred the first. All of them count."
+        ),
     ]
     zone: Annotated[str, Field(description="zero, average, full, oversize, undersize, wear or probe_fault.")]
     results: Annotated[

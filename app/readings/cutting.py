@@ -14,18 +14,22 @@ from typing import NamedTuple, overload
 from app.core.compensation import DECIMALS
 from app.offsets.tables import OUTSTANDING
 from app.readings.ground import Cut, Ground, IssuedCorrection, Named, Step, StreamState, ToolState
+from app.readings.records import MOST_OUTSTANDING
 from app.readings.schemas import ReadingIn
 
 MOST_CUTS = 8  # that a tool keeps; each is as long as its open corrections are many
 
 
 class Firsts(Sequence[int]):
-    """The first numbers of a list that goes on growing: a batch's readings share one list of outstanding corrections."""
+    """The first numbers of a list that goes on growing: a batch's readings share one list of outstanding corrections.
+
+    At most MOST_OUTSTANDING of them, because each reading is stored with its own.
+    """
 
     __slots__ = ("_count", "_numbers")
 
     def __init__(self, numbers: list[int]) -> None:
-        self._numbers, self._count = numbers, len(numbers)
+        self._numbers, self._count = numbers, min(len(numbers), MOST_OUTSTANDING)
 
     def __len__(self) -> int:
         return self._count
@@ -56,7 +60,7 @@ class Circumstance(NamedTuple):
     """What a part was cut with.
 
     previous_tool: with an offset from before a tool change or an edit by hand. outstanding: numbers of the corrections it
-    was cut without; amounts: theirs, mm of offset, good until the next reading is judged. compensated: the sum (mm) of
+    was cut without, of very many the first; amounts: of all of them, mm of offset, good until the next reading is judged. compensated: the sum (mm) of
     those of this tool's life that it was cut with, None with a previous tool.
     """
 

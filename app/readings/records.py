@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import NamedTuple
 
+MOST_OUTSTANDING = 100  # numbers stored with a reading; a machine that never confirms leaves ever more of them open
+
 
 class Entry(NamedTuple):
     """Where a characteristic is kept."""

@@ -7,7 +7,7 @@ from app.core.compensation import Code, average_of
 from app.core.parameters import Parameters
 from app.core.probing import TouchError
 from app.core.zones import Zone, nanometres, within_tolerance
-from app.readings.records import Record
+from app.readings.records import MOST_OUTSTANDING, Record
 from app.web.i18n import _
 
 NAMED_AT_MOST = 3
@@ -184,6 +184,8 @@ def _note(code: str, record: Record, parameters: Parameters) -> str:
 def _listed(numbers: Sequence[int]) -> str:
     """The numbers as a sentence lists them; of many only the first, for the reading itself lists them all."""
     named = ", ".join(map(str, numbers[:NAMED_AT_MOST]))
+    if len(numbers) >= MOST_OUTSTANDING:
+        return _("%(numbers)s and many more") % {"numbers": named}
     more = len(numbers) - NAMED_AT_MOST
     return _("%(numbers)s and %(n)s more") % {"numbers": named, "n": more} if more > 0 else named
 

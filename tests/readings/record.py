@@ -10,6 +10,7 @@ import pytest
 from app.core.compensation import Decision, State, decide, deviation_of, outstanding_effect
 from app.core.parameters import Parameters
 from app.core.zones import Zone
+from app.readings.records import MOST_OUTSTANDING
 from app.readings.statements import BASE_LEVEL, FAN, TOP_LEVEL
 
 
@@ -170,7 +171,7 @@ def replay(parameters: Parameters, stored: Iterable[dict[str, Any]]) -> list[tup
         average = decision.average_after
         if decision.amount is not None:
             issued[reading["correction"]] = decision.amount
-        decided.append((reading | {"expected_outstanding": outstanding}, decision))
+        decided.append((reading | {"expected_outstanding": outstanding[:MOST_OUTSTANDING]}, decision))
     return decided
 
 

@@ -12,10 +12,11 @@ from app.readings.cutting import Firsts
 from app.readings.ground import AverageState, Ground, IssuedCorrection, Named, StreamState, ToolState, Verdict
 from app.readings.judge import judge
 from app.readings.quiet import QuietReadings
-from app.readings.records import Entry, Record
+from app.readings.records import MOST_OUTSTANDING, Entry, Record
 from app.readings.rows import HEADER, TRAILER, array_of_int4
 from app.readings.schemas import ReadingIn
 from app.readings.transaction import _decide
+from app.readings.wording import reason
 from tests.shop import PARAMETERS
 
 NOW = datetime(2026, 11, 22, 6, tzinfo=UTC)
@@ -102,6 +103,19 @@ def test_what_is_kept_of_a_tool_changes_no_decision(seed: int) -> None:
     kept, fresh = records(forgetting=False), records(forgetting=True)
     assert kept == fresh
     assert any(len(record.outstanding or ()) > 3 for record in kept)
+
+
+def test_of_very_many_the_first_are_stored_and_all_count() -> None:
+    """Where nobody confirms, the numbers of a year of corrections would be stored with each reading."""
+    ground = ground_of()
+    tool = ground.tools[1, 3]
+    tool.corrections = [IssuedCorrection(1, number, 3, -0.00001, "pending") for number in range(1, 1001)]
+    verdict = judge(ground, ENTRY, ReadingIn("seat", measured=40.013), NOW)
+    assert isinstance(verdict, Verdict)
+    record = verdict.record()
+    assert list(record.outstanding or ()) == list(range(1, MOST_OUTSTANDING + 1))
+    assert (record.deviation, record.decided) == (0.013, 0.003)
+    assert "before correction 1, 2, 3 and many more took effect" in reason(record, verdict.parameters)["text"]
 
 
 def test_readings_share_the_numbers_and_each_keeps_its_own_count() -> None:
