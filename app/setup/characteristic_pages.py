@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from typing import Any
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 from fastapi import APIRouter, Request, Response
 from sqlalchemy.orm import Session
@@ -15,6 +15,7 @@ from app.core.parameters import BY_NAME
 from app.core.plausibility import suggested_jump
 from app.errors import Conflict, InbandError, Invalid
 from app.machines import queries as machines
+from app.machines.tables import Machine
 from app.programs import queries as programs
 from app.readings import queries as readings
 from app.setup import parameter_form
@@ -25,22 +26,36 @@ from app.whatif import queries as what_if
 from app.whatif import wording
 
 router = APIRouter()
+ON_PAGE = 200
 LOOKED_BACK = 100  # readings from which a plausible jump is suggested
 
 
 @router.get("/setup/characteristics")
-def characteristics_page(request: Request, session: SessionDep, caller: Viewer, machine: str = "") -> Response:
+def characteristics_page(
+    request: Request, session: SessionDep, caller: Viewer, machine: str = "", after: str = ""
+) -> Response:
     chosen = machines.find_machine(session, machine)
+    rows = queries.characteristics(session, machine_id=chosen.id if chosen else None, after=after, limit=ON_PAGE + 1)
+    more = rows[ON_PAGE - 1].characteristic.key if len(rows) > ON_PAGE else None
     return setup_page(
         request,
         "characteristics.html",
         caller,
         "characteristics",
-        rows=queries.characteristics(session, machine_id=chosen.id if chosen else None, limit=100_000),
+        rows=rows[:ON_PAGE],
+        older=_page_of(chosen, more) if more else None,
+        newest=_page_of(chosen, None) if after else None,
         machines=machines.machines(session, limit=100_000),
         machine=chosen,
         mode_words=lambda mode: parameter_form.choice("mode", mode.value),
     )
+
+
+def _page_of(machine: Machine | None, after: str | None) -> str:
+    query = urlencode(
+        {name: value for name, value in (("machine", machine and machine.key), ("after", after)) if value}
+    )
+    return "/setup/characteristics" + (f"?{query}" if query else "")
 
 
 @router.get("/setup/characteristics/new")

@@ -180,6 +180,18 @@ class TestCharacteristics:
         page = self.new(engineer, shop, "No Key", 422, machine="", zero_range="").text
         assert len(errors(page)) == 3
 
+    def test_a_list_of_very_many_goes_on_on_another_page(self, engineer: Browser, shop: Shop) -> None:
+        keys = [f"{shop.machine}-{number:03}" for number in range(201)]
+        for key in keys:
+            shop.add(key, tool_memory=4)
+        first = engineer.get(f"/setup/characteristics?machine={shop.machine}")
+        (more,) = re.findall(r'href="([^"]+)" rel="next"', first)
+        second = engineer.get(unescape(more))
+        shown = [re.findall(r'href="/setup/characteristics/([^"?]+)"><strong>', page) for page in (first, second)]
+        assert sorted(shown[0] + shown[1]) == sorted([shop.characteristic, *keys])
+        assert (len(shown[0]), len(shown[1])) == (200, 2)
+        assert f'href="/setup/characteristics?machine={shop.machine}" rel="prev"' in second
+
     def test_a_factor_of_ones_own(self, engineer: Browser, shop: Shop) -> None:
         self.new(engineer, shop, "own-factor", factor="other", factor_other="0,25")
         assert shop.call("GET", "/characteristics/own-factor")["parameters"]["factor"] == 0.25
