@@ -47,6 +47,7 @@ PORT = "5432"  # only names the socket file
 PATIENCE = 600.0  # seconds: recovery after a crash may take its time
 PROC = Path("/proc")
 NO_PROCESS = 2**31 - 2  # a process number that no system gives out
+MOST_LOG = 10 * 2**20  # bytes
 ROOM = 200 * 2**20  # bytes a new cluster wants before it is begun
 
 ENVIRONMENT = {"PATH": PATH, "LC_ALL": "C", "TZ": "UTC"}
@@ -106,12 +107,23 @@ class EmbeddedServer:
 
     def _keep_alive(self) -> None:
         while not self._ended.wait(LOOK_EVERY):
+            with contextlib.suppress(OSError):  # a full disk: another look may do
+                self._trim_log()
             if self.pid is None:
                 log.error("PostgreSQL has ended by itself; starting it again. Its own words: %s", self.log)
                 try:
                     self.start()
                 except EmbeddedServerError as error:
                     log.error("%s", error)  # noqa: TRY400 - the message says it all; the next look tries again
+
+    def _trim_log(self) -> None:
+        """Begin a long log anew and keep the old one beside it, also while the server runs: it may do so for years."""
+        if not self.log.exists() or self.log.stat().st_size <= MOST_LOG:
+            return
+        older = os.open(self.log.with_suffix(".log.1"), os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+        with self.log.open("rb") as said, os.fdopen(older, "wb") as kept:
+            shutil.copyfileobj(said, kept)
+        os.truncate(self.log, 0)  # the server appends, so it goes on from the beginning
 
     @property
     def url(self) -> str:
@@ -280,8 +292,7 @@ class EmbeddedServer:
         if self.cluster.stat().st_uid != owner.pw_uid:  # a backup that root copied back
             give(self.cluster, owner, recursive=True)
         give(self._socket_dir(), owner)
-        if self.log.exists() and self.log.stat().st_size > 10 * 2**20:
-            self.log.replace(self.log.with_suffix(".log.1"))
+        self._trim_log()
         self._log_begins = self.log.stat().st_size if self.log.exists() else 0
         command = [*self._as(owner), str(binary("postgres")), "-D", str(self.cluster)]
         command += [f"--{key}={value}" for key, value in settings.items()]

@@ -208,6 +208,27 @@ def test_a_server_that_dies_while_it_is_used_comes_back(folder: Path, monkeypatc
     assert server.pid is None, "the last one out stops it all the same"
 
 
+def test_the_log_of_a_server_that_runs_on_does_not_outgrow_the_disk(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(embedded, "LOOK_EVERY", 0.02)
+    monkeypatch.setattr(embedded, "MOST_LOG", 20_000)
+    server = EmbeddedServer(folder, {"fsync": "off"})
+    older = folder / "postgres.log.1"
+    with server as url, psycopg.connect(url, autocommit=True) as connection:
+        for _error in range(5000):  # half a kilobyte each
+            with pytest.raises(psycopg.errors.DivisionByZero):
+                connection.execute(f"SELECT 1/0 -- {'x' * 500}")
+            if older.exists() and server.log.stat().st_size <= 20_000:
+                break
+        with pytest.raises(psycopg.errors.UndefinedTable):
+            connection.execute("SELECT * FROM said_afterwards")
+        assert "said_afterwards" in server.log.read_text()
+        assert "\0" not in server.log.read_text(), "it goes on from the beginning"
+        assert "ready to accept connections" in older.read_text()
+        assert older.stat().st_mode & 0o077 == 0
+
+
 def test_a_pid_file_whose_number_now_belongs_to_another_program_is_stale(folder: Path) -> None:
     with EmbeddedServer(folder / "data"):
         pass
