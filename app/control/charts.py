@@ -32,7 +32,7 @@ from app.statistics import queries as statistics
 from app.statistics.queries import Window
 from app.web.i18n import _
 
-__all__ = ["Marked", "View", "kinds", "marked_by", "unjudged", "view"]
+__all__ = ["Marked", "View", "kinds", "marked_by", "only", "unjudged", "view"]
 NEIGHBOURS = (
     100  # points before the window that are looked at too: runs of points go on, and the one before may be excluded
 )

@@ -9,11 +9,10 @@ import numpy as np
 from app.control import charts, signals_queries, wording
 from app.control import queries as controls
 from app.control import signals_wording as signals
-from app.control.charts import View
+from app.control.charts import View, only
 from app.control.figures import control_figure
 from app.control.signals_queries import SignalRow
 from app.control.tables import Baseline
-from app.control.view import only
 from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Floats
 from app.core.spc.rules import RuleName
