@@ -11,7 +11,7 @@ from typing import Any
 
 from psycopg import AsyncConnection
 from psycopg.errors import error_from_result
-from psycopg.pq import ExecStatus
+from psycopg.pq import ExecStatus, TransactionStatus
 from psycopg.pq.abc import PGresult
 
 Step = tuple[str, *tuple[str, ...]]
@@ -32,6 +32,11 @@ class Pipeline:
     def closed(self) -> bool:
         """Whether the connection is of no use any more."""
         return self.connection.closed
+
+    @property
+    def begun(self) -> bool:
+        """Whether a transaction is open, or has failed and waits for its ROLLBACK."""
+        return self.connection.pgconn.transaction_status != TransactionStatus.IDLE
 
     def look(self) -> None:
         """See whether the server has ended the idle connection meanwhile, which it says by itself.

@@ -132,7 +132,7 @@ class Keeper:
 
     async def _roll_back(self) -> None:
         self._ground = Ground()
-        if self._pipeline is not None and not self._pipeline.closed:
+        if self._pipeline is not None and not self._pipeline.closed and self._pipeline.begun:
             try:
                 await self._pipeline.run(ROLLBACK)
             except psycopg.Error:
