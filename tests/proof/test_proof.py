@@ -5,6 +5,7 @@ import gc
 import json
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -120,8 +121,9 @@ class TestOncePerProcess:
         """The proof brings in the compiler: a hundred thousand objects that every full round of the collector would walk."""
         kept: list[bool] = []
         monkeypatch.setattr(main, "keep_for_good", lambda: kept.append(queries._proof is not None))
-        monkeypatch.setattr(queries, "cases", lambda: (l75(),))
-        monkeypatch.setattr(queries, "SETTLED_AFTER", 0.5)
+        started = threading.Event()
+        monkeypatch.setattr(queries, "cases", lambda: (l75(),) if started.wait(60) else ())
+        monkeypatch.setattr(queries, "SETTLED_AFTER", 0.1)
         app: Any = main.create_app(Settings(database_url=server.database.dsn))
         while not hasattr(app, "router"):
             app = app.app
@@ -129,6 +131,7 @@ class TestOncePerProcess:
         async def served() -> None:
             async with app.router.lifespan_context(app):
                 assert kept == [False]
+                started.set()
                 for _moment in range(200):
                     if len(kept) == 2:
                         break

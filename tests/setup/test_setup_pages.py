@@ -180,7 +180,8 @@ class TestCharacteristics:
         page = self.new(engineer, shop, "No Key", 422, machine="", zero_range="").text
         assert len(errors(page)) == 3
 
-    def test_a_list_of_very_many_goes_on_on_another_page(self, engineer: Browser, shop: Shop) -> None:
+    def test_a_list_of_very_many_goes_on_on_another_page(self, engineer: Browser, server: Any) -> None:
+        shop = Shop(server)
         keys = [f"{shop.machine}-{number:03}" for number in range(201)]
         for key in keys:
             shop.add(key, tool_memory=4)
