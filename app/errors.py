@@ -20,6 +20,8 @@ that a machinist understands. The web layer makes RFC 9457 problem documents or 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
+from app.web.i18n import _
+
 
 class FieldError(NamedTuple):
     """What is wrong with one field, e.g. ``parameters.averaging_limit`` or ``[17].measured``."""
@@ -134,6 +136,11 @@ class Invalid(InbandError):
     status = 422
     kind = "invalid"
     title = "The request cannot be used as it is"
+
+    def as_problem(self) -> dict[str, Any]:
+        """With the usual advice where it has none of its own."""
+        usual = {} if self.what_to_do else {"what_to_do": _("Correct the named fields and send it again.")}
+        return super().as_problem() | usual
 
 
 class TooManyRequests(InbandError):

@@ -58,8 +58,6 @@ def local_path(path: str | None, default: str = "/") -> str:
 
 def answer(request: Request, error: InbandError) -> Response:
     """The answer for an error of ours, as a document or as a page."""
-    if isinstance(error, Invalid) and error.what_to_do is None:
-        error.what_to_do = _("Correct the named fields and send it again.")
     if is_for_programs(request.url.path):
         return JSONResponse(error.as_problem(), error.status, error.headers, media_type=PROBLEM_JSON)
     if isinstance(error, NotSignedIn):
@@ -86,7 +84,7 @@ async def _validation(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     errors = field_errors(error.errors())
     detail = "; ".join(f"{field}: {message}" for field, message in errors[:3])
-    return answer(request, Invalid(detail, _("Correct the named fields and send it again."), errors=errors))
+    return answer(request, Invalid(detail, errors=errors))
 
 
 async def _http(request: Request, error: Exception) -> Response:
