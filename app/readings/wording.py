@@ -182,11 +182,11 @@ def _note(code: str, record: Record, parameters: Parameters) -> str:
 
 
 def _listed(numbers: Sequence[int]) -> str:
-    """The numbers as a sentence lists them; of many only the first, for the reading itself lists them all."""
+    """The numbers as a sentence lists them; of many only the first, for the reading itself lists more of them."""
     named = ", ".join(map(str, numbers[:NAMED_AT_MOST]))
-    if len(numbers) >= MOST_OUTSTANDING:
-        return _("%(numbers)s and many more") % {"numbers": named}
     more = len(numbers) - NAMED_AT_MOST
+    if len(numbers) >= MOST_OUTSTANDING:
+        return _("%(numbers)s and at least %(n)s more") % {"numbers": named, "n": more}
     return _("%(numbers)s and %(n)s more") % {"numbers": named, "n": more} if more > 0 else named
 
 
