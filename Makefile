@@ -1,6 +1,6 @@
 # make run     the demonstration plant at http://127.0.0.1:8000; ARGS="--past 42" for six weeks behind it
 # make test    lint, then every test on a real PostgreSQL and in a real browser; ARGS="-k name" for some of them
-# make lint    style, types and the walls between the parts of the house
+# make lint    style, types, lengths, and the walls between the rooms
 # make bench   the benchmarks; each prints ratios
 # make messages  collect what can be translated into frontend/locale/inband.pot
 # make clean   remove what make has made; no data
@@ -27,10 +27,11 @@ lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check --quiet
 	@$(BIN)/ruff format --check --quiet
 	@$(BIN)/mypy --no-error-summary
+	@$(BIN)/python -m tests.style
 	@$(BIN)/lint-imports > $(VENV)/lint-imports.txt || { cat $(VENV)/lint-imports.txt; exit 1; }
 
 bench: $(VENV)/installed-dev
-	@for each in single batch chart memory spc history replay; do $(BIN)/python -m bench.$$each; done
+	@for each in cli single batch chart memory spc history replay; do $(BIN)/python -m bench.$$each; done
 
 messages: $(VENV)/installed
 	@$(BIN)/pybabel -q extract -F pyproject.toml --project Inband -o frontend/locale/inband.pot .

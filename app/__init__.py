@@ -1,47 +1,58 @@
 """Inband: probe readings in, decisions out, tool-offset corrections back to the machine.
 
-The map of the house. Whoever knows the shop floor knows where to look:
+The map of the house, from the top floor down. A room knows only rooms of the floors below it, and of its own floor those that
+stand lower in this list; import-linter holds that. Inside a room: tables (columns), queries (SELECT only), actions (load,
+decide in core, save), schemas (JSON), api and pages (routes), wording (sentences), figures (pure, charts as dicts). Rooms meet
+only through each other's queries and actions. frontend/ and migrations/ lie beside this folder.
 
-    core             the decisions themselves, pure: parameters R10-R37, zones, running average, decide()
-    machines         machine tools, their keys, the lock that serialises what happens on one machine
-    characteristics  what is measured: nominal, limits, and the versions of the R parameters
-    readings         the door: probe readings come in, are decided, stored and answered together
-    offsets          tool memory (R10), average memory (R11), corrections and their life
-    alarms           what needs a person, and what follows when one acknowledges it
-    calibration      empirical values: against a gauge, in a ring, by pairs; what is due
-    plant            the first page: every machine and characteristic at a glance
-    overview         every characteristic ranked by what needs attention, with the reasons
-    statistics       what the readings say together: counts, spread, charts of ten million points
-    wear             true wear behind the corrections, how long an edge will do, and loops that hunt
-    control          control charts by frozen baselines, run rules and their signals
-    whatif           stored readings replayed with other settings, maps of them, proposals of changes
-    reports          a characteristic and a period as page, PDF, spreadsheet; many at once in the background
-    capability       Cp to Ppk with intervals, normality, behaviour in time, the tool without its corrections
-    gauges           gauge studies: Cg, R&R, linearity, bias, and what they say about R33
-    forms            form and position from touches: roundness, flatness, position, with uncertainty
-    zeros            work zero and size from an edge finder's touches, and how a fixture shifts
-    alignments       the set-up error of a part: frame, residuals, what to enter
-    kinematics       rotary axes: runs of the preset compensation, drift, back-ups of the kinematics
-    proof            published examples run through the live engine: what it says, what was published
-    setup            the pages where all of that is set up
-    people           who may do what: sign-in, sessions, roles, personal keys
-    audit            who changed what, from what, to what, and why
-    programs         program text of the controls: read, written, corrections fetched as text
-    formats          files in and out
-    paper            what a report says as values, and how it is written: picture, PDF, spreadsheet, CSV, JSON
-    demo             a simulated plant that talks to the public API like real machines do
-
-    web              the browser kit: templates, problem pages, live events, translation
-    db               PostgreSQL: engine, column types, migrations, the embedded server
-    cli              the command `inband`
-    rounds.py        what has to be looked after although nobody asks, once a minute
-    settings.py      every setting with its meaning; unsafe values are refused
-    errors.py        every error that people or machines may see
+    cli              the command `inband`, and the demonstration plant that talks to the public API like real machines
     main.py          create_app(): the wiring
 
-A part holds at most: tables (columns), queries (SELECT only), actions (load, decide in core, save),
-schemas (JSON), api and pages (routes), figures (pure, charts as dicts). Parts meet only through each
-other's queries and actions. frontend/ and migrations/ lie beside this folder.
+    views            pages that compose several rooms
+        reports          a characteristic and a period as page, PDF, spreadsheet; many at once in the background
+        overview         every characteristic ranked by what needs attention, with the reasons
+        approvals        corrections that wait for a person
+        plant            the first page: every machine and characteristic at a glance
+        characteristic   one characteristic: zone chart, decisions, capability
+        set_up           machines, characteristics, people, programs, the record, background jobs
+    quality          judgement of processes and of measuring systems
+        what_if          stored readings replayed with other settings, maps of them, proposals of changes
+        gauge_studies    Cg, R&R, linearity, bias, and their advice for R33
+        capability       Cp to Ppk with intervals, normality, behaviour in time, the process without its corrections
+        control_charts   control charts by frozen baselines, run rules and their signals
+        wear             true wear behind the corrections, remaining tool life, loops that hunt
+        proof            published examples run through the live engine, beside the published results
+    geometry         results of probed points
+        alignment        the set-up error of a part: frame, residuals, values to enter
+        work_zero        work zero and size from an edge finder's points, and how a fixture shifts
+        geometric_form   form and position: roundness, flatness, position, with uncertainty
+        rotary_axes      preset compensation of rotary axes, drift, back-ups of the kinematics
+    loop             the compensation loop
+        summaries        counts, standard deviations, charts of ten million points
+        calibration      empirical values: against a gauge, in a ring, by pairs; calibrations that are due
+        faults           faults that a machine reports about itself and its probe
+        alarm_response   the list of alarms, acknowledgement and what follows from it
+        tools            tool memory (R10), average memory (R11), corrections and their life
+        programs         program text of the controls: read, written
+        alarms           kinds of alarms, raised once
+        readings         the door: probe readings come in, are decided, stored and answered together
+        characteristics  nominal, limits, and the versions of the R parameters
+        warnings         implausible values that a person acknowledges before a machine gets them
+        machines         machine tools, their keys, the lock that orders everything that happens on one machine
+        tables           the tables of the loop: one schema under one lock
+    access           people, sign-in, sessions, roles, keys, the record of changes
+
+    web              the browser kit: templates, problem pages, live events
+    files            file formats in and out; reports as picture, PDF, spreadsheet, CSV, JSON
+    jobs             periodic background jobs, once a minute: run, retried, and those that fail
+    db               PostgreSQL: engine, column types, migrations, the embedded server
+    language         translation, and the writing of numbers, units and times
+    core             the decisions themselves, pure: parameters R10-R37, zones, running average, statistics, geometry
+
+    errors.py        every error that people or machines may see
+    logs.py          the server's log
+    memory.py        free memory given back to the system
+    settings.py      every setting with its meaning; unsafe values are refused
 """
 
 __version__ = "0.1.0"

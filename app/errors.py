@@ -11,7 +11,7 @@
     ├── TooManyRequests    429  with Retry-After
     ├── DatabaseAway       503  with Retry-After; nothing was stored
     ├── OutcomeUnknown     503  the database went away during the commit; send again with the same key
-    └── Unexpected         500  an error nobody foresaw; told by the number under which it was logged
+    └── Unexpected         500  an unhandled error; its trace is in the log under the id of the request
 
 Each carries what is wrong (`detail`), where (`errors`) and what to do about it (`what_to_do`), in words
 that a machinist understands. The web layer makes RFC 9457 problem documents or problem pages of them.
@@ -20,11 +20,12 @@ that a machinist understands. The web layer makes RFC 9457 problem documents or 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from app.web.i18n import _
+from app.language.i18n import _
+from app.logs import REQUEST
 
 
 class FieldError(NamedTuple):
-    """What is wrong with one field, e.g. ``parameters.averaging_limit`` or ``[17].measured``."""
+    """Error of one field, e.g. ``parameters.averaging_limit`` or ``[17].measured``."""
 
     field: str
     message: str
@@ -59,7 +60,7 @@ class InbandError(Exception):
         return {} if self.retry_after is None else {"Retry-After": str(self.retry_after)}
 
     def as_problem(self) -> dict[str, Any]:
-        """The RFC 9457 problem document."""
+        """The RFC 9457 problem document, with the id of the request that is being answered."""
         problem: dict[str, Any] = {
             "type": f"urn:inband:problem:{self.kind}",
             "title": self.title,
@@ -69,6 +70,8 @@ class InbandError(Exception):
         }
         if self.what_to_do:
             problem["what_to_do"] = self.what_to_do
+        if (request := REQUEST.get()) is not None:
+            problem["request_id"] = request
         return problem | self.more
 
 
@@ -173,16 +176,17 @@ class OutcomeUnknown(InbandError):
     kind = "outcome-unknown"
     title = "The database went away during the commit"
 
-    def __init__(self) -> None:
+    def __init__(self, what_to_do: str | None = None) -> None:
         super().__init__(
             "The database went away while this was being committed, and has not come back to say whether it was.",
-            "Send it again with the same key: if it was stored you get its answer, if not it is stored now.",
+            what_to_do
+            or "Send it again with the same key: if it was stored you get its answer, if not it is stored now.",
             retry_after=2,
         )
 
 
 class Unexpected(InbandError):
-    """An error that nobody foresaw. Its trace is in the log, under `incident`."""
+    """An unhandled error. Its trace is in the log, under the id of the request."""
 
     kind = "unexpected"
     title = "Something went wrong on the server"

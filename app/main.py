@@ -2,91 +2,105 @@
 
 import asyncio
 import gc
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
 
 from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
 
-from app.alarms import api as alarms
-from app.alarms import pages as alarm_pages
-from app.alignments import api as alignments
-from app.alignments import pages as alignment_pages
-from app.alignments import pictures_api as alignment_pictures
-from app.audit import api as audit
-from app.calibration import api as calibration
-from app.calibration import pages as calibration_pages
-from app.calibration.overdue import raise_overdue
-from app.capability import api as capability
-from app.capability import pages as capability_pages
-from app.characteristics import api as characteristics
-from app.characteristics import figures_api
-from app.characteristics import pages as characteristic_pages
-from app.control import api as control
-from app.control import pages as control_pages
-from app.control import rules_api, rules_pages, signals_api, signals_pages
-from app.control.signals_actions import SignalRounds
+from app.access import api as people
+from app.access import events_api, keys_api
+from app.access import pages as sign_in_pages
+from app.access.audit import api as audit
+from app.access.deps import recognise
+from app.access.keys import KeyRing
+from app.access.queries import still_granted
+from app.db.connections import Connections
 from app.db.engine import Database
-from app.forms import api as forms
-from app.forms import pages as form_pages
-from app.gauges import api as gauges
-from app.gauges import pages as gauge_pages
-from app.kinematics import api as kinematics
-from app.kinematics import new_pages as new_run_pages
-from app.kinematics import pages as kinematics_pages
-from app.kinematics import protocol_api as kinematics_protocol
-from app.machines import api as machines
-from app.offsets import api as offsets
-from app.offsets import chores as offset_chores
-from app.offsets import edge_pages, edges_api, queue_pages, text_api, text_pages
-from app.offsets import pages as offset_pages
-from app.overview import api as overview
-from app.overview import pages as overview_pages
-from app.people import api as people
-from app.people import keys_api
-from app.people import pages as sign_in_pages
-from app.people.keys import KeyRing
-from app.plant import pages as plant_pages
-from app.programs import api as programs
-from app.proof import api as proof
-from app.proof import pages as proof_pages
-from app.proof import queries as proofs
-from app.readings import actions as reading_chores
-from app.readings import api as readings
-from app.readings.by_hand import api as by_hand
-from app.readings.door import Directory, ReadingsDoor
-from app.readings.importing import pages as import_pages
-from app.readings.quiet import compile_now
-from app.readings.writer import Writer
-from app.reports import actions as report_chores
-from app.reports import api as reports
-from app.reports import jobs_api as report_jobs
-from app.reports import jobs_pages as report_job_pages
-from app.reports import pages as report_pages
-from app.reports import points_api as report_points
-from app.reports.making import Reporter
-from app.rounds import Chore, Rounds
+from app.geometry.alignment import api as alignments
+from app.geometry.alignment import pages as alignment_pages
+from app.geometry.alignment import pictures_api as alignment_pictures
+from app.geometry.geometric_form import api as forms
+from app.geometry.geometric_form import pages as form_pages
+from app.geometry.rotary_axes import api as kinematics
+from app.geometry.rotary_axes import new_pages as new_run_pages
+from app.geometry.rotary_axes import pages as kinematics_pages
+from app.geometry.rotary_axes import plan_api, plan_pages
+from app.geometry.rotary_axes import protocol_api as kinematics_protocol
+from app.geometry.work_zero import api as zeros
+from app.geometry.work_zero import pages as zero_pages
+from app.jobs.actions import PeriodicJob
+from app.jobs.runner import JobRunner
+from app.language.times import use_zone
+from app.loop.alarm_response import api as alarms
+from app.loop.alarm_response import pages as alarm_pages
+from app.loop.alarm_response.queries import ACTIVE_COUNT
+from app.loop.calibration import api as calibration
+from app.loop.calibration import jobs
+from app.loop.calibration import pages as calibration_pages
+from app.loop.characteristics import api as characteristics
+from app.loop.faults import api as faults
+from app.loop.machines import api as machines
+from app.loop.machines import keys_api as machine_keys
+from app.loop.machines.keys import caller_of_key
+from app.loop.programs import api as programs
+from app.loop.readings import api as readings
+from app.loop.readings import results
+from app.loop.readings.by_hand import api as by_hand
+from app.loop.readings.door import Directory, ReadingsDoor
+from app.loop.readings.importing import pages as import_pages
+from app.loop.readings.writer.columnar import compile_now
+from app.loop.readings.writer.group_commit import Writer
+from app.loop.summaries import api as statistics
+from app.loop.tools import api as offsets
+from app.loop.tools import edge_pages, edges_api, text_api, text_pages
+from app.loop.tools import jobs as offset_jobs
+from app.loop.tools import pages as offset_pages
+from app.memory import give_back_free_memory, keep_few_arenas
+from app.quality.capability import actions as capability_actions
+from app.quality.capability import api as capability
+from app.quality.control_charts import api as control
+from app.quality.control_charts import pages as control_pages
+from app.quality.control_charts import rules_api, rules_pages, signals_actions, signals_api, signals_pages
+from app.quality.gauge_studies import api as gauges
+from app.quality.gauge_studies import pages as gauge_pages
+from app.quality.proof import api as proof
+from app.quality.proof import pages as proof_pages
+from app.quality.proof import queries as proofs
+from app.quality.wear import actions as wear_actions
+from app.quality.wear import api as wear
+from app.quality.what_if import api as what_if
+from app.quality.what_if import pages as what_if_pages
 from app.settings import Settings
-from app.setup import pages as setup_pages
-from app.statistics import api as statistics
-from app.wear import actions as wear_chores
-from app.wear import api as wear
-from app.web import api_docs, events_api, health
+from app.views.approvals import pages as queue_pages
+from app.views.approvals.queries import WAITING_COUNT
+from app.views.characteristic import capability_pages, figures_api
+from app.views.characteristic import pages as characteristic_pages
+from app.views.overview import api as overview
+from app.views.overview import pages as overview_pages
+from app.views.plant import pages as plant_pages
+from app.views.reports import actions as report_actions
+from app.views.reports import api as reports
+from app.views.reports import jobs_api as report_jobs
+from app.views.reports import jobs_pages as report_job_pages
+from app.views.reports import pages as report_pages
+from app.views.reports import points_api as report_points
+from app.views.reports.worker import ReportWorker
+from app.views.set_up import pages as setup_pages
+from app.web import api_docs, health
 from app.web.limits import BodyLimit
 from app.web.live import Live
 from app.web.openapi import document
 from app.web.problems import add_problem_handlers
+from app.web.request_log import RequestLog
 from app.web.security import SecurityHeaders
 from app.web.templates import assets
-from app.whatif import api as what_if
-from app.whatif import pages as what_if_pages
-from app.zeros import api as zeros
-from app.zeros import pages as zero_pages
 
 # Each part of the shop floor brings its JSON routes (api) and its pages.
 ROUTERS: tuple[APIRouter, ...] = (
     machines.router,
+    faults.router,
     characteristics.router,
     figures_api.router,
     statistics.router,
@@ -111,6 +125,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     calibration.router,
     gauges.router,
     kinematics_protocol.router,
+    plan_api.router,
     kinematics.router,
     edges_api.router,
     forms.router,
@@ -119,6 +134,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     alarms.router,
     events_api.router,
     people.router,
+    machine_keys.router,
     keys_api.router,
     audit.router,
     health.router,
@@ -142,6 +158,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     alignment_pages.router,
     zero_pages.router,
     new_run_pages.router,
+    plan_pages.router,
     kinematics_pages.router,
     sign_in_pages.router,
     setup_pages.router,
@@ -151,20 +168,20 @@ ROUTERS: tuple[APIRouter, ...] = (
     report_job_pages.router,
 )
 
-# What is looked after once a minute; see app.rounds.
-CHORES: tuple[Chore, ...] = (
-    Chore("corrections expire", offset_chores.expire_corrections),
-    Chore("tool lives are told", offset_chores.tell_tool_lives),
-    Chore("wear is foretold, and hunting told", wear_chores.look_ahead),
-    Chore("calibrations are overdue", raise_overdue),
-    Chore("old reports are thrown away", report_chores.drop_old),
-    Chore("signals of the rules are kept", SignalRounds().look),
-    Chore("results of other measuring systems become readings", reading_chores.push_waiting),
+# What is done once a minute; see app.jobs.
+JOBS: tuple[PeriodicJob, ...] = (
+    *offset_jobs.JOBS,
+    wear_actions.JOB,
+    jobs.JOB,
+    report_actions.JOB,
+    signals_actions.JOB,
+    capability_actions.JOB,
+    results.JOB,
 )
 
 
 def keep_for_good() -> None:
-    """What has been made so far stays: the collector, for which everybody waits, need not walk it again.
+    """Exempt all present objects from garbage collection, during which everybody waits.
 
     At the start, which halves the p99; and when the proof has brought in the compiler, where a full round would take a
     tenth of a second at best, and half a second while pages compute. So nothing is collected before: that is such a round.
@@ -172,52 +189,76 @@ def keep_for_good() -> None:
     gc.freeze()
 
 
-def create_app(settings: Settings | None = None) -> ASGIApp:
-    """Make the application for one server process. Without settings they come from the environment."""
+def create_app(settings: Settings | None = None, ending: Callable[[], None] = lambda: None) -> ASGIApp:
+    """Make the application for one server process. Without settings they come from the environment.
+
+    ending: called when the application begins to end.
+    """
     settings = settings or Settings()
+    keep_few_arenas()
     if settings.database_url is None:
         raise RuntimeError("no database: `inband serve` starts one, or set INBAND_DATABASE_URL")
-    database = Database(settings.database_url, pool_size=settings.pool_size)
+    use_zone(settings)
+    connections = Connections(settings.database_url, settings.database_patience)
+    database = Database(settings.database_url, pool_size=settings.pool_size, connections=connections)
     # Readings are let in by connections of their own: requests that work for seconds may hold all the others. There are as
     # many as threads that look up: where the database is away, nobody waits half a minute for a connection of somebody else.
-    letting_in = Database(settings.database_url, pool_size=4, overflow=-1)
-    keys, directory = KeyRing(letting_in), Directory(letting_in)
-    writer, live, rounds = Writer(database.dsn), Live(database.dsn), Rounds(database, CHORES)
-    reporter = Reporter(database)
+    letting_in = Database(settings.database_url, pool_size=4, overflow=-1, connections=connections)
+    keys, directory = KeyRing(letting_in, caller_of_key), Directory(letting_in)
+    writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(database, JOBS)
+    report_worker = ReportWorker(database)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        connections.start()
         writer.start()
         live.start()
-        rounds.start()
-        reporter.start()
+        jobs.start()
+        report_worker.start()
         compiling = asyncio.get_running_loop().run_in_executor(None, compile_now)
+        giving_back = asyncio.get_running_loop().create_task(give_back_free_memory(), name="free memory")
         proving = proofs.begin_later(keep_for_good)
         gc.collect()
         keep_for_good()
         yield
+        ending()
         proving.cancel()
+        giving_back.cancel()
         await compiling
         await live.stop()
-        await rounds.stop()
-        await reporter.stop()
+        await jobs.stop()
+        await report_worker.stop()
         await writer.stop()
         letting_in.close()
         database.close()
+        connections.stop()
 
-    app = FastAPI(title="Inband", version="1", lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
+    app = FastAPI(
+        title="Inband",
+        version="1",
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url=None,
+        redirect_slashes=False,  # the framework's own redirect names the host that the request gave; see app.web.problems
+    )
     app.state.settings = settings
     app.state.database = database
     app.state.key_ring = keys
     app.state.directory = directory
     app.state.writer = writer
     app.state.live = live
-    app.state.reporter = reporter
-    app.state.metrics = health.registry(database)
-    add_problem_handlers(app)
+    app.state.report_worker = report_worker
+    app.state.metrics = health.registry(database, settings.data_dir)
+    app.state.waiting = {
+        "active_alarms": ACTIVE_COUNT.scalar_subquery(),
+        "waiting_corrections": WAITING_COUNT.scalar_subquery(),
+    }
+    add_problem_handlers(app, recognise)
     app.add_middleware(BodyLimit)
     for router in ROUTERS:
         app.include_router(router)
     app.openapi = partial(document, app, readings.SCHEMAS)  # type: ignore[method-assign]
     app.mount("/static", assets())
-    return ReadingsDoor(SecurityHeaders(app), keys.lookup, directory, writer, letting_in)
+    door = ReadingsDoor(SecurityHeaders(app), keys.lookup, directory, writer, letting_in)
+    return RequestLog(door, settings.slow_request)

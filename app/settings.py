@@ -1,36 +1,53 @@
-"""What an installation may decide for itself. Every field is also an environment variable: ``port`` is ``INBAND_PORT``."""
+"""Settings of an installation. Every field is also an environment variable: ``port`` is ``INBAND_PORT``."""
 
 from ipaddress import ip_address
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 from urllib.parse import urlsplit
+from zoneinfo import available_timezones
 
 import platformdirs
-from pydantic import AfterValidator, Field, PostgresDsn, TypeAdapter, ValidationError, model_validator
+from pydantic import AfterValidator, Field, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 HOUSE = Path(__file__).resolve().parent.parent
 """The tree Inband runs from: ``frontend/`` and ``migrations/`` lie here, beside ``app/``."""
 
-_POSTGRES = TypeAdapter(PostgresDsn)
-
 
 def _postgres_url(url: str) -> str:
+    from psycopg import ProgrammingError  # late: a command that only says how it is used needs no driver
+    from psycopg.conninfo import conninfo_to_dict
+
     scheme, separator, rest = url.partition("://")
     if not separator or scheme not in {"postgresql", "postgres", "postgresql+psycopg"}:
         raise ValueError(
             "must be a PostgreSQL address such as postgresql://inband:secret@db.example:5432/inband; "
             "Inband runs on PostgreSQL only"
         )
-    if not rest.startswith(("/", "?")) and "@/" not in rest:  # a unix socket has no host; pydantic asks for one
-        try:
-            _POSTGRES.validate_python(url)
-        except ValidationError:
-            # The address may hold a password: say what is wanted, never what was given.
-            raise ValueError(
-                "is not a well-formed address; write postgresql://user:password@host:5432/database"
-            ) from None
-    if not urlsplit(url).path.strip("/"):
+    # Whatever reads such an address takes the first @, / or # for the end of the password, and names the rest in its errors.
+    parts = urlsplit(url)
+    if parts.netloc.count("@") > 1 or "@" in parts.path or "@" in parts.fragment:
+        raise ValueError(
+            "holds an @, / or # that is taken for the end of the password: in user and password write @ as %40, / as %2F, "
+            "# as %23"
+        )
+    # The address may hold a password: say what is wanted, never what was given.
+    wrong = ValueError("is not a well-formed address; write postgresql://user:password@host:5432/database")
+    try:
+        parameters = {name: str(value) for name, value in conninfo_to_dict(f"postgresql://{rest}").items()}
+    except ProgrammingError:
+        raise wrong from None
+    hosts = parameters.get("hostaddr", parameters.get("host", "")).split(",")
+    ports = parameters.get("port", "5432").split(",")
+    if any("@" in host for host in hosts):
+        raise ValueError("has an @ in its password; write it as %40, and likewise : as %3A, / as %2F, % as %25")
+    if any(mark in host for host in hosts for mark in " \t<>#?"):
+        raise wrong
+    if any(port and not (port.isdecimal() and 1 <= int(port) <= 65535) for port in ports):
+        raise wrong
+    if len(ports) not in {1, len(hosts)}:
+        raise ValueError("needs as many ports as hosts, or one for all of them")
+    if not parameters.get("dbname"):
         raise ValueError("names no database; write postgresql://user:password@host:5432/DATABASE")
     return url
 
@@ -49,8 +66,23 @@ def _origin(url: str) -> str:
     return url.rstrip("/")
 
 
+def computer_timezone() -> str:
+    """The name of this computer's time zone; UTC if it has none that is known by name."""
+    from babel.localtime import get_localzone
+
+    name = str(getattr(get_localzone(), "key", "UTC"))
+    nameless = {"localtime", "Factory", "Etc/UTC", "Etc/UCT", "Etc/GMT"}
+    return name if name in available_timezones() - nameless else "UTC"
+
+
+def _timezone(name: str) -> str:
+    if name not in available_timezones():
+        raise ValueError(f"there is no time zone {name!r}; name it like Europe/Belgrade")
+    return name
+
+
 def is_loopback(host: str) -> bool:
-    """Whether only programs on this computer reach ``host``."""
+    """Tell if only programs on this computer reach ``host``."""
     try:
         return ip_address(host.strip("[]")).is_loopback
     except ValueError:
@@ -73,6 +105,11 @@ class Settings(BaseSettings):
         default_factory=lambda: platformdirs.user_data_path("inband"),
         description="Where Inband keeps what it stores, the embedded PostgreSQL included.",
     )
+    postgres_bin: Path | None = Field(
+        default=None,
+        description="Folder of PostgreSQL's programs for the embedded server. Without it those of the wheel, or newer ones of "
+        "the same major release that the system offers.",
+    )
     host: str = Field(default="127.0.0.1", min_length=1, description="Address to listen on.")
     port: int = Field(default=8000, ge=1, le=65535, description="Port to listen on.")
     workers: int = Field(default=1, ge=1, le=32, description="Server processes; one is enough for most plants.")
@@ -87,7 +124,27 @@ class Settings(BaseSettings):
         default="127.0.0.1", description="Proxies whose X-Forwarded-* headers are believed, comma-separated."
     )
     pool_size: int = Field(default=10, ge=1, le=200, description="Database connections kept open per process.")
+    timezone: Annotated[str, AfterValidator(_timezone)] = Field(
+        default_factory=computer_timezone,
+        description="Time zone of the plant, such as Europe/Belgrade: pages, charts, reports and files have its times.",
+    )
+    database_patience: float = Field(
+        default=5.0,
+        ge=1,
+        le=60,
+        description="Seconds that a request waits for a database that does not answer, before it gets 503.",
+    )
     session_hours: int = Field(default=12, ge=1, le=24 * 31, description="Hours until a browser must sign in again.")
+
+    log_level: Literal["debug", "info", "warning", "error"] = Field(
+        default="info", description="The least that is logged: debug, info, warning or error."
+    )
+    log_format: Literal["text", "json"] = Field(
+        default="text", description="How the log is written: text, or json for programs that collect it."
+    )
+    slow_request: float = Field(
+        default=1.0, gt=0, le=3600, description="Seconds from which a request is logged as slow."
+    )
 
     @model_validator(mode="after")
     def _nobody_listens_in(self) -> Self:
@@ -106,7 +163,7 @@ class Settings(BaseSettings):
 
     @property
     def address(self) -> str:
-        """What a person types to get here."""
+        """Address that a person types to get here."""
         if self.public_url:
             return self.public_url
         host = f"[{self.host}]" if ":" in self.host else self.host

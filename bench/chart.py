@@ -54,12 +54,12 @@ def main() -> None:
         for last, scale in (("all", "zones"), ("all", "true"), ("1000", "zones"), ("50", "zones")):
             times: dict[str, list[float]] = {"small": [], "large": []}
             for turn in range(arguments.rounds + 3):
-                for name, taken in times.items():
+                for name, milliseconds in times.items():
                     begun = time.perf_counter()
                     answer = client.get(f"/characteristics/{name}/figures/zones", params={"last": last, "scale": scale})
                     answer.raise_for_status()
                     if turn >= 3:  # the first ones warm up
-                        taken.append((time.perf_counter() - begun) * 1000)
+                        milliseconds.append((time.perf_counter() - begun) * 1000)
                     answers[name, last] = answer
             small, large = median(times["small"]), median(times["large"])
             size = len(answer.content) / 1024

@@ -12,10 +12,10 @@ from typing import Any
 import httpx
 import psycopg
 
-from app.characteristics.queries import characteristic_named
 from app.db.engine import Database
-from app.statistics.queries.history import history_of
-from app.statistics.queries.window import window_of
+from app.loop.characteristics.queries import characteristic_named
+from app.loop.summaries.queries.history import history_of
+from app.loop.summaries.queries.window import window_of
 from bench.plant import PARAMETERS, Plant, median, plant
 from bench.readings import fill
 
@@ -28,8 +28,8 @@ CASES = {
 
 def ours(database: Database, names: tuple[str, ...]) -> int:
     with database.begin() as session:
-        standing = characteristic_named(session, "c").characteristic
-        return len(history_of(session, standing, window_of(session, standing), names[1:]))
+        characteristic = characteristic_named(session, "c").characteristic
+        return len(history_of(session, characteristic, window_of(session, characteristic), names[1:]))
 
 
 def theirs(connection: psycopg.Connection[Any], names: tuple[str, ...]) -> int:
@@ -42,9 +42,9 @@ def theirs(connection: psycopg.Connection[Any], names: tuple[str, ...]) -> int:
 
 def seconds(task: Callable[[], int], expected: int) -> float:
     begun = time.perf_counter()
-    found = task()
-    if found != expected:
-        raise SystemExit(f"{found} readings, not {expected}")
+    readings = task()
+    if readings != expected:
+        raise SystemExit(f"{readings} readings, not {expected}")
     return time.perf_counter() - begun
 
 
@@ -59,10 +59,10 @@ def measure(at: Plant, count: int, rounds: int) -> None:
             mine, copies = [], []
             for turn in range(rounds + 1):
                 copied = seconds(lambda columns=columns: theirs(connection, columns), count)  # type: ignore[misc]
-                taken = seconds(lambda columns=columns: ours(database, columns), count)  # type: ignore[misc]
+                own = seconds(lambda columns=columns: ours(database, columns), count)  # type: ignore[misc]
                 if turn:  # the first ones warm up
                     copies.append(copied)
-                    mine.append(taken)
+                    mine.append(own)
             ratio = median([a / b for a, b in zip(mine, copies, strict=True)])
             print(f"{name:<22} {median(copies) * 1000:10.0f} {median(mine) * 1000:16.0f}   {ratio:.2f}")
     database.close()

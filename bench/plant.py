@@ -14,9 +14,10 @@ from pathlib import Path
 import httpx
 import psycopg
 
-from app.db.embedded import EmbeddedServer, binary
+from app.access import actions
+from app.db.binaries import binary
+from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
-from app.people import actions
 
 PARAMETERS = {
     "nominal": 40.0,
@@ -34,7 +35,7 @@ TARGET = 39.992
 
 @dataclass
 class Plant:
-    """What a benchmark needs to know."""
+    """Plant of a benchmark."""
 
     url: str
     port: int

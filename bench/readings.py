@@ -9,7 +9,7 @@ from typing import Any
 
 import psycopg
 
-from app.readings.statements import BASE_LEVEL, FAN, SUMMARISE_READINGS, SUMMARISE_SUMMARIES, TOP_LEVEL
+from app.loop.readings.writer.statements import BASE_LEVEL, FAN, SUMMARISE_READINGS, SUMMARISE_SUMMARIES, TOP_LEVEL
 
 CORRECTED = 97  # every so many readings a correction
 TOOL_LIFE = 50_000
@@ -77,14 +77,14 @@ def fill(
 
     It must have R10 = 3 and be the only one of its machine. The answer is the extremes by sequence (mm).
     """
-    found = connection.execute(
+    stored = connection.execute(
         "SELECT c.machine_id, c.id, (p.parameters ->> 'target')::float8, (p.parameters ->> 'tolerance_width')::float8 "
         "FROM characteristic c JOIN parameters_version p ON p.machine_id = c.machine_id AND p.characteristic_id = c.id "
         "WHERE c.key = %s",
         [characteristic],
     ).fetchone()
-    assert found is not None
-    machine, number, target, width = found
+    assert stored is not None
+    machine, number, target, width = stored
     extremes = {max(1, round(share * count)): deviation for share, deviation in EXTREMES.items()}
     values = {
         "machine": machine,

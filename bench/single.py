@@ -73,9 +73,9 @@ def theirs(at: Plant, script: str, place: tuple[int, int, int], connections: int
         capture_output=True,
         text=True,
     )
-    found = re.search(r"tps = ([\d.]+)", out.stdout)
-    assert found is not None, out.stdout
-    return float(found[1])
+    match = re.search(r"tps = ([\d.]+)", out.stdout)
+    assert match is not None, out.stdout
+    return float(match[1])
 
 
 def main() -> None:
@@ -104,9 +104,9 @@ def main() -> None:
                 others.append(other)
                 p50s.append(mine["p50"] / 1000)
                 p99s.append(mine["p99"] / 1000)
-            wanted = WANTED_AT_ONE if spread == 1 else WANTED[connections]
+            goal = WANTED_AT_ONE if spread == 1 else WANTED[connections]
             print(
-                f"{connections:>3} on {spread:>3}   {median(rates):>7.0f}  {median(others):>8.0f}   {median(ratios):>5.2f} ({wanted})"
+                f"{connections:>3} on {spread:>3}   {median(rates):>7.0f}  {median(others):>8.0f}   {median(ratios):>5.2f} ({goal})"
                 f"      {median(p50s):>6.2f}  {median(p99s):>6.2f}  {median([b / a for a, b in zip(p50s, p99s, strict=True)]):>5.2f}",
                 flush=True,
             )

@@ -69,8 +69,8 @@ def main() -> None:
     def chart() -> Any:
         return signals_of(individuals(individuals_baseline(readings), readings))
 
-    found = chart()
-    runs = sum(found.count(name) for name in found.runs)
+    signals = chart()
+    runs = sum(signals.count(name) for name in signals.runs)
     print(f"{len(readings):,} readings, {runs:,} signals of eight rules; first chart of a new process: ", end="")
     print(f"{first_call(arguments.readings):.1f} s")
     # In turn, so that both meet the same machine.
@@ -78,11 +78,11 @@ def main() -> None:
     for _ in range(arguments.rounds):
         charts.append(best(chart, 1))
         sorts.append(best(lambda: np.sort(readings), 1))
-    taken, sort = min(charts), min(sorts)
-    print(f"chart with all rules {taken * 1000:7.1f} ms   np.sort {sort * 1000:7.1f} ms")
-    print(f"ratio {taken / sort:.2f} of a sort (wanted <= {WANTED_OF_A_SORT:g})")
+    fastest, sort = min(charts), min(sorts)
+    print(f"chart with all rules {fastest * 1000:7.1f} ms   np.sort {sort * 1000:7.1f} ms")
+    print(f"ratio {fastest / sort:.2f} of a sort (wanted <= {WANTED_OF_A_SORT:g})")
     other, whence = other_package(readings)
-    print(f"{other / taken:,.0f} times as fast as {other:.1f} s (wanted >= {WANTED_FASTER:g}; {whence})")
+    print(f"{other / fastest:,.0f} times as fast as {other:.1f} s (wanted >= {WANTED_FASTER:g}; {whence})")
 
 
 if __name__ == "__main__":

@@ -10,9 +10,9 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, get_args
 
-from app.characteristics import wording
 from app.core.parameters import FIELDS, Field, Kind
 from app.errors import InbandError
+from app.loop.characteristics import wording
 from app.settings import HOUSE, Settings
 
 PART = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -94,6 +94,8 @@ def _command_reference() -> str:
 def _default(name: str, field: Any) -> str:
     if name == "data_dir":
         return "`~/.local/share/inband`"
+    if name == "timezone":
+        return "the computer's"
     if field.default is None:
         return ""
     return f"`{str(field.default).lower() if isinstance(field.default, bool) else field.default}`"
@@ -169,25 +171,17 @@ def _errors() -> str:
 
 def vocabulary() -> dict[str, tuple[str, ...]]:
     """Words that must be explained in the reference: what they are, and the words."""
-    from app.alarms.acknowledging import ACTIONS
-    from app.core.compensation import Action, Code, Signal
-    from app.core.zones import Zone
-    from app.offsets.schemas import Status
-    from app.people.callers import Role
+    from app.access.callers import Role
+    from app.core.decision.limits import Zone
+    from app.core.decision.step import Action, Code
+    from app.loop.alarms.kinds import ACTIONS, kinds
+    from app.loop.tools.schemas import Status
 
     return {
         "zones": tuple(Zone),
         "actions": tuple(Action),
         "codes": tuple(Code),
-        "alarm kinds": (
-            *Signal,
-            "offset_differs",
-            "tool_life",
-            "calibration_overdue",
-            "calibration_refused",
-            "fixture_shifted",
-            "kinematics_drift",
-        ),
+        "alarm kinds": tuple(kind.name for kind in kinds()),
         "acknowledgements": ACTIONS,
         "statuses": get_args(Status),
         "roles": get_args(Role),

@@ -2,11 +2,10 @@
 ``alembic`` with INBAND_DATABASE_URL."""
 
 from alembic import context
-from sqlalchemy import Connection, NullPool, create_engine
+from sqlalchemy import Connection
 
 from app.db.base import whole_metadata
-from app.db.engine import psycopg_url
-from app.db.migrate import OPTIONS, include_object
+from app.db.migrate import connected, include_object
 from app.settings import Settings
 
 
@@ -28,6 +27,5 @@ else:
     url = Settings().database_url
     if url is None:
         raise SystemExit("alembic needs INBAND_DATABASE_URL; `inband migrate` migrates the embedded database")
-    engine = create_engine(psycopg_url(url), poolclass=NullPool, connect_args={"options": OPTIONS})
-    with engine.connect() as own:
+    with connected(url) as own:
         run(own)

@@ -24,7 +24,7 @@ import httpx
 import psycopg
 import pytest
 from hypothesis import settings
-from playwright.sync_api import Browser, Page, Playwright, Request, sync_playwright
+from playwright.sync_api import Browser, Page, Playwright, Request, expect, sync_playwright
 from sqlalchemy.orm import Session
 from xdist import plugin as xdist_plugin
 
@@ -40,6 +40,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # hundreds of servers start; ea
 
 settings.register_profile("inband", deadline=None)  # a computer that is busy is no fault of what is tested
 settings.load_profile("inband")
+expect.set_options(timeout=20_000)  # ms; what is expected comes at once where the computer has nothing else to do
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
@@ -120,6 +121,59 @@ def drop_database(url: str) -> None:
         connection.execute(f'DROP DATABASE IF EXISTS "{urlsplit(url).path[1:]}" WITH (FORCE)')
 
 
+MANY = 100_000
+
+
+@pytest.fixture(scope="session")
+def many_template(postgres: str, shared_dir: Path) -> str:
+    """The name of a database in which the characteristic ``long`` of the machine ``lathe-long`` has `MANY` readings.
+
+    Made once in a run, by the server itself, and copied from then on; `many_readings` is such a copy.
+    """
+    name = f"{TEMPLATE}_many"
+    with (shared_dir / "template.lock").open("w") as lock, psycopg.connect(postgres, autocommit=True) as connection:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not connection.execute("SELECT 1 FROM pg_database WHERE datname = %s", [name]).fetchone():
+            connection.execute(f"CREATE DATABASE {name}_new TEMPLATE {TEMPLATE}")
+            _fill(in_database(postgres, f"{name}_new"))
+            connection.execute(f"ALTER DATABASE {name}_new RENAME TO {name}")
+    return name
+
+
+def _fill(url: str) -> None:
+    from app.loop.characteristics import actions as characteristics
+    from app.loop.characteristics.schemas import CharacteristicIn
+    from app.loop.machines import actions as machines
+    from app.loop.machines.schemas import MachineIn
+    from bench.plant import PARAMETERS
+    from bench.readings import fill
+
+    database = Database(url, pool_size=1)
+    with database.begin() as session:
+        machines.add_machine(session, MachineIn(key="lathe-long", name="Lathe", control="sinumerik"), "tests")
+        parameters = PARAMETERS | {"tool_memory": 3}
+        added = CharacteristicIn(key="long", name="Long", machine="lathe-long", parameters=parameters)
+        characteristics.add_characteristic(session, added, "tests")
+    database.close()
+    with psycopg.connect(url, autocommit=True) as connection:
+        fill(connection, "long", MANY)
+        connection.execute("VACUUM ANALYZE")
+
+
+@pytest.fixture(scope="module")
+def many_readings(postgres: str, many_template: str) -> Iterator[Database]:
+    """A database of the tests of one file with a characteristic of `MANY` readings, ``long``."""
+    name = f"{many_template}_{os.environ.get('PYTEST_XDIST_WORKER', 'main')}"
+    url = in_database(postgres, name)
+    drop_database(url)
+    with psycopg.connect(postgres, autocommit=True) as connection:
+        connection.execute(f"CREATE DATABASE {name} TEMPLATE {many_template} STRATEGY file_copy")
+    made = Database(url, pool_size=2)
+    yield made
+    made.close()
+    drop_database(url)
+
+
 @pytest.fixture
 def database(new_database: NewDatabase) -> Iterator[Database]:
     """An empty, migrated database of this test alone; what it commits is gone afterwards."""
@@ -182,16 +236,16 @@ class Server:
 
     def key(self, role: str | None = "admin", machine: str | None = None) -> str:
         """The secret of a new key, for a role or for a machine."""
-        from app.people import actions
+        from app.access.keys import add_key
 
         with self.database.begin() as session:
-            return actions.add_key(
+            return add_key(
                 session, role=None if machine else role, machine=machine, name="a test's key", actor="tests"
             ).secret
 
     def person(self, name: str, role: str, password: str = "correct horse battery") -> str:
         """A new person who may sign in; the answer is the password."""
-        from app.people import actions
+        from app.access import actions
 
         with self.database.begin() as session:
             actions.add_person(session, name=name, role=role, password=password, actor="tests")

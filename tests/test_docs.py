@@ -6,14 +6,18 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 import pytest
 
+from app.db.embedded import EmbeddedServer
+from app.db.engine import Database
 from app.settings import HOUSE, Settings
 from docs import generate
-from tests.conftest import Server
+from tests.conftest import Server, begun, free_port, wait_ready
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]*)?\)")
@@ -41,8 +45,11 @@ def blocks(path: Path) -> list[tuple[str, str]]:
     return [(kind, text) for kind, text in BLOCK.findall(path.read_text())]
 
 
-def shell(path: Path, server: Server, folder: Path) -> list[str]:
-    """Run the shell blocks of a document one after the other in one shell, against this server; what each printed."""
+def shell(path: Path, server: Server, folder: Path, **environment: str) -> list[str]:
+    """Run the shell blocks of a document one after the other in one shell, against this server; what each printed.
+
+    environment: by which variables the commands find the server's database; else by its address.
+    """
     bin_ = folder / ".venv" / "bin"
     bin_.mkdir(parents=True)
     (bin_ / "inband").write_text(f'#!/bin/sh\nPYTHONPATH={HOUSE} exec {sys.executable} -m app "$@"\n')
@@ -57,7 +64,8 @@ def shell(path: Path, server: Server, folder: Path) -> list[str]:
         capture_output=True,
         text=True,
         env=os.environ
-        | {"PATH": f"{os.environ['PATH']}:{bin_}", "INBAND_DATABASE_URL": server.database.dsn, "NO_PROXY": "*"},
+        | {"PATH": f"{os.environ['PATH']}:{bin_}", "NO_PROXY": "*"}
+        | (environment or {"INBAND_DATABASE_URL": server.database.dsn}),
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.split(f"{BETWEEN}\n")
@@ -78,10 +86,31 @@ def parts_that_differ(said: Any, printed: Any, where: str = "") -> list[str]:
     return [] if said == printed else [f"{where}: {printed!r} is printed, {said!r} was answered"]
 
 
+@pytest.fixture(scope="module")
+def second_example(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, Path]]:
+    """A server on a data folder of its own, as `--data-dir ~/six-weeks` starts one, and the folder."""
+    home = Path(mkdtemp(prefix="inband-test-"))  # a socket's path is short
+    folder, stderr, port = home / "six-weeks", home / "stderr", free_port()
+    process = begun(["serve", "--port", str(port), "--data-dir", str(folder)], stderr)
+    try:
+        wait_ready(f"http://127.0.0.1:{port}", process, stderr)
+        database = Database(EmbeddedServer(folder).url, pool_size=1)
+        running = Server(f"http://127.0.0.1:{port}", database, process, lambda: process, stderr)
+        yield running, folder
+        database.close()
+        running.close()
+    finally:
+        if process.poll() is None:
+            process.kill()
+        shutil.rmtree(home)
+
+
 class TestReadme:
-    def test_its_commands_work_and_answer_as_printed(self, server: Server, tmp_path: Path) -> None:
-        readme = HOUSE / "README.md"
-        printed = shell(readme, server, tmp_path)
+    def test_its_commands_work_and_answer_as_printed(self, second_example: tuple[Server, Path], tmp_path: Path) -> None:
+        """As the README says it for the second example: with the folder in a variable. Then once more, as it says too."""
+        readme, (server, folder) = HOUSE / "README.md", second_example
+        assert "`export INBAND_DATA_DIR=~/six-weeks`" in readme.read_text()
+        printed = shell(readme, server, tmp_path, INBAND_DATA_DIR=str(folder))
         kinds = [kind for kind, _text in blocks(readme)]
         texts = [text for _kind, text in blocks(readme)]
         compared = 0
@@ -90,7 +119,12 @@ class TestReadme:
                 answer = printed[kinds[:at].count("sh") - 1].strip().splitlines()[-1]
                 assert parts_that_differ(json.loads(answer), json.loads(texts[at])) == []
                 compared += 1
-        assert compared >= 5
+        assert compared >= 6
+        (tmp_path / "again").mkdir()
+        again = shell(readme, server, tmp_path / "again", INBAND_DATA_DIR=str(folder))
+        answers = [json.loads(each) for each in "".join(again).splitlines() if each.startswith("{")]
+        assert [answer.get("status") for answer in answers[:2]] == [409, 409]
+        assert [answer["sequence"] for answer in answers if "measured" in answer] == [1, 2, 3]
 
     def test_it_says_what_it_is_for_in_three_sentences(self) -> None:
         first = re.search(r"^# Inband\n\n(.*?)\n\n!\[", (HOUSE / "README.md").read_text(), re.DOTALL)

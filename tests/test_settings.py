@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,44 @@ def test_a_password_in_an_address_is_never_repeated() -> None:
         Settings(database_url="postgresql://me:hunter2@db.example")
     assert "hunter2" not in str(refused.value)
     assert "hunter2" not in repr(Settings(database_url="postgresql://me:hunter2@db.example/inband"))
+
+
+@pytest.mark.parametrize("password", ["sec@ret", "77/88", "77@88@99", "77#88", "pqr/stu@vwx"])
+def test_an_at_or_slash_in_a_password_is_refused_and_not_repeated(password: str) -> None:
+    """libpq would take the rest for the host, and name it in its error."""
+    with pytest.raises(ValidationError, match=r"%40|well-formed|names no database") as refused:
+        Settings(database_url=f"postgresql://me:{password}@127.0.0.1:5432/inband")
+    assert not [part for part in re.split("[@/#]", password) if part in str(refused.value)]
+    assert Settings(database_url="postgresql://me:sec%40ret@127.0.0.1:5432/inband").database_url
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "postgresql://u:p@a:5432,b:5432/db",
+        "postgresql://u:p@[::1]:5432/db",
+        "postgresql://inband@/inband?host=/srv/inband/run&port=5432",
+        "postgresql+psycopg://u@a,b/db?target_session_attrs=any",
+    ],
+)
+def test_an_address_may_be_what_postgresql_understands(url: str) -> None:
+    assert Settings(database_url=url).database_url == url
+
+
+@pytest.mark.parametrize(
+    ("url", "why"),
+    [
+        ("postgresql://u:hunter2@a:x/db", "not a well-formed address"),
+        ("postgresql://u:hunter2@/db?host=a,b,c&port=1,2", "as many ports as hosts"),
+        ("postgresql://u:hunter2@a/db?nonsense=1", "not a well-formed address"),
+        ("postgresql://u:hun@ter2@a/db", "%40"),
+        ("postgresql://u:hunter2@a", "names no database"),
+    ],
+)
+def test_an_address_of_a_database_that_cannot_be_is_refused_without_its_password(url: str, why: str) -> None:
+    with pytest.raises(ValidationError, match=why) as refused:
+        Settings(database_url=url)
+    assert "ter2" not in str(refused.value)
 
 
 @pytest.mark.parametrize("url", ["https://inband.example/sub", "inband.example", "ftp://inband.example"])

@@ -25,7 +25,7 @@ PARTS = (
     "app.cli.replay",
     "app.cli.programs",
     "app.cli.proof",
-    "app.demo.cli",
+    "app.cli.demo.cli",
 )
 
 

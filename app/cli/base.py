@@ -1,28 +1,42 @@
-"""What all commands share: settings from options and environment, the database they work on, how they speak."""
+"""Common parts of all commands: settings from options and environment, their database, their output."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from pydantic import ValidationError
 from rich.console import Console
-from sqlalchemy.exc import OperationalError
 
-from app.db.embedded import EmbeddedServer, EmbeddedServerError
-from app.db.engine import Database
-from app.db.migrate import MigrationError, upgrade
+from app import __version__
 from app.errors import InbandError
-from app.settings import Settings
+
+if TYPE_CHECKING:
+    from app.db.engine import Database
+    from app.settings import Settings
 
 cli = typer.Typer(
-    help="Inband decides tool-offset corrections from CNC probe readings.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=False,
 )
 people = Console(stderr=True, highlight=False)
+
+
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"inband {__version__}")
+        raise typer.Exit
+
+
+@cli.callback()
+def inband(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version and end.")
+    ] = False,
+) -> None:
+    """Inband decides tool-offset corrections from CNC probe readings."""
+
 
 DataDir = Annotated[
     Path | None,
@@ -43,27 +57,105 @@ def say(words: str, style: str | None = None) -> None:
     people.print(words, style=style, markup=False, soft_wrap=True)
 
 
-def settings_from(**options: Any) -> Settings:
+def settings_from(**options: Any) -> "Settings":
     """The settings: options given on the command line before the environment's."""
+    from app.settings import Settings
+
     return Settings(**{name: value for name, value in options.items() if value is not None})
 
 
 @contextmanager
-def reachable(settings: Settings) -> Iterator[str]:
-    """Where the database is, as long as the block runs: the one that is named, else the embedded one."""
+def reachable(settings: "Settings") -> Iterator[str]:
+    """URL of the database for as long as the block runs: the named one, or the embedded one, created if need be."""
+    from app.db.embedded import EmbeddedServer
+
     if settings.database_url is not None:
-        yield settings.database_url
+        from app.db.connections import plain_url
+
+        yield plain_url(settings.database_url)
     else:
         with EmbeddedServer(settings.data_dir) as url:
             yield url
 
 
 @contextmanager
-def migrated(settings: Settings) -> Iterator[Database]:
-    """The database, with the schema of this program."""
+def migrated(settings: "Settings") -> Iterator["Database"]:
+    """The database, made if there is none, and brought to the schema of this program."""
+    from app.db.migrate import upgrade
+
     with reachable(settings) as url:
         upgrade(url)
-        database = Database(url, pool_size=2, application_name="inband command")
+        yield from _opened(url, settings)
+
+
+@contextmanager
+def existing(settings: "Settings") -> Iterator["Database"]:
+    """The database of an Inband that is there already; see `existing_url`."""
+    with existing_url(settings) as url:
+        yield from _opened(url, settings)
+
+
+@contextmanager
+def existing_url(settings: "Settings") -> Iterator[str]:
+    """URL of an existing Inband database, which is neither created nor migrated.
+
+    Raises `InbandError` where there is none, or one of another version.
+    """
+    from app.db.migrate import pending
+
+    refuse_nothing_there(settings)
+    with reachable(settings) as url:
+        refuse_empty(url)
+        if pending(url):
+            raise InbandError(
+                "This database has the schema of an older Inband.",
+                "Stop the server, make a backup with the Inband that it belongs to, then run `inband migrate`.",
+            )
+        yield url
+
+
+def refuse_nothing_there(settings: "Settings") -> None:
+    """Refuse a data directory without a database, and name those that are known: a slip of the pen makes no new one.
+
+    Raises `InbandError`. A database that is named by its address is looked at by `refuse_empty`.
+    """
+    from app.db.embedded import EmbeddedServer, clusters_in_use
+
+    if settings.database_url is not None or EmbeddedServer(settings.data_dir).exists:
+        return
+    usual = type(settings).model_fields["data_dir"].get_default(call_default_factory=True)
+    there = {usual} if EmbeddedServer(usual).exists else set()
+    known = sorted(map(str, there | clusters_in_use()))
+    raise InbandError(
+        f"There is no Inband in {settings.data_dir}.",
+        (
+            f"There is one in {', '.join(known)}: name it with --data-dir. "
+            if known
+            else "Name its folder with --data-dir. "
+        )
+        + "If your server was started with --database-url (INBAND_DATABASE_URL), name the same here. "
+        "`inband serve` and `inband restore` make a new one.",
+    )
+
+
+def refuse_empty(url: str) -> None:
+    """Refuse a database in which there is no Inband. Raises `InbandError`."""
+    from app.db.migrate import current
+
+    if current(url) is None:
+        raise InbandError(
+            "There is no Inband in this database.",
+            "Look at --data-dir and --database-url; they are to be those of the server. "
+            "`inband serve`, `inband migrate` and `inband restore` make a new one.",
+        )
+
+
+def _opened(url: str, settings: "Settings") -> Iterator["Database"]:
+    from app.db.connections import Connections
+    from app.db.engine import Database
+
+    with Connections(url, settings.database_patience) as connections:
+        database = Database(url, pool_size=2, application_name="inband command", connections=connections)
         try:
             yield database
         finally:
@@ -71,19 +163,31 @@ def migrated(settings: Settings) -> Iterator[Database]:
 
 
 def explain(error: Exception) -> tuple[str | None, int]:
-    """What went wrong, in words, and the exit status; no words for what is a fault of the program."""
+    """Message and exit status for an error; no message for a fault of the program."""
+    from psycopg import OperationalError as Away
+    from pydantic import ValidationError
+    from sqlalchemy.exc import OperationalError
+
+    from app.db.binaries import BinariesError
+    from app.db.embedded import EmbeddedServerError
+    from app.db.migrate import MigrationError
+
     match error:
         case ValidationError():
             lines = [_setting(problem) for problem in error.errors(include_url=False, include_input=False)]
             return "\n".join(lines), 2
         case InbandError():
-            fields = [f"  {each.field}: {each.message}" for each in error.errors if each.message not in error.detail]
+            fields = [
+                f"  {problem_field.field}: {problem_field.message}"
+                for problem_field in error.errors
+                if problem_field.message not in error.detail
+            ]
             return "\n".join([error.detail, *fields, *([error.what_to_do] if error.what_to_do else [])]), 1
-        case EmbeddedServerError() | MigrationError():
+        case EmbeddedServerError() | BinariesError() | MigrationError():
             return str(error), 1
-        case OperationalError():
+        case OperationalError() | Away():
             return (
-                f"The database cannot be used: {str(error.orig).strip()}\nIs INBAND_DATABASE_URL right, and the server up?",
+                f"The database cannot be used: {str(getattr(error, 'orig', error)).strip()}\nIs INBAND_DATABASE_URL right, and the server up?",
                 1,
             )
     return None, 1

@@ -6,27 +6,26 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TextIO
 from zoneinfo import ZoneInfo
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from app.cli.base import DatabaseUrl, DataDir, cli, migrated, people, say, settings_from
+from app.cli.base import DatabaseUrl, DataDir, cli, existing, people, say, settings_from
 from app.errors import NotFound
-from app.formats import values
-from app.readings import exporting, queries
-from app.readings.importing.actions import import_readings
-from app.readings.importing.history import Flawed, Summary
-from app.readings.importing.layout import Layout, Wishes, look
-from app.readings.importing.lines import Flaw
-from app.web.i18n import _, ngettext
+from app.language.i18n import _, ngettext
+from app.language.times import MINUTES, in_zone, plant_zone, written
+
+if TYPE_CHECKING:
+    from app.loop.readings.importing.history import Flawed, Summary
+    from app.loop.readings.importing.layout import Layout, Wishes
+    from app.loop.readings.importing.lines import Flaw
 
 ALIKE = 3  # lines in a row with the same flaw that are named one by one
 
 
 class Unit(StrEnum):
-    """What lengths in the file are written in."""
+    """Unit of the lengths in the file."""
 
     MM = "mm"
     UM = "um"
@@ -34,7 +33,7 @@ class Unit(StrEnum):
 
 
 class Format(StrEnum):
-    """What a file is written as."""
+    """Format of a written file."""
 
     CSV = "csv"
     NDJSON = "ndjson"
@@ -51,10 +50,10 @@ Mapping = Annotated[
     ),
 ]
 Delimiter = Annotated[
-    str | None, typer.Option(envvar="INBAND_DELIMITER", help="What parts the cells.", show_default="found out")
+    str | None, typer.Option(envvar="INBAND_DELIMITER", help="Column separator.", show_default="automatic")
 ]
 Decimal = Annotated[
-    str | None, typer.Option(envvar="INBAND_DECIMAL", help="Point or comma in numbers.", show_default="found out")
+    str | None, typer.Option(envvar="INBAND_DECIMAL", help="Point or comma in numbers.", show_default="automatic")
 ]
 UnitOption = Annotated[
     Unit | None, typer.Option(envvar="INBAND_UNIT", help="Unit of the lengths.", show_default="the header's, else mm")
@@ -67,7 +66,7 @@ TimeFormat = Annotated[
     typer.Option(envvar="INBAND_TIME_FORMAT", help="How times are written, as for strptime: '%d/%m/%Y %H:%M'."),
 ]
 Encoding = Annotated[
-    str | None, typer.Option(envvar="INBAND_ENCODING", help="utf-8, utf-16, cp1250, cp1251 …", show_default="found out")
+    str | None, typer.Option(envvar="INBAND_ENCODING", help="utf-8, utf-16, cp1250, cp1251 …", show_default="automatic")
 ]
 Characteristic = Annotated[str, typer.Option(envvar="INBAND_CHARACTERISTIC", help="The key of the characteristic.")]
 
@@ -93,10 +92,14 @@ def import_file(
     database_url: DatabaseUrl = None,
 ) -> None:
     """Import readings from a file: all of them or none. They are history: judged, but they correct nothing."""
+    from app.loop.readings.importing.actions import import_readings
+    from app.loop.readings.importing.history import Flawed
+    from app.loop.readings.importing.layout import look
+
     wishes = wishes_of(mapping, delimiter, decimal, unit, timezone, time_format, encoding)
     layout = look(file, wishes)
     _tell(layout)
-    with migrated(settings_from(data_dir=data_dir, database_url=database_url)) as database, _bar(file) as bar:
+    with existing(settings_from(data_dir=data_dir, database_url=database_url)) as database, _bar(file) as bar:
         try:
             summary = import_readings(
                 database,
@@ -111,7 +114,8 @@ def import_file(
         except Flawed as refusal:
             report(refusal)
             raise typer.Exit(1) from None
-    _sum_up(summary, characteristic, live=live, dry_run=dry_run)
+    with in_zone(_zone(timezone)):
+        _sum_up(summary, characteristic, live=live, dry_run=dry_run)
 
 
 @cli.command("export")
@@ -130,19 +134,29 @@ def export_file(
     database_url: DatabaseUrl = None,
 ) -> None:
     """Write the readings of a characteristic, oldest first, as CSV or NDJSON."""
+    from app.access.audit import actions as audit
+    from app.loop.readings import exporting, queries
+
     zone = _zone(timezone)
-    first, end = _moment(since, zone, "--from"), _moment(until, zone, "--to")
+    first, end = _moment(since, zone, "--from", 0), _moment(until, zone, "--to", 0)
     lines_wanted = format_ is Format.NDJSON or (format_ is None and output is not None and output.suffix == ".ndjson")
     with (
-        migrated(settings_from(data_dir=data_dir, database_url=database_url)) as database,
+        existing(settings_from(data_dir=data_dir, database_url=database_url)) as database,
         database.begin() as session,
     ):
         entry = queries.entry_of(session, characteristic)
         if entry is None:
             raise NotFound(_("There is no characteristic {key}.").format(key=repr(characteristic)))
-        found = exporting.rows(session, entry, since=first, until=end, last=last)
-        with _output(output) as target:
-            count = (exporting.write_ndjson if lines_wanted else exporting.write_csv)(found, target)
+        exported = exporting.rows(session, entry, since=first, until=end, last=last)
+        with _output(output) as target, in_zone(zone):
+            count = (exporting.write_ndjson if lines_wanted else exporting.write_csv)(exported, target)
+        audit.record(
+            session,
+            f"command line ({getpass.getuser()})",
+            "readings exported",
+            f"characteristic/{characteristic}",
+            after={"readings": count, "format": "ndjson" if lines_wanted else "csv"},
+        )
     say(ngettext("%(num)d reading written.", "%(num)d readings written.", count) % {"num": count})
 
 
@@ -154,7 +168,9 @@ def wishes_of(
     timezone: str | None,
     time_format: str | None,
     encoding: str | None,
-) -> Wishes:
+) -> "Wishes":
+    from app.loop.readings.importing.layout import Wishes
+
     pairs = [pair.partition("=") for pair in mapping.split(",") if pair.strip()]
     if any(not name.strip() or not sign for name, sign, _column in pairs):
         raise typer.BadParameter("write it as measured=COLUMN,measured_at=COLUMN", param_hint="--map")
@@ -170,8 +186,8 @@ def wishes_of(
     )
 
 
-def _tell(layout: Layout) -> None:
-    """How the file is understood, so that a wrong guess is seen."""
+def _tell(layout: "Layout") -> None:
+    """Print how the file is understood, so that a wrong guess is seen."""
     known = ", ".join(f"{name} ← {layout.named(name)}" for name in layout.columns)
     say(_("Columns: {known} (in {unit})").format(known=known, unit=layout.unit))
     if layout.ignored:
@@ -182,6 +198,8 @@ def _tell(layout: Layout) -> None:
 
 @contextmanager
 def _bar(file: Path) -> Iterator[Any]:
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
     with file.open("rb") as opened:
         total = sum(part.count(b"\n") for part in iter(lambda: opened.read(1 << 20), b""))
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
@@ -190,13 +208,13 @@ def _bar(file: Path) -> Iterator[Any]:
         yield lambda: progress.advance(task)
 
 
-def report(refusal: Flawed, *, stored: bool = True) -> None:
+def report(refusal: "Flawed", *, stored: bool = True) -> None:
     """Every line with what is wrong with it; where line after line is wrong in the same way, the first ones and how far."""
     for column, reason, flaws in _alike(refusal.flaws):
-        shown = flaws if len(flaws) <= ALIKE + 1 else flaws[:ALIKE]
-        for flaw in shown:
+        listed = flaws if len(flaws) <= ALIKE + 1 else flaws[:ALIKE]
+        for flaw in listed:
             say(str(flaw))
-        if len(shown) < len(flaws):
+        if len(listed) < len(flaws):
             lines = _("lines {first} to {last}").format(first=flaws[ALIKE].line, last=flaws[-1].line)
             say(f"{lines}{f', {column}' if column else ''}: {reason}")
     more = refusal.count - len(refusal.flaws)
@@ -205,7 +223,7 @@ def report(refusal: Flawed, *, stored: bool = True) -> None:
     say(f"{refusal.detail} {refusal.what_to_do if stored else ''}", style="bold red")
 
 
-def _alike(flaws: Iterable[Flaw]) -> Iterator[tuple[str, str, list[Flaw]]]:
+def _alike(flaws: "Iterable[Flaw]") -> "Iterator[tuple[str, str, list[Flaw]]]":
     """Flaws of neighbouring lines with the same column and reason, together."""
     together: list[Flaw] = []
     for flaw in flaws:
@@ -221,7 +239,7 @@ def _alike(flaws: Iterable[Flaw]) -> Iterator[tuple[str, str, list[Flaw]]]:
         yield together[0].column, together[0].reason, together
 
 
-def _sum_up(summary: Summary, characteristic: str, *, live: bool, dry_run: bool) -> None:
+def _sum_up(summary: "Summary", characteristic: str, *, live: bool, dry_run: bool) -> None:
     begin = _("Nothing was stored; this would be: ") if dry_run else ""
     text = _("{stored} readings of {characteristic}").format(stored=summary.stored, characteristic=characteristic)
     if dry_run and live:
@@ -229,7 +247,7 @@ def _sum_up(summary: Summary, characteristic: str, *, live: bool, dry_run: bool)
     if summary.first_sequence is not None:
         text += _(", numbers {first} to {last}").format(first=summary.first_sequence, last=summary.last_sequence)
     if summary.first_at is not None and summary.last_at is not None:
-        span = f"{summary.first_at:%Y-%m-%d %H:%M} – {summary.last_at:%Y-%m-%d %H:%M}"
+        span = f"{written(summary.first_at, MINUTES)} – {written(summary.last_at, MINUTES)} {plant_zone().key}"
         text += _(", measured {span}").format(span=span)
     say(f"{begin}{text}.", style="bold")
     if summary.repeated:
@@ -247,16 +265,20 @@ def _sum_up(summary: Summary, characteristic: str, *, live: bool, dry_run: bool)
 
 
 def _zone(name: str | None) -> ZoneInfo:
+    from app.files.formats import cell_values
+
     try:
-        return values.zone_named(name or "UTC")
-    except values.Unreadable as error:
+        return cell_values.zone_named(name) if name else plant_zone()
+    except cell_values.Unreadable as error:
         raise typer.BadParameter(str(error), param_hint="--timezone") from None
 
 
-def _moment(text: str | None, zone: ZoneInfo, option: str) -> Any:
+def _moment(text: str | None, zone: ZoneInfo, option: str, fold: Literal[0, 1]) -> Any:
+    from app.files.formats import cell_values
+
     try:
-        return values.moment(text, zone) if text else None
-    except values.Unreadable as error:
+        return cell_values.moment(text, zone, fold=fold) if text else None
+    except cell_values.Unreadable as error:
         raise typer.BadParameter(f"{text!r} {error}", param_hint=option) from None
 
 

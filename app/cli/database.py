@@ -1,23 +1,46 @@
 """``inband migrate`` and ``inband check``."""
 
 import platform
+import re
+from collections.abc import Sequence
+from contextlib import closing
+from typing import TYPE_CHECKING
 
 import typer
-from sqlalchemy import text
 
 from app import __version__
-from app.cli.base import DatabaseUrl, DataDir, cli, explain, people, reachable, say, settings_from
-from app.db import migrate as migrations
-from app.db.engine import Database
+from app.cli.base import (
+    DatabaseUrl,
+    DataDir,
+    cli,
+    explain,
+    people,
+    reachable,
+    refuse_empty,
+    refuse_nothing_there,
+    say,
+    settings_from,
+)
+
+if TYPE_CHECKING:
+    import psycopg
+
+    from app.db.engine import Database
+    from app.db.rights import Rights
+    from app.jobs.tables import JobFailure
 
 
 @cli.command()
 def migrate(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
     """Bring the database to the schema of this program."""
-    with reachable(settings_from(data_dir=data_dir, database_url=database_url)) as url:
+    from app.db import migrate as migrations
+
+    settings = settings_from(data_dir=data_dir, database_url=database_url)
+    refuse_nothing_there(settings)  # an empty database of a server of one's own is migrated: somebody made it
+    with reachable(settings) as url:
         done = migrations.upgrade(url)
-        for each in done:
-            say(f"migrated: {each}")
+        for revision in done:
+            say(f"migrated: {revision}")
         if not done:
             say(f"nothing to do: the database is at {migrations.current(url)}")
 
@@ -25,25 +48,49 @@ def migrate(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
 @cli.command()
 def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
     """Look at configuration, database and migrations, and say what is wrong and what to do. Changes nothing."""
+    from sqlalchemy import text
+
+    from app.db import migrate as migrations
+    from app.db.binaries import advice as release_advice
+    from app.db.binaries import binaries
+    from app.db.connections import Connections
+    from app.db.disk import free, shortage
+    from app.db.engine import Database
+    from app.db.replication import advice_on, in_words, replication_of
+
     try:
         settings = settings_from(data_dir=data_dir, database_url=database_url)
         _well("Inband", f"{__version__}, Python {platform.python_version()}")
         _well("configuration", f"{settings.address}, {settings.workers} worker(s)")
-        if settings.database_url is None and not (settings.data_dir / "postgres").exists():
-            _well("database", f"none yet in {settings.data_dir}; `inband serve` makes it")
-            return
+        _well("time zone", f"{settings.timezone}; INBAND_TIMEZONE names another")
+        refuse_nothing_there(settings)
         with reachable(settings) as url:
-            database = Database(url, pool_size=1)
-            with database.begin() as session:
+            refuse_empty(url)
+            with (
+                Connections(url, settings.database_patience) as connections,
+                closing(Database(url, pool_size=1, connections=connections)) as database,
+                database.begin() as session,
+            ):
                 version, size = session.execute(
                     text(
                         "SELECT current_setting('server_version'), pg_size_pretty(pg_database_size(current_database()))"
                     )
                 ).one()
-            database.close()
+                replication = replication_of(session)
+                driver: psycopg.Connection = session.connection().connection.driver_connection  # type: ignore[assignment]
+                answering = f"{driver.info.host} port {driver.info.port}"
+                todo = migrations.pending(url)
+                failing, rights = ([], None) if todo else _condition(database)
             where = "your own server" if settings.database_url else f"embedded in {settings.data_dir}"
+            if settings.database_url is None:
+                where += f", programs of {binaries().folder}"
             _well("database", f"PostgreSQL {version}, {size}, {where}")
-            todo = migrations.pending(url)
+            if advice_on_release := release_advice(_release(version), embedded=settings.database_url is None):
+                _note(f"database: {advice_on_release}")
+            if settings.database_url is not None:
+                _well("copies", f"{in_words(replication)} (asked of {answering})")
+            for advice in advice_on(replication):
+                _note(advice)
             now = migrations.current(url)
     except Exception as error:
         words, status = explain(error)
@@ -51,16 +98,76 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
             raise
         _wrong(words)
         raise typer.Exit(status) from None
+    full = shortage(settings.data_dir)
+    if full:
+        _wrong(full)
+    else:
+        _well("disk", f"{free(settings.data_dir) / 1e9:,.1f} GB free where {settings.data_dir} lies")
     if todo:
         _wrong(
             f"{len(todo)} migration(s) to run: {', '.join(todo)}. `inband migrate` runs them, `inband serve` does so too."
         )
         raise typer.Exit(1)
     _well("migrations", f"at {now}, none to run")
+    for failure in failing:
+        _wrong(
+            f"background job {failure.job} fails for {failure.subject or 'all'} since {failure.first_at:%Y-%m-%d %H:%M} UTC, "
+            f"{failure.failures} time(s): {failure.error} It is tried again by itself at {failure.retry_at:%H:%M} UTC."
+        )
+    if not failing:
+        _well("background jobs", "none fails")
+    protected = rights is None or _rights(rights, own=settings.database_url is not None)
+    if failing or full or not protected:
+        raise typer.Exit(1)
+
+
+def _condition(database: "Database") -> "tuple[Sequence[JobFailure], Rights | None]":
+    from app.db.rights import rights_of
+    from app.jobs import queries as jobs
+
+    with database.begin() as session:
+        return jobs.failures(session), rights_of(session.connection())
+
+
+def _rights(rights: "Rights", *, own: bool) -> bool:
+    """Say what the role may do, and whether facts are protected. False if something has to be done."""
+    if rights.missing:
+        _wrong(
+            f"rights: the role {rights.role} lacks {', '.join(rights.missing)}. "
+            "Grant them as the owner of the tables; docs/how-to/run-for-real.md has the statements."
+        )
+    if rights.unprotected:
+        _wrong(
+            f"rights: nothing protects the facts in {', '.join(rights.unprotected)} any more: their trigger was removed or "
+            "switched off. Find out by whom; `ALTER TABLE ... ENABLE TRIGGER ALL`, or restore a backup made before."
+        )
+    if rights.missing or rights.unprotected:
+        return False
+    if not rights.owner:
+        _well("rights", f"{rights.role} reads and writes rows, and can neither alter nor remove facts")
+    elif own:
+        _note(
+            f"rights: facts are protected by triggers, but the role {rights.role} could remove these (it owns tables or is a "
+            "superuser). Serve with a role of its own: docs/how-to/run-for-real.md, *A role that cannot alter facts*."
+        )
+    else:
+        _well("rights", "facts are protected by triggers; whoever may read the data folder could remove them")
+    return True
+
+
+def _release(version: str) -> tuple[int, int]:
+    """Major and minor release of `18.4 (Debian 18.4-1)`; a development version has no minor release."""
+    numbers = [int(number) for number in re.findall(r"\d+", version.partition(" ")[0])]
+    return numbers[0], numbers[1] if len(numbers) > 1 else 0
 
 
 def _well(what: str, words: str) -> None:
     people.print(f"[green]ok[/green]    {what}: ", end="")
+    say(words)
+
+
+def _note(words: str) -> None:
+    people.print("[yellow]note[/yellow]  ", end="")
     say(words)
 
 

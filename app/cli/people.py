@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from app.cli.base import DatabaseUrl, DataDir, cli, migrated, say, settings_from
-from app.people import actions
+from app.cli.base import DatabaseUrl, DataDir, cli, existing, existing_url, say, settings_from
 
 user = typer.Typer(help="People who sign in.", no_args_is_help=True)
 key = typer.Typer(help="Keys by which machines and programs call.", no_args_is_help=True)
@@ -17,7 +16,7 @@ cli.add_typer(key, name="key")
 
 
 class Role(StrEnum):
-    """What a person, or a person's program, may do; each may also do what those before may."""
+    """Role of a person, or of a person's program; each may also do what those before it may."""
 
     VIEWER = "viewer"
     OPERATOR = "operator"
@@ -48,9 +47,12 @@ def add_user(
         password = typer.prompt(f"Password for {name}", hide_input=True, confirmation_prompt=True, err=True)
     else:
         raise typer.BadParameter("there is no terminal to ask for a password; pipe it in with --password-stdin")
-    with migrated(settings) as database, database.begin() as session:
+    from app.access import actions
+
+    with existing(settings) as database, database.begin() as session:
         actions.add_person(session, name=name, role=role.value, password=password, actor=_actor())
-    say(f"{name} may sign in at {settings.address} as {role.value}.")
+    where = f" at {settings.public_url}" if settings.public_url else ""  # no other address is known to this command
+    say(f"{name} may sign in{where} as {role.value}.")
 
 
 @key.command("add")
@@ -68,11 +70,17 @@ def add_key(
     """Add a key and print its secret, this once."""
     if (role is None) == (machine is None):
         raise typer.BadParameter("say either --role ROLE or --machine MACHINE")
+    from app.access.new_keys import insert_key
+    from app.db.connections import LIMITS, Connections
+
+    settings = settings_from(data_dir=data_dir, database_url=database_url)
+    # Without SQLAlchemy, which takes longer to read than everything else here.
     with (
-        migrated(settings_from(data_dir=data_dir, database_url=database_url)) as database,
-        database.begin() as session,
+        existing_url(settings) as url,
+        Connections(url, settings.database_patience) as connections,
+        connections.connect(options=LIMITS, application_name="inband command") as connection,
     ):
-        made = actions.add_key(
-            session, role=role.value if role else None, machine=machine, name=name or "command line", actor=_actor()
+        new_key = insert_key(
+            connection, role=role and role.value, machine=machine, name=name or "command line", actor=_actor()
         )
-    sys.stdout.write(f"{made.secret}\n")
+    sys.stdout.write(f"{new_key.secret}\n")

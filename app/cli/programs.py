@@ -9,16 +9,9 @@ from typing import Annotated
 
 import typer
 
-from app.characteristics import queries
-from app.cli.base import DatabaseUrl, DataDir, cli, migrated, say, settings_from
+from app.cli.base import DatabaseUrl, DataDir, cli, existing, say, settings_from
 from app.core.programs.corrections import Form
 from app.core.programs.lines import MOST_CHARACTERS, Verdict
-from app.machines.queries import machine_named
-from app.offsets import fetching
-from app.people.callers import Caller
-from app.programs import queries as programs
-from app.programs import wording
-from app.programs.schemas import looked_out
 
 program = typer.Typer(help="Program text of the controls.", no_args_is_help=True)
 cli.add_typer(program, name="program")
@@ -26,14 +19,22 @@ NOT_UNDERSTOOD = Verdict.NOT_UNDERSTOOD.value
 
 
 class Control(StrEnum):
-    """Whose text it is."""
+    """Control that the text is for."""
 
     SINUMERIK = "sinumerik"
     FANUC = "fanuc"
 
 
+class ReadableControl(StrEnum):
+    """Controls whose texts are read."""
+
+    SINUMERIK = "sinumerik"
+    FANUC = "fanuc"
+    HEIDENHAIN = "heidenhain"
+
+
 class Kind(StrEnum):
-    """Which of the two subprograms."""
+    """One of the two subprograms."""
 
     MEASURING = "measuring"
     CALIBRATION = "calibration"
@@ -43,15 +44,19 @@ class Kind(StrEnum):
 def read_program(
     file: Annotated[Path, typer.Argument(help="The text.", exists=True, dir_okay=False, readable=True)],
     control: Annotated[
-        Control | None,
-        typer.Option(envvar="INBAND_CONTROL", help="Whose text it is.", show_default="found out by the text"),
+        ReadableControl | None,
+        typer.Option(envvar="INBAND_CONTROL", help="Control that the text is for.", show_default="from the text"),
     ] = None,
 ) -> None:
     """Read a program text: what was not understood to standard error, the parameters as JSON to standard output."""
+    from app.loop.programs import queries as programs
+    from app.loop.programs import wording
+    from app.loop.programs.schemas import program_read
+
     with file.open("rb") as opened:
         text = programs.decoded(opened.read(4 * MOST_CHARACTERS + 4))
-    looked = programs.look(text, control.value if control else None)
-    answer = looked_out(looked)
+    examined = programs.check(text, control.value if control else None)
+    answer = program_read(examined)
     for line in answer.lines:
         worth_saying = [note.text for note in line.notes if note.warning or line.verdict == NOT_UNDERSTOOD]
         if worth_saying:
@@ -60,14 +65,16 @@ def read_program(
             say(f"{line.line}: {line.text.strip()[:120]}\n   {words}: {'; '.join(worth_saying)}", style=style)
     for note in answer.program.notes if answer.program else ():
         say(note.text, style="yellow")
-    for problem in (*answer.problems, *answer.warnings):
+    for problem in answer.problems:
         say(f"{problem.field}: {problem.message}", style="yellow")
-    found = (
+    for warning in answer.warnings:
+        say(f"{warning.field}: {warning.text}" if warning.field else warning.text, style="yellow")
+    content = (
         answer.program.model_dump(include={"kind", "parameters", "about", "values", "results", "touches"})
         if answer.program
         else {}
     )
-    json.dump(found, sys.stdout, ensure_ascii=False, indent=2)
+    json.dump(content, sys.stdout, ensure_ascii=False, indent=2)
     sys.stdout.write("\n")
     if answer.program is None:
         raise typer.Exit(1)
@@ -87,8 +94,11 @@ def write_program(
     database_url: DatabaseUrl = None,
 ) -> None:
     """Write the measuring or the calibration subprogram of a characteristic to standard output."""
+    from app.loop.characteristics import queries
+    from app.loop.programs import queries as programs
+
     settings = settings_from(data_dir=data_dir, database_url=database_url)
-    with migrated(settings) as database, database.begin() as session:
+    with existing(settings) as database, database.begin() as session:
         standing = queries.characteristic_named(session, characteristic)
         chosen = programs.control_of(standing, control.value if control else None)
         sys.stdout.write(programs.program_of(standing, chosen, kind.value, gauge=gauge))
@@ -108,12 +118,17 @@ def write_corrections(
     database_url: DatabaseUrl = None,
 ) -> None:
     """Write the pending corrections of a machine as program text to standard output."""
+    from app.access.callers import Caller
+    from app.loop.machines.queries import machine_named
+    from app.loop.programs import wording
+    from app.loop.tools import fetching
+
     settings = settings_from(data_dir=data_dir, database_url=database_url)
-    with migrated(settings) as database, database.begin() as session:
-        found = machine_named(session, machine)
-        handed = fetching.pending_text(session, found, form)
+    with existing(settings) as database, database.begin() as session:
+        machine_row = machine_named(session, machine)
+        handed = fetching.pending_text(session, machine_row, form)
         if fetched and handed.numbers:
             caller = Caller("key", f"command line ({getpass.getuser()})", role="operator")
-            fetching.mark_fetched(session, found, handed.numbers, handed.form, caller)
+            fetching.mark_fetched(session, machine_row, handed.numbers, handed.form, caller)
         sys.stdout.write(handed.text)
     say(wording.guarded(handed.form))

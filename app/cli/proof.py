@@ -2,17 +2,17 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from app.cli.base import cli, people, say
 from app.errors import InbandError
-from app.proof import wording
-from app.proof.cases import Case, case_from, cases
-from app.proof.queries import Proof, run
-from app.proof.schemas import ProofOut
-from app.web.i18n import _
+from app.language.i18n import _
+
+if TYPE_CHECKING:
+    from app.quality.proof.cases import Case
+    from app.quality.proof.queries import Proof
 
 
 @cli.command()
@@ -21,7 +21,7 @@ def proof(
         Path | None,
         typer.Option(
             envvar="INBAND_EXAMPLES",
-            help="Examples of your own, written as those in app/proof/cases.",
+            help="Examples of your own, written as those in app/quality/proof/cases.",
             show_default="the published ones",
             exists=True,
             dir_okay=False,
@@ -33,26 +33,34 @@ def proof(
     ] = False,
 ) -> None:
     """Run published examples through the engine and compare. Exits with 1 when one does not come out. Needs no database."""
-    found = run(cases() if examples is None else _read(examples))
+    from app.quality.proof.cases import cases
+    from app.quality.proof.queries import run
+    from app.quality.proof.schemas import ProofOut
+
+    outcome = run(cases() if examples is None else _read(examples))
     if as_json:
-        typer.echo(ProofOut.of(found).model_dump_json(indent=2))
+        typer.echo(ProofOut.of(outcome).model_dump_json(indent=2))
     else:
-        _tell(found)
-    if not found.passed:
+        _tell(outcome)
+    if not outcome.passed:
         raise typer.Exit(1)
 
 
-def _read(path: Path) -> tuple[Case, ...]:
+def _read(path: Path) -> "tuple[Case, ...]":
+    from app.quality.proof.cases import case_from
+
     try:
         return tuple(case_from(described) for described in json.loads(path.read_text(encoding="utf-8")))
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise InbandError(
             _("{path} holds no examples that can be read: {error}").format(path=path, error=error),
-            _("Write a list of examples as the files in app/proof/cases do."),
+            _("Write a list of examples as the files in app/quality/proof/cases do."),
         ) from None
 
 
-def _tell(proof: Proof) -> None:
+def _tell(proof: "Proof") -> None:
+    from app.quality.proof import wording
+
     for result in proof.results:
         mark = "[green]ok[/green]   " if result.passed else "[bold red]wrong[/bold red]"
         people.print(mark, end=" ")

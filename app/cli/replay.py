@@ -4,37 +4,20 @@ import json
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import msgspec
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from app.characteristics import wording
 from app.cli.base import cli, say
-from app.cli.data import (
-    Decimal,
-    Delimiter,
-    Encoding,
-    File,
-    Mapping,
-    TimeFormat,
-    UnitOption,
-    Zone,
-    report,
-    wishes_of,
-)
+from app.cli.data import Decimal, Delimiter, Encoding, File, Mapping, TimeFormat, UnitOption, Zone, report, wishes_of
 from app.core.parameters import ParameterError, Parameters, read
 from app.errors import Invalid
-from app.programs.queries import look as look_at_program
-from app.programs.schemas import looked_out
-from app.readings.importing.history import Flawed
-from app.readings.importing.layout import look
-from app.readings.importing.lines import Flaw, lines
-from app.readings.replaying import replay
-from app.web.i18n import _
-from app.web.numbers import um
+from app.language.i18n import _
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from app.loop.readings.importing.lines import Flaw
 
 
 @cli.command("replay")
@@ -69,14 +52,22 @@ def replay_file(
     ] = False,
 ) -> None:
     """Run readings through the rules and print the decisions. Stores nothing and needs no database."""
+    import msgspec
+    from rich.console import Console
+
+    from app.loop.readings.importing.history import Flawed
+    from app.loop.readings.importing.layout import look
+    from app.loop.readings.importing.lines import lines
+    from app.loop.readings.replaying import replay
+
     rules = _parameters(parameters, factor)
     layout = look(file, wishes_of(mapping, delimiter, decimal, unit, timezone, time_format, encoding))
     decisions = replay(rules, lines(file, layout, "replay"), "replay")
     flaws: list[Flaw] = []
     good = _aside(decisions, flaws)
     if as_json or not sys.stdout.isatty():
-        for each in good:
-            sys.stdout.write(msgspec.json.encode(each).decode() + "\n")
+        for decision in good:
+            sys.stdout.write(msgspec.json.encode(decision).decode() + "\n")
     else:
         Console().print(_table(good))
     if flaws:
@@ -84,48 +75,56 @@ def replay_file(
         raise typer.Exit(1)
 
 
-def _aside(decisions: Iterable[dict[str, Any] | Flaw], flaws: list[Flaw]) -> Iterator[dict[str, Any]]:
-    for each in decisions:
-        if isinstance(each, Flaw):
-            flaws.append(each)
+def _aside(decisions: "Iterable[dict[str, Any] | Flaw]", flaws: "list[Flaw]") -> Iterator[dict[str, Any]]:
+    from app.loop.readings.importing.lines import Flaw
+
+    for decision in decisions:
+        if isinstance(decision, Flaw):
+            flaws.append(decision)
         else:
-            yield each
+            yield decision
 
 
-def _table(decisions: Iterable[dict[str, Any]]) -> Table:
+def _table(decisions: Iterable[dict[str, Any]]) -> "Table":
+    from rich.table import Table
+
+    from app.language.numbers import um
+
     table = Table(header_style="bold", pad_edge=False)
     table.add_column(_("No."), justify="right")
     for heading in (_("Measured"), _("Deviation"), _("Average"), _("Correction")):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column(_("Zone"), no_wrap=True)
     table.add_column(_("Reason"), ratio=1)
-    for each in decisions:
-        correction = each["correction"]
+    for decision in decisions:
+        correction = decision["correction"]
         table.add_row(
-            str(each["sequence"]),
-            f"{each['measured']:.4f}",
-            um(each["deviation"]),
-            um(each["average_after"]),
+            str(decision["sequence"]),
+            f"{decision['measured']:.4f}",
+            um(decision["deviation"]),
+            um(decision["average_after"]),
             um(correction["amount"]) if correction else "",
-            each["zone"].replace("_", " "),
-            each["reason"]["text"],
+            decision["zone"].replace("_", " "),
+            decision["reason"]["text"],
             style="bold" if correction else None,
         )
     return table
 
 
 def _parameters(path: Path, factor: float | None) -> Parameters:
+    from app.loop.characteristics import wording
+
     text = path.read_text("utf-8-sig")
     try:
-        given = json.loads(text) if text.lstrip().startswith("{") else _of_program(text)
+        stored = json.loads(text) if text.lstrip().startswith("{") else _of_program(text)
     except ValueError as error:
         raise Invalid(f"{path.name}: {error}") from None
-    if isinstance(given.get("parameters"), dict):  # what GET /characteristics/… answers
-        given = given["parameters"]
+    if isinstance(stored.get("parameters"), dict):  # what GET /characteristics/… answers
+        stored = stored["parameters"]
     if factor is not None:
-        given["factor"] = factor
+        stored["factor"] = factor
     try:
-        rules, warnings = read(given)
+        rules, warnings = read(stored)
     except ParameterError as error:
         wrong = wording.field_errors(error.problems)
         missing = any(problem.code == "sign_missing" for problem in error.problems)
@@ -140,13 +139,16 @@ def _parameters(path: Path, factor: float | None) -> Parameters:
 
 def _of_program(text: str) -> dict[str, Any]:
     """The parameters of program text. Raises `ValueError` where a line holds something that was not understood."""
-    looked = looked_out(look_at_program(text))
-    for line in looked.lines:
-        said = "; ".join(note.text for note in line.notes)
+    from app.loop.programs.queries import check as check_program
+    from app.loop.programs.schemas import program_read
+
+    examined = program_read(check_program(text))
+    for line in examined.lines:
+        notes = "; ".join(note.text for note in line.notes)
         if line.verdict == "not_understood":
-            raise ValueError(_("line {line}: {said}").format(line=line.line, said=said))
+            raise ValueError(_("line {line}: {said}").format(line=line.line, said=notes))
         if any(note.warning for note in line.notes):
-            say(_("line {line}: {said}").format(line=line.line, said=said), style="yellow")
-    if looked.program is None or not looked.program.parameters:
+            say(_("line {line}: {said}").format(line=line.line, said=notes), style="yellow")
+    if examined.program is None or not examined.program.parameters:
         raise ValueError(_("There are no R parameters such as R33=0.001 in it."))
-    return looked.program.parameters
+    return examined.program.parameters

@@ -1,25 +1,24 @@
 """``inband report``: reports of characteristics as files."""
 
+import getpass
 import sys
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from app.characteristics import queries as characteristics
-from app.cli.base import DatabaseUrl, DataDir, cli, migrated, people, say, settings_from
+from app.cli.base import DatabaseUrl, DataDir, cli, existing, people, say, settings_from
 from app.cli.data import Zone
-from app.db.engine import Database
 from app.errors import InbandError
-from app.paper.content import Format, Paper
-from app.proof import queries as proof
-from app.reports import queries
-from app.reports.asking import SectionName, Wishes, typed
-from app.reports.bundle import Bundle, BundleFormat, Part, packed
-from app.web.i18n import _, ngettext
+from app.files.documents.content import Format, Paper
+from app.language.i18n import _, ngettext
+from app.views.reports.request import ReportRequest, SectionName, typed
+
+if TYPE_CHECKING:
+    from app.db.engine import Database
+    from app.views.reports.bundle import Bundle, BundleFormat, Part
 
 Keys = Annotated[list[str], typer.Argument(help="Keys of characteristics.", metavar="CHARACTERISTIC...")]
 
@@ -58,7 +57,7 @@ def report_files(
     """Write reports of characteristics: numbers, capability, wear, corrections, alarms, parameters, decisions."""
     keys = list(dict.fromkeys(characteristic))
     form = format_ or _form_by(output)
-    wishes = typed(
+    request = typed(
         {
             "from": since or "",
             "to": until or "",
@@ -69,10 +68,13 @@ def report_files(
         [name.value for name in section or ()],
     )
     _check(keys, form, output)
+    from app.quality.proof import queries as proof
+    from app.views.reports.bundle import Bundle
+
     proof.begin()
-    bundle = Bundle(wishes, _bundled(form, output, keys))
-    with migrated(settings_from(data_dir=data_dir, database_url=database_url)) as database:
-        parts = _made(database, keys, bundle, wishes)
+    bundle = Bundle(request, _bundled(form, output, keys))
+    with existing(settings_from(data_dir=data_dir, database_url=database_url)) as database:
+        parts = _made(database, keys, bundle, request)
     _write(parts, bundle, form, output)
     failed = [part for part in parts if part.trouble is not None]
     for part in failed:
@@ -103,14 +105,22 @@ def _check(keys: Sequence[str], form: Format, output: Path | None) -> None:
         raise typer.BadParameter(f"there is no folder {folder}", param_hint="--output")
 
 
-def _bundled(form: Format, output: Path | None, keys: Sequence[str]) -> BundleFormat:
+def _bundled(form: Format, output: Path | None, keys: Sequence[str]) -> "BundleFormat":
     """One workbook for several characteristics where the output is one .xlsx; else files."""
     one_sheet_each = output is not None and output.suffix.lower() == ".xlsx" and not output.is_dir() and len(keys) > 1
     return "workbook" if one_sheet_each else form.value
 
 
-def _made(database: Database, keys: Sequence[str], bundle: Bundle, wishes: Wishes) -> list[Part]:
+def _made(database: "Database", keys: Sequence[str], bundle: "Bundle", request: ReportRequest) -> "list[Part]":
     """Every report, or why there is none."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from app.access.audit.actions import record
+    from app.loop.characteristics import queries as characteristics
+    from app.quality.proof import queries as proof
+    from app.views.reports import queries
+    from app.views.reports.bundle import Part
+
     parts: list[Part] = []
     proof.proof()  # what is handed over says it if an example fails
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
@@ -121,7 +131,9 @@ def _made(database: Database, keys: Sequence[str], bundle: Bundle, wishes: Wishe
             try:
                 with database.begin() as session:
                     standing = characteristics.characteristic_named(session, key)
-                    report = queries.report_of(session, standing, wishes, datetime.now(UTC))
+                    report = queries.report_of(session, standing, request, datetime.now(UTC))
+                    actor, subject = f"command line ({getpass.getuser()})", f"characteristic/{key}"
+                    record(session, actor, "report written", subject, after={"format": bundle.form})
                 parts.append(Part(key, bundle.part(report), None))
             except InbandError as error:
                 parts.append(Part(key, None, f"{error.detail} {error.what_to_do or ''}".strip()))
@@ -129,21 +141,23 @@ def _made(database: Database, keys: Sequence[str], bundle: Bundle, wishes: Wishe
     return parts
 
 
-def _write(parts: Sequence[Part], bundle: Bundle, form: Format, output: Path | None) -> None:
-    made = [part for part in parts if part.content is not None]
-    if not made:
+def _write(parts: "Sequence[Part]", bundle: "Bundle", form: Format, output: Path | None) -> None:
+    from app.views.reports.bundle import packed
+
+    finished = [part for part in parts if part.content is not None]
+    if not finished:
         return
     if output is None:
-        sys.stdout.buffer.write(made[0].content or b"")
+        sys.stdout.buffer.write(finished[0].content or b"")
         sys.stdout.buffer.flush()
     elif output.is_dir() or not output.suffix:
         output.mkdir(parents=True, exist_ok=True)
-        for part in made:
+        for part in finished:
             _replace(output / f"report-{part.key}.{form.value}", part.content or b"")
     elif bundle.form == "workbook" or output.suffix.lower() == ".zip":
         _replace(output, packed(bundle.form, parts, datetime.now(UTC)))
     else:
-        _replace(output, made[0].content or b"")
+        _replace(output, finished[0].content or b"")
 
 
 def _replace(path: Path, content: bytes) -> None:

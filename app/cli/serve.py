@@ -1,33 +1,67 @@
 """``inband serve``: the database, the migrations, the server."""
 
 import errno
+import logging
 import os
 import signal
 import socket
+import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
+from enum import StrEnum
+from functools import partial
 from multiprocessing import parent_process
 from types import FrameType
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import httpx
 import typer
-import uvicorn
-from starlette.types import ASGIApp
-from uvicorn.config import STARTUP_FAILURE
-from uvicorn.supervisors import Multiprocess
 
+from app import __version__, logs
 from app.cli.base import DatabaseUrl, DataDir, cli, migrated, say, settings_from
-from app.db.engine import Database
+from app.db.disk import watch
 from app.errors import InbandError
-from app.people import actions, queries
-from app.settings import Settings
-from app.web.protocol import OneWriteProtocol
+
+if TYPE_CHECKING:
+    from starlette.types import ASGIApp
+
+    from app.db.engine import Database
+    from app.settings import Settings
+
+log = logging.getLogger(__name__)
+
+END_WITHIN = 5.0
+"""Seconds that the application has for ending in order; then it is left as it is, and the database is stopped in order."""
 
 Host = Annotated[str | None, typer.Option(envvar="INBAND_HOST", help="Address to listen on.", show_default="127.0.0.1")]
 Port = Annotated[int | None, typer.Option(envvar="INBAND_PORT", help="Port to listen on.", show_default="8000")]
 Workers = Annotated[int | None, typer.Option(envvar="INBAND_WORKERS", help="Server processes.", show_default="1")]
+
+
+class Level(StrEnum):
+    """The least that is logged."""
+
+    DEBUG = "debug"
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+class LogFormat(StrEnum):
+    """Format of the log."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+LogLevel = Annotated[
+    Level | None, typer.Option(envvar="INBAND_LOG_LEVEL", help="The least that is logged.", show_default="info")
+]
+LogForm = Annotated[
+    LogFormat | None,
+    typer.Option("--log-format", envvar="INBAND_LOG_FORMAT", help="How it is logged.", show_default="text"),
+]
 
 
 @cli.command()
@@ -37,40 +71,130 @@ def serve(
     data_dir: DataDir = None,
     workers: Workers = None,
     database_url: DatabaseUrl = None,
+    log_level: LogLevel = None,
+    log_format: LogForm = None,
 ) -> None:
     """Run the server until Ctrl-C or SIGTERM."""
-    settings = settings_from(host=host, port=port, data_dir=data_dir, workers=workers, database_url=database_url)
+    settings = settings_from(
+        host=host,
+        port=port,
+        data_dir=data_dir,
+        workers=workers,
+        database_url=database_url,
+        log_level=log_level,
+        log_format=log_format,
+    )
     run(settings, prepare=invite_administrator)
 
 
 def run(
-    settings: Settings,
+    settings: "Settings",
     *,
-    prepare: Callable[[Database, Settings], None] | None = None,
-    beside: Callable[[Settings], None] | None = None,
+    prepare: "Callable[[Database, Settings], None] | None" = None,
+    beside: "Callable[[Settings], None] | None" = None,
 ) -> None:
     """Serve until told to end. ``prepare`` runs when the database is migrated, ``beside`` in a thread once we answer."""
+    logs.configure(settings.log_level, settings.log_format)
     signal.signal(signal.SIGTERM, _end)  # from the first moment on, so that the database is always ended in order
-    listening = _listen(settings)
-    with listening, migrated(settings) as database:
+    from app.web.protocol import raise_file_limit
+
+    raise_file_limit()
+    with _listen(settings) as listening, ExitStack() as stack:
+        database = stack.enter_context(migrated(settings))
         os.environ |= {
             "INBAND_DATABASE_URL": database.dsn,  # for the workers, which make their own Settings
             "INBAND_DATA_DIR": str(settings.data_dir),
             "INBAND_HOST": settings.host,
             "INBAND_PORT": str(settings.port),
             "INBAND_WORKERS": str(settings.workers),
+            "INBAND_LOG_LEVEL": settings.log_level,
+            "INBAND_LOG_FORMAT": settings.log_format,
         }
         if prepare is not None:
             prepare(database, settings)
+        _log_start(database, settings)
         database.close()
+        database.connections.stop()
+        watch(settings.data_dir)
         if beside is not None:
             threading.Thread(target=_once_ready, args=(settings, beside), daemon=True).start()
         say(f"Inband: {settings.address}  (Ctrl-C ends it)")
-        _serve(settings, listening)
+        _serve(settings, listening, stack.close)
+    log.info("Inband has ended")
+    _leave_threads()
 
 
-def invite_administrator(database: Database, settings: Settings) -> None:
+def _log_start(database: "Database", settings: "Settings") -> None:
+    from sqlalchemy import text
+
+    with database.begin() as session:
+        version = session.scalar(text("SHOW server_version"))
+    log.info(
+        "Inband %s begins to listen on %s port %d (%s), %d worker(s), data folder %s, PostgreSQL %s %s",
+        __version__,
+        settings.host,
+        settings.port,
+        settings.address,
+        settings.workers,
+        settings.data_dir,
+        version,
+        f"at {database.connections.place}" if settings.database_url else "embedded there",
+    )
+
+
+class _Ending:
+    """The end of a process whose application may not come to its own: whoever is first ends the rest."""
+
+    def __init__(self, finish: Callable[[], None]) -> None:
+        self._finish = finish
+        self._first = threading.Lock()
+
+    def begin(self) -> None:
+        """Give the application its time; call it when it begins to end."""
+        log.info("Inband ends")
+        watch = threading.Timer(END_WITHIN, self._give_up)
+        watch.daemon = True
+        watch.start()
+
+    def done(self) -> None:
+        """The application has ended. Does not come back if it has been given up by then."""
+        if not self._first.acquire(blocking=False):
+            threading.Event().wait()
+
+    def _give_up(self) -> None:
+        if self._first.acquire(blocking=False):
+            log.warning("the server did not end within %g s; still at work: %s", END_WITHIN, ", ".join(_at_work()))
+            self._finish()
+            _leave()
+
+
+def _at_work() -> list[str]:
+    """Names of the threads that keep the process."""
+    return [
+        thread.name for thread in threading.enumerate() if thread is not threading.main_thread() and not thread.daemon
+    ] or ["the main thread"]
+
+
+def _leave_threads() -> None:
+    """End the process although a thread works on, which would keep it for as long as that lasts: everything is closed."""
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread() and not thread.daemon:
+            thread.join(0.5)  # most are only about to end
+            if thread.is_alive():
+                log.warning("the server has ended; still at work and left behind: %s", ", ".join(_at_work()))
+                _leave()
+
+
+def _leave() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(0)
+
+
+def invite_administrator(database: "Database", settings: "Settings") -> None:
     """As long as nobody could set anything up, print a link by which one person becomes administrator, once."""
+    from app.access import actions, queries
+
     with database.begin() as session:
         if queries.active_admins(session):
             return
@@ -79,17 +203,25 @@ def invite_administrator(database: Database, settings: Settings) -> None:
     say(f"  {settings.address}/invitation/{token}", style="bold")
 
 
-def _serve(settings: Settings, listening: socket.socket) -> None:
+def _serve(settings: "Settings", listening: socket.socket, finish: Callable[[], None]) -> None:
+    import uvicorn
+    from uvicorn.config import STARTUP_FAILURE
+    from uvicorn.supervisors import Multiprocess
+
+    from app.web.protocol import ServerProtocol
+
+    ending = _Ending(finish)
     config = uvicorn.Config(
-        "app.main:create_app" if settings.workers == 1 else "app.cli.serve:create_worker",
+        partial(_create_alone, ending) if settings.workers == 1 else "app.cli.serve:create_worker",
         factory=True,
         host=settings.host,
         port=settings.port,
         workers=settings.workers,
         loop="uvloop",
-        http=OneWriteProtocol,
+        http=ServerProtocol,
         ws="none",
         access_log=False,
+        log_config=None,  # ours: see app.logs
         log_level="warning",
         server_header=False,
         forwarded_allow_ips=settings.forwarded_allow_ips,
@@ -107,14 +239,30 @@ def _serve(settings: Settings, listening: socket.socket) -> None:
         server.run(sockets=[listening])
     except KeyboardInterrupt:  # uvicorn has ended in order and passes the signal on
         return
+    except SystemExit as end:  # the same of SIGTERM, or the application has not started
+        if end.code:
+            raise
+        return
+    finally:
+        ending.done()
     if not server.started:
         raise InbandError("The server did not start; the reason stands above.")
 
 
-def create_worker() -> ASGIApp:
-    """The application in one of several processes; it ends when the parent, which keeps the database, is killed."""
+def _create_alone(ending: _Ending) -> "ASGIApp":
+    """The application of the only process."""
     from app.main import create_app
 
+    return create_app(ending=ending.begin)
+
+
+def create_worker() -> "ASGIApp":
+    """The application in one of several processes; it ends when the parent, which keeps the database, is killed."""
+    from app.main import create_app
+    from app.settings import Settings
+
+    settings = Settings()
+    logs.configure(settings.log_level, settings.log_format)
     parent = parent_process()  # as it was when we were begun: by now it may be gone already
     assert parent is not None
 
@@ -123,10 +271,10 @@ def create_worker() -> ASGIApp:
         os.kill(os.getpid(), signal.SIGTERM)
 
     threading.Thread(target=watch, daemon=True).start()
-    return create_app()
+    return create_app(settings, ending=_Ending(lambda: None).begin)
 
 
-def _listen(settings: Settings) -> socket.socket:
+def _listen(settings: "Settings") -> socket.socket:
     """Take the port before anything else is begun. Nobody is let in before the server says so: bound, not listening."""
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     listening = socket.socket(family)
@@ -147,7 +295,9 @@ def _listen(settings: Settings) -> socket.socket:
     return listening
 
 
-def _once_ready(settings: Settings, beside: Callable[[Settings], None]) -> None:
+def _once_ready(settings: "Settings", beside: "Callable[[Settings], None]") -> None:
+    import httpx
+
     host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(settings.host, settings.host)  # noqa: S104 - compared only
     url = f"http://[{host}]" if ":" in host else f"http://{host}"
     while True:

@@ -6,13 +6,13 @@ inside; a value on the limit is good. With m = 1 the single value decides, and n
 
 from collections.abc import Sequence
 
-from app.core.compensation import deviation_of
+from app.core.decision.limits import within_tolerance
+from app.core.decision.step import deviation_of
 from app.core.parameters import Parameters
-from app.core.zones import within_tolerance
 
 
 def accepted(parameters: Parameters, sections: Sequence[float], empirical_value: float = 0.0) -> bool:
-    """Whether enough section values (mm, one per point) lie within the tolerance.
+    """Tell if enough section values (mm, one per point) lie within the tolerance.
 
     With ``accept.m`` = 1 the rule is off: zones alone judge, and this is always True.
     """
@@ -22,7 +22,7 @@ def accepted(parameters: Parameters, sections: Sequence[float], empirical_value:
 
 
 def sections_outside(parameters: Parameters, sections: Sequence[float], empirical_value: float = 0.0) -> int:
-    """How many sections (values in mm) lie out of tolerance; the lathe line adds them up in its variable #513."""
+    """Number of sections (values in mm) out of tolerance; the lathe line adds them up in its variable #513."""
     return sum(
         not within_tolerance(deviation_of(value, parameters.target, empirical_value), parameters.limits)
         for value in sections

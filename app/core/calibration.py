@@ -20,15 +20,17 @@ from enum import StrEnum
 from math import fsum
 from typing import NamedTuple
 
-from app.core.compensation import DECIMALS, average_of
+from app.core.decision.limits import nanometres, reaches, within
+from app.core.decision.step import DECIMALS, average_of
+from app.core.plausibility import inch_warnings
 from app.core.probing import TouchError
-from app.core.zones import nanometres
+from app.core.warning import CodedWarning
 
 SECTIONS = 3  # that the ring calibration of the lathe line touches
 
 
 class Outcome(StrEnum):
-    """How a calibration came out. The sentence that goes with each is worded at the edge."""
+    """Outcome of a calibration. The room `loop.calibration` words the sentence of each."""
 
     WITHIN_ZERO_RANGE = "within_zero_range"
     AVERAGE_KEPT = "average_kept"
@@ -43,15 +45,15 @@ class Outcome(StrEnum):
 
     @property
     def refused(self) -> bool:
-        """Whether the calibration counts for nothing."""
+        """Tell if the calibration was refused and changes nothing."""
         return self in {Outcome.WINDOW, Outcome.PROBE_FAULT, Outcome.NOT_A_BORE, Outcome.WRONG_GAUGE}
 
 
 @dataclass(frozen=True)
 class Gauge:
-    """What L92 is told about the gauge and how to judge it; lengths in mm.
+    """Inputs of L92: the gauge and the limits to judge it by; lengths in mm.
 
-    size: R32. path_factor: R28, a touch is expected within ±1 mm x R28 of the size. weighting_factor: R29.
+    size: R32. path_factor: R28, a probed point is expected within ±1 mm x R28 of the size. weighting_factor: R29.
     zero_range, averaging_limit, confidence_limit: R33, R34, R36.
     """
 
@@ -103,7 +105,7 @@ def calibrate(gauge: Gauge, touches: Sequence[float], *, empirical_value: float,
     measured = _round(fsum(touches) / len(touches))
     difference = _round(measured - gauge.size)
     deviation = _round(difference - empirical_value)
-    size, zero = abs(nanometres(deviation)), nanometres(gauge.zero_range)
+    size, zero = nanometres(deviation), nanometres(gauge.zero_range)
 
     def result(
         outcome: Outcome, after: float = average, change: float | None = None, repeat: int | None = None
@@ -117,16 +119,33 @@ def calibrate(gauge: Gauge, touches: Sequence[float], *, empirical_value: float,
     for repeat, touch in enumerate(touches, start=1):
         if nanometres(abs(touch - gauge.size)) > nanometres(gauge.window):
             return result(Outcome.WINDOW, repeat=repeat)
-    if size >= nanometres(gauge.confidence_limit):
+    if reaches(size, nanometres(gauge.confidence_limit)):
         return result(Outcome.PROBE_FAULT)
     updated = average_of(average, deviation, gauge.weighting_factor)
-    if size <= zero:
+    if within(size, zero):
         return result(Outcome.WITHIN_ZERO_RANGE, updated)
-    if size > nanometres(gauge.averaging_limit):
+    if not within(size, nanometres(gauge.averaging_limit)):
         return result(Outcome.FULL_DIFFERENCE, updated, deviation)
-    if abs(nanometres(updated)) <= zero:
+    if within(nanometres(updated), zero):
         return result(Outcome.AVERAGE_KEPT, updated)
     return result(Outcome.AVERAGED_DIFFERENCE, updated, updated)
+
+
+def gauge_in_inches(size: float, touches: Sequence[float], known: Sequence[float] = ()) -> list[CodedWarning]:
+    """Return a warning where the gauge or its touches look like inches, mm.
+
+    known: sizes that are expected at this place: of its characteristics, and of the gauge before.
+
+    >>> [each.field for each in gauge_in_inches(1.5748, [40.001])], [each.field for each in gauge_in_inches(40.0, [1.5748])]
+    (['gauge_size'], ['touches'])
+    >>> [each.field for each in gauge_in_inches(1.5748, [1.5749], [40.0])]
+    ['gauge_size', 'touches']
+    """
+    measured = _round(fsum(touches) / len(touches))
+    return inch_warnings(
+        [("gauge_size", size, expected) for expected in (measured, *known)]
+        + [("touches", measured, expected) for expected in (size, *known)]
+    )
 
 
 @dataclass(frozen=True)
@@ -143,14 +162,14 @@ class Ring:
 
 
 class Section(NamedTuple):
-    """Where X stood (#5041) when the probe touched in +X and in -X, mm."""
+    """Positions of X (#5041) at the trigger in +X and in -X, mm."""
 
     plus: float
     minus: float
 
 
 class Centring(NamedTuple):
-    """What the ring says, mm. diameters: per section, as far as they were measured.
+    """Result of a calibration in a ring, mm. diameters: per section, as far as they were measured.
 
     correction: what the X offset of the probe (#2732) changes by; None when refused. section: the first that lies outside
     the ring's limits, from 1.
@@ -186,14 +205,38 @@ def centre(ring: Ring, sections: Sequence[Section], *, blocked: bool = False) ->
     diameters = tuple(diameter(ring, section) for section in sections)
     if blocked:
         return Centring(Outcome.NOT_A_BORE, diameters, None)
-    for number, found in enumerate(diameters, start=1):
-        if not nanometres(ring.smallest) <= nanometres(found) <= nanometres(ring.largest):
+    for number, size in enumerate(diameters, start=1):
+        if not nanometres(ring.smallest) <= nanometres(size) <= nanometres(ring.largest):
             return Centring(Outcome.WRONG_GAUGE, diameters, None, number)
     if len(sections) != SECTIONS:
         raise TouchError("points", point=min(len(sections), SECTIONS) + 1, expected=SECTIONS, got=len(sections))
     plus = fsum(section.plus for section in sections) / SECTIONS
     minus = fsum(section.minus for section in sections) / SECTIONS
     return Centring(Outcome.CENTRED, diameters, _round((plus + minus) / 2))
+
+
+def ring_in_inches(
+    nominal: float, radius_term: float, sections: Sequence[Section], known: Sequence[float] = ()
+) -> list[CodedWarning]:
+    """Return a warning where the ring, the tip or the touches look like inches, mm.
+
+    known: sizes of the rings before.
+
+    >>> touched = [Section(24.012, -23.988)]
+    >>> [[each.field for each in ring_in_inches(*sizes, touched)] for sizes in ((1.1811, 6.0), (30.0, 0.23622))]
+    [['nominal'], ['radius_term']]
+    >>> [each.field for each in ring_in_inches(30.0, 6.0, [Section(0.94535, -0.94441)])]
+    ['sections']
+    """
+    sizes = [("nominal", nominal, known_size) for known_size in known]
+    if sections:
+        travel = _round(fsum(abs(section.plus - section.minus) for section in sections) / (2 * len(sections)))
+        sizes += [
+            ("nominal", nominal, travel + radius_term),
+            ("radius_term", radius_term, nominal - travel),
+            ("sections", travel, nominal - radius_term),
+        ]
+    return inch_warnings((field, size, _round(expected)) for field, size, expected in sizes)
 
 
 def _round(length: float) -> float:

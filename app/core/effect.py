@@ -32,6 +32,7 @@ from scipy.special import stdtrit
 
 from app.core.compiled import compiled
 from app.core.spc.refusal import Reason, Refused
+from app.core.spc.variation import varies
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -63,12 +64,12 @@ class Effect(NamedTuple):
 
     @property
     def is_full(self) -> bool:
-        """Whether corrections may well act in full: the interval holds 1."""
+        """Tell if corrections may act in full: the confidence interval holds 1."""
         return self.low <= 1 <= self.high
 
 
 def measured_effect(deviation: Floats, compensated: Floats, factor: float, begins: Flags) -> Effect:
-    """What corrections did, by the newest `LONGEST` readings. begins: those that continue nothing, such as the first of an edge.
+    """Effect of corrections in the newest `LONGEST` readings. begins: flags of readings after a break, such as a new edge.
 
     Raises `Refused` with fewer than ten corrections or fifty readings, and where nothing varies.
 
@@ -90,7 +91,7 @@ def measured_effect(deviation: Floats, compensated: Floats, factor: float, begin
     if len(steps) < FEWEST_CORRECTIONS:
         raise Refused(Reason.INCOMPLETE_STUDY, have=len(steps), needed=FEWEST_CORRECTIONS, what="corrections")
     scatter = float(np.median(np.abs(np.diff(y - x)))) * 1.4826 / sqrt(2)
-    if not scatter > 1e-9:
+    if not varies(scatter, y, x):
         raise Refused(Reason.NO_VARIATION)
     slope, line = 1.0, None
     for _pass in range(PASSES):
@@ -123,18 +124,20 @@ def _line(y: Floats, x: Floats, begins: Flags, steps: tuple[float, float], slope
     sxx, freedom = float(dx @ dx), len(dy) - 1
     if not sxx > 0 or freedom < 1:
         return _Line(slope, 0.0, 0.0, freedom, inf)
-    found = float(dx @ dy) / sxx
-    left = dy - found * dx
-    each = float(left @ left) / freedom
-    unlikely = len(dy) * log(max(each, 1e-12)) + float(np.log(variance[used]).sum()) + left_out * OUTLIER**2
-    return _Line(found, sxx, each, freedom, unlikely)
+    share = float(dx @ dy) / sxx
+    left = dy - share * dx
+    residual_variance = float(left @ left) / freedom
+    unlikely = (
+        len(dy) * log(max(residual_variance, 1e-12)) + float(np.log(variance[used]).sum()) + left_out * OUTLIER**2
+    )
+    return _Line(share, sxx, residual_variance, freedom, unlikely)
 
 
 @compiled
 def _missed(
     y: Floats, x: Floats, begins: Flags, level_step: float, slope_step: float, share: float, outlier: float
 ) -> tuple[Floats, Floats, Floats, Flags, int]:
-    """What the filter misses of y and x, the variance of it, which of them count, and how many were outliers.
+    """Innovations of the filter for y and x, their variance, flags of those that count, and the number of outliers.
 
     The scatter has the variance 1. At a beginning nothing is known of the level: the first two readings count for nothing.
     """

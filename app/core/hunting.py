@@ -1,10 +1,10 @@
-"""Does a loop run after its own scatter? What scatter alone would correct, and what to set so that it does not.
+"""Over-correction (hunting) of a loop: the corrections that scatter alone causes, and settings that prevent them.
 
 A correction that answers to scatter moves a process that was right, and the next one moves it back: the offset hunts, and
 parts scatter more than with no loop at all (Deming's funnel, rule 2; Grubbs 1954 and MacGregor 1988 on over-adjustment). The mark of hunting
 are corrections that take the one before back. Wear asks for corrections of one sign.
 
-**What scatter alone causes** (`alone`) is worked out for the rules as they stand (`app.core.compensation`), not by rules
+**What scatter alone causes** (`corrections_by_scatter`) is worked out for the rules as they stand (`app.core.decision.decide`), not by rules
 of thumb. Readings are decided on the deviation with every correction issued so far counted in, so the pipeline drops out::
 
     y = mu + e,    e normal with the scatter's standard deviation,
@@ -39,8 +39,8 @@ LARGEST_K = 10.0
 ROUND_K, ROUND_R33 = 0.5, 0.0001  # suggestions are made in such steps
 
 
-class State(StrEnum):
-    """What can be said of a loop."""
+class LoopVerdict(StrEnum):
+    """Verdict on a loop."""
 
     UNKNOWN = "unknown"  # too few readings
     QUIET = "quiet"
@@ -48,9 +48,9 @@ class State(StrEnum):
     SWINGING = "swinging"  # more than its scatter explains
 
 
-class Alone(NamedTuple):
-    """What scatter alone causes: corrections per reading, those of them that take the one before back per reading, and
-    the mean size error that one removes (in standard deviations of the scatter, or mm).
+class ScatterCorrections(NamedTuple):
+    """Corrections that scatter alone causes: all per reading, those per reading that reverse the previous one, and the
+    mean size error that one removes (in standard deviations of the scatter, or mm).
 
     excess: by what share the parts scatter more than with no correction at all.
     """
@@ -62,7 +62,7 @@ class Alone(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """What a loop is set to, mm. memory: whether there is a running average (R11); without, M is 0 before each reading."""
+    """Settings of a loop, mm. memory: whether there is a running average (R11); without, M is 0 before each reading."""
 
     zero_range: float
     averaging_limit: float
@@ -87,46 +87,48 @@ class Remedy(NamedTuple):
 class Hunting(NamedTuple):
     """The verdict on a run of readings. Sizes are size errors removed, mm; expected: by scatter alone, over the run."""
 
-    state: State
+    state: LoopVerdict
     readings: int
     scatter: float
     corrections: int
     reversals: int
     mean_size: float | None
-    expected: Alone | None
+    expected: ScatterCorrections | None
     probability: float
     remedy: Remedy | None
 
 
-def alone(settings: Settings, scatter: float) -> Alone:
-    """What scatter of this standard deviation (mm) alone causes with these settings; `size` in mm.
+def corrections_by_scatter(settings: Settings, scatter: float) -> ScatterCorrections:
+    """Corrections that scatter of this standard deviation (mm) alone causes with these settings; `size` in mm.
 
-    >>> found = alone(Settings(zero_range=0.0, averaging_limit=1.0, weighting_factor=1), scatter=0.001)
+    >>> found = corrections_by_scatter(Settings(zero_range=0.0, averaging_limit=1.0, weighting_factor=1), scatter=0.001)
     >>> round(found.corrections, 3), round(found.reversals, 2), round(found.excess, 1)  # after every reading: y_i = e_i - e_i-1
     (1.0, 0.67, 0.4)
     """
     if scatter <= 0:
-        return Alone(0.0, 0.0, 0.0, 0.0)
+        return ScatterCorrections(0.0, 0.0, 0.0, 0.0)
     memory = settings.memory and settings.weighting_factor > 1
-    found = _alone(
+    expected = _corrections_by_scatter(
         round(min(settings.zero_range / scatter, FARTHEST - 0.5), 3),
         round(min(settings.averaging_limit / scatter, FARTHEST), 3),
         round(settings.weighting_factor, 3),
         memory,
     )
-    return found._replace(size=found.size * scatter)
+    return expected._replace(size=expected.size * scatter)
 
 
-def least(settings: Settings, scatter: float, floor: float = 0.0) -> Remedy:
-    """How far k at this R33, and R33 at this k, must at least be raised (see `Remedy`).
+def least_remedy(settings: Settings, scatter: float, floor: float = 0.0) -> Remedy:
+    """The least k at this R33, and the least R33 at this k, that stop over-correction (see `Remedy`).
 
-    >>> least(Settings(0.001, 0.01, 1.0), 0.001).zero_range
+    >>> least_remedy(Settings(0.001, 0.01, 1.0), 0.001).zero_range
     0.0037
     """
     k = None
     if settings.weighting_factor < LARGEST_K:
         k = _lowest(
-            lambda step: alone(settings._replace(weighting_factor=step * ROUND_K), scatter).corrections <= GOAL,
+            lambda step: (
+                corrections_by_scatter(settings._replace(weighting_factor=step * ROUND_K), scatter).corrections <= GOAL
+            ),
             ceil(settings.weighting_factor / ROUND_K),
             int(LARGEST_K / ROUND_K),
         )
@@ -146,33 +148,35 @@ def least(settings: Settings, scatter: float, floor: float = 0.0) -> Remedy:
 
 def _least_r33(settings: Settings, scatter: float, floor: float) -> float | None:
     """The least R33 below R34 with which scatter alone corrects no more than `GOAL`, mm."""
-    found = _lowest(
-        lambda step: alone(settings._replace(zero_range=step * ROUND_R33), scatter).corrections <= GOAL,
+    step_count = _lowest(
+        lambda step: (
+            corrections_by_scatter(settings._replace(zero_range=step * ROUND_R33), scatter).corrections <= GOAL
+        ),
         ceil(max(floor, settings.zero_range) / ROUND_R33 - 1e-6),
         ceil(settings.averaging_limit / ROUND_R33 - 1e-6) - 1,
     )
-    return None if found is None else round(found * ROUND_R33, 9)
+    return None if step_count is None else round(step_count * ROUND_R33, 9)
 
 
 def judge(sizes: Sequence[float], readings: int, scatter: float, settings: Settings, *, floor: float = 0.0) -> Hunting:
-    """Whether a loop hunts. sizes: the size errors (mm) that the corrections of these readings remove, in their order.
+    """Judge if a loop over-corrects. sizes: the size errors (mm) that the corrections of these readings remove, in order.
 
     >>> swing = judge([0.002, -0.003] * 20, 60, 0.001, Settings(0.0, 0.005, 1.0))
     >>> swing.state, swing.reversals, swing.remedy.zero_range
-    (<State.HUNTING: 'hunting'>, 39, 0.0037)
+    (<LoopVerdict.HUNTING: 'hunting'>, 39, 0.0037)
     """
     signs = np.sign([size for size in sizes if size])
     reversals = int((signs[1:] != signs[:-1]).sum())
     mean_size = float(np.abs(sizes).mean()) if len(sizes) else None
     if readings < FEWEST or scatter <= 0:
-        return Hunting(State.UNKNOWN, readings, scatter, len(sizes), reversals, mean_size, None, 1.0, None)
-    expected = alone(settings, scatter)
+        return Hunting(LoopVerdict.UNKNOWN, readings, scatter, len(sizes), reversals, mean_size, None, 1.0, None)
+    expected = corrections_by_scatter(settings, scatter)
     probability = _at_least(reversals, TOLERABLE * readings)
-    state, remedy = State.QUIET, None
+    state, remedy = LoopVerdict.QUIET, None
     if probability < ALARM:
         unexplained = _at_least(reversals, expected.reversals * readings) < ALARM
-        state = State.SWINGING if unexplained else State.HUNTING
-        remedy = None if unexplained else least(settings, scatter, floor)
+        state = LoopVerdict.SWINGING if unexplained else LoopVerdict.HUNTING
+        remedy = None if unexplained else least_remedy(settings, scatter, floor)
     return Hunting(state, readings, scatter, len(sizes), reversals, mean_size, expected, probability, remedy)
 
 
@@ -203,8 +207,8 @@ FARTHEST = 6.0  # standard deviations: scatter reaches a limit that lies further
 
 
 @lru_cache(maxsize=4096)
-def _alone(r33: float, r34: float, k: float, memory: bool) -> Alone:
-    """`alone`, everything in standard deviations of the scatter."""
+def _corrections_by_scatter(r33: float, r34: float, k: float, memory: bool) -> ScatterCorrections:
+    """`corrections_by_scatter`, everything in standard deviations of the scatter."""
     edges = np.linspace(-REACH, REACH, PLACES + 1)
     place = (edges[1:] + edges[:-1]) / 2  # of mu
     if memory and r33 > 0:
@@ -248,7 +252,7 @@ def _alone(r33: float, r34: float, k: float, memory: bool) -> Alone:
     size = float(often @ (chain * np.abs(place[:, None] - place[None, :])).sum(axis=1))
     reversals = float(after_up @ (1 - up_next) + after_down @ up_next)
     variance = float((often * waiting) @ place**2) / readings
-    return Alone(1 / readings, reversals / readings, size, sqrt(1 + variance) - 1)
+    return ScatterCorrections(1 / readings, reversals / readings, size, sqrt(1 + variance) - 1)
 
 
 def _between(low: Values, high: Values, mu: Values) -> Values:
@@ -257,9 +261,9 @@ def _between(low: Values, high: Values, mu: Values) -> Values:
 
 
 def _stationary(chain: Values) -> Values:
-    """How often each state of a Markov chain is visited in the long run."""
+    """Stationary distribution of a Markov chain: the long-run share of each state."""
     count = len(chain)
     system = np.vstack((chain.T - np.eye(count), np.ones(count)))
-    found, *_rest = np.linalg.lstsq(system, np.concatenate((np.zeros(count), [1.0])), rcond=None)
-    often = np.maximum(found, 0.0)
+    shares, *_rest = np.linalg.lstsq(system, np.concatenate((np.zeros(count), [1.0])), rcond=None)
+    often = np.maximum(shares, 0.0)
     return np.asarray(often / often.sum())

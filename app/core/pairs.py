@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import stdtrit
 
-from app.core.compensation import DECIMALS
-from app.core.zones import nanometres
+from app.core.decision.limits import nanometres
+from app.core.decision.step import DECIMALS
+from app.core.spc.resolution import resolution_of
 
 FEWEST = 5
 """Pairs before an empirical value is suggested. With two, t = 12.7 makes the interval useless; with five it is 2.8."""
@@ -20,12 +21,14 @@ FEWEST_FOR_OUTLIER = 3
 
 
 class Comparison(NamedTuple):
-    """What the pairs say together; mm.
+    """Comparison of pairs of sizes; mm.
 
     pairs: how many. mean and deviation (the sample's standard deviation) are None without enough pairs; low and high bound the mean.
     outlier: which pair, from 0, stands out; only a hint. missing: how many more pairs a suggestion needs.
-    suggested: the empirical value to accept; None while pairs are missing, and when the one in effect lies inside the
-    interval, for then they agree with it.
+    suggested: the empirical value to accept; None while pairs are missing, when the one in effect lies inside the
+    interval, for then they agree with it, and when all differences are the same. equal: they are, so that they say nothing of
+    how well the mean is known; low and high are None. step: smallest distance between two of them, where rounding alone
+    decides on the interval because it is larger than their scatter; else None.
     """
 
     pairs: int
@@ -37,12 +40,15 @@ class Comparison(NamedTuple):
     outlier: int | None
     missing: int
     suggested: float | None
+    equal: bool = False
+    step: float | None = None
 
 
 def compare(differences: Sequence[float], *, empirical_value: float, confidence: float = 0.95) -> Comparison:
     """Mean difference with its Student t interval: mean ± t(1 - (1 - confidence)/2, n - 1) s/√n.
 
-    Source: NIST/SEMATECH e-Handbook 1.3.5.2, confidence limits for the mean, on the differences of the pairs.
+    Source: NIST/SEMATECH e-Handbook 1.3.5.2, confidence limits for the mean, on the differences of the pairs. Where these
+    differ by steps larger than s the gauge rounds more than the parts scatter: the mean is known to half a step at best.
 
     >>> compare([0.002, 0.003], empirical_value=0.0).missing
     3
@@ -55,7 +61,12 @@ def compare(differences: Sequence[float], *, empirical_value: float, confidence:
     if count == 1:
         return Comparison(1, confidence, _round(mean), None, None, None, None, missing, None)
     deviation = float(np.std(differences, ddof=1))
+    resolution = resolution_of(np.round(differences, DECIMALS))
+    if resolution.distinct == 1:
+        return Comparison(count, confidence, _round(mean), 0.0, None, None, None, missing, None, equal=True)
     half = float(stdtrit(count - 1, (1 + confidence) / 2)) * deviation / sqrt(count)
+    step = resolution.step if resolution.coarse(deviation) and resolution.step / 2 > half else None
+    half = max(half, (step or 0.0) / 2)
     low, high = _round(mean - half), _round(mean + half)
     agrees = nanometres(low) <= nanometres(empirical_value) <= nanometres(high)
     return Comparison(
@@ -68,6 +79,7 @@ def compare(differences: Sequence[float], *, empirical_value: float, confidence:
         outlier(differences),
         missing,
         None if missing or agrees else _round(mean),
+        step=step,
     )
 
 

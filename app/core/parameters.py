@@ -10,16 +10,17 @@ from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
 from itertools import pairwise
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, NamedTuple
 
-from app.core.zones import Limits, nanometres
+from app.core.decision.limits import Limits, nanometres
+from app.core.decision.step import Rules
 
 LARGEST_LENGTH = 100_000.0  # mm; no machine tool is a hundred metres long
 
 
 class Variant(StrEnum):
-    """How a dimension is probed (R25, and R24 for two points)."""
+    """Measuring variant of a dimension (R25, and R24 for two points)."""
 
     SINGLE = "single"
     INDEXED = "indexed"
@@ -43,15 +44,34 @@ class Direction(StrEnum):
     NEGATIVE = "negative"
 
 
+class MachineType(StrEnum):
+    """Kinds of machine tool, as far as measuring cycles differ between them."""
+
+    LATHE = "lathe"
+    MILL = "mill"
+    MILL_TURN = "mill_turn"
+    GRINDER = "grinder"
+    OTHER = "other"
+
+
+TOOL_LOCATIONS, AVERAGE_LOCATIONS = 32, 20
+"""Of the control that the sources describe (R10, R11); a machine has numbers of its own."""
+MOST_LOCATIONS = 999
+
+
 class Feature(StrEnum):
-    """Whether the surface is touched from outside (shaft, spigot, web) or from inside (bore, slot, pocket)."""
+    """The probed feature: a part from outside (shaft, spigot, web) or inside (bore, slot, pocket), or the tool R10 itself.
+
+    The length or radius of a tool tells its wear directly: no correction of an offset changes it.
+    """
 
     OUTSIDE = "outside"
     INSIDE = "inside"
+    TOOL = "tool"
 
 
 class Mode(StrEnum):
-    """What becomes of a computed correction."""
+    """Use of a computed correction."""
 
     AUTOMATIC = "automatic"
     APPROVAL = "approval"
@@ -59,7 +79,7 @@ class Mode(StrEnum):
 
 
 class WearPolicy(StrEnum):
-    """Whether a correction computed in the wear zone waits for the operator."""
+    """Policy for a correction computed in the wear zone: hold it for the operator, or release it."""
 
     HOLD = "hold"
     RELEASE = "release"
@@ -115,6 +135,21 @@ class Parameters:
         """The zone limits in whole nanometres."""
         return Limits.of(self)
 
+    @cached_property
+    def rules(self) -> Rules:
+        """The numbers that the arithmetic of a decision uses."""
+        return Rules(
+            *self.limits,
+            weighting_factor=self.weighting_factor,
+            factor=self.factor,
+            max_step=inf if self.max_step is None else self.max_step,
+            max_total=inf if self.max_total is None else self.max_total,
+            averages=self.average_memory != 0,
+            measures_only=self.measures_only,
+            holds_wear=self.wear_policy is WearPolicy.HOLD,
+            rejected_may_correct=self.rejected_may_correct,
+        )
+
     @property
     def measures_only(self) -> bool:
         """No correction is ever computed: by mode, or because no tool memory is named (R10 = 0)."""
@@ -133,7 +168,7 @@ class Parameters:
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> "Parameters":
-        """What `as_dict` wrote. It was checked when it was made, so old sets stay readable when rules change."""
+        """Parameters from a dict of `as_dict`. It was checked before, so old sets stay readable when rules change."""
         values = dict(stored)
         accept = values.pop("accept")
         for name, enum in ENUMS.items():
@@ -143,7 +178,7 @@ class Parameters:
 
 
 class Kind(StrEnum):
-    """What a field may hold."""
+    """Type of a parameter's value."""
 
     LENGTH = "length"
     NUMBER = "number"
@@ -176,8 +211,18 @@ def _choices(enum: type[StrEnum]) -> tuple[str, ...]:
 
 
 FIELDS: tuple[Field, ...] = (
-    Field("tool_memory", "R10", Kind.WHOLE, default=0, lowest=0, highest=32),
-    Field("average_memory", "R11", Kind.WHOLE, default=0, lowest=0, highest=20),
+    Field(
+        "tool_memory", "R10", Kind.WHOLE, default=0, lowest=0, highest=MOST_LOCATIONS, source_range=(0, TOOL_LOCATIONS)
+    ),
+    Field(
+        "average_memory",
+        "R11",
+        Kind.WHOLE,
+        default=0,
+        lowest=0,
+        highest=MOST_LOCATIONS,
+        source_range=(0, AVERAGE_LOCATIONS),
+    ),
     Field("variant", "R25", Kind.CHOICE, default="single", choices=_choices(Variant), codes=(0, 1, 2, 3)),
     Field("points", "R23", Kind.WHOLE, default=1, lowest=1, highest=100),
     Field("repeats", "R27", Kind.WHOLE, default=1, lowest=1, highest=100, source_range=(1, 10)),
@@ -196,7 +241,7 @@ FIELDS: tuple[Field, ...] = (
     Field("wear_limit", "R37", Kind.LENGTH, required=True, lowest=0, source_range=(0.3, 3)),
     Field("confidence_limit", "R36", Kind.LENGTH, required=True, lowest=0, source_range=(1, 3)),
     Field("weighting_factor", "R29", Kind.NUMBER, default=1.0, lowest=1, highest=1_000_000, source_range=(1, 4)),
-    Field("path_factor", "R28", Kind.NUMBER, default=1.0, lowest=0.001, highest=1000, source_range=(1, 10)),
+    Field("path_factor", "R28", Kind.NUMBER, default=1.0, lowest=0.001, highest=1000, source_range=(1, 5)),
     Field("factor", None, Kind.NUMBER, lowest=-1000, highest=1000),
     Field("rejected_may_correct", None, Kind.YES_NO, default=False),
     Field("mode", None, Kind.CHOICE, default="automatic", choices=_choices(Mode)),
@@ -215,7 +260,8 @@ class Problem(NamedTuple):
     """Something wrong with a parameter set: where, what (a code with values), and how bad.
 
     Codes: required, unknown, twice, not_a_number, not_whole, not_a_choice, not_yes_no, range, order, target_missing,
-    target_twice, tolerance_sign, sign_missing, factor_zero, accept, sections, and the warning source_range.
+    target_twice, tolerance_sign, sign_missing, factor_zero, accept, sections, tool_measured, no_location, and the warnings source_range,
+    variant_axis, points_missing, not_on_lathe, factor_on_lathe.
     """
 
     field: str
@@ -276,6 +322,7 @@ def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
         problems.append(Problem("factor", "factor_zero", {}))
     problems.extend(_order(values))
     problems.extend(_sections(values))
+    problems.extend(_tool_measured(values))
     if problems:
         raise ParameterError(problems)
     for name, enum in ENUMS.items():
@@ -401,9 +448,96 @@ def _order(values: Mapping[str, Any]) -> Iterator[Problem]:
             )
 
 
+def _tool_measured(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """A tool that is measured itself belongs to a location, and nothing is corrected by its own size."""
+    if values["feature"] != Feature.TOOL:
+        return
+    if values["tool_memory"] == 0:
+        yield Problem("tool_memory", "tool_measured", {})
+    if values["mode"] != Mode.MEASURE_ONLY:
+        yield Problem("mode", "tool_measured", {})
+
+
+INDEX_ANGLES = (0.0, 359.5)  # degrees, R26 of the variants that index the part
+CALIBRATION_RANGES = {"path_factor": (1, 10)}  # where L92 has another range than L93
+
+
 def _unusual(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """Values that the measuring cycles of the sources would not take: ranges, and variants that do not fit together."""
     for field in FIELDS:
+        if field.source_range and values.get(field.name) is not None:
+            yield from _outside(field.name, values[field.name], field.source_range)
+    variant, points = values["variant"], values["points"]
+    if variant in (Variant.INDEXED, Variant.ROUND) and values.get("index") is not None:
+        yield from _outside("index", values["index"], INDEX_ANGLES)
+    if variant in (Variant.INDEXED, Variant.ROUND, Variant.ALONG) and values["axis"] != Axis.X:
+        data = {"variant": str(variant), "axis": str(values["axis"])}
+        yield Problem("axis", "variant_axis", data, warning=True)
+    if variant in (Variant.ROUND, Variant.ALONG) and max(points, values["accept_m"]) < 2:
+        yield Problem("points", "points_missing", {"variant": str(variant)}, warning=True)
+
+
+def unusual_partly(given: Mapping[str, Any]) -> list[Problem]:
+    """Warn of what is unusual in a set that is not complete: what is known of it counts, defaults stand for the rest."""
+    values = {field.name: field.default for field in FIELDS} | {"accept_m": 1}
+    ignored: list[Problem] = []
+    for name, value in _named(given, ignored):
+        field = BY_NAME.get(name)
+        if field is not None and value is not None:
+            wrong: list[Problem] = []
+            checked = _checked(field, value, wrong)
+            if not wrong:
+                values[name] = checked
+        elif name == "accept" and value is not None:
+            values["accept_m"] = _accept(value, ignored)[1]
+    return list(_unusual(values))
+
+
+def _outside(name: str, value: float, usual: tuple[float, float]) -> Iterator[Problem]:
+    low, high = usual
+    if not low <= value <= high:
+        yield Problem(name, "source_range", {"value": value, "lowest": low, "highest": high}, warning=True)
+
+
+def unusual_calibration(values: Mapping[str, Any]) -> list[Problem]:
+    """Warn of values of a calibration (L92) outside the ranges of the sources. values: parameters by name, as far as said."""
+    problems: list[Problem] = []
+    for field in FIELDS:
+        usual = CALIBRATION_RANGES.get(field.name, field.source_range)
         value = values.get(field.name)
-        if field.source_range and value is not None and not field.source_range[0] <= value <= field.source_range[1]:
-            low, high = field.source_range
-            yield Problem(field.name, "source_range", {"value": value, "lowest": low, "highest": high}, warning=True)
+        if usual and isinstance(value, int | float) and not isinstance(value, bool):
+            problems.extend(_outside(field.name, value, usual))
+    return problems
+
+
+def unusual_on(values: Mapping[str, Any], machine: MachineType) -> list[Problem]:
+    """Warn of what does not fit the type of a machine. values: parameters by name, as far as they are known.
+
+    Two-point measurement is for machining centres (R24, domain §2); on a lathe the offset acts against the size, so that no
+    factor is positive (domain §3).
+
+    >>> given = {"factor": 0.5, "tool_memory": 3}
+    >>> [problem.code for problem in unusual_on(given, MachineType.LATHE)], unusual_on(given, MachineType.MILL)
+    (['factor_on_lathe'], [])
+    """
+    if machine is not MachineType.LATHE:
+        return []
+    problems = []
+    if values.get("variant") == Variant.TWO_POINT:
+        problems.append(Problem("variant", "not_on_lathe", {}, warning=True))
+    factor = values.get("factor")
+    corrects = values.get("tool_memory") and values.get("mode") != Mode.MEASURE_ONLY
+    if isinstance(factor, int | float) and factor > 0 and corrects:
+        problems.append(Problem("factor", "factor_on_lathe", {"value": factor}, warning=True))
+    return problems
+
+
+def without_location(values: Mapping[str, Any], tool_locations: int, average_locations: int) -> list[Problem]:
+    """Refuse locations (R10, R11) that a machine does not have; values: by name or R number, as `read` takes them."""
+    problems = []
+    for name, last in (("tool_memory", tool_locations), ("average_memory", average_locations)):
+        r = BY_NAME[name].r
+        value = next((value for raw, value in values.items() if raw in (name, r) or raw.upper() == r), None)
+        if isinstance(value, int | float) and last < value <= MOST_LOCATIONS:
+            problems.append(Problem(name, "no_location", {"value": int(value), "last": last}))
+    return problems

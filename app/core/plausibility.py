@@ -6,13 +6,19 @@ to go on: an exponentially weighted average with lambda = 1/2 (Roberts 1959), be
 and need not filter, with one reading weighed against a limit of several standard deviations.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from math import sqrt
 from statistics import fmean, median
 
-from app.core.zones import nanometres
+from app.core.decision.limits import nanometres
+from app.core.warning import CodedWarning, Value
 
+INCH = 25.4
+PAIR_APART = 1.0  # mm; the same part measured twice differs by micrometres
+UNIT_SLACK = 0.05  # by which a ratio may differ from 25.4
+OFFSET_STEP = 10.0  # mm; by hand an offset is set by less, unless the tool is another one
+EMPIRICAL_VALUE = 1.0  # mm; what is taken off every measurement is micrometres
 WEIGHT = 0.5  # lambda: of the newest reading in the level
 SIGMAS = 6.0  # of the scatter that a plausible jump may have
 D4 = 0.954  # median moving range of two readings over their standard deviation (Shewhart's d4 for n = 2)
@@ -20,7 +26,7 @@ FEWEST = 10  # readings from which a jump may be suggested
 
 
 def uncorrected(deviation: float, compensated: float, factor: float) -> float:
-    """What the deviation would be without the corrections in effect when the part was cut, mm: D + compensated / factor.
+    """Deviation without the corrections in effect when the part was cut, mm: D + compensated / factor.
 
     An offset correction of `a` changes the size by -a / factor, so taking it out adds a / factor.
 
@@ -32,8 +38,76 @@ def uncorrected(deviation: float, compensated: float, factor: float) -> float:
     return round(deviation + compensated / factor, 9) + 0.0
 
 
+def looks_like_inches(value: float, expected: float) -> bool:
+    """Return whether a value is the expected one in inches, both taken for mm.
+
+    >>> looks_like_inches(1.5748, 40.0), looks_like_inches(39.9, 40.0), looks_like_inches(0.0, 0.0)
+    (True, False, False)
+    """
+    return value * expected > 0 and abs(value * INCH / expected - 1) < UNIT_SLACK
+
+
+def inch_warnings(sizes: Iterable[tuple[str, float, float]]) -> list[CodedWarning]:
+    """Return a warning for each field whose size is the expected one in inches, at most one a field.
+
+    sizes: the field, its size and the size expected there, mm.
+
+    >>> [each.field for each in inch_warnings([("gauge_size", 1.5748, 40.001), ("touches", 40.001, 1.5748)])]
+    ['gauge_size']
+    """
+    warnings: dict[str, CodedWarning] = {}
+    for field, size, expected in sizes:
+        if field not in warnings and looks_like_inches(size, expected):
+            values: dict[str, Value] = {"which": "size", "size": size, "expected": expected}
+            warnings[field] = CodedWarning("looks_like_inches", values, field)
+    return list(warnings.values())
+
+
+def pair_warnings(machine_value: float, external_value: float, sizes: Iterable[float] = ()) -> list[CodedWarning]:
+    """Return what may be wrong with one part measured on the machine and on an external gauge, mm.
+
+    sizes: of the characteristics that the pair serves.
+
+    >>> [each.code for each in pair_warnings(40.001, 1.5748)], [each.code for each in pair_warnings(40.001, 30.002)]
+    (['looks_like_inches'], ['pair_apart'])
+    """
+    values = {"machine_value": machine_value, "external_value": external_value}
+    against = [*values.values(), *sizes]
+    inches = inch_warnings((field, value, expected) for field, value in values.items() for expected in against)
+    if inches or abs(machine_value - external_value) <= PAIR_APART:
+        return inches
+    apart = {"off": round(abs(machine_value - external_value), 9), "limit": PAIR_APART}
+    return [CodedWarning("pair_apart", apart, "external_value")]
+
+
+def offset_warnings(before: float, after: float) -> list[CodedWarning]:
+    """Return the warning of an offset set by hand that is far from the one before, mm: 400 for 0.4, or 4.7244 for 120.
+
+    >>> [each.code for each in offset_warnings(0.38, 400.0)], offset_warnings(0.38, 0.4)
+    (['offset_step'], [])
+    >>> [each.code for each in offset_warnings(120.0, 4.7244)]
+    ['looks_like_inches']
+    """
+    step = abs(after - before)
+    if step > OFFSET_STEP and (inches := inch_warnings([("offset", after, before)])):
+        return inches
+    values = {"before": before, "after": after, "limit": OFFSET_STEP}
+    return [CodedWarning("offset_step", values, "offset")] if step > OFFSET_STEP else []
+
+
+def empirical_value_warnings(value: float) -> list[CodedWarning]:
+    """Return the warning of an empirical value that no probe has, mm.
+
+    >>> [each.field for each in empirical_value_warnings(2.6)]
+    ['empirical_value']
+    """
+    if abs(value) <= EMPIRICAL_VALUE:
+        return []
+    return [CodedWarning("empirical_value_large", {"value": value, "limit": EMPIRICAL_VALUE}, "empirical_value")]
+
+
 def is_jump(now: float, level: float | None, allowed: float) -> bool:
-    """Whether a reading lies further from the level than can be; ``allowed`` itself can. Without a level nothing is a jump.
+    """Tell if a reading lies further than ``allowed`` from the level. Without a level nothing is a jump.
 
     >>> is_jump(0.021, 0.001, allowed=0.02), is_jump(0.0211, 0.001, allowed=0.02), is_jump(5.0, None, allowed=0.02)
     (False, True, False)

@@ -13,7 +13,7 @@ SIGMAS = 2.0  # and so many standard errors
 
 
 class Criterion(StrEnum):
-    """What is looked for on a map."""
+    """Criterion for the best cell of a map."""
 
     PPK = "ppk"
     REJECTS = "rejects"
@@ -23,9 +23,9 @@ class Criterion(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """Where a map is best: the index of the best cell, None where no cell has the number, and which are as good.
+    """Best region of a map: the index of the best cell, None where no cell has the number, and flags of equally good ones.
 
-    calmest: of those as good the one that corrects least. What cannot be told from the best is not worth correcting for.
+    calmest: the equally good cell that corrects least; more corrections would gain nothing that can be seen.
     choice: which cells were compared at all.
     """
 
@@ -54,17 +54,17 @@ def with_settings(
     factor: float | None = None,
 ) -> Parameters:
     """Other settings of the loop; those not given stay."""
-    given = {
+    changes = {
         "weighting_factor": weighting_factor,
         "zero_range": zero_range,
         "averaging_limit": averaging_limit,
         "factor": factor,
     }
-    return replace(parameters, **{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
+    return replace(parameters, **{name: value for name, value in changes.items() if value is not None})  # type: ignore[arg-type]
 
 
 def in_order(parameters: Parameters) -> bool:
-    """Whether R33 < R34 <= R35/2, the part of the order of the parameters that a map moves about in."""
+    """Tell if R33 < R34 <= R35/2, the part of the order of the parameters that a map varies."""
     limits = parameters.limits
     return limits.zero_range < limits.averaging <= limits.tolerance
 
@@ -89,7 +89,7 @@ def best_region(cells: Sequence[Figures | None], criterion: Criterion, today: Fi
     figures = cells[best]
     assert figures is not None
     allowed = room(figures, criterion, value)
-    inside = tuple(each is not None and sign * (each - value) <= allowed for each in values)
+    inside = tuple(figure is not None and sign * (figure - value) <= allowed for figure in values)
     calmest = min(
         (at for at, holds in enumerate(inside) if holds),
         key=lambda at: (cells[at].corrections, sign * (values[at] or 0.0)),  # type: ignore[union-attr]
@@ -106,7 +106,7 @@ def _worse(cell: Figures, today: Figures) -> bool:
 
 
 def room(figures: Figures, criterion: Criterion, value: float) -> float:
-    """How far another setting's number may lie from this one and be as good: two standard errors, or 5 %."""
+    """Largest difference of a number that counts as equally good: two standard errors, or 5 %."""
     return max(SIGMAS * _error(figures, criterion, value), NEAR * abs(value)) + 1e-12
 
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from math import fsum
 from typing import NamedTuple
 
-from app.core.compensation import DECIMALS
+from app.core.decision.limits import nanometres
+from app.core.decision.step import DECIMALS
 from app.core.parameters import Axis, Direction, Feature, Parameters, Variant
-from app.core.zones import nanometres
 
 Touches = Sequence[Sequence[float | None] | None]
 """One list of repeats per point, mm; None where the probe did not trigger."""
@@ -39,14 +39,14 @@ class TouchError(ValueError):
 
 
 class Travel(NamedTuple):
-    """Where the probe's measuring move starts and where it ends if nothing triggers, on the measuring axis, mm."""
+    """Start of the probe's measuring move, and its end if nothing triggers, on the measuring axis, mm."""
 
     start: float
     end: float
 
 
 def points_expected(parameters: Parameters) -> int:
-    """How many points a reading has: R23, and no fewer than the variant and the sections of n of m need.
+    """Number of points of a reading: R23, and no fewer than the variant and the sections of n of m need.
 
     >>> from app.core.parameters import read
     >>> drawing = {"R32": 62.0, "R35": 0.03, "R33": 0, "R37": 0.3, "R36": 1.0}
@@ -71,13 +71,13 @@ def measured_value(parameters: Parameters, touches: Touches) -> Measured:
     expected = points_expected(parameters)
     if len(touches) != expected:
         raise TouchError("points", point=min(len(touches), expected) + 1, expected=expected, got=len(touches))
-    found = [_repeats(parameters, at, repeats or ()) for at, repeats in enumerate(touches, start=1)]
+    points = [_repeats(parameters, at, repeats or ()) for at, repeats in enumerate(touches, start=1)]
     if parameters.variant is Variant.TWO_POINT:
-        _refuse_distances(parameters, found)
+        _refuse_distances(parameters, points)
     else:
-        _refuse_outside(parameters, found)
-    means = tuple(round(fsum(repeats) / len(repeats), DECIMALS) for repeats in found)
-    sections = sections_of(parameters, [fsum(repeats) / len(repeats) for repeats in found])
+        _refuse_outside(parameters, points)
+    means = tuple(round(fsum(repeats) / len(repeats), DECIMALS) for repeats in points)
+    sections = sections_of(parameters, [fsum(repeats) / len(repeats) for repeats in points])
     return Measured(round(fsum(sections) / len(sections), DECIMALS), means)
 
 
@@ -134,7 +134,7 @@ def _refuse_outside(parameters: Parameters, touches: Sequence[Sequence[float]]) 
 
 
 def _refuse_distances(parameters: Parameters, touches: Sequence[Sequence[float]]) -> None:
-    """Where two surfaces lie is not programmed, how far they are apart is: each pair of touches is held against that."""
+    """Refuse pairs whose distance is not near the target: of two surfaces only the distance is programmed."""
     window = nanometres(parameters.window)
     for second in range(1, len(touches), 2):
         for repeat, (a, b) in enumerate(zip(touches[second - 1], touches[second], strict=True), start=1):

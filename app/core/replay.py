@@ -1,11 +1,11 @@
-"""What if: the process without corrections, rebuilt from readings, and another policy run in closed loop on it.
+"""Simulation: the process without corrections, rebuilt from readings, and another policy run in closed loop on it.
 
 The offset corrections in effect when a part was cut are taken out of its deviation D (`plausibility.uncorrected`), with S
 their sum, f the factor and e the share of a correction that takes effect::
 
     free = D + e S / f
 
-On that course another loop decides each reading by the whole of domain §3 (`compensation.decide`), and what it corrects
+On that course another loop decides each reading by the whole of domain §3 (`decision.decide`), and what it corrects
 changes the parts that follow::
 
     D' = free - e S' / f,    a correction issued at part t is in effect from part t + delay + 1 on.
@@ -17,18 +17,28 @@ waits until the one that was held then was released, if it was. The pipeline is 
 Assumed is that corrections act in full, e = 1; `app.core.effect` measures e. Lengths are mm.
 """
 
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from math import inf, sqrt
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from math import sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.closed_loop import Count, Course, Floats, Mark, Total, Way, Whole, follow, follow_each
-from app.core.compensation import DECIMALS, Action, State, decide, outstanding_effect
-from app.core.parameters import Parameters, WearPolicy
-from app.core.zones import nanometres
+from app.core.decision.limits import nanometres
+from app.core.decision.loops import (
+    LANE,
+    TALLY,
+    Floats,
+    Mark,
+    ProcessTrace,
+    ReplayResult,
+    Rows,
+    Whole,
+    follow,
+    follow_each,
+)
+from app.core.decision.step import DECIMALS
+from app.core.parameters import Parameters
 
 LONGEST_DELAY = 200  # parts
 FEWEST_FOR_PPK = 20
@@ -46,9 +56,14 @@ class Lane(NamedTuple):
     memory: int = 0
     counts: bool = True
 
+    def row(self) -> tuple[Any, ...]:
+        """Return it as a row of `LANE`."""
+        rules = self.parameters.rules
+        return (*rules, self.response, self.memory if rules.averages else -1, self.counts)
+
 
 class Policy(NamedTuple):
-    """How each lane of a way is decided, and how many parts come out with the old offset after a correction is issued."""
+    """Parameters of each lane of a trace, and the number of parts cut with the old offset after a correction is issued."""
 
     lanes: tuple[Lane, ...]
     delay: int = 0
@@ -60,10 +75,10 @@ class Policy(NamedTuple):
 
 
 class Figures(NamedTuple):
-    """What a replay amounts to, of the readings that count and are not left out; mm, None where there are too few to say.
+    """Figures of a replay, of the readings that count and are not left out; mm, None where there are too few.
 
     rejects: parts out of tolerance, probe faults apart. Mean, spread, Ppk and largest are of the `inner` readings, within
-    R37: what lies beyond is an operator's business. mean_size: of the size errors that corrections removed.
+    R37: an operator decides about those beyond. mean_size: of the size errors that corrections removed.
     """
 
     readings: int
@@ -114,144 +129,58 @@ def parts_of(lane: Whole, serial: Whole | None = None, at: NDArray[np.datetime64
         known = (serial[1:] >= 0) & (serial[:-1] >= 0)
         ends[1:] = np.where(known, serial[1:] != serial[:-1], ends[1:])
     seen: set[int] = set()
-    found, part = np.zeros(len(lane), np.int64), 0
+    parts, part = np.zeros(len(lane), np.int64), 0
     for place, (which, ended) in enumerate(zip(lane.tolist(), ends.tolist(), strict=True)):
         if seen and (ended or which in seen):
             part, seen = part + 1, set()
         seen.add(which)
-        found[place] = part
-    return found
+        parts[place] = part
+    return parts
 
 
 def _after_long_pauses(lane: Whole, at: NDArray[np.datetime64]) -> NDArray[np.bool_]:
     """Readings that follow upon the lane before them after a pause twice as long as any other two lanes that are neighbours."""
     kind = lane[:-1] * (int(lane.max(initial=0)) + 1) + lane[1:]
     pauses = np.diff(at).astype(np.float64)
-    usual = sorted((float(np.median(pauses[kind == each])), each) for each in np.unique(kind[lane[1:] != lane[:-1]]))
-    found = np.zeros(len(lane), np.bool_)
+    usual = sorted(
+        (float(np.median(pauses[kind == transition])), transition)
+        for transition in np.unique(kind[lane[1:] != lane[:-1]])
+    )
+    after_pause = np.zeros(len(lane), np.bool_)
     if len(usual) > 1 and usual[-1][0] > 2 * usual[-2][0]:
-        found[1:] = kind == usual[-1][1]
-    return found
+        after_pause[1:] = kind == usual[-1][1]
+    return after_pause
 
 
-def followed(way: Way, policy: Policy) -> Iterator[tuple[float, float, float, float, float, str, str]]:
-    """Each reading as it comes out and is decided, the columns of `Course`: what `run` compiles, in plain Python.
-
-    The worked example of domain §3 up to its first correction:
-
-    >>> p = Parameters(target=10, tolerance_width=0.04, zero_range=0.004, averaging_limit=0.0133, wear_limit=0.3,
-    ...                confidence_limit=1.0, weighting_factor=2, factor=-1, tool_memory=1, average_memory=1)
-    >>> way = undisturbed(np.array([0.003, 0.005, 0.006]))
-    >>> [row[3] for row in followed(way, Policy((Lane(p, response=1.0),)))]
-    [0.0, 0.0, -0.004625]
-    """
-    averages: list[float] = []
-    waiting: deque[tuple[int, float]] = deque()
-    offset = pending = total = 0.0
-    held: float | None = None
-    begun = 0
-    columns = (way.free.tolist(), way.lane.tolist(), way.marks.tolist(), way.part.tolist())
-    for free, which, mark, part in zip(*columns, strict=True):
-        lane = policy.lanes[which]
-        parameters = lane.parameters
-        if mark & Mark.BEGIN:
-            offset, pending = float(way.offset[begun]), float(way.pending[begun])
-            averages = way.averages[begun].tolist()
-            total, held = round(offset + pending, DECIMALS) + 0.0, None
-            waiting.clear()
-            if pending:
-                waiting.append((part + policy.delay + 1, pending))
-            begun += 1
-        if mark & Mark.RESTART and lane.memory >= 0:
-            averages[lane.memory] = 0.0
-        if mark & Mark.RELEASED and held is not None:
-            offset, total, held = round(offset + held, DECIMALS) + 0.0, round(total + held, DECIMALS) + 0.0, None
-        while waiting and waiting[0][0] <= part:
-            _due, amount = waiting.popleft()
-            offset, pending = round(offset + amount, DECIMALS) + 0.0, round(pending - amount, DECIMALS) + 0.0
-        decision = decide(
-            parameters,
-            State(averages[lane.memory] if lane.memory >= 0 else 0.0, total, bool(mark & Mark.PAUSED)),
-            round(free + lane.response * offset, DECIMALS) + 0.0,
-            outstanding=outstanding_effect((pending,), parameters.factor),
-            accepted=not mark & Mark.REJECTED,
-            jump=bool(mark & Mark.JUMP),
-        )
-        if lane.memory >= 0:
-            averages[lane.memory] = decision.average_after
-        if decision.amount is not None:
-            held = decision.amount if decision.action is Action.HOLD else None
-            if decision.action is Action.CORRECT:
-                total = round(total + decision.amount, DECIMALS) + 0.0
-                pending = round(pending + decision.amount, DECIMALS) + 0.0
-                waiting.append((part + policy.delay + 1, decision.amount))
-        yield (
-            decision.deviation,
-            decision.decided,
-            decision.average_after,
-            decision.amount or 0.0,
-            offset,
-            decision.zone,
-            decision.code,
-        )
-
-
-def undisturbed(free: Floats) -> Way:
-    """A way of one characteristic and one edge on which nothing happens."""
+def without_events(free: Floats) -> ProcessTrace:
+    """Return the trace of one characteristic and one edge on which nothing happens."""
     count = len(free)
     marks = np.zeros(count, np.int8)
     marks[:1] = Mark.BEGIN
     nothing = np.zeros(1)
-    return Way(free, np.zeros(count, np.int64), marks, np.arange(count), nothing, nothing, np.zeros((1, 1)))
+    return ProcessTrace(free, np.zeros(count, np.int64), marks, np.arange(count), nothing, nothing, np.zeros((1, 1)))
 
 
-def run(way: Way, policy: Policy) -> tuple[Course, Figures]:
+def run(trace: ProcessTrace, policy: Policy) -> tuple[ReplayResult, Figures]:
     """Follow the loop, compiled: each reading, and what they amount to."""
-    course = Course.room(len(way.free))
-    counts, sums = np.zeros(len(Count), np.int64), np.zeros(len(Total))
-    numbers, limits = _rows(policy)
-    follow(way, numbers, limits, policy.delay, course, counts, sums)
-    return course, _figures(counts, sums, _half(policy))
+    result = ReplayResult.room(len(trace.free))
+    tally = np.zeros(1, TALLY)
+    follow(trace, rows_of([policy])[0], policy.delay, result, tally[0])
+    return result, _figures(tally[0], _half(policy))
 
 
-def figures_of(way: Way, policies: Sequence[Policy]) -> list[Figures]:
-    """What each of many policies amounts to; they have the delay of the first. Lets the interpreter go while it works."""
+def figures_of(trace: ProcessTrace, policies: Sequence[Policy]) -> list[Figures]:
+    """Figures of each of many policies; they have the delay of the first. Releases the interpreter lock while it works."""
     if not policies:
         return []
-    rows = [_rows(policy) for policy in policies]
-    numbers, limits = (np.stack(column) for column in zip(*rows, strict=True))
-    counts, sums = np.zeros((len(rows), len(Count)), np.int64), np.zeros((len(rows), len(Total)))
-    follow_each(way, numbers, limits, policies[0].delay, Course.room(0), counts, sums)
-    return [_figures(counts[at], sums[at], _half(policy)) for at, policy in enumerate(policies)]
+    tallies = np.zeros(len(policies), TALLY)
+    follow_each(trace, rows_of(policies), policies[0].delay, ReplayResult.room(0), tallies)
+    return [_figures(tally, _half(policy)) for tally, policy in zip(tallies, policies, strict=True)]
 
 
-def _rows(policy: Policy) -> tuple[Floats, Whole]:
-    numbers = [
-        (p.weighting_factor, p.factor, lane.response, _or_inf(p.max_step), _or_inf(p.max_total))
-        for lane in policy.lanes
-        for p in (lane.parameters,)
-    ]
-    whole = [
-        (
-            p.limits.zero_range,
-            p.limits.averaging,
-            p.limits.tolerance,
-            p.limits.wear,
-            p.limits.confidence,
-            p.measures_only,
-            lane.memory if p.average_memory else -1,
-            p.wear_policy is WearPolicy.HOLD,
-            p.rejected_may_correct,
-            lane.counts,
-        )
-        for lane in policy.lanes
-        for p in (lane.parameters,)
-    ]
-    return np.array(numbers, np.float64), np.array(whole, np.int64)
-
-
-def _or_inf(limit: float | None) -> float:
-    return inf if limit is None else limit
+def rows_of(policies: Sequence[Policy]) -> Rows:
+    """Return the lanes of policies as the loops take them, a row a policy."""
+    return np.array([[lane.row() for lane in policy.lanes] for policy in policies], LANE)
 
 
 def _half(policy: Policy) -> float:
@@ -259,39 +188,30 @@ def _half(policy: Policy) -> float:
     return next(lane.parameters.tolerance_width for lane in reversed(policy.lanes) if lane.counts) / 2
 
 
-def _figures(counts: Whole, sums: Floats, half: float) -> Figures:
-    number = {place: int(counts[place]) for place in Count}
-    inner, corrections = number[Count.INNER], number[Count.CORRECTIONS]
-    mean = float(sums[Total.SUM]) / inner if inner else None
+def _figures(tally: Any, half: float) -> Figures:
+    number = dict(zip(TALLY.names or (), tally.item(), strict=True))
+    total, squares, largest, sizes = (number.pop(name) for name in ("sum", "squares", "largest", "sizes"))
+    inner, corrections = number["inner"], number["corrections"]
+    mean = total / inner if inner else None
     spread = ppk = None
     if mean is not None and inner > 1:
-        spread = sqrt(max(0.0, (float(sums[Total.SQUARES]) - inner * mean * mean) / (inner - 1)))
+        spread = sqrt(max(0.0, (squares - inner * mean * mean) / (inner - 1)))
         if not nanometres(spread * 1000):  # of equal readings rounding alone is left
             spread = 0.0
         elif inner >= FEWEST_FOR_PPK:
             ppk = (half - abs(mean)) / (3 * spread)
     return Figures(
-        readings=number[Count.READINGS],
-        rejects=number[Count.REJECTS],
-        oversize=number[Count.OVERSIZE],
-        undersize=number[Count.UNDERSIZE],
-        worn=number[Count.WORN],
-        faults=number[Count.FAULTS],
-        offset_limit=number[Count.LIMIT],
-        corrections=corrections,
-        of_tool=number[Count.OF_TOOL],
-        held=number[Count.HELD],
-        mean_size=float(sums[Total.SIZES]) / corrections if corrections else None,
-        inner=inner,
+        **number,
+        mean_size=sizes / corrections if corrections else None,
         mean=mean,
         spread=spread,
         ppk=ppk,
-        largest=float(sums[Total.LARGEST]) if inner else None,
+        largest=largest if inner else None,
     )
 
 
 def agreement(mine: NDArray[np.float64], true: NDArray[np.float64]) -> tuple[float, float]:
-    """How far a replay runs from what happened: root mean square of the difference, and the share of readings that are the
+    """Accuracy of a replay: root mean square of the difference from the real readings, and the share of readings that are the
     same to 0.1 µm. Of readings that both have; (nan, nan) of none.
 
     >>> agreement(np.array([0.001, 0.002, 0.003, 0.004]), np.array([0.001, 0.002, 0.003, 0.006]))

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
 
+from app.core.decision.limits import nanometres, reaches, within_tolerance
 from app.core.parameters import Parameters
-from app.core.zones import nanometres, within_tolerance
 
 DRIFT = 7  # readings in a row on one side, beyond the zero range, are a drift
 QUIET = timedelta(minutes=15)  # nobody expects a reading sooner
@@ -48,7 +48,7 @@ CALM = frozenset({State.CORRECTING, State.DRIFTING_UP, State.DRIFTING_DOWN, Stat
 
 @dataclass(frozen=True)
 class Known:
-    """What the state is told by.
+    """Facts that the state is derived from.
 
     paused: by a probe fault; tool_paused: nobody knows which offset its tool has.
     alarms: kinds of the active ones. corrections: statuses of the open ones. trend: the last deviations, oldest first, mm;
@@ -70,11 +70,11 @@ class Known:
 
     @property
     def tells_of_the_part(self) -> bool:
-        """Whether the last reading is a size of the last part: neither declared false nor beyond R36."""
+        """Tell if the last reading is a size of the last part: neither declared false nor beyond R36."""
         return (
             not self.excluded
             and self.deviation is not None
-            and abs(nanometres(self.deviation)) < self.parameters.limits.confidence
+            and not reaches(nanometres(self.deviation), self.parameters.limits.confidence)
         )
 
     @property
@@ -112,7 +112,7 @@ def state_of(known: Known) -> State:
 
 
 def drift(trend: Sequence[float], parameters: Parameters) -> State | None:
-    """Whether the last readings all lie on one side beyond the zero range."""
+    """The drift state when the last readings all lie on one side beyond the zero range, else None."""
     last = [nanometres(deviation) for deviation in trend[-DRIFT:]]
     if len(last) == DRIFT and min(last) > parameters.limits.zero_range:
         return State.DRIFTING_UP

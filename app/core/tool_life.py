@@ -1,7 +1,7 @@
-"""How much of a planned tool life is used: by parts cut, or by wear life, the sum of the corrections of the tool.
+"""Use of a planned tool life: by parts cut, or by wear life, the sum of the corrections of the tool.
 
 A closed loop takes the wear out of the size and puts it into the offset: the sum of the corrections since the tool was
-changed is the wear it has seen, and an edge is spent when that reaches what it bears (VB max of the insert, as the
+changed is the wear it has seen, and an edge is worn out when that reaches what it bears (VB max of the insert, as the
 corrections show it). Lengths are mm.
 """
 
@@ -10,11 +10,11 @@ from math import floor
 from statistics import median
 from typing import Literal, NamedTuple
 
-from app.core.zones import nanometres
+from app.core.decision.limits import nanometres
 
 
-class Plan(NamedTuple):
-    """How long an edge is to last; None where nothing is planned.
+class LifePlan(NamedTuple):
+    """Planned life of an edge; None where nothing is planned.
 
     parts: parts cut. total: magnitude of the sum of corrections, mm.
     """
@@ -23,12 +23,12 @@ class Plan(NamedTuple):
     total: float | None = None
 
 
-class Use(NamedTuple):
-    """What is used of a plan.
+class LifeUse(NamedTuple):
+    """Used share of a plan.
 
-    share: of the planned life, 1 is all of it; of the two the greater. left: parts until it is spent, at the rate of wear
+    share: of the planned life, 1 is all of it; of the two the greater. left: parts until it is worn out, at the rate of wear
     so far where the sum decides; None without a plan, or while nothing is known of the rate.
-    spent: what has been reached, `parts` before `total`.
+    spent: the limit that was reached, `parts` before `total`.
     """
 
     share: float | None
@@ -36,17 +36,17 @@ class Use(NamedTuple):
     spent: Literal["parts", "total"] | None
 
 
-def use_of(plan: Plan, parts: int, total: float) -> Use:
-    """How far a tool is that has cut so many parts and been corrected by so much in all.
+def use_of(plan: LifePlan, parts: int, total: float) -> LifeUse:
+    """Use of a tool's planned life. parts: cut so far; total: sum of its corrections, mm.
 
     share = max(parts / planned parts, \\|total\\| / planned total); left = planned parts - parts, or
     (planned total - \\|total\\|) / (\\|total\\| / parts), whichever is less, and not below 0.
 
-    >>> use_of(Plan(parts=400), 300, 0.0)
-    Use(share=0.75, left=100, spent=None)
-    >>> use_of(Plan(parts=400, total=0.05), 100, -0.04)
-    Use(share=0.8, left=25, spent=None)
-    >>> use_of(Plan(total=0.05), 120, 0.05).spent
+    >>> use_of(LifePlan(parts=400), 300, 0.0)
+    LifeUse(share=0.75, left=100, spent=None)
+    >>> use_of(LifePlan(parts=400, total=0.05), 100, -0.04)
+    LifeUse(share=0.8, left=25, spent=None)
+    >>> use_of(LifePlan(total=0.05), 120, 0.05).spent
     'total'
     """
     shares: list[float] = []
@@ -66,7 +66,7 @@ def use_of(plan: Plan, parts: int, total: float) -> Use:
         lefts.append(max(0, plan.parts - parts))
         if parts >= plan.parts:
             spent = "parts"
-    return Use(max(shares, default=None), min(lefts, default=None), spent)
+    return LifeUse(max(shares, default=None), min(lefts, default=None), spent)
 
 
 def usual_life(parts: Sequence[int]) -> float | None:

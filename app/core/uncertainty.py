@@ -1,11 +1,11 @@
-"""What the way of the probe's signal costs: the axis moves on while the signal travels (domain §4).
+"""Uncertainty from the signal path of the probe: the axis moves on while the signal travels (domain §4).
 
 A probe wired straight to the control stops the axis position at the trigger. Through the PLC the signal waits for the
 PLC's scan, up to a quarter of a millisecond, and the position is taken that much too late::
 
     position error = probing feed x delay        (150 mm/min x 0.25 ms = 0.625 µm)
 
-A constant delay calibrates away at the same feed. What varies from touch to touch, its jitter, does not: it belongs in
+A constant delay calibrates away at the same feed. The part that varies from point to point, its jitter, does not: it belongs in
 the measurement uncertainty, and a zero range (R33) below it would correct what nobody has measured.
 """
 
@@ -17,14 +17,14 @@ MILLISECONDS_IN_A_MINUTE = 60_000.0
 
 
 class SignalPath(StrEnum):
-    """How the probe's signal reaches the control."""
+    """Path of the probe's signal to the control."""
 
     DIRECT = "direct"
     PLC = "plc"
 
 
 def position_uncertainty(feed: float, delay: float) -> float:
-    """How far the axis moves during the delay, mm. feed: mm/min; delay: ms.
+    """Travel of the axis during the delay, mm. feed: mm/min; delay: ms.
 
     >>> position_uncertainty(150.0, 0.25)
     0.000625

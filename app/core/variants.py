@@ -1,4 +1,4 @@
-"""What a measuring variant yields beside the value (domain §4), and how well the probe repeats itself.
+"""Results of a measuring variant beside the value (domain §4), and the repeatability of the probe.
 
 ==================  =========================================================================
 one point, indexed  run-out = half-difference of the sides (of more than two, half their range)
@@ -18,7 +18,7 @@ from math import fsum, sqrt
 from typing import NamedTuple
 
 from app.core.acceptance import sections_outside
-from app.core.compensation import DECIMALS
+from app.core.decision.step import DECIMALS
 from app.core.parameters import Parameters, Variant
 from app.core.probing import Touches, points_expected, sections_of
 
@@ -44,7 +44,7 @@ class Results(NamedTuple):
 
 
 def yielded_by(parameters: Parameters) -> tuple[str, ...]:
-    """Which lengths of `Results` a characteristic with these parameters yields, the variant's own first.
+    """Names of the `Results` lengths of a characteristic with these parameters, the variant's own first.
 
     >>> from app.core.parameters import read
     >>> yielded_by(read({"R32": 62.0, "R35": 0.03, "R33": 0, "R37": 0.3, "R36": 1.0, "R25": 1, "R27": 2})[0])
@@ -53,8 +53,8 @@ def yielded_by(parameters: Parameters) -> tuple[str, ...]:
     own = {Variant.INDEXED: "run_out", Variant.ROUND: "out_of_roundness", Variant.ALONG: "taper"}.get(
         parameters.variant
     )
-    found = (own,) if own and points_expected(parameters) >= POINTS_FOR_A_SHAPE else ()
-    return (*found, *(("repeat_range", "repeat_deviation") if parameters.repeats > 1 else ()))
+    shape = (own,) if own and points_expected(parameters) >= POINTS_FOR_A_SHAPE else ()
+    return (*shape, *(("repeat_range", "repeat_deviation") if parameters.repeats > 1 else ()))
 
 
 def results_of(
@@ -96,7 +96,7 @@ def results_of(
 
 
 def fitted_step(points: Sequence[float]) -> float:
-    """How much the least-squares line through evenly spaced points rises from one to the next, mm.
+    """Rise of the least-squares line through evenly spaced points from one to the next, mm.
 
     ``b = sum (i - i_mean) y_i / sum (i - i_mean)^2``
 
@@ -110,7 +110,7 @@ def fitted_step(points: Sequence[float]) -> float:
 
 
 def fitted_points(points: Sequence[float]) -> list[float]:
-    """Where the least-squares line runs at each of evenly spaced points, mm.
+    """The least-squares line at each of evenly spaced points, mm.
 
     >>> fitted_points([1.0, 3.0, 2.0])
     [1.5, 2.0, 2.5]

@@ -13,17 +13,22 @@ with S = 0, so with its setting error. Whatever was decided and however late it 
 (`fit`). Its standard error counts positively autocorrelated scatter by the effective number of readings
 n (1 - rho) / (1 + rho), rho the lag-1 autocorrelation of the residuals (Santer et al. 2000, J. Geophys. Res. 105, 7337,
 eq. 6; rho freed of its bias of -(2 + 4 rho)/n after Marriott and Pope 1954, Biometrika 41, 390). It assumes that
-scatter is of one size, and that wear goes on as it did: an edge that breaks cannot be foretold.
+scatter is of one size; an edge that breaks cannot be foretold.
 
-*Parts left* to a limit is where that line, continued, reaches it. The interval is Fieller's (1954, J. R. Stat. Soc. B
-16, 175) with the scatter of a single part added: outside of it the limit lies out of the 95 % prediction interval of a
-part, so its lower end is when single parts begin to lie beyond. Lengths are mm.
+*Parts left* to a limit is where that line, continued, reaches it. Its interval has two sources. Fieller's (1954, J. R. Stat.
+Soc. B 16, 175), with the scatter of a single part added, is that of a line that goes on straight. Wear does not: an edge runs
+in, wears evenly, then faster (ISO 3685, the wear curve of a tool life). So both ends are moved apart by the factor
+
+    (1 + parts / seen) ** widening
+
+with `seen` the parts that the line was fitted over, `parts` those to the end of the straight interval: as far ahead again as
+was seen, wear may turn out half or twice as fast. `widening` is 1, and more where the forecasts of edges before missed by more (`backtest`, `widened`). Lengths are mm.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from math import inf, sqrt
+from math import ceil, inf, log, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +36,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc, stdtrit
 
 from app.core.parameters import Parameters
+from app.core.spc.variation import varies
 
 Values = NDArray[np.float64]
 
@@ -41,6 +47,10 @@ BREAK = 0.001  # so rarely scatter alone makes one line look like two
 OUTLIER = 5.0  # standard deviations from its neighbours
 STEP = 8.0  # standard deviations from one reading to the next
 NEAR = 5  # readings on either side of a step of the reference that say whether the parts moved
+MOST_AHEAD = 10.0  # times as far along the line as a part is ahead, `cone` looks
+LOOKS = (0.3, 0.5, 0.7, 0.9)  # of a tool life: where `backtest` makes a forecast of its end
+MOST_WIDENING = 4.0  # exponent from which on an interval says nothing
+SHORTEST_LIFE = 40  # readings of a tool life that a forecast is tested on
 
 
 class Step(NamedTuple):
@@ -92,9 +102,9 @@ class Fit:
 
     @property
     def is_wear(self) -> bool:
-        """Whether wear is to be seen: its interval does not hold 0."""
+        """Tell if wear is significant: the confidence interval of the slope does not hold 0."""
         low, high = self.slope_interval
-        return low > 0 or high < 0
+        return self.slope != 0 and (low > 0 or high < 0)
 
     def at(self, ahead: float) -> float:
         """The w of the part that comes so many parts after the last."""
@@ -108,7 +118,7 @@ class Fit:
 
 
 class Forecast(NamedTuple):
-    """Parts until the line reaches a limit, with its interval; 0 = reached. high is inf where nobody can say."""
+    """Parts until the wear reaches a limit, with its 95 % interval; 0 = reached. high is inf where nobody can say."""
 
     parts: float
     low: float
@@ -135,16 +145,16 @@ def joined(sequence: NDArray[np.int64], curve: Values, steps: Sequence[Step]) ->
     >>> joined(s, w, [Step(6, 0.5)])[0].tolist() == [0.0] * 10, joined(s, w * 0, [Step(6, 0.5)])[0].tolist() == [0.0] * 10
     (True, True)
     """
-    made, lifted = curve.copy(), 0.0
+    lifted_curve, lifted = curve.copy(), 0.0
     for step in sorted(steps):
         at = int(np.searchsorted(sequence, step.sequence))
-        if not 0 < at < len(made):
+        if not 0 < at < len(lifted_curve):
             continue
-        jump = float(np.median(made[at : at + NEAR]) - np.median(made[max(0, at - NEAR) : at]))
+        jump = float(np.median(lifted_curve[at : at + NEAR]) - np.median(lifted_curve[max(0, at - NEAR) : at]))
         if abs(jump + step.size) < abs(jump):
-            made[at:] += step.size
+            lifted_curve[at:] += step.size
             lifted += step.size
-    return made, lifted
+    return lifted_curve, lifted
 
 
 def scatter_of(curve: Values) -> float:
@@ -198,7 +208,7 @@ def fit(sequence: NDArray[np.int64], curve: Values) -> Fit | None:
     x = x - last
     centre, count = float(x.mean()), len(x)
     spread = float(((x - centre) ** 2).sum())
-    slope = float(((x - centre) * y).sum() / spread)
+    slope = float(((x - centre) * y).sum() / spread) if varies(float(np.ptp(y)), y) else 0.0
     residual = y - y.mean() - slope * (x - centre)
     rho = _correlation(residual)
     effective = max(4.0, count * (1 - rho) / (1 + rho))
@@ -222,16 +232,62 @@ def fit(sequence: NDArray[np.int64], curve: Values) -> Fit | None:
     )
 
 
-def forecast(fit: Fit, limit: float) -> Forecast | None:
+def forecast(fit: Fit, limit: float, widening: float = 1.0) -> Forecast | None:
     """Parts until w reaches `limit` (mm), one that lies the way that it wears; None where no wear is to be seen.
 
     A limit that the line has passed already is reached: 0 parts. What broke tells nothing of what comes: None as well.
+    widening: exponent of the factor by which wear that does not go on straight widens the interval; see `Record`.
 
     >>> w = np.arange(40) * 0.0001 + np.array([0.001, -0.001] * 20)
     >>> f = forecast(fit(np.arange(1, 41), w), 0.0139)
     >>> round(f.parts), round(f.low), round(f.high)
-    (105, 70, 163)
+    (105, 25, 825)
     """
+    straight = _straight(fit, limit)
+    if straight is None:
+        return None
+    return Forecast(straight.parts, _sooner(fit, straight.low, widening), _later(fit, straight.high, widening))
+
+
+def cone(fit: Fit, ahead: Values, widening: float = 1.0) -> tuple[Values, Values]:
+    """Limits of the size of a part so many parts after the last, mm: with the slowest and with the fastest wear.
+
+    The same interval as that of `forecast`, seen from the parts: it comes to a limit after `low` and after `high` parts.
+
+    >>> line = fit(np.arange(1, 41), np.arange(40) * 0.0001 + np.array([0.001, -0.001] * 20))
+    >>> [ends.round(4).tolist() for ends in cone(line, np.array([0.0, 18.7]))]
+    [[0.0017, 0.0029], [0.006, 0.0098]]
+    """
+    straight = np.concatenate(([0.0], np.geomspace(0.01, MOST_AHEAD * max(float(ahead.max()), 1.0), 1_000)))
+    sooner = np.array([_sooner(fit, distance, widening) for distance in straight])
+    later = np.array([_later(fit, distance, widening) for distance in straight])
+    sign = 1.0 if fit.slope >= 0 else -1.0
+    slow, fast = np.interp(ahead, later, straight), np.interp(ahead, sooner, straight)
+    return (
+        np.array([fit.at(distance) - sign * fit.half_width(distance, single=True) for distance in slow]),
+        np.array([fit.at(distance) + sign * fit.half_width(distance, single=True) for distance in fast]),
+    )
+
+
+def _bending(fit: Fit, parts: float) -> float:
+    """By how much faster or slower than along the line wear may come so far."""
+    return 1 + parts / (fit.last - fit.first + 1)
+
+
+def _sooner(fit: Fit, parts: float, widening: float) -> float:
+    """The parts after which faster wear may be where the line is after `parts`; never fewer than for a nearer place."""
+    if widening > 1:
+        parts = min(parts, (fit.last - fit.first + 1) / (widening - 1))
+    return float(parts / _bending(fit, parts) ** widening)
+
+
+def _later(fit: Fit, parts: float, widening: float) -> float:
+    """The parts after which slower wear may only be where the line is after `parts`."""
+    return float(parts * _bending(fit, parts) ** widening)
+
+
+def _straight(fit: Fit, limit: float) -> Forecast | None:
+    """The forecast of wear that goes on along its line."""
     if not fit.is_wear or fit.off:
         return None
     # (c + b u - L)^2 = T^2 (1 + v/n + v u^2 / Sxx) about the centre of the readings, u = parts - centre.
@@ -248,8 +304,76 @@ def forecast(fit: Fit, limit: float) -> Forecast | None:
     return Forecast(max(0.0, parts), max(0.0, low), max(0.0, high))
 
 
+class Record(NamedTuple):
+    """Record of earlier forecasts: number tested, on how many lives, and number whose interval held the true value.
+
+    widening: the exponent with which 95 % of them would have held it, never below 1; for `forecast` of the edge that is
+    in the machine. held counts the intervals as they are without it.
+    """
+
+    lives: int
+    tested: int
+    held: int
+    widening: float
+
+
+def backtest(lives: Sequence[tuple[NDArray[np.int64], Values]]) -> Record:
+    """Test forecasts on tool lives that are over: sequences and wear curve of each, ascending.
+
+    At several moments of a life its forecast of the level that it came to in the end is made from the readings until then,
+    and compared with the parts that it really took. Lives of fewer than `SHORTEST_LIFE` readings, and moments at which no
+    forecast would have been made, count for nothing.
+
+    >>> w = np.arange(200) * 0.0001 + np.array([0.001, -0.001] * 100)
+    >>> backtest([(np.arange(1, 201), w)])
+    Record(lives=1, tested=4, held=4, widening=1.0)
+    """
+    tested = held = counted = 0
+    needed: list[float] = []
+    for numbers, worn in lives:
+        if len(worn) < SHORTEST_LIFE:
+            continue
+        whole = len(worn) - _off(worn)  # an edge that broke in the end was worn until then
+        sequence, curve = numbers[:whole], worn[:whole]
+        end, limit = int(sequence[-1 - NEAR // 2]), float(np.median(curve[-NEAR:]))
+        before = tested
+        for share in LOOKS:
+            upto = int(len(curve) * share)
+            line = fit(sequence[:upto], curve[:upto])
+            straight = None if line is None else _straight(line, limit)
+            if line is None or straight is None or straight.parts <= 0:
+                continue
+            tested += 1
+            exponent = _needed(line, straight, float(end - line.last))
+            needed.append(exponent)
+            held += exponent <= 1
+        counted += tested > before
+    return Record(counted, tested, held, max(1.0, widened(needed)))
+
+
+def _needed(fit: Fit, straight: Forecast, truth: float) -> float:
+    """The exponent with which the interval just holds the truth; 0 where the straight one does."""
+    if straight.low <= truth <= straight.high:
+        return 0.0
+    if truth < straight.low:
+        return log(straight.low / truth) / log(_bending(fit, straight.low))
+    return log(truth / straight.high) / log(_bending(fit, straight.high))
+
+
+def widened(needed: Sequence[float]) -> float:
+    """The exponent that holds at least 95 % of what comes, by what was needed so far: the (n + 1) 0.95th smallest.
+
+    Of fewer than 19 it is the largest (split conformal prediction: Vovk et al. 2005, Algorithmic learning in a random
+    world); and never above `MOST_WIDENING`, from which on the interval says nothing.
+    """
+    if not needed:
+        return 1.0
+    place = min(len(needed), ceil((len(needed) + 1) * LEVEL))
+    return min(MOST_WIDENING, sorted(needed)[place - 1])
+
+
 class Towards(StrEnum):
-    """What an edge comes to: R37 worn off, the end of the tolerance, or the tool's offset limit."""
+    """The limit that wear reaches: R37 worn off, the end of the tolerance, or the tool's offset limit."""
 
     WEAR = "wear"
     TOLERANCE = "tolerance"
@@ -257,7 +381,7 @@ class Towards(StrEnum):
 
 
 def limits_of(parameters: Parameters, way: float, total: float, lifted: float = 0.0) -> dict[Towards, float]:
-    """Where on the wear curve each limit lies, mm, the way that it wears (sign of `way`).
+    """Position of each limit on the wear curve, mm, in the direction of wear (sign of `way`).
 
     wear: nothing corrected, a part would deviate by R37. tolerance: were nothing corrected from now on, a part would
     deviate by R35/2; `total` is the sum of the corrections issued since the tool change. offset: following the wear, the
@@ -269,17 +393,17 @@ def limits_of(parameters: Parameters, way: float, total: float, lifted: float = 
     {'wear': 0.3, 'tolerance': 0.028, 'offset': 0.1}
     """
     sign = 1.0 if way >= 0 else -1.0
-    found = {
+    limits = {
         Towards.WEAR: sign * parameters.wear_limit,
         Towards.TOLERANCE: total / parameters.factor + lifted + sign * parameters.tolerance_width / 2,
     }
     if parameters.max_total is not None and not parameters.measures_only:
-        found[Towards.OFFSET] = sign * parameters.max_total / abs(parameters.factor) + lifted
-    return found
+        limits[Towards.OFFSET] = sign * parameters.max_total / abs(parameters.factor) + lifted
+    return limits
 
 
 def _off(curve: Values) -> int:
-    """How many of the newest readings lie beyond a step, `STEP` standard deviations high; so many as make a line do not."""
+    """Number of newest readings after a step, `STEP` standard deviations high; none once they are enough for a line."""
     newest = np.abs(np.diff(curve[-FEWEST:]))
     steps = np.flatnonzero(newest > max(STEP * scatter_of(curve), 1e-9))
     return len(newest) - int(steps[0]) if len(curve) > FEWEST and len(steps) else 0
@@ -312,7 +436,7 @@ def _squares(x: Values, y: Values) -> float:
 
 
 def _breaks(x: Values, y: Values) -> bool:
-    """Whether two lines describe these readings significantly better than one."""
+    """Tell if two lines describe these readings significantly better than one."""
     half = len(x) // 2
     whole = _squares(x, y)
     parts = _squares(x[:half], y[:half]) + _squares(x[half:], y[half:])

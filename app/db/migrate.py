@@ -4,25 +4,32 @@ Several server processes may start at once; an advisory lock lets one migrate wh
 A migration that cannot get a table within ``LOCK_PATIENCE`` gives up rather than make every reading queue behind it.
 """
 
+from __future__ import annotations
+
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from alembic import command
-from alembic.autogenerate import compare_metadata
-from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, NullPool, create_engine, text
-from sqlalchemy.exc import OperationalError
-from sqlalchemy.schema import SchemaItem
+from psycopg.errors import InsufficientPrivilege
 
-from app.db.base import whole_metadata
-from app.db.engine import psycopg_url
+from app.db.connections import Connections
 from app.settings import HOUSE
+
+if TYPE_CHECKING:  # SQLAlchemy and Alembic: half a second to read, which most commands need not spend
+    from alembic.config import Config
+    from alembic.script import ScriptDirectory
+    from sqlalchemy import Connection
+    from sqlalchemy.schema import SchemaItem
 
 LOCK = 7_010_000_833  # any number, the same in every process
 LOCK_PATIENCE = "5s"
+VERSIONS = HOUSE / "migrations" / "versions"
+OTHERS_TURN = "10min"
+SQUASHED = "0063"
+"""Last of the revisions before the first release. Its tables are those of the first schema, so it is stamped as that."""
+CARRIER = "e963582"
+"""The last commit of Inband that carries these revisions one by one."""
 OPTIONS = f"-c timezone=UTC -c lock_timeout={LOCK_PATIENCE}"
 
 
@@ -31,15 +38,34 @@ class MigrationError(Exception):
 
 
 def upgrade(url: str) -> list[str]:
-    """Run the pending migrations; their names. None of a migration that fails remains."""
-    with _connected(url) as connection:
-        connection.execute(text("SET lock_timeout = 0"))  # for the others' turn we wait
-        connection.execute(text("SELECT pg_advisory_lock(:lock)"), {"lock": LOCK})
+    """Run the pending migrations; their names. None of a migration that fails remains.
+
+    A database at `SQUASHED` gets another number of revision and keeps everything else.
+    """
+    if current(url) == head():
+        return []
+    from alembic import command
+    from sqlalchemy import text
+    from sqlalchemy.exc import OperationalError, ProgrammingError
+
+    with connected(url) as connection:
+        connection.execute(text(f"SET lock_timeout = '{OTHERS_TURN}'"))
+        try:
+            connection.execute(text("SELECT pg_advisory_lock(:lock)"), {"lock": LOCK})
+        except OperationalError as error:
+            if "lock timeout" not in str(error):
+                raise
+            raise MigrationError(
+                f"another Inband has been migrating this database for {OTHERS_TURN}. Look whether it still works; "
+                "if it does not, end it and try again."
+            ) from error
         connection.execute(text(f"SET lock_timeout = '{LOCK_PATIENCE}'"))
-        todo = _pending(connection)
+        now, todo = _revision(connection), _pending(connection)
         connection.commit()  # alembic commits only what it has begun itself
         if todo:
             try:
+                if now == SQUASHED:
+                    _stamp(connection)
                 command.upgrade(_config(connection), "head")
             except OperationalError as error:
                 if "lock timeout" not in str(error):
@@ -48,29 +74,51 @@ def upgrade(url: str) -> list[str]:
                     f"a table was in use for {LOCK_PATIENCE}, so the database was left as it was. "
                     "Stop the servers on this database, or try again at a quieter moment."
                 ) from error
+            except ProgrammingError as error:
+                if not isinstance(error.orig, InsufficientPrivilege):
+                    raise
+                driver = connection.connection.driver_connection
+                raise MigrationError(
+                    f"{len(todo)} migration(s) have to run, and the role {driver.info.user if driver else ''} may not change "
+                    "tables. Run `inband migrate` with INBAND_DATABASE_URL of the role that owns them, then start again."
+                ) from error
         return todo  # the lock ends with the connection
 
 
 def current(url: str) -> str | None:
     """The database's revision; None before the first migration."""
-    with _connected(url) as connection:
-        return MigrationContext.configure(connection).get_current_revision()
+    with Connections(url).connect(options=OPTIONS) as connection:
+        (there,) = connection.execute("SELECT to_regclass('alembic_version')").fetchone() or (None,)
+        row = connection.execute("SELECT version_num FROM alembic_version").fetchone() if there else None
+    return str(row[0]) if row else None
 
 
 def head() -> str | None:
-    """The revision that this program's tables are at."""
-    return _scripts().get_current_head()
+    """The revision that this program's tables are at: the one migration that no other goes on from."""
+    texts = [path.read_text(encoding="utf-8") for path in VERSIONS.glob("*.py")]
+    here = {match[1] for source in texts if (match := re.search(r'^revision\b.*?= "(\w+)"', source, re.MULTILINE))}
+    heads = here - {
+        match[1] for source in texts if (match := re.search(r'^down_revision\b.*?= "(\w+)"', source, re.MULTILINE))
+    }
+    return heads.pop() if len(heads) == 1 else _scripts().get_current_head()
 
 
 def pending(url: str) -> list[str]:
     """The migrations still to run, oldest first, as ``revision summary``."""
-    with _connected(url) as connection:
+    if current(url) == head():
+        return []
+    with connected(url) as connection:
         return _pending(connection)
 
 
 def differences(url: str) -> list[Any]:
-    """What ``alembic revision --autogenerate`` would write: empty when tables.py and migrations say the same."""
-    with _connected(url) as connection:
+    """Changes that ``alembic revision --autogenerate`` would write; empty when tables.py and migrations agree."""
+    from alembic.autogenerate import compare_metadata
+    from alembic.runtime.migration import MigrationContext
+
+    from app.db.base import whole_metadata
+
+    with connected(url) as connection:
         options = {"compare_type": True, "compare_server_default": True, "include_object": include_object}
         return list(compare_metadata(MigrationContext.configure(connection, opts=options), whole_metadata()))
 
@@ -81,19 +129,27 @@ def include_object(item: SchemaItem, *_: object) -> bool:
 
 
 @contextmanager
-def _connected(url: str) -> Iterator[Connection]:
-    engine = create_engine(
-        psycopg_url(url), poolclass=NullPool, connect_args={"options": OPTIONS, "connect_timeout": 10}
-    )
-    with engine.connect() as connection:
-        yield connection
+def connected(url: str) -> Iterator[Connection]:
+    """A connection on which no reading waits for long behind a migration."""
+    from sqlalchemy import NullPool, create_engine
+
+    with Connections(url) as connections:
+        engine = create_engine(
+            "postgresql+psycopg://", creator=lambda: connections.connect(options=OPTIONS), poolclass=NullPool
+        )
+        with engine.connect() as connection:
+            yield connection
 
 
 def _config(connection: Connection | None = None) -> Config:
+    from alembic.config import Config
+
     return Config(toml_file=HOUSE / "pyproject.toml", attributes={"connection": connection})
 
 
 def _scripts() -> ScriptDirectory:
+    from alembic.script import ScriptDirectory
+
     try:
         return ScriptDirectory.from_config(_config())
     except Exception as error:
@@ -102,9 +158,31 @@ def _scripts() -> ScriptDirectory:
         ) from error
 
 
+def _revision(connection: Connection) -> str | None:
+    from alembic.runtime.migration import MigrationContext
+
+    return MigrationContext.configure(connection).get_current_revision()
+
+
+def _stamp(connection: Connection) -> None:
+    from sqlalchemy import text
+
+    revisions = {"first": _scripts().get_base(), "squashed": SQUASHED}
+    connection.execute(text("UPDATE alembic_version SET version_num = :first WHERE version_num = :squashed"), revisions)
+    connection.commit()
+
+
 def _pending(connection: Connection) -> list[str]:
-    scripts, now = _scripts(), MigrationContext.configure(connection).get_current_revision()
+    scripts, now = _scripts(), _revision(connection)
+    if now == SQUASHED:
+        now = None  # the first schema is still to be stamped
     if now is not None and now not in {script.revision for script in scripts.walk_revisions()}:
+        if re.fullmatch(r"\d{4}", now) and now < SQUASHED:
+            raise MigrationError(
+                f"the database is at revision {now}, of the days before the first release; this Inband goes on from the last "
+                f"one of these, {SQUASHED}. Make a backup with the Inband that has served it. Then check out commit {CARRIER} "
+                "of 2026-11-22 and run its `inband migrate` on this database; after that, start this Inband."
+            )
         raise MigrationError(
             f"the database is at revision {now}, which this Inband does not know: a newer one has used it. "
             "Run that newer Inband, or restore a backup made before."

@@ -7,12 +7,12 @@ does. This speaks libpq through `psycopg.pq`, on a connection that psycopg has m
 import asyncio
 from collections.abc import Sequence
 from itertools import count
-from typing import Any
 
-from psycopg import AsyncConnection
-from psycopg.errors import error_from_result
+from psycopg.errors import OperationalError, error_from_result
 from psycopg.pq import ExecStatus, TransactionStatus
 from psycopg.pq.abc import PGresult
+
+from app.db.connections import LOOK, WatchedAsyncConnection
 
 Step = tuple[str, *tuple[str, ...]]
 """A statement and its parameters."""
@@ -24,25 +24,28 @@ _names = count()
 class Pipeline:
     """One connection and the statements that have been prepared on it."""
 
-    def __init__(self, connection: AsyncConnection[Any]) -> None:
+    def __init__(self, connection: WatchedAsyncConnection) -> None:
         self.connection = connection
+        self.until: float | None = None
+        """By the clock of the event loop: when waiting for an answer ends. None: as long as the database is heard."""
         self._prepared: dict[str, bytes] = {}
 
     @property
     def closed(self) -> bool:
-        """Whether the connection is of no use any more."""
+        """Tell if the connection is of no use any more."""
         return self.connection.closed
 
     @property
     def begun(self) -> bool:
-        """Whether a transaction is open, or has failed and waits for its ROLLBACK."""
+        """Tell if a transaction is open, or has failed and waits for its ROLLBACK."""
         return self.connection.pgconn.transaction_status != TransactionStatus.IDLE
 
     def look(self) -> None:
-        """See whether the server has ended the idle connection meanwhile, which it says by itself.
+        """See whether the server has ended the idle connection meanwhile, which it says by itself, or is silent.
 
         Raises psycopg's `OperationalError`. Found out only after statements were sent, nobody knew what became of them.
         """
+        self.connection.check()
         pgconn = self.connection.pgconn
         for _last_words_then_end in range(2):
             pgconn.consume_input()
@@ -55,7 +58,7 @@ class Pipeline:
         begun. Raises psycopg's errors.
         """
         pgconn = self.connection.pgconn
-        kept: list[bool] = []  # whether the answer is one that was asked for, or that of a preparation
+        asked_for: list[bool] = []  # whether the answer is one that was asked for, or that of a preparation
         preparing: dict[str, bytes] = {}
         pgconn.enter_pipeline_mode()
         for statement, *parameters in steps:
@@ -63,9 +66,9 @@ class Pipeline:
             if name is None:
                 name = preparing[statement] = b"inband_%d" % next(_names)
                 pgconn.send_prepare(name, statement.encode())
-                kept.append(False)
+                asked_for.append(False)
             pgconn.send_query_prepared(name, [parameter.encode() for parameter in parameters])
-            kept.append(True)
+            asked_for.append(True)
         pgconn.pipeline_sync()
         results = await self._results()
         pgconn.exit_pipeline_mode()
@@ -73,7 +76,7 @@ class Pipeline:
             if result.status not in (ExecStatus.TUPLES_OK, ExecStatus.COMMAND_OK):
                 raise error_from_result(result)
         self._prepared |= preparing
-        return [_rows(result) for result, asked in zip(results, kept, strict=True) if asked]
+        return [_rows(result) for result, is_asked in zip(results, asked_for, strict=True) if is_asked]
 
     async def _results(self) -> list[PGresult]:
         """One result for each thing sent, and one more where only the commit at the end of them failed."""
@@ -88,26 +91,36 @@ class Pipeline:
                 if result.status == ExecStatus.PIPELINE_SYNC:
                     return results
                 results.append(result)
-            await _ready(pgconn.socket, write=unsent)
+            if not await _ready(pgconn.socket, write=unsent):
+                self._look_up()
             pgconn.consume_input()
             unsent = unsent and bool(pgconn.flush())
 
+    def _look_up(self) -> None:
+        """Go on waiting, or close the connection: what was sent may still be done."""
+        self.connection.check()
+        if self.until is not None and asyncio.get_running_loop().time() > self.until:
+            self.connection.pgconn.finish()
+            raise OperationalError("the database has taken too long to answer")
 
-async def _ready(socket: int, *, write: bool) -> None:
-    """Wait until there is something to read, or room to send the rest."""
+
+async def _ready(socket: int, *, write: bool) -> bool:
+    """Wait for a moment until there is something to read, or room to send the rest; whether there is."""
     loop = asyncio.get_running_loop()
-    woken: asyncio.Future[None] = loop.create_future()
+    woken: asyncio.Future[bool] = loop.create_future()
 
-    def wake() -> None:
+    def wake(ready: bool = True) -> None:
         if not woken.done():
-            woken.set_result(None)
+            woken.set_result(ready)
 
+    looking_up = loop.call_later(LOOK, wake, False)
     loop.add_reader(socket, wake)
     if write:
         loop.add_writer(socket, wake)
     try:
-        await woken
+        return await woken
     finally:
+        looking_up.cancel()
         loop.remove_reader(socket)
         if write:
             loop.remove_writer(socket)

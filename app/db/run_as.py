@@ -65,12 +65,12 @@ def run_as(user: pwd.struct_passwd, *, reads: Sequence[Path], enters: Sequence[P
 def give(path: Path, user: pwd.struct_passwd, *, recursive: bool = False) -> None:
     """Root makes ``path`` the user's; others do nothing, for it is theirs already."""
     if os.geteuid() == 0:
-        for each in [path, *(path.rglob("*") if recursive else [])]:
-            os.chown(each, user.pw_uid, user.pw_gid, follow_symlinks=False)
+        for entry in [path, *(path.rglob("*") if recursive else [])]:
+            os.chown(entry, user.pw_uid, user.pw_gid, follow_symlinks=False)
 
 
 def _passable(folder: Path) -> bool:
-    return all(each.stat().st_mode & 0o001 for each in (folder, *folder.parents))
+    return all(entry.stat().st_mode & 0o001 for entry in (folder, *folder.parents))
 
 
 def _held() -> int:

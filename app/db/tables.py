@@ -10,7 +10,7 @@ from app.db.base import Base
 
 
 class Event(Base):
-    """What changed, in the order of the commits. Kept for some hours, so that a client can resume."""
+    """A published change, in the order of the commits. Kept for some hours, so that a client can resume."""
 
     __tablename__ = "event"
 

@@ -1,4 +1,4 @@
-"""What all JSON routes have in common: strict bodies, and every error described in the OpenAPI document."""
+"""Common parts of all JSON routes: strict bodies, and every error described in the OpenAPI document."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ BASE = "/api/v1"
 
 
 class WrongField(BaseModel):
-    """What is wrong with one field."""
+    """Error of one field."""
 
     field: str
     message: str
@@ -42,6 +42,7 @@ class Problem(BaseModel):
     detail: str
     errors: list[WrongField] = []
     what_to_do: str | None = None
+    request_id: str | None = Field(None, description="Names the request in the server's log.")
 
 
 def _error(error: InbandError) -> dict[str, Any]:
@@ -82,7 +83,7 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
 
 
 def plain(example: str) -> dict[int | str, dict[str, object]]:
-    """How an answer in plain text is described."""
+    """Description of an answer in plain text."""
     return {200: {"description": "The text", "content": {"text/plain": {"example": example}}}}
 
 

@@ -12,12 +12,10 @@ from urllib.parse import quote
 
 from fastapi import APIRouter, Request, Response
 from markupsafe import Markup
-from starlette.concurrency import run_in_threadpool
 
-from app.people.queries import signed_in
+from app.language.i18n import _
 from app.web.api import BASE
-from app.web.deps import SESSION_COOKIE, SessionDep, SettingsDep
-from app.web.i18n import _
+from app.web.deps import SettingsDep
 from app.web.openapi import Json, operations, resolve
 from app.web.templates import page
 
@@ -37,7 +35,7 @@ class FieldRow(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What an operation answers when it succeeds."""
+    """Answer of an operation that succeeds."""
 
     status: str
     text: str
@@ -73,46 +71,43 @@ def openapi_document(request: Request) -> dict[str, Any]:
 
 
 @router.get("/api/docs", include_in_schema=False)
-async def api_documentation(request: Request, session: SessionDep, settings: SettingsDep) -> Response:
+async def api_documentation(request: Request, settings: SettingsDep) -> Response:
     """Every operation with its parameters, fields, examples, a line for curl and its errors."""
-    token = request.cookies.get(SESSION_COOKIE)
-    if token and (found := await run_in_threadpool(signed_in, session, token)):
-        caller, request.state.waiting = found
-        request.state.person, request.state.csrf = caller, caller.csrf
-    made = request.app.openapi()
+    await request.app.state.recognise(request)
+    openapi = request.app.openapi()
     return page(
         request,
         "api_docs.html",
-        info=made["info"],
-        introduction=prose(made["info"]["description"]),
-        groups=groups(made, settings.address),
-        problems=problems(made),
+        info=openapi["info"],
+        introduction=prose(openapi["info"]["description"]),
+        groups=groups(openapi, settings.address),
+        problems=problems(openapi),
         document=DOCUMENT,
         address=settings.address,
     )
 
 
-def groups(made: Json, address: str) -> list[tuple[str, str, list[Operation]]]:
+def groups(openapi: Json, address: str) -> list[tuple[str, str, list[Operation]]]:
     """Name, sentence and operations of every tag, in the order of the document's tags."""
-    order = [tag["name"] for tag in made["tags"]]
-    found = sorted(operations(made), key=lambda each: order.index(each[2]["tags"][0]))
-    sentences = {tag["name"]: tag["description"] for tag in made["tags"]}
+    order = [tag["name"] for tag in openapi["tags"]]
+    ordered = sorted(operations(openapi), key=lambda operation: order.index(operation[2]["tags"][0]))
+    sentences = {tag["name"]: tag["description"] for tag in openapi["tags"]}
     return [
-        (tag, sentences[tag], [_operation(made, *each, address) for each in of_tag])
-        for tag, of_tag in groupby(found, lambda each: each[2]["tags"][0])
+        (tag, sentences[tag], [_operation(openapi, *operation, address) for operation in of_tag])
+        for tag, of_tag in groupby(ordered, lambda operation: operation[2]["tags"][0])
     ]
 
 
-def problems(made: Json) -> list[tuple[str, str, str]]:
+def problems(openapi: Json) -> list[tuple[str, str, str]]:
     """Status, title and example of every error."""
     return [
         (name.removeprefix("Problem"), response["description"], _json(_media(response)["example"]))
-        for name, response in made["components"]["responses"].items()
+        for name, response in openapi["components"]["responses"].items()
     ]
 
 
-def _operation(made: Json, method: str, path: str, described: Json, address: str) -> Operation:
-    responses = {status: resolve(made, response) for status, response in described["responses"].items()}
+def _operation(openapi: Json, method: str, path: str, described: Json, address: str) -> Operation:
+    responses = {status: resolve(openapi, response) for status, response in described["responses"].items()}
     body = described.get("requestBody", {})
     return Operation(
         id=described["operationId"],
@@ -122,15 +117,15 @@ def _operation(made: Json, method: str, path: str, described: Json, address: str
         text=prose(described.get("description", "")),
         role=described.get("x-role"),
         machine_key=described.get("x-machine-key", False),
-        parameters=[(each["in"], _parameter(made, each)) for each in described.get("parameters", [])],
-        body=list(_fields(made, _media(body).get("schema", {}))) if body else [],
+        parameters=[(parameter["in"], _parameter(openapi, parameter)) for parameter in described.get("parameters", [])],
+        body=list(_fields(openapi, _media(body).get("schema", {}))) if body else [],
         body_optional=bool(body) and not body.get("required", False),
         curl=curl(method, path, described, address),
         answers=[
             Answer(
                 status,
                 response["description"],
-                list(_fields(made, _media(response).get("schema", {}))),
+                list(_fields(openapi, _media(response).get("schema", {}))),
                 _json(_media(response).get("example")),
             )
             for status, response in sorted(responses.items(), reverse=True)  # something new (201) first
@@ -184,11 +179,11 @@ def _quoted(text: str) -> str:
 # --- fields
 
 
-def _parameter(made: Json, parameter: Json) -> FieldRow:
+def _parameter(openapi: Json, parameter: Json) -> FieldRow:
     schema = parameter["schema"]
     return FieldRow(
         parameter["name"],
-        _kind(made, schema),
+        _kind(openapi, schema),
         _line(parameter.get("description", "")),
         parameter.get("required", False),
         _default(schema),
@@ -200,45 +195,45 @@ def _default(schema: Json) -> str | None:
     return None if default in (None, "", []) else json.dumps(default, ensure_ascii=False)
 
 
-def _fields(made: Json, schema: Json, prefix: str = "", seen: tuple[int, ...] = ()) -> Iterator[FieldRow]:
+def _fields(openapi: Json, schema: Json, prefix: str = "", seen: tuple[int, ...] = ()) -> Iterator[FieldRow]:
     """The fields of an object, those of objects in it behind them: `correction.number`, `items[].sequence`."""
-    schema = _bare(made, schema)
+    schema = _bare(openapi, schema)
     if schema.get("type") == "array":
-        yield from _fields(made, schema["items"], f"{prefix}[]", seen)
+        yield from _fields(openapi, schema["items"], f"{prefix}[]", seen)
         return
     if id(schema) in seen or len(seen) > DEEPEST:
         return
     required = schema.get("required", [])
     for name, inner in schema.get("properties", {}).items():
         whole = f"{prefix}.{name}" if prefix else name
-        bare = _bare(made, inner)
+        bare = _bare(openapi, inner)
         meaning = inner.get("description") or bare.get("description", "")
-        yield FieldRow(whole, _kind(made, inner), _line(meaning), name in required, _default(inner))
-        yield from _fields(made, inner, whole, (*seen, id(schema)))
+        yield FieldRow(whole, _kind(openapi, inner), _line(meaning), name in required, _default(inner))
+        yield from _fields(openapi, inner, whole, (*seen, id(schema)))
 
 
-def _bare(made: Json, schema: Json) -> Json:
+def _bare(openapi: Json, schema: Json) -> Json:
     """The schema itself: references followed, `or null` left out."""
-    schema = resolve(made, schema)
+    schema = resolve(openapi, schema)
     if "anyOf" in schema:
-        others = [each for each in schema["anyOf"] if each.get("type") != "null"]
+        others = [option for option in schema["anyOf"] if option.get("type") != "null"]
         if len(others) == 1:
-            return resolve(made, others[0])
+            return resolve(openapi, others[0])
     return schema
 
 
-def _kind(made: Json, schema: Json) -> str:
-    """What a value must be, in words."""
-    bare = _bare(made, schema)
+def _kind(openapi: Json, schema: Json) -> str:
+    """Type of a value, in words."""
+    bare = _bare(openapi, schema)
     kinds = bare.get("type", "")
     nullable = ("anyOf" in schema and bare is not schema) or "null" in kinds
-    kind = next((each for each in kinds if each != "null"), "") if isinstance(kinds, list) else kinds
+    kind = next((name for name in kinds if name != "null"), "") if isinstance(kinds, list) else kinds
     if "enum" in bare:
-        words = " | ".join(str(each) for each in bare["enum"] if each is not None)
+        words = " | ".join(str(name) for name in bare["enum"] if name is not None)
     elif "const" in bare:
         words = str(bare["const"])
     elif kind == "array":
-        words = _("list of {kind}").format(kind=_kind(made, bare["items"]).partition(",")[0])
+        words = _("list of {kind}").format(kind=_kind(openapi, bare["items"]).partition(",")[0])
     elif bare.get("format") == "date-time":
         words = _("time")
     else:

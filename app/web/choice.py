@@ -1,4 +1,4 @@
-"""Which readings somebody asks for: by number, by moment, or the last ones; the same words at every door."""
+"""Choice of readings: by number, by time, or the last ones; the same fields in every API and page."""
 
 from datetime import datetime
 from typing import Annotated, NamedTuple
@@ -6,12 +6,12 @@ from typing import Annotated, NamedTuple
 from fastapi import Depends, Query
 
 from app.errors import FieldError, Invalid
+from app.language.i18n import _
 from app.web.fields import LARGEST_ID, Moment
-from app.web.i18n import _
 
 
 class Choice(NamedTuple):
-    """Which readings are asked for."""
+    """Chosen readings."""
 
     last: int | None
     first: int | None

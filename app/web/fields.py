@@ -1,6 +1,7 @@
 """The kinds of text and number that come in from outside, the same at every door.
 
-Text is trimmed and holds no control characters: PostgreSQL cannot store U+0000, and nobody can read the others.
+Text is trimmed and holds no control characters: PostgreSQL cannot store U+0000, and nobody can read the others. Nor does it
+hold signs that turn the order of what follows (U+202E), or, in a name, blanks without a width (U+200B).
 Half surrogates are refused by pydantic itself.
 """
 
@@ -21,17 +22,19 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from app.web.i18n import _
+from app.language.i18n import _
 
 SLUG = r"[a-z0-9][a-z0-9._-]{0,63}"
 _SLUG = re.compile(SLUG)
+_REORDERING = frozenset(map(chr, [*range(0x202A, 0x202F), *range(0x2066, 0x206A)]))
+_UNSEEN = frozenset("\u200b\u2060\ufeff")
 LARGEST_ID = 2**63 - 1
 LARGEST_SERIAL = 2**31 - 1
 Item = TypeVar("Item")
 
 
 def is_slug(text: str) -> bool:
-    """Whether this can be the key of a machine or characteristic."""
+    """Tell if this can be the key of a machine or characteristic."""
     return _SLUG.fullmatch(text) is not None
 
 
@@ -43,7 +46,7 @@ def _slug(text: str) -> str:
 
 def _readable(text: str) -> str:
     for character in text:
-        if unicodedata.category(character) in {"Cc", "Cs"} and character not in "\n\t":
+        if (unicodedata.category(character) in {"Cc", "Cs"} and character not in "\n\t") or character in _REORDERING:
             raise PydanticCustomError("control_character", "control character", {"code": f"U+{ord(character):04X}"})
     return text
 
@@ -51,6 +54,8 @@ def _readable(text: str) -> str:
 def _one_line(text: str) -> str:
     if "\n" in text or "\t" in text:
         raise PydanticCustomError("one_line", "one line")
+    for character in _UNSEEN.intersection(text):
+        raise PydanticCustomError("control_character", "control character", {"code": f"U+{ord(character):04X}"})
     return _readable(text)
 
 
@@ -75,7 +80,7 @@ def _sensible(moment: datetime) -> datetime:
 
 
 LatelyOrNow = Annotated[Moment, AfterValidator(_sensible)]
-"""When something happened at a machine, by its clock."""
+"""Time of an event at a machine, by its clock."""
 
 Control = Annotated[
     Literal["sinumerik", "fanuc", "heidenhain", "other"], Field(description="Which family its control belongs to.")
@@ -97,17 +102,27 @@ Reason = Annotated[
     AfterValidator(_readable),
     Field(description="Why, in words; it stays on record."),
 ]
-"""Why somebody did something: 1 to 1000 characters."""
+"""Reason for an action: 1 to 1000 characters."""
 
 Limit = Annotated[int, Field(ge=1, le=1000, description="How many items at most.")]
 Cursor = Annotated[int, Field(ge=0, le=LARGEST_ID, description="Cursor: the `next` of the page before.")]
 """A cursor that is the number of the last item seen."""
+SerialCursor = Annotated[int, Field(ge=0, le=LARGEST_SERIAL, description="Cursor: the `next` of the page before.")]
+"""The same, where items are counted with 32 bits."""
 
 
 class Body(BaseModel):
-    """What comes in as JSON: fields that are not known are named, not ignored."""
+    """Body of a JSON request: unknown fields are refused by name, not ignored."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class ReasonIn(Body):
+    """The reason for a change."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"reason": "stylus replaced"}})
+
+    reason: Reason
 
 
 class Page(BaseModel, Generic[Item]):

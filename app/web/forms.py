@@ -5,8 +5,9 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from app.core.number_text import number_or_none
 from app.errors import FieldError, InbandError, Invalid
-from app.web.i18n import _
+from app.language.i18n import _
 from app.web.validation import field_errors
 
 Schema = TypeVar("Schema", bound=BaseModel)
@@ -14,16 +15,16 @@ Schema = TypeVar("Schema", bound=BaseModel)
 
 def parsed(schema: type[Schema], fields: Mapping[str, Any]) -> Schema:
     """The form's fields as the API's schema; a field left empty is not said. Raises `Invalid`."""
-    given = {name: value for name, value in fields.items() if value is not None and value != ""}
+    filled = {name: value for name, value in fields.items() if value is not None and value != ""}
     try:
-        return schema.model_validate(given)
+        return schema.model_validate(filled)
     except ValidationError as error:
         errors = [FieldError(field, message) for field, message in field_errors(error.errors())]
         raise Invalid(_("The form has to be corrected."), errors=errors) from None
 
 
 def by_field(error: InbandError) -> dict[str, str]:
-    """What is wrong, by the name of the field in the form."""
+    """Errors by the name of the field in the form."""
     messages: dict[str, str] = {}
     for field, message in error.errors:
         name = field.removeprefix("parameters.")
@@ -35,14 +36,14 @@ def by_field(error: InbandError) -> dict[str, str]:
 def length(text: str | None) -> float | str | None:
     """A length in mm as people type it, with a decimal point or comma; what is no number is left for the schema to refuse.
 
-    >>> length(" 0,05 "), length("−0.5"), length(""), length("5 mm")
-    (0.05, -0.5, None, '5 mm')
+    >>> length(" 0,05 "), length("−0.5"), length(""), length("5 mm"), length("0. 001")
+    (0.05, -0.5, None, '5 mm', '0. 001')
     """
     text = (text or "").strip()
-    try:
-        return float(text.replace(",", ".").replace("\N{MINUS SIGN}", "-")) if text else None
-    except ValueError:
-        return text
+    if not text:
+        return None
+    value = number_or_none(text)
+    return text if value is None else value
 
 
 def whole(text: str | None) -> int | str | None:

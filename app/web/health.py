@@ -1,6 +1,8 @@
 """For those who run the server: is it alive, is it ready, and what does it count."""
 
 from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, Request
@@ -11,6 +13,7 @@ from prometheus_client.registry import Collector
 from sqlalchemy import text
 from starlette.responses import Response
 
+from app.db.disk import free
 from app.db.engine import Database
 from app.web.api import EVERY_ERROR
 
@@ -70,7 +73,17 @@ class Plant(Collector):
                 corrections.add_metric([machine, status], count)
             for machine, kind, count in session.execute(text(_ALARMS)):
                 alarms.add_metric([machine, kind], count)
-        return readings, latest, corrections, alarms
+            failing = GaugeMetricFamily(
+                "inband_failing_jobs", "Units of work of a periodic job that fail.", labels=["job"]
+            )
+            finished = GaugeMetricFamily(
+                "inband_job_last_run_timestamp_seconds", "When a periodic job last ran.", labels=["job"]
+            )
+            for job, at, count in session.execute(text(_JOBS)):
+                failing.add_metric([job], count)
+                if at is not None:
+                    finished.add_metric([job], float(at))
+        return readings, latest, corrections, alarms, failing, finished
 
 
 _READINGS = """
@@ -85,13 +98,31 @@ _ALARMS = """
 SELECT m.key, a.kind, count(*) FROM alarm a JOIN machine m ON m.id = a.machine_id
 WHERE a.acknowledged_at IS NULL GROUP BY 1, 2
 """
+_JOBS = """
+SELECT job, extract(epoch FROM r.finished_at), coalesce(f.failing, 0)
+FROM job_run r FULL JOIN (SELECT job, count(*) AS failing FROM job_failure GROUP BY job) f USING (job)
+"""
 
 
-def registry(database: Database) -> Any:
-    """The metrics of one application: those of the plant, and those of its process."""
-    made = CollectorRegistry()
-    made.register(Plant(database))
-    ProcessCollector(registry=made)
-    PlatformCollector(registry=made)
-    GCCollector(registry=made)
-    return made
+class Disk(Collector):
+    """Room on the disk of the data directory."""
+
+    def __init__(self, data_dir: Path) -> None:
+        self._data_dir = data_dir
+
+    def collect(self) -> Iterable[Metric]:
+        room = GaugeMetricFamily("inband_disk_free_bytes", "Free on the disk of the data directory.")
+        with suppress(OSError):
+            room.add_metric([], free(self._data_dir))
+        return (room,)
+
+
+def registry(database: Database, data_dir: Path) -> Any:
+    """The metrics of one application: those of the plant, of its process, and of its disk."""
+    collectors = CollectorRegistry()
+    collectors.register(Plant(database))
+    collectors.register(Disk(data_dir))
+    ProcessCollector(registry=collectors)
+    PlatformCollector(registry=collectors)
+    GCCollector(registry=collectors)
+    return collectors

@@ -12,7 +12,7 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 
 from app.errors import FieldError, Invalid, NotSignedIn
-from app.web.i18n import _
+from app.language.i18n import _
 from app.web.validation import field_path
 
 DEEPEST = 20
@@ -57,7 +57,7 @@ def read_json(body: bytes, content_type: str | None) -> Any:
     _look(value, (), problems)
     if problems:
         raise Invalid(
-            _("The request holds values that cannot be used."),
+            _("The request contains values that cannot be used."),
             _("Correct the named fields and send it again."),
             errors=problems,
         )
@@ -73,12 +73,12 @@ class _DoubledError(ValueError):
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    made = dict(pairs)
-    if len(made) != len(pairs):
+    values = dict(pairs)
+    if len(values) != len(pairs):
         names = [name for name, _value in pairs]
         doubled = next(name for name in names if names.count(name) > 1)
         raise _DoubledError(_("says {name} twice; say it once").format(name=json.dumps(doubled)))
-    return made
+    return values
 
 
 def _look(value: Any, path: tuple[str | int, ...], problems: list[FieldError]) -> None:

@@ -1,4 +1,4 @@
-"""How large a request may be. Past its limit a request is not read on, and is answered 413."""
+"""Largest size of a request. Past its limit a request is not read on, and is answered 413."""
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException

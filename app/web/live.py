@@ -7,20 +7,23 @@ send, it gets a ``resync`` and loads its page anew.
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Sequence
 from contextlib import suppress
+from time import monotonic
 from typing import Any, NamedTuple
 
 import msgspec
 import psycopg
 from psycopg import AsyncConnection
 
+from app.db.connections import Connections
 from app.db.events import CHANNEL
 
 log = logging.getLogger(__name__)
 
 PAUSE = 0.1  # s between two looks into the journal
 IDLE = 0.5  # s, while no page is open
+LOOK = 1.0  # s between two looks if whoever listens still may
 HEARTBEAT = 5.0  # s; a page that hears nothing for longer says so
 KEPT_HOURS = 6
 MOST_MISSED = 1000  # transactions that a client which comes back is told one by one
@@ -29,19 +32,32 @@ ABOUT = ("kind", "machine", "characteristic", "tool", "id", "number", "average_m
 
 
 class Message(NamedTuple):
-    """What is told of one change, ready to be sent; the machine it concerns, None for whatever concerns everybody."""
+    """One published change, ready to be sent; the machine it concerns, None if it concerns everybody."""
 
     number: int
     machine: str | None
     frame: bytes
 
 
+class Access(NamedTuple):
+    """By what somebody listens: the SHA-256 of a browser's session, or the number of a key; and the role it gave then."""
+
+    session: bytes | None
+    key: int | None
+    role: str | None
+
+
+StillGranted = Callable[[AsyncConnection[Any], Collection[Access]], Awaitable[Collection[Access]]]
+"""Asks the database which of these accesses are still granted as they are."""
+
+
 class Live:
     """The open pages of one process and the journal they are fed from."""
 
-    def __init__(self, dsn: str) -> None:
-        self._dsn = dsn
-        self._clients: set[asyncio.Queue[Message | None]] = set()
+    def __init__(self, connections: Connections, still_granted: StillGranted) -> None:
+        self._connections = connections
+        self._still_granted = still_granted
+        self._clients: dict[asyncio.Queue[Message | None], Access] = {}
         self._opened = asyncio.Event()  # the first page, after a time without
         self._last: int | None = None  # the last event that was passed on; None before the journal was seen
         self._tasks: list[asyncio.Task[None]] = []
@@ -50,7 +66,11 @@ class Live:
     def start(self) -> None:
         """Begin to listen; call it on the loop that serves requests."""
         loop = asyncio.get_running_loop()
-        self._tasks = [loop.create_task(self._listen(), name="live events"), loop.create_task(self._tidy())]
+        self._tasks = [
+            loop.create_task(self._listen(), name="live events"),
+            loop.create_task(self._tidy()),
+            loop.create_task(self._guard(), name="access to live events"),
+        ]
 
     async def stop(self) -> None:
         """Let every open page go, so that the server can end."""
@@ -65,29 +85,60 @@ class Live:
         for client in self._clients:
             client.put_nowait(None)
 
+    async def _guard(self) -> None:
+        """End the streams of those whose access has ended or changed, in whichever process that was done."""
+        while True:
+            try:
+                async with await self._connections.connect_async(application_name="inband-live") as conn:
+                    while True:
+                        await asyncio.sleep(LOOK)
+                        if self._clients:
+                            async with asyncio.timeout(HEARTBEAT):
+                                await self._end_those_without_access(conn)
+            except TimeoutError:  # nobody can say who may still listen
+                self._let_go()
+            except psycopg.Error as error:
+                log.debug("access to live events cannot be checked: %s", error)
+                await asyncio.sleep(LOOK)
+            except Exception:
+                log.exception("unhandled error in the access to live events")
+                await asyncio.sleep(LOOK)
+
+    async def _end_those_without_access(self, conn: AsyncConnection[Any]) -> None:
+        granted = await self._still_granted(conn, set(self._clients.values()))
+        for client, access in self._clients.items():
+            if access not in granted:
+                while not client.empty():  # what waits is not told any more
+                    client.get_nowait()
+                client.put_nowait(None)
+
     async def _listen(self) -> None:
+        away_since: float | None = None
         while True:
             listening = False
             try:
-                async with await AsyncConnection.connect(
-                    self._dsn, autocommit=True, application_name="inband-live", connect_timeout=5
-                ) as conn:
+                async with await self._connections.connect_async(application_name="inband-live") as conn:
                     await conn.execute(f"LISTEN {CHANNEL}")
                     listening = True
                     if self._last is None:
                         self._last = await _newest(conn)
+                    if away_since is not None:
+                        log.info("live events go on after an interruption of %.0f s", monotonic() - away_since)
+                        away_since = None
                     while True:
                         await self._pass_on(conn)
                         async for _ in conn.notifies(timeout=HEARTBEAT, stop_after=1):
                             pass
                         await self._rest()
             except psycopg.Error as error:
-                log.warning("live events are interrupted: %s", error)
+                if away_since is None:  # once, however long it lasts
+                    away_since = monotonic()
+                    log.warning("live events are interrupted: %s", error)
                 if not listening:  # the database is away: no page may go on calling itself live
                     self._let_go()
                 await asyncio.sleep(1)
             except Exception:
-                log.exception("live events met what nobody foresaw")
+                log.exception("unhandled error in live events")
                 await asyncio.sleep(1)
 
     async def _rest(self) -> None:
@@ -123,16 +174,16 @@ class Live:
     async def _tidy(self) -> None:
         while True:
             try:
-                async with await AsyncConnection.connect(self._dsn, autocommit=True, connect_timeout=5) as conn:
+                async with await self._connections.connect_async() as conn:
                     await conn.execute("DELETE FROM event WHERE at < now() - make_interval(hours => %s)", (KEPT_HOURS,))
             except psycopg.Error as error:
-                log.warning("the journal of events could not be tidied: %s", error)
+                log.warning("old events could not be deleted: %s", error)
             await asyncio.sleep(600)
 
-    async def stream(self, after: int | None, machine: str | None = None) -> AsyncIterator[bytes]:
-        """Server-sent events from now on, or from number `after` on; of one machine, or of all."""
+    async def stream(self, access: Access, after: int | None, machine: str | None = None) -> AsyncIterator[bytes]:
+        """Server-sent events from now on, or from number `after` on; of one machine, or of all. They end with the access."""
         client: asyncio.Queue[Message | None] = asyncio.Queue()
-        self._clients.add(client)
+        self._clients[client] = access
         self._opened.set()
         try:
             yield b"retry: 2000\n\n"
@@ -157,12 +208,12 @@ class Live:
                 if next_message.number > sent and (next_message.machine in {None, machine} or machine is None):
                     yield next_message.frame
         finally:
-            self._clients.discard(client)
+            self._clients.pop(client, None)
 
     async def _missed(self, after: int) -> list[Message]:
         """Everything since event `after`, or one `resync`."""
         try:
-            async with await AsyncConnection.connect(self._dsn, autocommit=True, connect_timeout=5) as conn:
+            async with await self._connections.connect_async() as conn:
                 cursor = await conn.execute("SELECT min(id), max(id) FROM event")
                 row = await cursor.fetchone()
                 oldest, newest = row if row and row[0] is not None else (0, 0)
@@ -190,11 +241,13 @@ def _messages(changes: Sequence[tuple[int, dict[str, Any]]]) -> list[Message]:
 
     Whoever is cut off between two of them comes back with the number before, and is told both again.
     """
-    made = []
+    messages = []
     for at, (number, change) in enumerate(changes):
         last = at + 1 == len(changes) or changes[at + 1][0] != number
-        made.append(Message(number, change.get("machine"), _frame(change["kind"], change, number if last else None)))
-    return made
+        messages.append(
+            Message(number, change.get("machine"), _frame(change["kind"], change, number if last else None))
+        )
+    return messages
 
 
 def _resync(number: int) -> Message:
@@ -202,5 +255,5 @@ def _resync(number: int) -> Message:
 
 
 def _frame(kind: str, change: dict[str, Any], number: int | None) -> bytes:
-    told = "" if number is None else f"id: {number}\n"
-    return f"{told}event: {kind}\ndata: {msgspec.json.encode(change).decode()}\n\n".encode()
+    head = "" if number is None else f"id: {number}\n"
+    return f"{head}event: {kind}\ndata: {msgspec.json.encode(change).decode()}\n\n".encode()

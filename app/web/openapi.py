@@ -35,6 +35,8 @@ Errors are `{PROBLEM_JSON}` (RFC 9457) with what is wrong, where, and what to do
 Lists answer `items` and `next`: pass `next` as the cursor of the following page (`after`, or `before` where the newest come first) \
 until it is null."""
 
+REQUEST_ID = "9f3c1a70-2b"
+
 TAGS = {
     "readings": "What the probe measured. The answer says what was decided, why, and what to correct.",
     "offsets": "Tool memory (R10), average memory (R11), and the corrections on their way into the offsets.",
@@ -71,28 +73,28 @@ def document(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
     return app.openapi_schema
 
 
-def operations(made: Json) -> Iterator[tuple[str, str, Json]]:
+def operations(openapi: Json) -> Iterator[tuple[str, str, Json]]:
     """Every operation of a document as (method, path, description), by path as it was declared."""
-    for path, item in made["paths"].items():
+    for path, item in openapi["paths"].items():
         for method, operation in item.items():
             yield method, path, operation
 
 
-def resolve(made: Json, part: Json) -> Json:
-    """What a ``$ref`` of the document stands for; anything else as it is.
+def resolve(openapi: Json, part: Json) -> Json:
+    """Target of a ``$ref`` of the document; anything else as it is.
 
     Raises `KeyError` for a reference to nothing.
     """
     while "$ref" in part:
-        found: Any = made
+        target: Any = openapi
         for step in part["$ref"].removeprefix("#/").split("/"):
-            found = found[step]
-        part = found
+            target = target[step]
+        part = target
     return part
 
 
 def _made(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
-    made = get_openapi(
+    openapi = get_openapi(
         title="Inband",
         version=__version__,
         summary=SUMMARY,
@@ -102,7 +104,7 @@ def _made(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
         servers=[{"url": "/", "description": "this server"}],
         license_info={"name": "MIT", "identifier": "MIT"},
     )
-    components = made["components"]
+    components = openapi["components"]
     components["schemas"] |= schemas
     for name, example in _examples(BaseModel):
         if name in components["schemas"]:
@@ -117,17 +119,17 @@ def _made(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
         },
     }
     components["responses"] = {_name(status): _problem(described) for status, described in _errors()}
-    made["security"] = [{"key": []}, {"session": []}]
+    openapi["security"] = [{"key": []}, {"session": []}]
     roles = dict(_roles(app))
-    for _method, _path, operation in operations(made):
-        _complete(made, operation)
+    for _method, _path, operation in operations(openapi):
+        _complete(openapi, operation)
         if OPEN_TAGS.intersection(operation["tags"]):
             operation["security"] = []
         else:
             operation["x-role"], operation["x-machine-key"] = roles[operation["operationId"]]
-    _tidy(made["paths"])
+    _tidy(openapi["paths"])
     _tidy(components["schemas"])
-    return made
+    return openapi
 
 
 # --- errors
@@ -135,9 +137,8 @@ def _made(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
 
 def _errors() -> Iterable[tuple[int, Json]]:
     unexpected = Unexpected(
-        "An error that nobody foresaw. Nothing of this request was stored.",
-        "Try again. If it happens again, tell your administrator the incident number 9f3c1a70.",
-        incident="9f3c1a70",
+        "An unexpected error. Nothing of this request was stored.",
+        f"Try again. If it happens again, tell your administrator the request number {REQUEST_ID}.",
     )
     described = {int(status): dict(error) for status, error in EVERY_ERROR.items()}
     described[InbandError.status] = {
@@ -153,17 +154,20 @@ def _name(status: int) -> str:
 
 def _problem(described: Json) -> Json:
     example = described["content"][PROBLEM_JSON]["example"]
+    example |= {"request_id": REQUEST_ID}
     content = {"schema": {"$ref": "#/components/schemas/Problem"}, "example": example}
     response: Json = {"description": described["description"], "content": {PROBLEM_JSON: content}}
+    words = "Names this answer in the server's log; yours, if you have sent one of letters, digits, dots, dashes."
+    response["headers"] = {"X-Request-ID": {"schema": {"type": "string"}, "description": words}}
     if example["status"] in {429, 503}:
-        response["headers"] = {"Retry-After": {"schema": {"type": "integer"}, "description": "Seconds to wait."}}
+        response["headers"]["Retry-After"] = {"schema": {"type": "integer"}, "description": "Seconds to wait."}
     return response
 
 
 # --- one operation
 
 
-def _complete(made: Json, operation: Json) -> None:
+def _complete(openapi: Json, operation: Json) -> None:
     operation["summary"] = operation["operationId"].replace("_", " ").capitalize()
     responses = operation["responses"]
     errors = {int(status) for status in responses if status >= "4"}
@@ -174,28 +178,28 @@ def _complete(made: Json, operation: Json) -> None:
     operation["responses"] = dict(sorted(responses.items()))
     for status, response in operation["responses"].items():
         if status < "4":
-            _with_examples(made, response.get("content", {}))
+            _with_examples(openapi, response.get("content", {}))
             if response["description"] == "Successful Response":
                 response["description"] = "Done"
     if "requestBody" in operation:
-        _with_examples(made, operation["requestBody"]["content"])
+        _with_examples(openapi, operation["requestBody"]["content"])
     for parameter in operation.get("parameters", []):
         examples = parameter["schema"].pop("examples", [None])
         if examples[0] is not None:
             parameter["example"] = examples[0]
 
 
-def _with_examples(made: Json, content: Json) -> None:
-    """Where the schema has an example and the place of use has none, that one."""
+def _with_examples(openapi: Json, content: Json) -> None:
+    """Copy the schema's example to a place of use that has none."""
     for media in content.values():
         if "example" in media or "examples" in media:
             continue
         schema = media.get("schema", {})
         if "anyOf" in schema:  # a body that may be left out
             schema = schema["anyOf"][0]
-        found = _example(made, resolve(made, schema))
-        if found is not None:
-            media["example"] = found
+        example = _example(openapi, resolve(openapi, schema))
+        if example is not None:
+            media["example"] = example
 
 
 def _examples(base: type[BaseModel]) -> Iterator[tuple[str, Json]]:
@@ -207,14 +211,14 @@ def _examples(base: type[BaseModel]) -> Iterator[tuple[str, Json]]:
         yield from _examples(model)
 
 
-def _example(made: Json, schema: Json) -> Any:
+def _example(openapi: Json, schema: Json) -> Any:
     if "example" in schema:
         return schema["example"]
     if "examples" in schema:
         return schema["examples"][0]
     properties = schema.get("properties", {})
     if set(properties) == {"items", "next"}:  # one page of a list
-        item = _example(made, resolve(made, properties["items"]["items"]))
+        item = _example(openapi, resolve(openapi, properties["items"]["items"]))
         return None if item is None else {"items": [item], "next": None}
     return None
 
@@ -228,13 +232,13 @@ def _roles(app: FastAPI) -> Iterator[tuple[str, tuple[str, bool]]]:
         route = context.original_route
         if not isinstance(route, APIRoute) or not route.path.startswith(BASE):
             continue
-        asked = {
+        roles = {
             dependency.call.__name__.removeprefix("require_")
             for dependency in route.dependant.dependencies
             if dependency.call is not None and dependency.call.__name__.startswith("require_")
         }
-        if asked:
-            yield route.name, (asked.pop(), False)
+        if roles:
+            yield route.name, (roles.pop(), False)
         else:  # any caller; the route itself then looks for the role at the machine in question
             yield route.name, ("viewer" if route.methods == {"GET"} else "operator", True)
 

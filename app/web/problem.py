@@ -9,15 +9,17 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
-from app.web.i18n import _
+from app.language.i18n import _
 from app.web.templates import page
 
 
 def problem_page(
     request: Request, problem: Mapping[str, Any], headers: Mapping[str, str] | None = None
 ) -> HTMLResponse:
-    """The page for an RFC 9457 problem (`title`, `status`, `detail`, `errors`, `what_to_do`, `incident`)."""
-    whole = {"detail": "", "errors": [], "what_to_do": None, "incident": None} | dict(problem)
+    """The page for an RFC 9457 problem (`title`, `status`, `detail`, `errors`, `what_to_do`, `request_id`)."""
+    whole = {"detail": "", "errors": [], "what_to_do": None, "request_id": None} | dict(problem)
     if whole["status"] == HTTPStatus.NOT_FOUND:  # whoever reads a page has no use for the calls of the API
-        whole["what_to_do"] = _("Check the address, or look for it from the plant: an old link may name what is gone.")
+        whole["what_to_do"] = _(
+            "Check the address, or start from the plant page: an old link may point to something deleted."
+        )
     return page(request, "problem.html", status=int(problem["status"]), headers=dict(headers or {}), problem=whole)

@@ -2,16 +2,19 @@
 
 import logging
 import re
-import secrets
+from collections.abc import Awaitable, Callable, Collection, Sequence
+from functools import cache
+from typing import Any, NamedTuple
 from urllib.parse import quote, urlsplit
 
 import psycopg
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
+from fastapi.routing import iter_route_contexts
 from sqlalchemy import exc as sql
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, RedirectResponse, Response
-from starlette.routing import Match
+from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.errors import (
@@ -23,13 +26,16 @@ from app.errors import (
     NotAllowed,
     NotFound,
     NotSignedIn,
+    OutcomeUnknown,
     TooLarge,
     Unexpected,
 )
-from app.web.deps import recognise
-from app.web.i18n import _, negotiate, speaking
+from app.language.i18n import _, negotiate, speaking
+from app.logs import REQUEST
+from app.web.deps import SAFE_METHODS
 from app.web.limits import MEGABYTE, limit_of
 from app.web.problem import problem_page
+from app.web.request_log import note_reason
 from app.web.validation import field_errors
 
 log = logging.getLogger("inband")
@@ -41,7 +47,7 @@ BAD_DATA = "22"
 
 
 def is_for_programs(path: str) -> bool:
-    """Whether an answer from this path is read by a program."""
+    """Tell if a program reads answers from this path."""
     return path.startswith(FOR_PROGRAMS) or path == "/api"
 
 
@@ -56,8 +62,9 @@ def local_path(path: str | None, default: str = "/") -> str:
     return path
 
 
-def answer(request: Request, error: InbandError) -> Response:
-    """The answer for an error of ours, as a document or as a page."""
+def answer(request: Request, error: InbandError, cause: BaseException | None = None) -> Response:
+    """The answer for an error of ours, as a document or as a page. cause: what it was made of, for the log."""
+    note_reason(request.scope, error, cause)
     if is_for_programs(request.url.path):
         return JSONResponse(error.as_problem(), error.status, error.headers, media_type=PROBLEM_JSON)
     if isinstance(error, NotSignedIn):
@@ -67,11 +74,11 @@ def answer(request: Request, error: InbandError) -> Response:
 
 def _to_sign_in(request: Request) -> Response:
     """People are asked to sign in and brought back to where they were; a form that was sent, to its page."""
-    wanted = request.url.path + (f"?{request.url.query}" if request.url.query else "")
+    address = request.url.path + (f"?{request.url.query}" if request.url.query else "")
     if request.method not in {"GET", "HEAD"}:
         referer = urlsplit(request.headers.get("referer", ""))
-        wanted = referer.path if referer.netloc == request.headers.get("host") else "/"
-    where = local_path(wanted)
+        address = referer.path if referer.netloc == request.headers.get("host") else "/"
+    where = local_path(address)
     return RedirectResponse("/sign-in" if where == "/" else f"/sign-in?next={quote(where, safe='/')}", 303)
 
 
@@ -82,6 +89,11 @@ async def _inband(request: Request, error: Exception) -> Response:
 
 async def _validation(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
+    own = _resource(request.app, request.url.path)
+    if own is not None and request.scope.get("endpoint") not in own.endpoints:
+        return answer(
+            request, _method_not_allowed(request)
+        )  # the word was taken for a number of the neighbour's address
     errors = field_errors(error.errors())
     detail = "; ".join(f"{field}: {message}" for field, message in errors[:3])
     return answer(request, Invalid(detail, errors=errors))
@@ -89,8 +101,10 @@ async def _validation(request: Request, error: Exception) -> Response:
 
 async def _http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
+    if error.status_code == NotFound.status and (elsewhere := _without_slash(request)) is not None:
+        return elsewhere
     if not is_for_programs(request.url.path):
-        await recognise(request)
+        await request.app.state.recognise(request)
     return answer(request, _of_http(request, error))
 
 
@@ -111,12 +125,7 @@ def _of_http(request: Request, error: HTTPException) -> InbandError:
     if error.status_code == NotAllowed.status:
         return NotAllowed(str(error.detail))
     if error.status_code == MethodNotAllowed.status:
-        allowed = ", ".join(_methods(request))
-        return MethodNotAllowed(
-            _("{method} cannot be used here.").format(method=request.method),
-            _("Use one of these methods: {allowed}.").format(allowed=allowed),
-            allowed=allowed,
-        )
+        return _method_not_allowed(request)
     if 400 <= error.status_code < 500:
         return Invalid(
             _("The request cannot be read: {detail}").format(detail=error.detail), _("Correct it and send it again.")
@@ -124,23 +133,66 @@ def _of_http(request: Request, error: HTTPException) -> InbandError:
     return InbandError(str(error.detail))
 
 
-def _methods(request: Request) -> list[str]:
-    """What can be done at this address. (Starlette names the methods of the first route that fits, not of all.)"""
-    return [
-        method
-        for method in ("GET", "POST", "PUT", "PATCH", "DELETE")
-        if any(route.matches({**request.scope, "method": method})[0] is Match.FULL for route in request.app.routes)
-    ]
+def _method_not_allowed(request: Request) -> MethodNotAllowed:
+    own = _resource(request.app, request.url.path)
+    allowed = ", ".join(own.methods if own else ())
+    return MethodNotAllowed(
+        _("{method} cannot be used here.").format(method=request.method),
+        _("Use one of these methods: {allowed}.").format(allowed=allowed),
+        allowed=allowed,
+    )
+
+
+class _Resource(NamedTuple):
+    """Resource at an address: its methods, and the functions that answer them."""
+
+    methods: Collection[str]
+    endpoints: Collection[Any]
+
+
+def _resource(app: FastAPI, path: str) -> _Resource | None:
+    """The resource at a path, by the most literal of the templates that fit: `/people/me` is not `/people/{person}`."""
+    fitting = [route for route in _routes(app) if route.path_regex.match(path)]
+    if not fitting:
+        return None
+    template = min(
+        (route.path for route in fitting), key=lambda template_path: (template_path.count("{"), -len(template_path))
+    )
+    same = [route for route in fitting if route.path == template]
+    methods = {method for route in same for method in route.methods or ()}
+    return _Resource(
+        [template_path for template_path in ("GET", "POST", "PUT", "PATCH", "DELETE") if template_path in methods],
+        [route.endpoint for route in same],
+    )
+
+
+@cache
+def _routes(app: FastAPI) -> Sequence[Route]:
+    contexts = iter_route_contexts(app.routes)
+    return [context.original_route for context in contexts if isinstance(context.original_route, Route)]
+
+
+def _without_slash(request: Request) -> Response | None:
+    """The way to a page whose address was typed with a slash at its end. It names no host: that of a request is not ours."""
+    path = request.url.path.rstrip("/")
+    if path in {"", request.url.path} or _resource(request.app, path) is None:
+        return None
+    query = f"?{request.url.query}" if request.url.query else ""
+    return RedirectResponse(f"{quote(path)}{query}", 307)
 
 
 async def _database(request: Request, error: Exception) -> Response:
-    """What the driver says, told apart by who is to blame: nobody (away, busy), the request, another request, or we."""
+    """Answer an error of the driver by its cause: none of ours (away, busy), the request, another request, or our fault."""
     cause = error.orig if isinstance(error, sql.DBAPIError) else error
     state = getattr(cause, "sqlstate", None) or ""
     away = isinstance(cause, psycopg.OperationalError | psycopg.InterfaceError) or isinstance(error, sql.TimeoutError)
     if away or (isinstance(error, sql.DBAPIError) and error.connection_invalidated):
-        log.warning("database away or busy: %s %s: %s", request.method, request.url.path, type(cause).__name__)
-        return answer(request, DatabaseAway())
+        if _in_commit(request, error):
+            look = _(
+                "Wait a moment, load the page or the list again, and see whether it was stored before you repeat it."
+            )
+            return answer(request, OutcomeUnknown(look), cause)
+        return answer(request, DatabaseAway(), cause)
     if state == ALREADY_TAKEN:
         return answer(
             request,
@@ -155,6 +207,16 @@ async def _database(request: Request, error: Exception) -> Response:
     return incident(request, error)
 
 
+def _in_commit(request: Request, error: Exception) -> bool:
+    """Tell if the connection was lost during a commit: SQLAlchemy names no statement for a commit."""
+    return (
+        request.method not in SAFE_METHODS
+        and isinstance(error, sql.DBAPIError)
+        and error.connection_invalidated
+        and error.statement is None
+    )
+
+
 async def unforeseen(request: Request, error: Exception) -> Response:
     """The answer to an error that is not one of our own."""
     if isinstance(error, sql.DBAPIError | sql.TimeoutError | psycopg.Error):
@@ -163,17 +225,16 @@ async def unforeseen(request: Request, error: Exception) -> Response:
 
 
 def incident(request: Request, error: BaseException) -> Response:
-    """An error nobody foresaw: logged in full under a number, told with nothing but that number."""
-    number = secrets.token_hex(4)
-    log.error("incident %s: %s %s", number, request.method, request.url.path, exc_info=error)
+    """An unhandled error: logged in full under the id of the request, told with nothing but that id."""
+    number = REQUEST.get() or "-"
+    log.error("unhandled error in %s %s", request.method, request.url.path, exc_info=error)
     return answer(
         request,
         Unexpected(
-            _("An error that nobody foresaw. Nothing of this request was stored."),
-            _("Try again. If it happens again, tell your administrator the incident number {number}.").format(
+            _("An unexpected error. Nothing of this request was stored."),
+            _("Try again. If it happens again, tell your administrator the request number {number}.").format(
                 number=number
             ),
-            incident=number,
         ),
     )
 
@@ -205,8 +266,15 @@ class LastResort:
                 await incident(request, error)(scope, receive, send)
 
 
-def add_problem_handlers(app: FastAPI) -> None:
-    """Make every error of this application an answer."""
+Recognise = Callable[[Request], Awaitable[None]]
+
+
+def add_problem_handlers(app: FastAPI, recognise: Recognise) -> None:
+    """Make every error of this application an answer.
+
+    recognise: looks up who is signed in, for pages that no route makes.
+    """
+    app.state.recognise = recognise
     app.add_exception_handler(InbandError, _inband)
     app.add_exception_handler(RequestValidationError, _validation)
     app.add_exception_handler(HTTPException, _http)

@@ -1,4 +1,4 @@
-"""What every answer tells the browser it may not do.
+"""Headers of every answer that forbid things to the browser.
 
 The policy allows this server and nothing else: no foreign request, no inline script, no inline style attribute, no
 frame. An answer that sets its own `Content-Security-Policy` keeps it.

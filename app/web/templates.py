@@ -17,8 +17,11 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
 from app import __version__
-from app.web import i18n, numbers, theme
+from app.errors import InbandError
+from app.language import i18n, numbers, times
+from app.web import states, theme
 from app.web.assets import Assets
+from app.web.request_log import note_reason
 
 TEMPLATE_DIR = Path(__file__).resolve().parents[2] / "frontend" / "templates"
 THEME_COOKIE = "inband_theme"
@@ -48,9 +51,17 @@ def environment() -> Environment:
         mm=numbers.mm,
         signed=numbers.signed,
         when=numbers.when,
+        written=lambda at: times.written(at, times.MINUTES),
         ago=numbers.ago,
     )
-    env.globals.update(asset=assets().url, assets=assets(), theme=theme, inband_version=__version__)
+    env.globals.update(
+        asset=assets().url,
+        assets=assets(),
+        theme=theme,
+        states=states,
+        inband_version=__version__,
+        plant_zone=times.plant_zone,
+    )
     return env
 
 
@@ -94,6 +105,10 @@ def page(
     **context: Any,
 ) -> HTMLResponse:
     """A whole page, or the part of one, as an answer. Pages show the state of now, so nobody keeps them."""
+    if status >= HTTPStatus.BAD_REQUEST:
+        for refusal in context.values():
+            if isinstance(refusal, InbandError):
+                note_reason(request.scope, refusal)
     return HTMLResponse(
         render(request, template, **context), status, headers={"Cache-Control": "no-store", **(headers or {})}
     )

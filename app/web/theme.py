@@ -1,4 +1,4 @@
-"""One look for everything drawn: zone names, their shapes and colours, and the dress of a chart.
+"""Common look of all charts: zone names, their shapes and colours, and the theme of a chart.
 
 ISA-101: quiet greys while all is well; colour only for what needs someone, and never colour alone – every zone and every
 state has a shape and a word as well. The colours are those of `frontend/static/css/tokens.css` (a test compares them).
@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, Literal
 
-from app.web.i18n import _
+from app.language.times import on_axis, plant_zone
+from app.web.states import tone_of, word_of
 
 ThemeName = Literal["light", "dark"]
 FONT = '"IBM Plex Sans", "Segoe UI", Roboto, "Noto Sans", "Liberation Sans", system-ui, sans-serif'
@@ -88,34 +89,16 @@ ZONE_OUTLINES = {
     "wear": "M7 3h10l5 9-5 9H7l-5-9z",
     "probe_fault": "M7 2 12 7l5-5 5 5-5 5 5 5-5 5-5-5-5 5-5-5 5-5-5-5z",
 }
-# How urgent a zone is: the tones of the style sheet.
-ZONE_TONES = {
-    "zero": "steady",
-    "average": "steady",
-    "full": "steady",
-    "oversize": "attention",
-    "undersize": "attention",
-    "wear": "wear",
-    "probe_fault": "stop",
-}
 
 
 def zone_name(zone: str) -> str:
     """The zone in one or two words."""
-    return {
-        "zero": _("Zero"),
-        "average": _("Averaging"),
-        "full": _("Full"),
-        "oversize": _("Oversize"),
-        "undersize": _("Undersize"),
-        "wear": _("Tool worn"),
-        "probe_fault": _("Probe fault"),
-    }.get(zone, zone)
+    return word_of(zone)
 
 
 def zone_colour(zone: str, colours: Palette) -> str:
     """Grey inside the tolerance; a colour where someone is needed."""
-    tone: str = getattr(colours, ZONE_TONES.get(zone, "steady"))
+    tone: str = getattr(colours, tone_of(zone))
     return tone
 
 
@@ -166,7 +149,7 @@ def layout(theme: ThemeName, **more: Any) -> dict[str, Any]:
 
 
 def date_axis(moments: Iterable[datetime] = (), **more: Any) -> dict[str, Any]:
-    """An axis of time: 24 hours, day before month. Moments carry their offset; plotly-chart.js shows them in local time.
+    """An axis of time: 24 hours, day before month. Moments carry their offset; drawn is the wall clock of the plant, whose zone the axis names.
 
     moments: of what is drawn. Where all are of one hour it shows half a day before and after: else it would count seconds.
     """
@@ -174,9 +157,11 @@ def date_axis(moments: Iterable[datetime] = (), **more: Any) -> dict[str, Any]:
     known = sorted(moments)
     if known and known[-1] - known[0] <= timedelta(hours=1):
         half = timedelta(hours=12)
-        more = {"range": [(known[0] - half).isoformat(), (known[-1] + half).isoformat()]} | more
+        more = {"range": [on_axis(known[0] - half), on_axis(known[-1] + half)]} | more
     return {
         "type": "date",
+        "title": {"text": plant_zone().key, "font": {"size": 12}, "standoff": 4},
+        "automargin": "height",
         "showgrid": False,
         "showline": True,
         "tickformatstops": [

@@ -1,19 +1,26 @@
-"""What pydantic found wrong with a request, in words that a machinist understands."""
+"""Errors that pydantic reports, in words that a machinist understands."""
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from app.core.parameters import LARGEST_LENGTH
 from app.errors import FieldError, Invalid
-from app.web.i18n import _
+from app.language.i18n import _
+
+LENGTHS = {"tip", "tip_radius", "feeler"}  # whose limit is nearer than that of other lengths
+_KIND = re.compile(r"constrained-\w+|literal\[.*\]")  # how pydantic names one of the kinds that a field may be of
+OTHER_UNITS = {"probing_feed": "mm/min", "group_pause": "min"}  # of fields that go as far as lengths and are none
 
 
 def field_path(location: Sequence[str | int]) -> str:
     """``("body", "parameters", "zero_range")`` is `parameters.zero_range`; list items are `[17].measured`."""
     if location and location[0] == "query":  # of several values, the query string does not say which
         location = [step for step in location if not isinstance(step, int)]
+    location = [step for step in location if not (isinstance(step, str) and _KIND.fullmatch(step))]
     path = ""
     for step in location[1:] if location and location[0] in {"body", "query", "path", "header"} else location:
         path += f"[{step}]" if isinstance(step, int) else f".{step}" if path else str(step)
@@ -21,8 +28,17 @@ def field_path(location: Sequence[str | int]) -> str:
 
 
 def field_errors(errors: Iterable[Mapping[str, Any]]) -> list[FieldError]:
-    """One sentence for each thing that is wrong."""
-    return [FieldError(field_path(error["loc"]), message(error)) for error in errors]
+    """One sentence for each thing that is wrong; where a field may be of several kinds, one for all of them."""
+    sentences: dict[str, list[str]] = {}
+    for error in errors:
+        sentences.setdefault(_field_of(error), []).append(message(error))
+    return [FieldError(field, _(", or ").join(dict.fromkeys(each))) for field, each in sentences.items()]
+
+
+def _field_of(error: Mapping[str, Any]) -> str:
+    """The field that is meant: of a check of several fields together, the one that it names as `at` in its context."""
+    at = str((error.get("ctx") or {}).get("at") or "")
+    return field_path((*error["loc"], *at.split("."))) if at else field_path(error["loc"])
 
 
 def message(error: Mapping[str, Any]) -> str:
@@ -68,7 +84,17 @@ def message(error: Mapping[str, Any]) -> str:
         return _("must be a number of readings from 1 on, such as 500, or one of: {words}").format(
             words=", ".join(words)
         )
-    return _with_values(kind, context) or str(error.get("msg", kind))
+    sentence = _with_values(kind, context)
+    return str(error.get("msg", kind)) if sentence is None else sentence + _unit_of(error)
+
+
+def _unit_of(error: Mapping[str, Any]) -> str:
+    """The unit of a limit that is as far as lengths go, so that nobody takes it for another one."""
+    limit = (error.get("ctx") or {}).get("le", (error.get("ctx") or {}).get("ge"))
+    field = str(error["loc"][-1]) if error.get("loc") else ""  # a value checked by itself has no place
+    if isinstance(limit, float) and (field in LENGTHS or abs(limit) == LARGEST_LENGTH):
+        return f" {OTHER_UNITS.get(field, 'mm')}"
+    return ""
 
 
 def _with_values(kind: str, context: Mapping[str, Any]) -> str | None:
@@ -102,7 +128,7 @@ def checked(kind: Any, value: Any, field: str) -> Any:
     try:
         return _adapter(kind).validate_python(value)
     except ValidationError as error:
-        errors = [FieldError(field, message(found)) for found in error.errors()]
+        errors = [FieldError(field, message(problem)) for problem in error.errors()]
         raise Invalid(
             f"{field}: {errors[0].message}", _("Correct the named field and send it again."), errors=errors
         ) from None

@@ -1,4 +1,4 @@
-"""What is backed up comes back, whole, and over nothing that is there."""
+"""A backup is restored whole, and never over existing data."""
 
 import os
 import stat
@@ -10,8 +10,9 @@ from pathlib import Path
 import psycopg
 import pytest
 
+from app.db import migrate
 from app.settings import HOUSE
-from tests.conftest import Server, drop_database, in_database
+from tests.conftest import NewDatabase, Server, drop_database, in_database
 from tests.shop import Shop
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -43,10 +44,33 @@ def test_a_backup_of_a_running_server_comes_back_whole(
         readings = "SELECT measured, key, correction FROM reading"
         with psycopg.connect(server.database.dsn) as before, psycopg.connect(empty) as after:
             assert after.execute(readings).fetchall() == before.execute(readings).fetchall() == [(40.0061, "part-1", 1)]
+        entries = "SELECT action, subject, after ->> 'file' FROM audit_entry WHERE action LIKE 'backup %' ORDER BY id"
+        made, restored = ((f"backup {what}", "database", "inband.dump") for what in ("made", "restored"))
+        with psycopg.connect(server.database.dsn) as before, psycopg.connect(empty) as after:
+            assert before.execute(entries).fetchall() == [made]
+            assert after.execute(entries).fetchall() == [restored], "a backup is noted after it is made"
         again = inband("restore", file, "--database-url", empty, expect=1)
         assert "empty one only" in again.stderr
     finally:
         drop_database(empty)
+
+
+def test_a_backup_of_the_last_revision_before_the_squash_comes_back_at_the_head(
+    new_database: NewDatabase, inband: Run, tmp_path: Path
+) -> None:
+    file, old, empty = tmp_path / "inband.dump", new_database(), new_database()
+    with psycopg.connect(old, autocommit=True) as connection:
+        connection.execute("INSERT INTO machine (key, name, control) VALUES ('lathe-1', 'Lathe 1', 'fanuc')")
+        connection.execute("UPDATE alembic_version SET version_num = %s", [migrate.SQUASHED])
+        machines = connection.execute("SELECT * FROM machine").fetchall()
+    with psycopg.connect(empty, autocommit=True) as connection:
+        connection.execute("DROP SCHEMA public CASCADE")
+        connection.execute("CREATE SCHEMA public")
+    inband("backup", file, "--database-url", old)
+    inband("restore", file, "--database-url", empty)
+    assert migrate.current(empty) == migrate.head()
+    with psycopg.connect(empty) as connection:
+        assert connection.execute("SELECT * FROM machine").fetchall() == machines
 
 
 def test_a_backup_replaces_no_file(server: Server, inband: Run, tmp_path: Path) -> None:

@@ -11,11 +11,14 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 import httpx
+import psycopg
 import pytest
 
+from app import __version__
+from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from app.settings import HOUSE
-from tests.conftest import NewDatabase, RunServer, Server, free_port, wait_ready
+from tests.conftest import NewDatabase, RunServer, Server, free_port, in_database, wait_ready
 
 
 def inband(*arguments: str, typed: str = "", **environment: str) -> subprocess.CompletedProcess[str]:
@@ -96,6 +99,52 @@ def test_open_live_pages_neither_delay_the_end_nor_leave_a_traceback(run_server:
         assert "Cancel" not in said
 
 
+STUBBORN = {
+    "a thread": "threading.Thread(target=time.sleep, args=(3600,), name='a long import').start()",
+    "a pool of threads": "asyncio.get_running_loop().run_in_executor(None, time.sleep, 3600)",
+    "an end that does not come": "Writer.stop = lambda self: asyncio.sleep(3600)",
+}
+
+
+@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("what", STUBBORN)
+def test_it_ends_whatever_works_on(data_dir: Path, tmp_path: Path, what: str, workers: str) -> None:
+    """And with it the database, in order."""
+    program, port, stderr = tmp_path / "stubborn.py", free_port(), tmp_path / "stderr"
+    program.write_text(
+        "import asyncio, threading, time\n"
+        "from app.cli import main\n"
+        "from app.loop.readings.writer.group_commit import Writer\n"
+        "start = Writer.start\n"
+        f"def stubborn(self):\n    {STUBBORN[what]}\n    start(self)\n"
+        "Writer.start = stubborn\n"
+        "if __name__ == '__main__':\n    main()\n"
+    )
+    command = [
+        sys.executable,
+        str(program),
+        "serve",
+        "--port",
+        str(port),
+        "--data-dir",
+        str(data_dir),
+        "--workers",
+        workers,
+    ]
+    with (
+        stderr.open("wb") as log,
+        subprocess.Popen(command, cwd=HOUSE, env=os.environ | {"PYTHONPATH": str(HOUSE)}, stderr=log) as process,
+        ExitStack() as end,
+    ):
+        end.callback(process.kill)
+        wait_ready(f"http://127.0.0.1:{port}", process, stderr)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(60) == 0
+    assert EmbeddedServer(data_dir).pid is None
+    if workers == "1" or "end" in what:  # a worker whose application has ended is ended by its signal
+        assert "still at work" in stderr.read_text()
+
+
 def test_workers_end_when_their_parent_is_killed(run_server: RunServer) -> None:
     with run_server(workers=2) as server:
         server.kill()
@@ -115,6 +164,101 @@ def test_two_workers_serve(run_server: RunServer) -> None:
     with run_server(workers=2) as server:
         key = server.key("viewer")
         assert server.client(key).get("/api/v1/machines").status_code == 200
+
+
+NOBODY = ["there is no", "--data-dir", "--database-url", "inband serve"]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["key", "add", "--role", "viewer"],
+        ["user", "add", "anna", "--role", "admin", "--password-stdin"],
+        ["export", "--characteristic", "c"],
+        ["import", "{file}", "--characteristic", "c"],
+        ["report", "c", "-o", "c.pdf"],
+        ["program", "write", "c"],
+        ["program", "corrections", "m"],
+        ["backup", "nothing.dump"],
+        ["check"],
+        ["migrate"],
+    ],
+    ids=lambda words: " ".join(words[:2]),
+)
+def test_a_folder_without_inband_is_refused_and_stays_as_it_is(
+    postgres: str, shared_dir: Path, data_dir: Path, command: list[str]
+) -> None:
+    """A slip of the pen in --data-dir would otherwise make a database, and a key that no server knows."""
+    file = data_dir.with_name("readings.csv")
+    file.write_text("measured\n39.998\n")
+    typo = inband(
+        *(word.format(file=file) for word in command), "--data-dir", str(data_dir), typed="horse battery staple\n"
+    )
+    assert typo.returncode == 1, typo.stderr
+    assert all(words in typo.stderr.lower() for words in NOBODY)
+    assert str(data_dir) in typo.stderr
+    assert str(shared_dir / "inband") in typo.stderr, "there is one, which runs"
+    assert not data_dir.exists()
+    assert not (HOUSE / "nothing.dump").exists()
+
+
+def test_a_database_without_inband_is_refused_and_stays_empty(postgres: str) -> None:
+    nothing = in_database(postgres, "postgres")
+    done = inband("key", "add", "--role", "viewer", "--database-url", nothing)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "no Inband in this database" in done.stderr
+    with psycopg.connect(nothing) as connection:
+        assert connection.execute("SELECT 1 FROM pg_tables WHERE schemaname = 'public'").fetchone() is None
+
+
+def test_an_older_schema_is_not_brought_up_to_date_by_the_way(new_database: NewDatabase) -> None:
+    """A server of that age may be running on it."""
+    url = new_database()
+    with psycopg.connect(url, autocommit=True) as connection:
+        connection.execute("UPDATE alembic_version SET version_num = %s", [migrate.SQUASHED])
+    done = inband("key", "add", "--role", "viewer", "--database-url", url)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "inband migrate" in done.stderr
+    assert migrate.current(url) == migrate.SQUASHED
+    done = inband("migrate", "--database-url", url)
+    assert (done.returncode, migrate.current(url)) == (0, migrate.head())
+
+
+def test_a_schema_from_before_the_squash_is_refused_with_the_way_on(new_database: NewDatabase) -> None:
+    url = new_database()
+    with psycopg.connect(url, autocommit=True) as connection:
+        connection.execute("UPDATE alembic_version SET version_num = '0021'")
+    for command in (["serve", "--port", str(free_port())], ["key", "add", "--role", "viewer"], ["check"], ["migrate"]):
+        done = inband(*command, "--database-url", url)
+        assert done.returncode == 1
+        assert f"check out commit {migrate.CARRIER}" in " ".join(done.stderr.split())
+    assert migrate.current(url) == "0021"
+
+
+def test_a_newer_schema_is_left_alone(new_database: NewDatabase) -> None:
+    url = new_database()
+    with psycopg.connect(url, autocommit=True) as connection:
+        connection.execute("UPDATE alembic_version SET version_num = 'tomorrow'")
+    for command in (["serve", "--port", str(free_port())], ["key", "add", "--role", "viewer"], ["check"], ["migrate"]):
+        done = inband(*command, "--database-url", url)
+        assert done.returncode == 1
+        assert "a newer one has used it" in done.stderr
+
+
+def test_the_version_is_told() -> None:
+    done = inband("--version")
+    assert (done.returncode, done.stdout) == (0, f"inband {__version__}\n")
+
+
+def test_help_and_keys_read_no_more_of_the_program_than_they_need(new_database: NewDatabase) -> None:
+    """The time that a command takes is the time of reading what it imports."""
+    heavy = {"numba", "numpy", "fastapi", "alembic", "uvicorn", "reportlab", "app.main"}
+    add = ["key", "add", "--role", "viewer", "--database-url", new_database()]
+    for words, more in ((["--help"], {"sqlalchemy", "psycopg", "pydantic"}), (add, {"sqlalchemy"})):
+        program = f"import sys; sys.argv = ['inband', *{words!r}]\nfrom app.cli import main\ntry: main()\nexcept SystemExit: pass\n"
+        program += "print(sorted(set(sys.modules)), file=sys.stderr)"
+        done = subprocess.run([sys.executable, "-c", program], cwd=HOUSE, capture_output=True, text=True)
+        assert [name for name in heavy | more if f"'{name}'" in done.stderr] == []
 
 
 def test_a_taken_port_is_said_before_anything_is_begun(server: Server, data_dir: Path) -> None:

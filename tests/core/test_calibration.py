@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from app.core.calibration import Calibration, Gauge, Outcome, Ring, Section, calibrate, centre
@@ -139,9 +139,20 @@ def test_limits_of_grubbs_test(count: int, published: float) -> None:
 
 
 def test_few_pairs_say_how_many_are_missing() -> None:
-    assert [compare([0.001] * n, empirical_value=0.5).missing for n in range(7)] == [5, 4, 3, 2, 1, 0, 0]
-    assert [compare([0.001] * n, empirical_value=0.5).suggested for n in range(3, 7)] == [None, None, 0.001, 0.001]
+    differences = [0.0008, 0.0012, 0.0009, 0.0011, 0.001, 0.001]
+    assert [compare(differences[:n], empirical_value=0.5).missing for n in range(7)] == [5, 4, 3, 2, 1, 0, 0]
+    assert [compare(differences[:n], empirical_value=0.5).suggested for n in range(3, 7)] == [None, None, 0.001, 0.001]
     assert (compare([], empirical_value=0.0).mean, compare([0.002], empirical_value=0.0).deviation) == (None, None)
+
+
+def test_equal_differences_are_no_certainty() -> None:
+    """A gauge that shows whole steps hides the scatter: an interval of width zero would call every other value wrong."""
+    found = compare([40.002 - 40.0, *([0.002] * 5)], empirical_value=0.0)  # as they come of subtracting: 0.002 + 2e-15
+    assert (found.mean, found.low, found.high, found.suggested, found.equal) == (0.002, None, None, None, True)
+    found = compare([*([0.002] * 9), 0.003], empirical_value=0.0)
+    assert found.step == pytest.approx(0.001), "a step is larger than s"
+    assert (found.low, found.high) == pytest.approx((0.0016, 0.0026)), "half a step to each side"
+    assert found.suggested == 0.0021
 
 
 def test_pairs_that_agree_with_the_value_in_effect_suggest_nothing() -> None:
@@ -152,6 +163,7 @@ def test_pairs_that_agree_with_the_value_in_effect_suggest_nothing() -> None:
 
 @given(st.lists(micrometres, min_size=2, max_size=30))
 def test_the_mean_lies_inside_its_interval_and_a_surer_one_is_wider(differences: list[float]) -> None:
+    assume(len(set(differences)) > 1)
     narrow = compare(differences, empirical_value=9.0, confidence=0.9)
     wide = compare(differences, empirical_value=9.0, confidence=0.99)
     assert narrow.mean is not None

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from app.core.compiled import plain
 from app.core.effect import FEWEST_CORRECTIONS, FEWEST_READINGS, LONGEST, Effect, _missed, measured_effect
-from app.core.replay import Lane, Policy, run, undisturbed
+from app.core.replay import Lane, Policy, run, without_events
 from app.core.spc.refusal import Reason, Refused
 from tests.core.test_replay import SHAFT
 
@@ -21,12 +21,12 @@ def loop(effect: float, delay: int, seed: int, count: int = 1500) -> tuple[Value
     chance, part = np.random.default_rng(seed), np.arange(count) % LIFE
     free = part * 0.00006 + 0.004 * (1 - np.exp(-part / 20)) + 0.006 * (1 - np.exp(-part / 40))
     free += chance.normal(0, 0.0008, count) + (chance.random(count) < 1 / 180) * 0.005
-    way = undisturbed(free.round(9))
-    way.marks[::LIFE] = 1
-    begins = int((way.marks > 0).sum())
-    way = way._replace(offset=np.zeros(begins), pending=np.zeros(begins), averages=np.zeros((begins, 1)))
-    course, _figures = run(way, Policy((Lane(replace(SHAFT, zero_range=0.002), effect),), delay))
-    return course.deviation, course.offset, way.marks > 0
+    trace = without_events(free.round(9))
+    trace.marks[::LIFE] = 1
+    begins = int((trace.marks > 0).sum())
+    trace = trace._replace(offset=np.zeros(begins), pending=np.zeros(begins), averages=np.zeros((begins, 1)))
+    course, _figures = run(trace, Policy((Lane(replace(SHAFT, zero_range=0.002), effect),), delay))
+    return course.deviation, course.offset, trace.marks > 0
 
 
 @pytest.mark.parametrize("delay", [0, 2])
@@ -42,7 +42,7 @@ def test_a_planted_effect_is_found_again(effect: float, delay: int) -> None:
 
 
 def test_comparing_before_and_after_would_not_do() -> None:
-    """What the module says of the simple ways: too much without the pipeline, for the loop follows scatter."""
+    """Bias of the simple estimates: too large without the pipeline, because the loop follows scatter."""
     deviation, offset, begins = loop(0.8, 0, 1)
     steps = np.flatnonzero((np.diff(offset) != 0) & ~begins[1:])
     simple = np.polyfit(np.diff(offset)[steps], np.diff(deviation)[steps], 1)[0]

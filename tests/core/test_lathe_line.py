@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from app.core.acceptance import accepted, sections_outside
-from app.core.compensation import Action, Signal, State, decide, deviation_of
+from app.core.decision.decide import ReadingAlarm, State, decide
+from app.core.decision.step import Action, deviation_of
 from app.core.parameters import Parameters, read
 from app.core.probing import measured_value
 
@@ -79,7 +80,7 @@ def test_our_corrections_make_the_same_offset_count_and_verdict() -> None:
         offset += Decimal(str(decision.amount or 0.0))
         assert (good, rejects) == (part["good"], macro.v513)
         assert abs(offset - macro.offset) <= len(CASE["parts"]) * PICOMETRE
-        assert (Signal.ACCEPTANCE in decision.signals) == (not part["good"])
+        assert (ReadingAlarm.ACCEPTANCE in decision.alarms) == (not part["good"])
     assert round(offset, 6) == round(macro.offset, 6)
 
 

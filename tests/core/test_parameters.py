@@ -87,7 +87,7 @@ def test_what_is_no_number_or_choice_is_refused_at_its_field(field: str, bad: An
 
 
 def test_everything_that_is_wrong_is_said_at_once() -> None:
-    found = problems({"R33": "x", "mode": "auto", "colour": 1, "R10": 40, "R11": 2.5, "accept": {"n": 3, "m": 2}})
+    found = problems({"R33": "x", "mode": "auto", "colour": 1, "R10": 4000, "R11": 2.5, "accept": {"n": 3, "m": 2}})
     assert found == {
         "zero_range": "not_a_number",
         "mode": "not_a_choice",

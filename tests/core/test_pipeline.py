@@ -1,4 +1,4 @@
-"""What it is worth to know which corrections a part was cut with: the same shift with and without it.
+"""The value of knowing the corrections that a part was cut with: the same shift with and without it.
 
 A tool wears, and once chips; between the cut and the probe lie some parts. *Naive*: every reading is taken as if all
 corrections were in effect, as a loop does that knows nothing of its pipeline. The same seed makes the same scatter.
@@ -10,7 +10,7 @@ from collections import deque
 import numpy as np
 import pytest
 
-from app.core.compensation import State, decide, outstanding_effect
+from app.core.decision.decide import State, decide, outstanding_effect
 from app.core.parameters import Parameters, WearPolicy
 
 PARAMETERS = Parameters(

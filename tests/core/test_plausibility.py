@@ -7,11 +7,12 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from app.core.compensation import Action, Code, Signal, State, decide, outstanding_effect
+from app.core.decision.decide import ReadingAlarm, State, decide, outstanding_effect
+from app.core.decision.limits import Zone
+from app.core.decision.step import Action, Code
 from app.core.parameters import Mode, Parameters, WearPolicy
 from app.core.plausibility import is_jump, moved, suggested_jump, uncorrected
-from app.core.tool_life import Plan, use_of, usual_life
-from app.core.zones import Zone
+from app.core.tool_life import LifePlan, use_of, usual_life
 
 Made = Callable[..., Parameters]
 lengths = st.floats(-0.5, 0.5).map(lambda length: round(length, 6))
@@ -91,7 +92,7 @@ def test_a_jump_never_corrects_and_leaves_the_average(deviation: float, average:
     assert decision.action in {Action.HOLD, Action.NONE}
     assert decision.code is Code.IMPLAUSIBLE
     assert decision.average_after == average
-    assert Signal.IMPLAUSIBLE in decision.signals
+    assert ReadingAlarm.IMPLAUSIBLE in decision.alarms
     assert (decision.amount is None) == (decision.zone is Zone.ZERO)
     if decision.amount is not None:
         assert decision.amount == pytest.approx(-deviation)
@@ -106,18 +107,18 @@ class TestDecision:
     @pytest.mark.parametrize(
         ("micrometres", "policy", "code", "signals"),
         [
-            (0.5, WearPolicy.HOLD, Code.IMPLAUSIBLE, {Signal.IMPLAUSIBLE}),
-            (20, WearPolicy.HOLD, Code.IMPLAUSIBLE, {Signal.IMPLAUSIBLE, Signal.OVERSIZE}),
-            (400, WearPolicy.HOLD, Code.TOOL_WORN_HELD, {Signal.TOOL_WORN}),  # it asks the same, and holds, too
-            (400, WearPolicy.RELEASE, Code.IMPLAUSIBLE, {Signal.IMPLAUSIBLE, Signal.TOOL_WORN}),
-            (1500, WearPolicy.HOLD, Code.PROBE_FAULT, {Signal.PROBE_FAULT}),
+            (0.5, WearPolicy.HOLD, Code.IMPLAUSIBLE, {ReadingAlarm.IMPLAUSIBLE}),
+            (20, WearPolicy.HOLD, Code.IMPLAUSIBLE, {ReadingAlarm.IMPLAUSIBLE, ReadingAlarm.OVERSIZE}),
+            (400, WearPolicy.HOLD, Code.TOOL_WORN_HELD, {ReadingAlarm.TOOL_WORN}),  # it asks the same, and holds, too
+            (400, WearPolicy.RELEASE, Code.IMPLAUSIBLE, {ReadingAlarm.IMPLAUSIBLE, ReadingAlarm.TOOL_WORN}),
+            (1500, WearPolicy.HOLD, Code.PROBE_FAULT, {ReadingAlarm.PROBE_FAULT}),
         ],
     )
     def test_what_asks_a_person(
-        self, shaft: Made, micrometres: float, policy: WearPolicy, code: Code, signals: set[Signal]
+        self, shaft: Made, micrometres: float, policy: WearPolicy, code: Code, signals: set[ReadingAlarm]
     ) -> None:
         decision = decide(shaft(wear_policy=policy.value), State(), micrometres / 1000, jump=True)
-        assert (decision.code, set(decision.signals)) == (code, signals)
+        assert (decision.code, set(decision.alarms)) == (code, signals)
 
     def test_where_nothing_is_corrected_anyway_nobody_is_asked(self, shaft: Made) -> None:
         assert decide(shaft(), State(paused=True), 0.02, jump=True).code is Code.PAUSED
@@ -135,21 +136,21 @@ class TestDecision:
 class TestToolLife:
     @given(st.integers(0, 10_000), lengths, st.integers(1, 10_000), st.floats(1e-3, 1))
     def test_spent_is_what_has_nothing_left(self, parts: int, total: float, planned: int, wear: float) -> None:
-        use = use_of(Plan(planned, wear), parts, total)
+        use = use_of(LifePlan(planned, wear), parts, total)
         assert use.share is not None
         assert (use.spent is not None) == (use.share >= 1 or abs(total) >= wear - 5e-7)
         if use.spent:
             assert use.left == 0
 
     def test_by_hand(self) -> None:
-        assert use_of(Plan(), 500, -0.03) == (None, None, None)
-        assert use_of(Plan(parts=100), 100, 0.0) == (1.0, 0, "parts")
-        assert use_of(Plan(parts=100, total=0.02), 40, 0.015) == (0.75, 13, None)  # 5 µm left at 15/40 µm per part
-        assert use_of(Plan(total=0.02), 0, 0.0) == (0.0, None, None)
+        assert use_of(LifePlan(), 500, -0.03) == (None, None, None)
+        assert use_of(LifePlan(parts=100), 100, 0.0) == (1.0, 0, "parts")
+        assert use_of(LifePlan(parts=100, total=0.02), 40, 0.015) == (0.75, 13, None)  # 5 µm left at 15/40 µm per part
+        assert use_of(LifePlan(total=0.02), 0, 0.0) == (0.0, None, None)
 
     @given(st.integers(1, 1000), st.floats(0.001, 0.1), st.integers(1, 1000))
     def test_less_is_left_the_more_is_cut(self, parts: int, total: float, more: int) -> None:
-        plan = Plan(parts=5000, total=0.2)
+        plan = LifePlan(parts=5000, total=0.2)
         assume(parts + more <= 5000)
         assert (use_of(plan, parts + more, total).left or 0) <= 5000 - parts - more
 

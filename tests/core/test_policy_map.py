@@ -1,4 +1,4 @@
-"""Where a map of settings is best."""
+"""The best region of a map of settings."""
 
 from app.core.policy_map import Criterion, best_region, in_order, with_settings
 from app.core.replay import Figures

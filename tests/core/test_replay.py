@@ -7,20 +7,21 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from app.core.closed_loop import CODES, ZONES, Count, Course, Mark, Way, _round9
-from app.core.compensation import Code
+from app.core.decision.limits import ZONES
+from app.core.decision.loops import Mark, ProcessTrace, ReplayResult, _rounded
+from app.core.decision.step import CODES, Code
 from app.core.parameters import Mode, Parameters, WearPolicy
 from app.core.replay import (
     Lane,
     Policy,
     agreement,
     figures_of,
-    followed,
     parts_of,
     rebuilt,
     run,
-    undisturbed,
+    without_events,
 )
+from bench.replay import followed
 
 SHAFT = Parameters(
     target=39.992,
@@ -74,7 +75,7 @@ def parameter_sets(draw: st.DrawFn) -> Parameters:
 
 
 @st.composite
-def ways(draw: st.DrawFn) -> tuple[Way, Policy]:
+def traces(draw: st.DrawFn) -> tuple[ProcessTrace, Policy]:
     lanes = tuple(
         Lane(p, -draw(st.sampled_from([1.0, 0.8])) / draw(st.sampled_from([-1.0, -0.5, 0.5])), memory, counts)
         for p, memory, counts in draw(
@@ -94,7 +95,7 @@ def ways(draw: st.DrawFn) -> tuple[Way, Policy]:
     marks[0] |= Mark.BEGIN
     begins = int((marks & Mark.BEGIN > 0).sum())
     starts = [draw(st.lists(LENGTHS, min_size=begins, max_size=begins)) for _column in range(4)]
-    way = Way(
+    trace = ProcessTrace(
         np.array([each[0] for each in readings]),
         lane,
         marks,
@@ -103,27 +104,27 @@ def ways(draw: st.DrawFn) -> tuple[Way, Policy]:
         np.array(starts[1]),
         np.array(starts[2:]).T.copy(),
     )
-    return way, Policy(lanes, draw(st.integers(0, 6)))
+    return trace, Policy(lanes, draw(st.integers(0, 6)))
 
 
-@given(ways())
+@given(traces())
 @settings(max_examples=500, deadline=None)
-def test_the_compiled_loop_is_decide_in_closed_loop_bit_for_bit(given_: tuple[Way, Policy]) -> None:
-    way, policy = given_
+def test_the_compiled_loop_is_decide_in_closed_loop_bit_for_bit(given_: tuple[ProcessTrace, Policy]) -> None:
+    trace, policy = given_
     policy = Policy(
         tuple(lane if lane.parameters.average_memory else lane._replace(memory=-1) for lane in policy.lanes),
         policy.delay,
     )
-    course, figures = run(way, policy)
-    rows = list(followed(way, policy))
+    result, figures = run(trace, policy)
+    rows = list(followed(trace, policy))
     for at, row in enumerate(rows):
-        mine = (*(float(column[at]) for column in course[:5]), ZONES[course.zone[at]], CODES[course.code[at]])
+        mine = (*(float(column[at]) for column in result[:5]), ZONES[result.zone[at]], CODES[result.code[at]])
         assert mine == row
         assert np.signbit(mine[:5]).tolist() == np.signbit(row[:5]).tolist()
-    assert figures_of(way, [policy, policy]) == [figures, figures]
+    assert figures_of(trace, [policy, policy]) == [figures, figures]
     counted = [
         row
-        for row, lane, mark in zip(rows, way.lane, way.marks, strict=True)
+        for row, lane, mark in zip(rows, trace.lane, trace.marks, strict=True)
         if policy.lanes[lane].counts and not mark & Mark.LEFT_OUT
     ]
     assert figures.readings == len(counted)
@@ -136,17 +137,17 @@ def test_the_compiled_loop_is_decide_in_closed_loop_bit_for_bit(given_: tuple[Wa
 @settings(max_examples=2000, deadline=None)
 def test_rounding_is_pythons(value: float) -> None:
     for near in (value, np.nextafter(value, np.inf), np.nextafter(value, -np.inf)):
-        assert _round9(float(near)) == round(float(near), 9) + 0.0
+        assert _rounded(float(near)) == round(float(near), 9) + 0.0
 
 
 def test_the_worked_example_of_the_cycles() -> None:
     # What was measured, with the corrections taken out that were made after the third and the seventh.
     free = micrometres(3, 5, 6, 2 + 4.625, 4 + 4.625, 5 + 4.625, 5 + 4.625, 3 + 9, 7 + 9, 7 + 13.25)
-    course, figures = run(undisturbed(free), Policy((Lane(EXAMPLE, response=1.0),)))
-    assert (course.deviation * 1000).round(9).tolist() == [3, 5, 6, 2, 4, 5, 5, 3, 7, 7]
-    m = np.where(course.amount != 0, -course.amount, course.average)
+    result, figures = run(without_events(free), Policy((Lane(EXAMPLE, response=1.0),)))
+    assert (result.deviation * 1000).round(9).tolist() == [3, 5, 6, 2, 4, 5, 5, 3, 7, 7]
+    m = np.where(result.amount != 0, -result.amount, result.average)
     assert (m * 1000).round(9).tolist() == [1.5, 3.25, 4.625, 1.0, 2.5, 3.75, 4.375, 1.5, 4.25, 3.5]
-    assert np.flatnonzero(course.amount).tolist() == [2, 6, 8]
+    assert np.flatnonzero(result.amount).tolist() == [2, 6, 8]
     assert (figures.corrections, figures.rejects) == (3, 0)
 
 
@@ -159,47 +160,47 @@ def test_the_worked_example_of_the_cycles() -> None:
     ],
 )
 def test_a_step_by_hand(delay: int, deviations: list[float], amounts: list[float]) -> None:
-    course, figures = run(undisturbed(micrometres(7, 7, 7, 7, 7)), Policy((Lane(SHAFT, 1.0),), delay))
-    assert (course.deviation * 1000).round(6).tolist() == deviations
-    assert (course.amount * 1000).round(6).tolist() == amounts
+    result, figures = run(without_events(micrometres(7, 7, 7, 7, 7)), Policy((Lane(SHAFT, 1.0),), delay))
+    assert (result.deviation * 1000).round(6).tolist() == deviations
+    assert (result.amount * 1000).round(6).tolist() == amounts
     assert (figures.corrections, figures.mean_size, figures.rejects) == (1, 0.007, 0)
 
 
 def test_wear_by_hand() -> None:
     # 1 µm a part, R33 = 2, k = 1: corrected by 3 at each third part.
     policy = Policy((Lane(replace(SHAFT, zero_range=0.002, weighting_factor=1), 1.0),))
-    course, figures = run(undisturbed(np.arange(13) / 1000), policy)
-    assert (course.deviation * 1000).round(6).tolist() == [0, 1, 2, 3, 1, 2, 3, 1, 2, 3, 1, 2, 3]
-    assert (course.offset * 1000).round(6).tolist() == [0, 0, 0, 0, -3, -3, -3, -6, -6, -6, -9, -9, -9]
+    result, figures = run(without_events(np.arange(13) / 1000), policy)
+    assert (result.deviation * 1000).round(6).tolist() == [0, 1, 2, 3, 1, 2, 3, 1, 2, 3, 1, 2, 3]
+    assert (result.offset * 1000).round(6).tolist() == [0, 0, 0, 0, -3, -3, -3, -6, -6, -6, -9, -9, -9]
     assert (figures.corrections, figures.largest) == (4, 0.003)
     # A part later: one more part has worn, which the correction did not know of.
-    late, _figures = run(undisturbed(np.arange(13) / 1000), policy._replace(delay=1))
+    late, _figures = run(without_events(np.arange(13) / 1000), policy._replace(delay=1))
     assert (late.deviation * 1000).round(6).tolist() == [0, 1, 2, 3, 4, 2, 3, 4, 2, 3, 4, 2, 3]
 
 
 def test_the_wrong_sign_runs_away_to_where_a_person_is_asked() -> None:
     wrong = Policy((Lane(replace(SHAFT, factor=1.0), 1.0),))
-    course, figures = run(undisturbed(np.full(40, 0.006)), wrong)
-    assert course.deviation[:4].tolist() == [0.006, 0.012, 0.024, 0.048]
+    result, figures = run(without_events(np.full(40, 0.006)), wrong)
+    assert result.deviation[:4].tolist() == [0.006, 0.012, 0.024, 0.048]
     assert (figures.worn, figures.held) == (34, 34)
 
 
 def test_what_is_held_waits_for_the_release_of_then() -> None:
-    way = undisturbed(np.full(5, 0.4))
-    way.marks[3] = Mark.RELEASED
-    course, figures = run(way, Policy((Lane(SHAFT, 1.0),)))
-    assert course.deviation.tolist() == [0.4, 0.4, 0.4, 0.0, 0.0]
+    trace = without_events(np.full(5, 0.4))
+    trace.marks[3] = Mark.RELEASED
+    result, figures = run(trace, Policy((Lane(SHAFT, 1.0),)))
+    assert result.deviation.tolist() == [0.4, 0.4, 0.4, 0.0, 0.0]
     assert (figures.held, figures.corrections) == (3, 0)
 
 
 def test_two_characteristics_of_one_tool_share_what_is_corrected() -> None:
     lane = np.array([0, 1, 0, 1, 0, 1])
-    way = undisturbed(micrometres(7, 1, 7, 1, 7, 1))._replace(lane=lane, part=parts_of(lane))
+    trace = without_events(micrometres(7, 1, 7, 1, 7, 1))._replace(lane=lane, part=parts_of(lane))
     both = Policy((Lane(SHAFT, 1.0), Lane(replace(SHAFT, zero_range=0.002), 1.0, counts=False)))
-    course, figures = run(way, both)
+    result, figures = run(trace, both)
     # They lie 6 µm apart, so each corrects what the other has asked for: the second of a part was cut without it.
-    assert (course.deviation * 1000).round(6).tolist() == [7, 1, 6, 0, 6, 0]
-    assert (course.decided * 1000).round(6).tolist() == [7, -6, 6, -6, 6, -6]
+    assert (result.deviation * 1000).round(6).tolist() == [7, 1, 6, 0, 6, 0]
+    assert (result.decided * 1000).round(6).tolist() == [7, -6, 6, -6, 6, -6]
     assert (figures.of_tool, figures.corrections) == (6, 3)
 
 
@@ -215,20 +216,20 @@ def test_taking_the_corrections_out_and_running_the_same_policy_gives_what_was(
     seed: int, wear: float, delay: int, factor: float, effect: float
 ) -> None:
     chance = np.random.default_rng(seed)
-    way = undisturbed(np.arange(300) * wear + chance.normal(0, 0.001, 300).round(6))
+    trace = without_events(np.arange(300) * wear + chance.normal(0, 0.001, 300).round(6))
     policy = Policy((Lane(replace(SHAFT, factor=factor), -effect / factor),), delay)
-    then, figures = run(way, policy)
+    then, figures = run(trace, policy)
     free = rebuilt(then.deviation, then.offset, factor, effect)
-    again, same = run(way._replace(free=free), policy)
-    np.testing.assert_allclose(free, way.free, atol=2e-9)
+    again, same = run(trace._replace(free=free), policy)
+    np.testing.assert_allclose(free, trace.free, atol=2e-9)
     assert same.corrections == figures.corrections
     np.testing.assert_allclose(again.deviation, then.deviation, atol=3e-9)
 
 
 def test_figures_by_hand() -> None:
-    way = undisturbed(micrometres(1, -1, 9, -9, 400, 1200, 0.5, -0.5))
-    way.marks[7] |= Mark.LEFT_OUT
-    _course, figures = run(way, Policy((Lane(replace(SHAFT, mode=Mode.MEASURE_ONLY), 1.0),)))
+    trace = without_events(micrometres(1, -1, 9, -9, 400, 1200, 0.5, -0.5))
+    trace.marks[7] |= Mark.LEFT_OUT
+    _result, figures = run(trace, Policy((Lane(replace(SHAFT, mode=Mode.MEASURE_ONLY), 1.0),)))
     assert (figures.readings, figures.inner, figures.rejects) == (7, 5, 3)
     assert (figures.oversize, figures.undersize, figures.worn, figures.faults, figures.alarms) == (1, 1, 1, 1, 4)
     assert figures.spread == pytest.approx(np.std(micrometres(1, -1, 9, -9, 0.5), ddof=1))
@@ -241,14 +242,14 @@ def test_ppk_is_that_of_the_statistics() -> None:
 
     free = np.random.default_rng(3).normal(0.001, 0.002, 400)
     quiet = Policy((Lane(replace(SHAFT, mode=Mode.MEASURE_ONLY), 1.0),))
-    course, figures = run(undisturbed(free), quiet)
-    expected = capability(course.deviation, Limits(-0.008, 0.008))
+    result, figures = run(without_events(free), quiet)
+    expected = capability(result.deviation, Limits(-0.008, 0.008))
     assert figures.ppk == pytest.approx(expected.ppk.value, rel=1e-9)
     assert figures.spread == pytest.approx(expected.overall.value, rel=1e-9)
 
 
 def test_equal_readings_have_no_ppk() -> None:
-    _course, figures = run(undisturbed(np.full(50, 0.0004)), Policy((Lane(SHAFT, 1.0),)))
+    _result, figures = run(without_events(np.full(50, 0.0004)), Policy((Lane(SHAFT, 1.0),)))
     assert (figures.ppk, figures.corrections) == (None, 0)
     assert figures.spread == pytest.approx(0, abs=1e-12)
 
@@ -258,8 +259,7 @@ def test_agreement_of_nothing_is_not_a_number() -> None:
 
 
 def test_a_way_without_readings_amounts_to_nothing() -> None:
-    _course, figures = run(undisturbed(np.zeros(0)), Policy((Lane(SHAFT, 1.0),)))
+    _result, figures = run(without_events(np.zeros(0)), Policy((Lane(SHAFT, 1.0),)))
     assert (figures.readings, figures.mean, figures.spread, figures.ppk, figures.largest) == (0, None, None, None, None)
-    assert len(Count) == 11
-    assert figures_of(undisturbed(np.zeros(0)), []) == []
-    assert len(Course.room(0).deviation) == 0
+    assert figures_of(without_events(np.zeros(0)), []) == []
+    assert len(ReplayResult.room(0).deviation) == 0

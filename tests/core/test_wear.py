@@ -7,9 +7,10 @@ from app.core.wear import (
     FEWEST,
     LONGEST,
     Fit,
-    Forecast,
     Step,
     Values,
+    backtest,
+    cone,
     fit,
     forecast,
     joined,
@@ -186,12 +187,101 @@ def test_the_forecast_reaches_the_limit_where_the_line_does() -> None:
     assert told.low < told.parts < told.high
 
 
-def test_at_both_ends_of_the_interval_the_limit_is_on_the_edge_of_what_a_part_may_be() -> None:
+def test_the_cone_comes_to_the_limit_after_the_parts_of_the_interval() -> None:
+    """Both ends: the chart and the number say the same, wider where edges before missed."""
     found = fitted(line(60, -0.0002, 0.002, seed=3))
-    told = forecast(found, -0.05)
+    for widening in (1.0, 1.7):
+        told = forecast(found, -0.024, widening)
+        assert told is not None
+        slow, fast = cone(found, np.array([told.low, told.high]), widening)
+        assert fast[0] == pytest.approx(-0.024, rel=0.01)
+        assert slow[1] == pytest.approx(-0.024, rel=0.01)
+
+
+def test_wear_that_goes_on_straight_is_no_excuse_for_a_narrow_interval() -> None:
+    """As far ahead again as the line is long, wear may turn out half or twice as fast."""
+    told = forecast(fitted(line(100, 0.0001, 0.0000001, seed=1)), 0.0199)
     assert told is not None
-    for end in (told.low, told.high):
-        assert abs(found.at(end) + 0.05) == pytest.approx(found.half_width(end, single=True))
+    assert told.low == pytest.approx(50, rel=0.01)
+    assert told.high == pytest.approx(200, rel=0.01)
+
+
+def worn_edge(rng: np.random.Generator) -> tuple[Values, Values]:
+    """A tool life in shares of its limit, to twice its length: the truth, and what is measured of it.
+
+    By turns three phases (run-in, even wear, faster wear), a power of the time, a straight line, and a curve like those of
+    milling cutters in public data: half of the wear in the first tenth, nearly none, then the rest. Scatter 0.3 to 6 %.
+    """
+    parts = int(rng.integers(120, 1500))
+    t = np.arange(1, 2 * parts) / parts
+    kind = rng.integers(0, 4)
+    if kind == 0:
+        begin, power = rng.uniform(0.5, 0.9), rng.uniform(1.5, 3.0)
+        w = rng.uniform(0.05, 0.35) * (1 - np.exp(-t / rng.uniform(0.02, 0.15))) + rng.uniform(0.3, 0.7) * t
+        w += rng.uniform(0.1, 0.6) * (np.maximum(t - begin, 0) / (1 - begin)) ** power
+    elif kind == 1:
+        w = t ** rng.uniform(0.5, 2.2)
+    elif kind == 2:
+        w = t
+    else:
+        w = 0.45 * (1 - np.exp(-t / 0.1)) + 0.25 * t + 0.3 * np.maximum(0, (t - 0.6) / 0.4) ** 1.5
+    w = w / np.interp(1, t, w)
+    return w, w + rng.normal(0, rng.choice([0.003, 0.01, 0.03, 0.06]), len(w))
+
+
+def test_the_interval_holds_the_truth_of_wear_that_is_not_linear() -> None:
+    """The interval of the line alone held it in 43 % of such forecasts."""
+    rng = np.random.default_rng(11)
+    held = []
+    for _life in range(250):
+        truth, curve = worn_edge(rng)
+        reached = int(np.argmax(truth >= 1)) + 1
+        for share in rng.uniform(0.1, 0.97, 3):
+            now = int(reached * share)
+            found = fit(np.arange(1, now + 1), curve[:now])
+            told = None if found is None else forecast(found, 1.0)
+            if told is not None:
+                held.append(told.low <= reached - now <= told.high)
+    assert len(held) > 600
+    assert np.mean(held) >= 0.93
+
+
+def abrupt(parts: int, seed: int) -> Values:
+    """An edge that wears ten times as fast in the last tenth of its life."""
+    t = np.arange(1, parts + 1) / parts
+    curve: Values = (0.5 * t + 5 * np.maximum(0, t - 0.9)) + np.random.default_rng(seed).normal(0, 0.005, parts)
+    return curve
+
+
+def test_the_forecasts_of_edges_before_widen_the_next() -> None:
+    record = backtest([(np.arange(1, n + 1), abrupt(n, n)) for n in (150, 260, 340)])
+    assert record.lives == 3
+    assert record.held < record.tested
+    assert record.widening > 1
+    curve = abrupt(300, 1)
+    alone, taught = (forecast(fitted(curve[:240]), 0.95, widening) for widening in (1.0, record.widening))
+    assert alone is not None
+    assert taught is not None
+    assert alone.low > 60 >= taught.low
+
+
+def test_edges_that_tell_nothing_widen_nothing() -> None:
+    short = (np.arange(1, 21), line(20, 0.001, 0.0001, seed=1))
+    flat = (np.arange(1, 101), line(100, 0.0, 0.001, seed=1))
+    assert backtest([]) == backtest([short, flat]) == (0, 0, 0, 1.0)
+
+
+def test_an_edge_that_broke_in_the_end_is_judged_by_its_wear_until_then() -> None:
+    curve = line(200, 0.0001, 0.0005, seed=2)
+    whole = backtest([(np.arange(1, 201), curve)])
+    curve[-3:] += 0.4
+    assert backtest([(np.arange(1, 201), curve)]).held == whole.held == 4
+
+
+def test_readings_that_are_all_the_same_are_no_wear() -> None:
+    """A hundred times 0.1 has a slope of 1e-19, and a scatter as small."""
+    assert not fitted(np.full(100, 0.1)).is_wear
+    assert not fitted(np.full(61, -0.0123)).is_wear
 
 
 def test_no_wear_no_number() -> None:
@@ -202,16 +292,3 @@ def test_a_limit_that_was_passed_is_reached() -> None:
     told = forecast(fitted(line(100, 0.0001, 0.0001, seed=1)), 0.005)
     assert told is not None
     assert told.parts == told.low == 0
-
-
-def test_parts_begin_to_lie_beyond_at_the_lower_end_as_often_as_the_interval_says() -> None:
-    beyond = within = total = 0
-    for seed in range(600):
-        told = forecast(fitted(line(100, 0.0001, 0.002, seed)), 0.03)
-        assert isinstance(told, Forecast)
-        when = np.random.default_rng(10_000 + seed).normal(0.0, 0.002)
-        total += 1
-        beyond += 0.0001 * (99 + told.low) + when >= 0.03
-        within += told.low <= (0.03 - 0.0099) / 0.0001 <= told.high
-    assert beyond / total == pytest.approx(0.025, abs=0.02)
-    assert within / total >= 0.95

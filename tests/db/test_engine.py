@@ -5,16 +5,23 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import StatementError
 
-from app.db.engine import Database, psycopg_url
+from app.db.connections import parameters_of
+from app.db.engine import Database
 from app.db.types import UtcTime
 
 
 @pytest.mark.parametrize("scheme", ["postgresql", "postgres", "postgresql+psycopg"])
 def test_every_way_of_writing_an_address_means_psycopg(scheme: str) -> None:
-    url = psycopg_url(f"{scheme}://me:p%40ss@db.example:5433/inband?sslmode=require")
-    assert url.render_as_string(hide_password=False) == (
-        "postgresql+psycopg://me:p%40ss@db.example:5433/inband?sslmode=require"
-    )
+    database = Database(f"{scheme}://me:p%40ss@db.example:5433/inband?sslmode=require")
+    assert database.dsn == "postgresql://me:p%40ss@db.example:5433/inband?sslmode=require"
+
+
+def test_of_several_hosts_the_one_is_taken_that_can_be_written_to() -> None:
+    parameters = parameters_of("postgresql://me:secret@a:5432,b:5433/inband")
+    assert (parameters["host"], parameters["port"]) == ("a,b", "5432,5433")
+    assert parameters["target_session_attrs"] == "read-write"
+    told = parameters_of("postgresql://me@a,b/inband?target_session_attrs=any&connect_timeout=9")
+    assert (told["target_session_attrs"], told["connect_timeout"]) == ("any", "9")
 
 
 def test_what_a_block_does_is_committed_or_undone_as_one(database: Database) -> None:

@@ -2,7 +2,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import psycopg
 import pytest
-from alembic import command
 
 from app.db import migrate
 from app.db.migrate import MigrationError
@@ -30,21 +29,36 @@ def test_an_empty_database_is_brought_to_the_head(empty: str) -> None:
     assert migrate.pending(empty) == migrate.upgrade(empty) == []
 
 
-def test_what_was_measured_before_the_last_migrations_stays(empty: str) -> None:
-    with migrate._connected(empty) as connection:
-        command.upgrade(migrate._config(connection), "0009")
-    with psycopg.connect(empty) as connection:
+def test_a_database_of_the_last_revision_before_the_squash_is_stamped_and_keeps_its_rows(
+    new_database: NewDatabase,
+) -> None:
+    url = new_database()
+    tables = "SELECT * FROM machine", "SELECT * FROM machine_state", "SELECT * FROM alarm"
+    with psycopg.connect(url) as connection:
         connection.execute("INSERT INTO machine (key, name, control) VALUES ('lathe-1', 'Lathe 1', 'fanuc')")
         connection.execute("INSERT INTO machine_state (machine_id) SELECT id FROM machine")
-        connection.execute(
-            "INSERT INTO alarm (machine_id, tool_memory, kind, data) SELECT id, 3, 'tool_life', '{}' FROM machine"
-        )
-    assert migrate.upgrade(empty)[0].startswith("0010 ")
-    with psycopg.connect(empty) as connection:
-        assert connection.execute(
-            "SELECT m.key, a.kind FROM machine m JOIN alarm a ON a.machine_id = m.id"
-        ).fetchall() == [("lathe-1", "tool_life")]
-    assert migrate.differences(empty) == []
+        connection.execute("INSERT INTO alarm (machine_id, tool_memory, kind) SELECT id, 3, 'tool_life' FROM machine")
+        connection.execute("UPDATE alembic_version SET version_num = %s", [migrate.SQUASHED])
+        before = [connection.execute(table).fetchall() for table in tables]
+    todo = migrate.pending(url)
+    assert migrate.current(url) == migrate.SQUASHED, "whoever asks changes nothing"
+    with ThreadPoolExecutor(4) as pool:
+        done = list(pool.map(migrate.upgrade, [url] * 4))
+    assert sorted(done) == [[], [], [], todo]
+    assert todo
+    assert migrate.current(url) == migrate.head()
+    with psycopg.connect(url) as connection:
+        assert [connection.execute(table).fetchall() for table in tables] == before
+    assert migrate.differences(url) == []
+
+
+def test_a_database_of_an_earlier_revision_before_the_squash_is_left_alone(new_database: NewDatabase) -> None:
+    url = new_database()
+    with psycopg.connect(url, autocommit=True) as connection:
+        connection.execute("UPDATE alembic_version SET version_num = '0030'")
+    with pytest.raises(MigrationError, match=rf"revision 0030.*goes on from.*{migrate.SQUASHED}.*{migrate.CARRIER}"):
+        migrate.upgrade(url)
+    assert migrate.current(url) == "0030"
 
 
 def test_of_processes_that_start_together_one_migrates(empty: str) -> None:

@@ -12,14 +12,14 @@ from fastapi.routing import APIRoute
 from playwright.sync_api import Browser, Page, expect
 
 from app.main import ROUTERS
-from tests.alignments.test_alignments import SIX
 from tests.conftest import Server
-from tests.control.line import Line
-from tests.forms.test_forms import BORE
-from tests.kinematics.bench import axis
+from tests.geometry.alignment.test_alignments import SIX
+from tests.geometry.geometric_form.test_forms import BORE
+from tests.geometry.rotary_axes.bench import axis
+from tests.quality.control_charts.line import Line
 from tests.shop import Person, Shop
 
-SIZES = {"desk": (1280, 800), "large": (1920, 1080), "panel": (800, 1280)}
+SIZES = {"desk": (1280, 800), "large": (1920, 1080), "panel": (800, 1280), "phone": (390, 844)}
 
 # By the address of the route: how it is opened, as a function of the shop.
 PAGES = {
@@ -128,6 +128,8 @@ PAGES = {
     "/forms/{form}": ["/forms/{form}", "/forms/{form}?section=2"],
     "/forms/features/{machine}/{feature}": ["/forms/features/{machine}/bore-d56?kind=axis_straightness"],
     "/kinematics": ["/kinematics"],
+    "/kinematics/measuring-plan": ["/kinematics/measuring-plan"],
+    "/setup/jobs": ["/setup/jobs"],
     "/kinematics/new": [
         "/kinematics/new",
         "/kinematics/new?way=positions",
@@ -162,7 +164,7 @@ PAGES = {
     "/proof": ["/proof"],
 }
 SIGNED_OUT = {"/sign-in", "/invitation/{token}"}
-OPENED_ELSEWHERE = {"/import/{token}"}  # needs a file that was sent; tests/imports
+OPENED_ELSEWHERE = {"/import/{token}"}  # needs a file that was sent; tests/loop/importing
 PARTS = {"/plant-summary", "/alarms/count", "/corrections/count"}  # only ever fetched into a page
 
 
@@ -320,6 +322,7 @@ def test_every_page_opens_in_order(sized: Page, shop: Shop, admin: Person) -> No
         assert answer is not None
         assert answer.status == 200, address
         expect(sized.locator("main")).to_be_visible()
+        expect(sized.locator("h1")).to_have_count(1)
         for chart in sized.locator("plotly-chart").all():
             expect(chart.locator(".main-svg").first).to_be_attached()
         if too_wide(sized) > 0:

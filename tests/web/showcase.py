@@ -16,9 +16,10 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
 
-from app.characteristics import figures as charts
-from app.core.zones import Limits, classify
-from app.offsets.figures import OffsetChange, offset_figure
+from app.core.decision.limits import Limits, classify
+from app.loop.tools.figures import OffsetChange, offset_figure
+from app.views.characteristic import figures as charts
+from app.views.characteristic import glance
 from app.web.problem import problem_page
 from app.web.security import SecurityHeaders
 from app.web.templates import assets, environment, page
@@ -96,7 +97,7 @@ def thinned(blocks: int = 600, size: int = 4096, seed: int = 2) -> list[charts.B
 
 
 class Stage:
-    """What a test can change while the page is open."""
+    """Content that a test can change while the page is open."""
 
     def __init__(self) -> None:
         self.readings = 120
@@ -119,7 +120,7 @@ def showcase(stage: Stage | None = None) -> Starlette:
         template = environment().from_string(text)
         parts: dict[str, Any] = {
             "pictures": [
-                (zone, charts.band_picture(d, LIMITS, average=m))
+                (zone, glance.band_picture(d, LIMITS, average=m))
                 for zone, d, m in (
                     ("average", 0.0031, 0.0012),
                     ("oversize", 0.0112, 0.002),
@@ -128,8 +129,8 @@ def showcase(stage: Stage | None = None) -> Starlette:
                     ("zero", -0.0004, -0.0002),
                 )
             ],
-            "nothing": charts.band_picture(None, LIMITS),
-            "spark": charts.sparkline([p.deviation for p in points[:60]], LIMITS),
+            "nothing": glance.band_picture(None, LIMITS),
+            "spark": glance.sparkline([p.deviation for p in points[:60]], LIMITS),
             "now": datetime.now(UTC) - timedelta(seconds=42),
             "only_chart": request.url.path == "/chart",
         }
@@ -145,7 +146,7 @@ def showcase(stage: Stage | None = None) -> Starlette:
             "limits": LIMITS,
             "scale": query.get("scale", "zones"),
             "theme": theme_from(query.get("theme")),
-            "centre": 39.992,
+            "sizes": charts.SizeAxis(39.992),
             "width": int(query.get("width", 1240)),
         }
         if request.path_params["name"] == "zones":
@@ -158,10 +159,8 @@ def showcase(stage: Stage | None = None) -> Starlette:
             counts = charts.histogram_counts([p.deviation for p in points], LIMITS)
             made = charts.histogram_figure(counts, LIMITS, theme=common["theme"])
         elif request.path_params["name"] == "run":
-            run = [
-                charts.RunPoint(p.sequence, p.at, 39.992 + p.deviation, p.zone, p.excluded) for p in points[:90] if p.at
-            ]
-            made = charts.run_figure(run, LIMITS, target=39.992, theme=common["theme"])
+            run = [charts.RunPoint(p.sequence, p.at, p.deviation, p.zone, p.excluded) for p in points[:90] if p.at]
+            made = charts.run_figure(run, LIMITS, sizes=common["sizes"], theme=common["theme"])
         else:
             total, changes = 0.0, []
             for step in steps:

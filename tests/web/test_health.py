@@ -1,4 +1,4 @@
-"""What those who run the server ask it: is it alive, is it ready, what does it count."""
+"""Health, readiness and metrics of the server."""
 
 from typing import Any
 
@@ -49,6 +49,10 @@ def test_metrics_count_what_is_in_the_record(shop: Shop) -> None:
     shop.acknowledge(shop.alarms()[0]["id"], "keep_cutting")
     assert of("inband_active_alarms", kind="tool_worn") is None
     assert of("inband_corrections", status="pending") == 2
+
+
+def test_the_room_on_the_disk_is_told(server: Server) -> None:
+    assert metrics(server)["inband_disk_free_bytes", ()] > 0
 
 
 def test_the_process_is_measured(server: Server) -> None:

@@ -1,10 +1,12 @@
 import re
 from datetime import UTC, datetime, timedelta, timezone
+from zoneinfo import ZoneInfo
 
 import httpx
 import pytest
 
-from app.web import i18n, numbers
+from app.language import i18n, numbers
+from app.language.times import in_zone
 from app.web.assets import FOREVER, STATIC_DIR
 from app.web.templates import assets, environment
 from app.web.theme import PALETTES, date_axis
@@ -25,10 +27,19 @@ class TestNumbers:
     def test_limits_have_no_more_decimals_than_they_need(self) -> None:
         assert [numbers.um_limit(x).replace("\xa0", " ") for x in (0.0053, 0.3, 1.0)] == ["±5.3 µm", "±300 µm", "±1 mm"]
 
-    def test_moments_carry_what_the_browser_needs(self) -> None:
+    def test_moments_are_those_of_the_plant_and_carry_their_offset(self) -> None:
         moment = datetime(2026, 11, 21, 9, 15, 2, tzinfo=timezone(timedelta(hours=1)))
-        assert 'datetime="2026-11-21T08:15:02+00:00"' in numbers.when(moment)
-        assert "21 Nov 2026 08:15:02 UTC" in numbers.when(moment)
+        with in_zone(ZoneInfo("Asia/Kathmandu")):
+            assert numbers.when(moment) == (
+                '<time datetime="2026-11-21T14:00:02+05:45" title="Asia/Kathmandu, UTC+05:45">21 Nov 2026 14:00:02</time>'
+            )
+
+    def test_a_wall_clock_time_that_is_there_twice_has_its_offset(self) -> None:
+        with in_zone(ZoneInfo("Europe/Berlin")):
+            first = datetime(2026, 10, 25, 0, 30, tzinfo=UTC)
+            assert numbers.when(first, "minutes").striptags() == "25 Oct 2026 02:30 UTC+02:00"
+            assert numbers.when(first + timedelta(hours=1), "minutes").striptags() == "25 Oct 2026 02:30 UTC+01:00"
+            assert numbers.when(first + timedelta(hours=2), "minutes").striptags() == "25 Oct 2026 03:30"
 
     def test_ages_have_one_unit(self) -> None:
         now = datetime(2026, 11, 21, 9, 0, tzinfo=UTC)

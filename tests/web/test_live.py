@@ -14,8 +14,11 @@ import httpx
 import psycopg
 import pytest
 
+from app.access import actions as people
+from app.access.sign_in import sign_out
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
+from app.loop.machines import keys
 from app.web.live import HEARTBEAT, MOST_MISSED
 from tests.conftest import RunServer, Server
 from tests.shop import Shop
@@ -63,8 +66,18 @@ class Listener:
             if event.kind == kind or (kind is None and event.kind not in {"hello", "heartbeat"}):
                 return event
 
+    def ends(self, seconds: float = 10) -> bool:
+        """Tell if the server ends the stream; messages until then are skipped."""
+        deadline = time.monotonic() + seconds
+        try:
+            while self.queue.get(timeout=max(0.01, deadline - time.monotonic())) is not None:
+                pass
+        except Empty:
+            return False
+        return True
+
     def quiet(self, seconds: float = 0.5) -> bool:
-        """Whether nothing is told for so long."""
+        """Tell if no message comes for so long."""
         try:
             self.next(seconds=seconds)
         except Empty:
@@ -175,10 +188,9 @@ class TestResuming:
             assert listener.next("reading").data["sequence"] == 5
 
     def test_cut_off_within_a_transaction_it_is_told_whole_again(self, shop: Shop) -> None:
-        shop.read(0.0)
-        with listening(shop.admin, after=0) as listener:
-            while listener.next("reading").data.get("characteristic") != shop.characteristic:
-                pass
+        with listening(shop.admin) as listener:
+            shop.read(0.0)
+            assert listener.next("reading").id is not None
             shop.read(350.0)
             first = listener.next()
             assert first.id is None
@@ -235,6 +247,19 @@ class TestResuming:
         with listening(shop.admin, newest - 5) as listener:
             assert listener.next("reading").data["machine"] == "x"
 
+    @pytest.mark.parametrize("missed", [MOST_MISSED - 1, MOST_MISSED])
+    def test_as_much_as_is_told_is_told_one_by_one(self, shop: Shop, missed: int) -> None:
+        with psycopg.connect(shop.server.database.dsn, autocommit=True) as connection:
+            connection.execute("DELETE FROM event")
+            connection.execute(
+                "INSERT INTO event (changes) SELECT jsonb_build_array(jsonb_build_object("
+                "'kind', 'reading', 'machine', 'x', 'sequence', n)) FROM generate_series(0, %s) AS n",
+                [missed],
+            )
+            (first,) = connection.execute("SELECT min(id) FROM event").fetchone() or (0,)
+        with listening(shop.admin, first) as listener:
+            assert [listener.next("reading").data["sequence"] for _ in range(missed)] == list(range(1, missed + 1))
+
     def test_a_number_that_is_not_known_is_a_resync(self, shop: Shop) -> None:
         with listening(shop.admin, 10**15) as listener:
             assert listener.next().kind == "resync"
@@ -242,7 +267,7 @@ class TestResuming:
     @pytest.mark.parametrize("number", ["", "x", "-1", "9" * 40, "٣"])
     def test_a_number_that_is_none_begins_now(self, shop: Shop, number: str) -> None:
         headers = httpx.Headers([(b"Last-Event-ID", number.encode())])
-        time.sleep(0.4)
+        time.sleep(1.5)  # as in `listening`: what was done before may still be told to who comes now
         with shop.admin.stream("GET", "/api/v1/events", headers=headers) as response:
             assert response.status_code == 200
             listener = Listener(response)
@@ -310,7 +335,9 @@ def test_the_stream_goes_on_after_the_database_cut_the_listener_off(shop: Shop) 
         assert numbers == {1, 2, 3, 4}
 
 
-def test_no_stream_calls_itself_live_while_the_database_is_away(run_server: RunServer, tmp_path: Path) -> None:
+def test_no_stream_calls_itself_live_in_an_outage_which_the_log_tells_once(
+    run_server: RunServer, tmp_path: Path
+) -> None:
     postgres = EmbeddedServer(tmp_path / "inband", {"fsync": "off"})
     migrate.upgrade(postgres.start())
     try:
@@ -322,10 +349,14 @@ def test_no_stream_calls_itself_live_while_the_database_is_away(run_server: RunS
                 postgres.stop()
                 while listener.queue.get(timeout=5) is not None:
                     pass
+            time.sleep(2.5)  # so long that it is tried again and again
             postgres.start()
             with listening(shop.admin) as listener:
                 shop.read(6.0)
                 listener.next("reading")
+            log = server.stderr.read_text()
+            assert log.count("live events are interrupted") == 1
+            assert log.count("live events go on after an interruption of") == 1
     finally:
         postgres.stop()
 
@@ -339,3 +370,52 @@ def test_streams_end_when_the_server_ends(run_server: RunServer) -> None:
             assert time.monotonic() - begun < 10
             while listener.queue.get(timeout=5) is not None:
                 pass
+
+
+class TestTheRightToHear:
+    """It is taken away here, in another process than the server's: streams end within a second or two all the same."""
+
+    @pytest.fixture
+    def person(self, server: Server) -> tuple[int, httpx.Client]:
+        name = f"Listener {time.time_ns()}"
+        password = server.person(name, "engineer")
+        browser = server.client()
+        assert browser.post("/sign-in", data={"name": name, "password": password}).status_code == 303
+        number: int = browser.get("/api/v1/people/me").json()["id"]
+        return number, browser
+
+    @pytest.mark.parametrize("ended", ["disabled", "another role", "signed out", "password reset"])
+    def test_of_a_person(self, server: Server, person: tuple[int, httpx.Client], ended: str) -> None:
+        number, browser = person
+        with listening(browser) as listener:
+            with server.database.begin() as session:
+                match ended:
+                    case "disabled":
+                        people.disable_person(session, number, "tests")
+                    case "another role":
+                        people.change_role(session, number, "viewer", "tests")
+                    case "signed out":
+                        sign_out(session, browser.cookies["inband_session"], "tests")
+                    case "password reset":
+                        people.reset_password(session, number, "tests")
+            assert listener.ends()
+        again = browser.get("/api/v1/machines").status_code
+        assert again == (200 if ended == "another role" else 401)
+
+    @pytest.mark.parametrize("of_machine", [True, False])
+    def test_of_a_key(self, server: Server, shop: Shop, of_machine: bool) -> None:
+        with server.database.begin() as session:
+            key = (
+                people.add_key(session, name="listener", actor="tests", machine=shop.machine)
+                if of_machine
+                else people.add_key(session, name="listener", actor="tests", role="viewer")
+            )
+        with listening(server.client(key.secret)) as listener, listening(shop.admin) as other:
+            with server.database.begin() as session:
+                if of_machine:
+                    keys.revoke_machine_key(session, shop.machine, key.id, "tests")
+                else:
+                    people.revoke_key(session, key.id, "tests")
+            assert listener.ends()
+            shop.read(1.0)
+            assert other.next().kind == "reading", "who may still hear goes on"

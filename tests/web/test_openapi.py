@@ -14,10 +14,10 @@ from fastapi.routing import APIRoute, iter_route_contexts
 from playwright.sync_api import Page, expect
 from pydantic import TypeAdapter
 
+from app.loop.readings.answers import ReadingAnswer
+from app.loop.readings.api import BatchCounts
+from app.loop.readings.schemas import ReadingIn
 from app.main import create_app
-from app.readings.answers import ReadingAnswer
-from app.readings.api import BatchCounts
-from app.readings.schemas import ReadingIn
 from app.settings import Settings
 from app.web.api_docs import _kind, curl, prose
 from app.web.openapi import operations, resolve
@@ -30,8 +30,9 @@ ROLES = ("viewer", "operator", "engineer", "admin")
 @pytest.fixture(scope="module")
 def app() -> FastAPI:
     door: Any = create_app(Settings(database_url="postgresql://nobody@localhost/none"))
-    inner: FastAPI = door.app.app
-    return inner
+    while not isinstance(door, FastAPI):
+        door = door.app
+    return door
 
 
 @pytest.fixture(scope="module")
@@ -219,18 +220,131 @@ def send(client: httpx.Client, method: str, path: str, operation: Json, number: 
             path = path.replace(f"{{{parameter['name']}}}", str(example))
         elif parameter.get("required"):
             query[parameter["name"]] = example
-    body = {}
-    if "requestBody" in operation:
-        kind, media = media_of(operation["requestBody"])[0]
-        body = {"content": json.dumps(without_time(media["example"])).encode(), "headers": {"Content-Type": kind}}
+    body = body_of(operation)
     if operation["operationId"] == "events":
         with client.stream(method, path) as answer:
             return answer
-    return client.request(method, path, params=query, **body)  # type: ignore[arg-type]
+    return client.request(method, path, params=query, **body)
+
+
+def is_number(made: Json, parameter: Json) -> bool:
+    schema = resolve(made, parameter["schema"])
+    return "integer" in {schema.get("type"), *(each.get("type") for each in schema.get("anyOf", []))}
+
+
+def strange_value(made: Json, parameter: Json) -> Any:
+    """Something of the right kind that nothing here is called: a number, a key, or the first of the words."""
+    if is_number(made, parameter):
+        return 999_999
+    schema = resolve(made, parameter["schema"])
+    for each in [schema, *schema.get("anyOf", [])]:
+        one = resolve(made, each)
+        if "enum" in one:
+            return one["enum"][0]
+        if one.get("type") == "boolean":
+            return "true"
+        if one.get("format") == "date-time":
+            return "2026-11-21T08:15:02Z"
+    return "nope"
+
+
+def body_of(operation: Json) -> Json:
+    if "requestBody" not in operation:
+        return {}
+    kind, media = media_of(operation["requestBody"])[0]
+    return {"content": json.dumps(without_time(media["example"])).encode(), "headers": {"Content-Type": kind}}
 
 
 # What these ask for, the twenty readings of this server do not carry: a good request, and a refusal in words.
 OF_MANY_READINGS = ("/baselines", "/baselines/preview", "/gauge-studies/from-readings")
+
+
+# What a page's form does, by the operations of the API that do the same; None: there is none, or it is for everybody.
+FORMS: dict[str, tuple[str, ...] | None] = {
+    "/account/password": None,
+    "/alarms/{number}/acknowledge": ("acknowledge_alarm",),
+    "/alignments/new": ("align",),
+    "/alignments/pallets/new": ("compose_pallet",),
+    "/alignments/{number}/acknowledge": ("acknowledge_alignment",),
+    "/alignments/{number}/recompute": ("recompute_alignment",),
+    "/calibration/{machine}/{memory}/{location}": ("calibrate_gauge", "calibrate_ring", "add_pair", "plan_calibration"),
+    "/calibration/{machine}/{memory}/{location}/{what}/{number}": (
+        "accept_calibration",
+        "accept_suggestion",
+        "exclude_pair",
+    ),
+    "/characteristics/{characteristic}/control/baselines/{version}/{what}": (
+        "put_baseline_in_force",
+        "retire_baseline",
+    ),
+    "/characteristics/{characteristic}/control/freeze": ("freeze_baseline",),
+    "/characteristics/{characteristic}/readings/{sequence}/by-hand": ("add_hand_measurement",),
+    "/characteristics/{characteristic}/readings/{sequence}/exclude": ("exclude_reading",),
+    "/characteristics/{characteristic}/rules": ("put_rules",),
+    "/characteristics/{characteristic}/what-if": ("propose_change",),
+    "/corrections/{machine}/tools/{tool}": ("approve_corrections",),
+    "/forms/new": ("measure_form",),
+    "/forms/{form}/recompute": ("recompute_form",),
+    "/gauges/new": ("add_gauge_study", "take_gauge_study"),
+    "/gauges/{number}/correct": ("correct_gauge_study",),
+    "/import": None,
+    "/import/{token}": None,
+    "/invitation/{token}": None,
+    "/kinematics/machines/{machine}": ("plan_kinematics",),
+    "/kinematics/machines/{machine}/backups/{version}": ("restore_kinematics",),
+    "/kinematics/new": ("take_kinematics_run",),
+    "/kinematics/runs/{run}/recompute": ("recompute_kinematics_run",),
+    "/kinematics/runs/{run}/{what}": ("confirm_kinematics_run", "enter_kinematics_run", "undo_kinematics_run"),
+    "/machines/{machine}/averages/{location}/edit": ("set_empirical_value",),
+    "/machines/{machine}/corrections/program": ("mark_fetched", "confirm_corrections"),
+    "/machines/{machine}/corrections/{number}": ("approve_correction", "release_correction", "reject_correction"),
+    "/machines/{machine}/tools/{number}": ("describe",),
+    "/machines/{machine}/tools/{number}/{what}": ("edit_tool", "change_tool", "switch_tool"),
+    "/proposals/{number}": ("approve_proposal", "reject_proposal", "withdraw_proposal"),
+    "/reports": ("ask_for_reports",),
+    "/reports/{number}/cancel": ("cancel_reports",),
+    "/reports/{number}/throw-away": ("throw_reports_away",),
+    "/setup/characteristics/new": ("add_characteristic",),
+    "/setup/characteristics/{characteristic}": ("change_characteristic",),
+    "/setup/machines/new": ("add_machine",),
+    "/setup/machines/{machine}": ("change_machine",),
+    "/setup/machines/{machine}/keys": ("make_machine_key",),
+    "/setup/machines/{machine}/keys/{key}/revoke": ("revoke_machine_key",),
+    "/setup/people/invitations": ("invite_person",),
+    "/setup/people/invitations/{token_hash}/withdraw": ("invite_person",),
+    "/setup/people/keys": ("make_key",),
+    "/setup/people/keys/{key}/revoke": ("revoke_key",),
+    "/setup/people/{person}/password": ("change_person",),
+    "/setup/people/{person}/{what}": ("change_person",),
+    "/setup/programs": ("read_program",),
+    "/sign-in": None,
+    "/sign-out": None,
+    "/signals/{number}": ("comment_signal",),
+    "/work-zeros/fixtures/{machine}/{fixture}": ("watch_fixture",),
+    "/work-zeros/new": ("find_work_zero",),
+    "/work-zeros/{number}/acknowledge": ("acknowledge_work_zero",),
+    "/work-zeros/{number}/recompute": ("recompute_work_zero",),
+}
+
+
+def test_a_page_asks_for_the_role_that_the_api_asks_for(app: FastAPI, made: Json) -> None:
+    """A form that does one of several things asks for the least of their roles, and its action for more where it must."""
+    roles = {operation["operationId"]: operation.get("x-role") for _m, _p, operation in operations(made)}
+    differing = {}
+    for context in iter_route_contexts(app.routes):
+        route = context.original_route
+        if not isinstance(route, APIRoute) or route.path.startswith("/api") or (route.methods or set()) <= {"GET"}:
+            continue
+        same = FORMS[route.path]
+        if same is None:
+            continue
+        calls = [dependency.call for dependency in route.dependant.dependencies]
+        names = [getattr(call, "__name__", "") for call in calls]
+        asked = {name.removeprefix("require_") for name in names if name.startswith("require_")}
+        wanted = min((roles[name] for name in same), key=ROLES.index)
+        if asked != {wanted}:
+            differing[route.path] = (asked, wanted)
+    assert differing == {}
 
 
 class TestAgainstTheServer:
@@ -272,6 +386,45 @@ class TestAgainstTheServer:
             else:
                 assert answer.status_code == 401, path
                 assert answer.headers["content-type"] == "application/problem+json"
+
+    def test_every_status_that_is_answered_is_described(self, shop: Json, made: Json) -> None:
+        """With names and numbers that nobody has: in the path, and in each query parameter alone."""
+        admin, undescribed = shop["clients"]["admin"], set()
+        for method, path, operation in operations(made):
+            if operation["operationId"] == "events":
+                continue
+            parameters = operation.get("parameters", [])
+            strange = {each["name"]: strange_value(made, each) for each in parameters}
+            known = {each["name"]: each.get("example", 1) for each in parameters if each["in"] == "path"}
+            wanted = {each["name"]: each.get("example", 1) for each in parameters if each.get("required")}
+            queries = [{}, *({each["name"]: strange[each["name"]]} for each in parameters if each["in"] == "query")]
+            attempts = [({name: strange[name] for name in known}, {})] + [(known, query) for query in queries]
+            for in_path, query in attempts:
+                asked = {name: value for name, value in wanted.items() if name not in known} | query
+                answer = admin.request(method, path.format(**in_path), params=asked, **body_of(operation))
+                if str(answer.status_code) not in operation["responses"]:
+                    undescribed.add(f"{method} {path} {query}: {answer.status_code}")
+        assert sorted(undescribed) == []
+
+    def test_numbers_beyond_what_is_stored_are_named(self, shop: Json, made: Json) -> None:
+        admin, wrong = shop["clients"]["admin"], []
+        for method, path, operation in operations(made):
+            if method != "get" or operation["operationId"] == "events":
+                continue
+            parameters = operation.get("parameters", [])
+            known = {each["name"]: each.get("example", 1) for each in parameters if each["in"] == "path"}
+            wanted = {each["name"]: each.get("example", 1) for each in parameters if each.get("required")}
+            for name in [each["name"] for each in parameters if is_number(made, each)]:
+                for value in (-1, 2**31, 2**63 - 1, 2**63, 10**30):
+                    given = known | wanted | {name: value}
+                    query = {each: given[each] for each in given if each not in known}
+                    answer = admin.get(path.format(**given), params=query)
+                    named = (
+                        [error["field"] for error in answer.json()["errors"]] if answer.status_code == 422 else [name]
+                    )
+                    if answer.status_code not in {200, 404, 422} or named != [name]:
+                        wrong.append(f"{path} {name}={value}: {answer.status_code} {named}")
+        assert wrong == []
 
     def test_the_document_needs_no_key(self, server: Server, made: Json) -> None:
         answer = server.client().get("/api/v1/openapi.json")

@@ -131,6 +131,13 @@ class TestAddresses:
         assert "PUT" in refused(answer, 405)["detail"]
         assert set(answer.headers["allow"].split(", ")) >= {"GET", "PATCH"}
 
+    def test_a_word_is_not_taken_for_the_number_of_a_neighbour(self, shop: Shop) -> None:
+        """`PATCH /people/{person}` is another address than `/people/me`."""
+        for method in ("PATCH", "DELETE"):
+            answer = shop.admin.request(method, "/api/v1/people/me", json={"role": "viewer"})
+            refused(answer, 405)
+            assert answer.headers["allow"] == "GET"
+
     def test_people_get_a_page(self, shop: Shop) -> None:
         answer = shop.server.client().get("/nothing-here")
         assert answer.status_code == 404
@@ -183,7 +190,10 @@ def raising() -> FastAPI:
     def fail(request: Request, kind: str) -> None:
         raise ERRORS[kind.rpartition("/")[2]][0]
 
-    add_problem_handlers(app)
+    async def nobody(_request: Request) -> None:
+        pass
+
+    add_problem_handlers(app, nobody)
     app.add_middleware(BodyLimit)
     return app
 
@@ -202,14 +212,31 @@ def get(app: FastAPI, path: str) -> httpx.Response:
 def test_every_error_becomes_an_answer(raising: FastAPI, kind: str, caplog: pytest.LogCaptureFixture) -> None:
     status = ERRORS[kind][1]
     answer = get(raising, f"/api/{kind}")
-    problem = refused(answer, status)
+    refused(answer, status)
     assert "secret" not in answer.text
     assert "10.1.2.3" not in answer.text
     if status in {429, 503}:
         assert int(answer.headers["retry-after"]) > 0
     if status == 500:
-        assert f"incident {problem['incident']}" in caplog.text
+        assert "unhandled error in GET" in caplog.text
     page = get(raising, f"/{kind}")
     assert page.status_code == status
     assert page.headers["content-type"].startswith("text/html")
     assert "secret" not in page.text
+
+
+def test_the_largest_length_is_refused_with_its_unit(shop: Shop) -> None:
+    far = {"nominal": [0, 0, 200_000.0], "normal": "+Z", "deviation": 0}
+    told = shop.call("POST", "/alignments", 422, machine=shop.machine, touches=[far])
+    assert told["errors"][0]["message"] == "must be at most 100000 mm"
+    told = shop.call("PATCH", f"/machines/{shop.machine}", 422, probing_feed=200_000.0)
+    assert told["errors"][0]["message"] == "must be at most 100000 mm/min"
+    zero: dict[str, Any] = {"kind": "corner", "work_offset": "G54", "touches": [{"x": 0, "approach": "-X"}] * 2}
+    told = shop.call("POST", "/work-zeros", 422, machine=shop.machine, **zero, tip=2000.0, feeler=200.0)
+    assert {"field": "tip", "message": "must be at most 1000 mm"} in told["errors"]
+    assert {"field": "feeler", "message": "must be at most 100 mm"} in told["errors"]
+
+
+def test_a_field_of_two_kinds_is_refused_once_by_its_own_name(shop: Shop) -> None:
+    told = shop.call("POST", "/kinematics/measuring-plans", 422, cycle=451, ball_radius=12.5, feed="FAST", axes=[])
+    assert told["errors"] == [{"field": "feed", "message": "must be a number, or must be one of FMAX, FAUTO or PREDEF"}]

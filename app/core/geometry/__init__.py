@@ -5,11 +5,11 @@ points          what is asked of points before anything is fitted through them, 
 circle          the circle, in its plane and in space
 line            the line, in a plane and in space
 plane           the plane
-zones           minimum zones (Chebyshev) of all three, and of an axis
+minimum_zones   minimum zones (Chebyshev) of all three, and of an axis
 discs           largest inscribed, smallest circumscribed circle
-elements        axes and planes as they are touched, with how certain they are
+elements        axes and planes as they are touched, with their cofactors
 form, relations form and position, verdicts
-doubt, suspicion  touches that do not belong
+outliers, suspect_points  points that do not belong to the element
 ==============  ==================================================================================
 
 Every fit is geometric: what is minimised are the orthogonal distances, not the residuals of an equation. Points are

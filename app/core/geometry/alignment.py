@@ -25,6 +25,7 @@ from scipy.special import ndtri, stdtrit
 from app.core.geometry.frames import angles_of, frame, turned, vector_of
 from app.core.geometry.layout import MOTIONS, Layout, Loose, NotLaidOut, layout_of, refuse_loose
 from app.core.geometry.points import FARTHEST, Degenerate, Floats, Reason
+from app.core.spc.variation import varies
 
 COVERAGE = 2.0
 STEPS = 60
@@ -33,7 +34,7 @@ Vector = tuple[float, float, float]
 
 
 class Method(StrEnum):
-    """How the unknowns are found."""
+    """Solution by small angles or by an exact rotation."""
 
     EXACT = "exact"  # finite rotation, iterated
     SMALL = "small"  # rows [n, r x n], small angles
@@ -41,7 +42,7 @@ class Method(StrEnum):
 
 
 class Touch(NamedTuple):
-    """Where a face was to be, which way it faces, and where the probe found it, mm."""
+    """Nominal place and normal of a face, and the point that was probed on it, mm."""
 
     nominal: Vector
     normal: Vector
@@ -76,7 +77,7 @@ class Advice(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Where the part lies.
+    """Position and rotation of a part, and their quality.
 
     motion: 4 x 4. shift: a, b, c, mm. angles: about X, Y, Z as a frame takes them (Z, Y', X''); turns: lambda, beta, gamma,
     the one turn about an axis in space, which for small angles is the same. residuals, leverage: per touch; a leverage
@@ -102,7 +103,7 @@ class Alignment:
     @property
     def shift(self) -> Vector:
         """a, b, c, mm."""
-        a, b, c = (float(each) for each in self.motion[:3, 3])
+        a, b, c = (float(value) for value in self.motion[:3, 3])
         return a, b, c
 
     @property
@@ -113,7 +114,7 @@ class Alignment:
     @property
     def turns(self) -> Vector:
         """lambda, beta, gamma, degrees."""
-        x, y, z = (float(each) for each in np.degrees(vector_of(self.motion[:3, :3])))
+        x, y, z = (float(value) for value in np.degrees(vector_of(self.motion[:3, :3])))
         return x, y, z
 
     @property
@@ -130,7 +131,7 @@ def align(
     solve_for: Sequence[str] = MOTIONS,
     repeatability: float | None = None,
 ) -> Alignment:
-    """Where the part lies, by all touches together.
+    """Fit position and rotation of a part to all its probed points.
 
     solve_for: the motions that are unknown; the others are taken for none. repeatability: standard deviation of one
     touch, mm. Raises `NotLaidOut` where the touches leave the part free to move, and `Degenerate` for what is no touch.
@@ -138,7 +139,7 @@ def align(
     >>> faces = [((0, 0, 0), (0, 0, 1)), ((100, 0, 0), (0, 0, 1)), ((0, 80, 0), (0, 0, 1))]
     >>> faces += [((10, 0, 0), (0, 1, 0)), ((90, 0, 0), (0, 1, 0)), ((0, 40, 0), (1, 0, 0))]
     >>> lifted = [Touch.off_by(place, normal, 0.1 if normal[2] else 0.0) for place, normal in faces]
-    >>> [round(each, 9) + 0.0 for each in align(lifted).shift]
+    >>> [round(value, 9) + 0.0 for value in align(lifted).shift]
     [0.0, 0.0, 0.1]
     """
     places, normals, measured = _rows(touches)
@@ -188,8 +189,8 @@ def _rows(touches: Sequence[Touch]) -> tuple[Floats, Floats, Floats]:
 
 def _small(layout: Layout, deviations: Floats) -> Floats:
     """One step of least squares; the shift as it is at the origin: ``t = s - w x g`` for s at the middle g."""
-    found = layout.spread(np.asarray(np.linalg.lstsq(layout.scaled, deviations, rcond=None)[0], dtype=np.float64))
-    shift, turns = found[:3], found[3:]
+    solution = layout.spread(np.asarray(np.linalg.lstsq(layout.scaled, deviations, rcond=None)[0], dtype=np.float64))
+    shift, turns = solution[:3], solution[3:]
     return frame(turned(turns), shift - np.cross(turns, layout.middle))
 
 
@@ -198,21 +199,21 @@ def _exact(layout: Layout, places: Floats, normals: Floats, measured: Floats, st
     middle = layout.middle
     shift = start[:3, 3] + rotation @ middle - middle
     along = (normals * (places - middle)).sum(axis=1)
-    best, kept = np.inf, (rotation, shift)
+    best, best_motion = np.inf, (rotation, shift)
     for _ in range(STEPS):
         facing = normals @ rotation.T
         away = measured - middle - shift
         left = (facing * away).sum(axis=1) - along
         square = float(left @ left)
         if square < best:
-            best, kept = square, (rotation, shift)
+            best, best_motion = square, (rotation, shift)
         rows = layout.scale(facing, np.cross(away, facing))
         step = layout.spread(np.asarray(np.linalg.lstsq(rows, left, rcond=None)[0], dtype=np.float64))
         shift = shift + step[:3]
         rotation = turned(step[3:]) @ rotation
         if np.abs(step[:3]).max() < 1e-13 * max(1.0, layout.reach) and np.abs(step[3:]).max() < 1e-15:
             break
-    rotation, shift = kept
+    rotation, shift = best_motion
     return frame(rotation, middle + shift - rotation @ middle)
 
 
@@ -254,8 +255,8 @@ def _uncertainty(layout: Layout, repeatability: float | None) -> dict[str, float
     lever = np.eye(6)
     lever[:3, 3:] = [[0, -z, y], [z, 0, -x], [-y, x, 0]]  # -w x g
     deviations = COVERAGE * np.sqrt(np.diag(lever @ covariance @ lever.T))
-    stated = [*deviations[:3], *np.degrees(deviations[3:])]
-    return {name: float(each) for name, each in zip(MOTIONS, stated, strict=True) if name in layout.solved_for}
+    uncertainties = [*deviations[:3], *np.degrees(deviations[3:])]
+    return {name: float(value) for name, value in zip(MOTIONS, uncertainties, strict=True) if name in layout.solved_for}
 
 
 def _misfits(layout: Layout, residuals: Floats, repeatability: float | None) -> tuple[tuple[int, ...], ...]:
@@ -264,8 +265,8 @@ def _misfits(layout: Layout, residuals: Floats, repeatability: float | None) -> 
     Four touches on a face check each other once: that one of them is off shows, but not which.
     """
     inside = list(range(len(residuals)))
-    rows, told = layout.scaled, residuals
-    found: list[tuple[int, ...]] = []
+    rows, left_over = layout.scaled, residuals
+    misfits: list[tuple[int, ...]] = []
     unknown = len(layout.solved_for)
     while (spare := len(inside) - unknown) >= (1 if repeatability else 2):
         mine = rows[inside]
@@ -273,11 +274,13 @@ def _misfits(layout: Layout, residuals: Floats, repeatability: float | None) -> 
             break
         q = np.linalg.qr(mine)[0]
         free = 1 - (q**2).sum(axis=1)
-        left = told[inside] - q @ (q.T @ told[inside])
+        left = left_over[inside] - q @ (q.T @ left_over[inside])
         checked = free > 1e-9
         if not checked.any():
             break
         square = float(left @ left)
+        if not repeatability and not varies(sqrt(square / spare), layout.reach):
+            break
         ratio = np.zeros(len(inside))
         if repeatability:
             ratio[checked] = np.abs(left[checked]) / (repeatability * np.sqrt(free[checked]))
@@ -291,6 +294,6 @@ def _misfits(layout: Layout, residuals: Floats, repeatability: float | None) -> 
         worst = int(ratio.argmax())
         if ratio[worst] <= limit:
             break
-        found.append(tuple(inside[i] + 1 for i in np.flatnonzero(ratio > (1 - 1e-6) * ratio[worst])))
+        misfits.append(tuple(inside[i] + 1 for i in np.flatnonzero(ratio > (1 - 1e-6) * ratio[worst])))
         del inside[worst]
-    return tuple(found)
+    return tuple(misfits)

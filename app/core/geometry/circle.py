@@ -91,7 +91,7 @@ def fit_circle(points: ArrayLike, least_arc: float = LEAST_ARC) -> Circle:
 
 
 def covered(away: Floats) -> float:
-    """How much of a circle points cover as seen from its centre: 360° less the greatest gap, degrees.
+    """Angle that points cover as seen from the centre: 360° less the greatest gap, degrees.
 
     >>> round(covered(np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])), 9)
     180.0
@@ -126,9 +126,9 @@ def fit_circle_in_space(points: ArrayLike, least_arc: float = LEAST_ARC) -> Circ
         square = float(residuals @ residuals)
         if square >= best * (1 - 1e-15):
             break
-        best, kept = square, (centre, axes, radius)
-        centre, axes, radius = _stepped(local, distances, residuals, kept)
-    centre, axes, radius = kept
+        best, best_circle = square, (centre, axes, radius)
+        centre, axes, radius = _stepped(local, distances, residuals, best_circle)
+    centre, axes, radius = best_circle
     local = (scaled - centre) @ axes.T
     radial = np.hypot(local[:, 0], local[:, 1]) - radius
     normal = unit(axes[2])

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from app.core.geometry.circle import fit_circle
+from app.core.geometry.minimum_zones import ENOUGH, NOTHING, ROUNDS, bearing, solved
 from app.core.geometry.points import Degenerate, Floats, Reason, points_of
-from app.core.geometry.zones import ENOUGH, NOTHING, ROUNDS, bearing, solved
 
 SURROUNDED = 180.0  # degrees: inside a shorter arc no circle is the largest
 INSIDE = 1e-12  # of the radius: rounding, not a point outside
@@ -52,13 +52,13 @@ def circumscribed(points: ArrayLike) -> Disc:
 def _smallest(points: Floats, among: tuple[int, ...]) -> tuple[Floats, float, tuple[int, ...]]:
     """The smallest circle about a few points, and on which two or three of them it rests."""
     chosen = points[list(among)]
-    found = []
+    discs = []
     for count in (2, 3):
         for rests in combinations(range(len(among)), count):
             centre, radius = _through(chosen[list(rests)])
             if np.linalg.norm(chosen - centre, axis=1).max() <= radius * (1 + INSIDE):
-                found.append((radius, count, centre, tuple(among[at] for at in rests)))
-    radius, _count, centre, rests = min(found, key=lambda each: each[:2])
+                discs.append((radius, count, centre, tuple(among[at] for at in rests)))
+    radius, _count, centre, rests = min(discs, key=lambda disc: disc[:2])
     return centre, radius, rests
 
 
@@ -95,8 +95,8 @@ def inscribed(points: ArrayLike) -> Disc:
         scale = max(circle.range, NOTHING)
         slopes = (centre - about) / distances[:, None]
         rows = np.column_stack([-slopes, np.ones(len(array))])
-        found = solved(np.array([0.0, 0.0, -1.0]), rows, (distances - distances.min()) / scale, reach / scale, 2)
-        step = found[:2] * scale
+        solution = solved(np.array([0.0, 0.0, -1.0]), rows, (distances - distances.min()) / scale, reach / scale, 2)
+        step = solution[:2] * scale
         tried = np.linalg.norm(about - centre - step, axis=1)
         gained = float(tried.min() - distances.min())
         if gained > 0:

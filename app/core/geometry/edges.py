@@ -18,7 +18,7 @@ Values = dict[str, float]
 
 
 class Kind(StrEnum):
-    """What is touched."""
+    """Shape that is measured to set a work zero."""
 
     BORE = "bore"
     BOSS = "boss"
@@ -28,12 +28,12 @@ class Kind(StrEnum):
 
     @property
     def inside(self) -> bool:
-        """Whether the tip touches from within, so that the size is larger than what it travels."""
+        """True if the tip touches from within, so that the size is larger than the travel of the tip."""
         return self in {Kind.BORE, Kind.POCKET}
 
     @property
     def is_round(self) -> bool:
-        """Whether it is a circle."""
+        """True if the shape is a circle."""
         return self in {Kind.BORE, Kind.BOSS}
 
 
@@ -57,7 +57,7 @@ class Approach(StrEnum):
 
 
 class Touch(NamedTuple):
-    """Where the tip's centre stood, mm. The coordinate across the approach may be missing where nothing is turned."""
+    """Position of the tip's centre, mm. The coordinate across the approach may be missing where nothing is turned."""
 
     x: float | None
     y: float | None
@@ -65,7 +65,7 @@ class Touch(NamedTuple):
 
 
 class Problem(StrEnum):
-    """Why there is no zero, beside the reasons for which no circle can be fitted. Worded at the edge."""
+    """Reasons for no zero, beside those for which no circle can be fitted. Worded at the edge."""
 
     TOO_FEW = "too_few"
     NO_APPROACH = "no_approach"
@@ -131,7 +131,7 @@ def _mean(touches: Sequence[Touch], which: Sequence[int], axis: int) -> float:
 
 
 def _sharing(touches: Sequence[Touch]) -> bool:
-    """Whether two touches share a side, so that the part may be turned; they must lie apart along it."""
+    """Tell if two points share a side, so that the part may be turned; they must lie apart along it."""
     shared = False
     for at, touch in enumerate(touches):
         for before in range(at):
@@ -221,7 +221,7 @@ def across(kind: Kind) -> Solver:
 
 
 def is_paired(touches: Sequence[Touch]) -> bool:
-    """Whether a round part was touched in pairs across it: every touch from a side of its own, with fewer than a circle takes."""
+    """Tell if a round part was probed in pairs across it: each point from another side, with too few for a circle."""
     approaches = [touch.approach for touch in touches]
     if None in approaches or len(set(approaches)) < len(approaches):
         return False
@@ -229,7 +229,7 @@ def is_paired(touches: Sequence[Touch]) -> bool:
 
 
 def corner(touches: Sequence[Touch], tip: float) -> tuple[Values, Floats]:
-    """Where the two sides of a corner meet. Each side with two touches has its own direction."""
+    """Intersection of the two sides of a corner. Each side with two points has its own direction."""
     places = places_of(touches, range(len(touches)), needed=_sharing(touches))
     axes = np.array([touch.approach.axis for touch in touches if touch.approach is not None])
     straight = _directions(touches)

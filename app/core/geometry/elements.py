@@ -36,7 +36,7 @@ class Centre:
 
     @property
     def radius(self) -> float | None:
-        """Of the tip's centre, mm: not yet compensated."""
+        """Radius of the path of the tip's centre, mm: not yet compensated."""
         return None if self.circle is None else self.circle.radius
 
 
@@ -57,7 +57,7 @@ class Element:
 
     @property
     def length(self) -> float:
-        """How far an axis reaches along itself, a plane across its widest, mm."""
+        """Length of an axis along itself, or of a plane across its widest, mm."""
         about = self.points - self.point
         if self.lengthwise:
             return float(np.ptp(about @ self.direction))
@@ -83,13 +83,13 @@ def centre_of(section: Section) -> Centre:
 
 def centres_of(sections: Sequence[Section]) -> list[Centre]:
     """The centres of sections. Raises `WrongSection`."""
-    found = []
+    centres = []
     for number, section in enumerate(sections, start=1):
         try:
-            found.append(centre_of(section))
+            centres.append(centre_of(section))
         except Degenerate as reason:
             raise WrongSection(number, reason) from None
-    return found
+    return centres
 
 
 def heights_of(sections: Sequence[Section]) -> Floats | None:

@@ -27,20 +27,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from app.core.geometry.certainty import COVERAGE, range_cofactor, zone_multipliers
+from app.core.decision.limits import nanometres
 from app.core.geometry.circle import Circle, fit_circle
 from app.core.geometry.discs import circumscribed, inscribed
 from app.core.geometry.elements import Point, Section, WrongSection, axis_through, centres_of, heights_of
+from app.core.geometry.form_uncertainty import COVERAGE, range_cofactor, zone_multipliers
 from app.core.geometry.line import fit_line
+from app.core.geometry.minimum_zones import (
+    minimum_zone_axis,
+    minimum_zone_circle,
+    minimum_zone_line,
+    minimum_zone_plane,
+)
 from app.core.geometry.plane import fit_plane
 from app.core.geometry.points import Degenerate, Floats, Reason, frame, points_of, surface_of
-from app.core.geometry.suspicion import Suspect, Suspicion, in_bore, in_line, in_plane, in_section
-from app.core.geometry.zones import minimum_zone_axis, minimum_zone_circle, minimum_zone_line, minimum_zone_plane
-from app.core.zones import nanometres
+from app.core.geometry.suspect_points import SuspectPoint, SuspectPoints, in_bore, in_line, in_plane, in_section
 
 
 class Kind(StrEnum):
-    """What is looked at."""
+    """Characteristic of form or position."""
 
     ROUNDNESS = "roundness"
     STRAIGHTNESS = "straightness"
@@ -53,7 +58,7 @@ class Kind(StrEnum):
 
 
 class Method(StrEnum):
-    """By which rule a deviation is told."""
+    """Rule by which a deviation is computed."""
 
     MINIMUM_ZONE = "minimum_zone"
     LEAST_SQUARES = "least_squares"
@@ -63,7 +68,7 @@ class Method(StrEnum):
 
 
 class Verdict(StrEnum):
-    """Within the tolerance or not, and whether the uncertainty leaves it at that."""
+    """Within the tolerance or not, and certain or not by the uncertainty."""
 
     GOOD = "good"
     GOOD_UNSURE = "good_unsure"
@@ -72,17 +77,17 @@ class Verdict(StrEnum):
 
     @property
     def good(self) -> bool:
-        """Whether the deviation as found is within the tolerance."""
+        """True if the measured deviation is within the tolerance."""
         return self in {Verdict.GOOD, Verdict.GOOD_UNSURE}
 
     @property
     def sure(self) -> bool:
-        """Whether the limit lies outside the uncertainty."""
+        """True if the limit lies outside the uncertainty."""
         return self in {Verdict.GOOD, Verdict.BAD}
 
 
 @dataclass(frozen=True, slots=True)
-class Touched:
+class ProbedFeature:
     """A feature: a bore or shaft in sections, or a surface or profile in points."""
 
     sections: tuple[Section, ...] = ()
@@ -105,11 +110,11 @@ class Value(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """What was found. details: centres, axes, residuals, as plain lists, for tables and pictures."""
+    """Deviations with suspect points. details: centres, axes, residuals, as plain lists, for tables and pictures."""
 
     values: tuple[Value, ...]
-    suspicion: Suspicion = field(default_factory=Suspicion)  # touches of the feature that do not belong
-    datum: Suspicion = field(default_factory=Suspicion)  # touches of the datum that do not
+    suspicion: SuspectPoints = field(default_factory=SuspectPoints)  # touches of the feature that do not belong
+    datum: SuspectPoints = field(default_factory=SuspectPoints)  # touches of the datum that do not
     details: dict[str, Any] = field(default_factory=dict)
 
     def by(self, method: Method | None) -> Value:
@@ -118,7 +123,7 @@ class Form:
 
 
 def verdict(value: float, tolerance: float, uncertainty: float | None) -> Verdict:
-    """Whether a deviation keeps its tolerance, to the nanometre; on the limit is good. mm.
+    """Compare a deviation with its tolerance, mm, to the nanometre; on the limit is good.
 
     >>> verdict(0.005, 0.005, None).value, verdict(0.0045, 0.005, 0.001).value, verdict(0.0082, 0.005, 0.001).value
     ('good', 'good_unsure', 'bad')
@@ -145,33 +150,38 @@ def printed_straightness(centres: Sequence[Point]) -> float:
     return 2 * float(np.abs(slope * about - (y - y.mean())).max()) / hypot(slope, 1)
 
 
-def roundness(feature: Touched) -> Form:
-    """Of one section or more; the worst one counts. Raises `Degenerate` and `WrongSection`.
+def roundness(feature: ProbedFeature) -> Form:
+    """Evaluate the roundness of one section or more; the worst one counts. Raises `Degenerate` and `WrongSection`.
 
     >>> lobed = ((10.01, 0.0), (0.0, 9.99), (-10.01, 0.0), (0.0, -9.99))
-    >>> [(value.method.value, round(value.value, 6)) for value in roundness(Touched((Section(lobed),))).values[:2]]
+    >>> [(value.method.value, round(value.value, 6)) for value in roundness(ProbedFeature((Section(lobed),))).values[:2]]
     [('minimum_zone', 0.02), ('least_squares', 0.02)]
     """
     if not feature.sections:
         raise Degenerate(Reason.TOO_FEW, have=0, needed=1)
-    found, told, tested = [], [], True
-    suspects: list[Suspect] = []
+    values_of_sections, details, tested = [], [], True
+    suspects: list[SuspectPoint] = []
     for number, section in enumerate(feature.sections, start=1):
         try:
             points_of(section.touches, 2, 4)
             values, circle, ring = _round(section)
         except Degenerate as reason:
             raise WrongSection(number, reason) from None
-        doubted = in_section(section.touches, number)
-        found.append(values)
-        suspects += doubted.suspects
-        tested = tested and doubted.tested
-        told.append(_circle_told(circle, section) | {"ring": ring} | {each.method.value: each.value for each in values})
-    methods = [method for method in Method if all(any(v.method is method for v in values) for values in found)]
-    worst = [
-        max((v for values in found for v in values if v.method is method), key=lambda v: v.value) for method in methods
+        suspect = in_section(section.touches, number)
+        values_of_sections.append(values)
+        suspects += suspect.suspects
+        tested = tested and suspect.tested
+        details.append(
+            _circle_told(circle, section) | {"ring": ring} | {value.method.value: value.value for value in values}
+        )
+    methods = [
+        method for method in Method if all(any(v.method is method for v in values) for values in values_of_sections)
     ]
-    return Form(tuple(worst), Suspicion(tuple(suspects), tested), details={"sections": told})
+    worst = [
+        max((v for values in values_of_sections for v in values if v.method is method), key=lambda v: v.value)
+        for method in methods
+    ]
+    return Form(tuple(worst), SuspectPoints(tuple(suspects), tested), details={"sections": details})
 
 
 def _round(section: Section) -> tuple[list[Value], Circle, dict[str, Any]]:
@@ -200,8 +210,8 @@ def _round(section: Section) -> tuple[list[Value], Circle, dict[str, Any]]:
     return values, circle, {"centre": ring.centre.tolist(), "inner": ring.inner, "outer": ring.outer}
 
 
-def straightness(feature: Touched) -> Form:
-    """Of a profile: points along it and across it. Raises `Degenerate`."""
+def straightness(feature: ProbedFeature) -> Form:
+    """Evaluate the straightness of a profile: points along it and across it. Raises `Degenerate`."""
     points_of(feature.points, 2, 3)
     line, strip = fit_line(feature.points), minimum_zone_line(feature.points)
     points = np.asarray(feature.points, dtype=np.float64)
@@ -218,8 +228,8 @@ def straightness(feature: Touched) -> Form:
     )
 
 
-def flatness(feature: Touched) -> Form:
-    """Of a surface. Raises `Degenerate`."""
+def flatness(feature: ProbedFeature) -> Form:
+    """Evaluate the flatness of a surface. Raises `Degenerate`."""
     surface_of(feature.points, 4)
     plane, slab = fit_plane(feature.points), minimum_zone_plane(feature.points)
     points = np.asarray(feature.points, dtype=np.float64)
@@ -243,7 +253,7 @@ def _slab_cofactor(points: Floats, slab: Any, levers: Floats) -> float:
     return float(shares @ shares)
 
 
-def axis_straightness(feature: Touched) -> Form:
+def axis_straightness(feature: ProbedFeature) -> Form:
     """Of the axis through the centres of three sections or more; without heights by the printed method alone.
 
     Raises `Degenerate` and `WrongSection`.
@@ -252,7 +262,7 @@ def axis_straightness(feature: Touched) -> Form:
     if len(sections) < 3:
         raise Degenerate(Reason.TOO_FEW, have=len(sections), needed=3)
     centres = centres_of(sections)
-    told = sections_told(sections)
+    details = sections_told(sections)
     printed: tuple[Value, ...] = ()
     with suppress(Degenerate):  # where all centres have one X the printed method has no line
         printed = (Value(Method.PRINTED, printed_straightness([tuple(each.at) for each in centres])),)
@@ -260,7 +270,7 @@ def axis_straightness(feature: Touched) -> Form:
     if heights is None:
         if not printed:
             raise Degenerate(Reason.NO_DIRECTION)
-        return Form(printed, in_bore(sections), details={"sections": told})
+        return Form(printed, in_bore(sections), details={"sections": details})
     points_of(heights, 1, 3)  # two heights are always on a line, however often they are touched
     axis = axis_through(sections)
     zone = minimum_zone_axis(axis.points)
@@ -277,9 +287,9 @@ def axis_straightness(feature: Touched) -> Form:
         Value(Method.LEAST_SQUARES, 2 * float(distances.max()), least),
         *printed,
     )
-    for each, off in zip(told, away.tolist(), strict=True):
+    for each, off in zip(details, away.tolist(), strict=True):
         each["off"] = off
-    return Form(values, in_bore(sections), details={"sections": told, "axis": axis_told(axis)})
+    return Form(values, in_bore(sections), details={"sections": details, "axis": axis_told(axis)})
 
 
 def _cylinder_cofactor(points: Floats, cofactors: Floats, zone: Any) -> float:
@@ -294,21 +304,21 @@ def _cylinder_cofactor(points: Floats, cofactors: Floats, zone: Any) -> float:
 
 
 def across(points: Floats, point: Floats, direction: Floats) -> Floats:
-    """What of each point lies across a line in space."""
+    """Components of points across a line in space."""
     about = points - point
-    found: Floats = about - np.outer(about @ direction, direction)
-    return found
+    components: Floats = about - np.outer(about @ direction, direction)
+    return components
 
 
 def sections_told(sections: Sequence[Section]) -> list[dict[str, Any]]:
     """Sections with centre, radius, residuals, as plain values."""
-    told = []
+    details = []
     for section, centre in zip(sections, centres_of(sections), strict=True):
         if centre.circle is None:
-            told.append({"centre": centre.at.tolist(), "height": section.height, "radius": None, "residuals": []})
+            details.append({"centre": centre.at.tolist(), "height": section.height, "radius": None, "residuals": []})
         else:
-            told.append(_circle_told(centre.circle, section))
-    return told
+            details.append(_circle_told(centre.circle, section))
+    return details
 
 
 def _circle_told(circle: Circle, section: Section) -> dict[str, Any]:
@@ -331,13 +341,13 @@ def axis_told(element: Any) -> dict[str, Any]:
     }
 
 
-def replaced(feature: Touched, suspects: Sequence[Suspect]) -> Touched:
+def replaced(feature: ProbedFeature, suspects: Sequence[SuspectPoint]) -> ProbedFeature:
     """The feature with suspected touches where they would have to be."""
     sections, points = [list(section.touches) for section in feature.sections], list(feature.points)
     for suspect in suspects:
         place = points if suspect.section is None else sections[suspect.section - 1]
         place[suspect.touch - 1] = suspect.nearest
-    return Touched(
+    return ProbedFeature(
         tuple(
             section._replace(touches=tuple(touches))
             for section, touches in zip(feature.sections, sections, strict=True)

@@ -40,7 +40,7 @@ class Hole(NamedTuple):
         (10.0, 10.0)
         """
         circle = fit_circle(touches)
-        x, y = (round(float(each), 9) + 0.0 for each in circle.centre)
+        x, y = (round(float(value), 9) + 0.0 for value in circle.centre)
         c = circle.cofactors
         size = 2 * circle.radius + (tip if inside else -tip)
         return cls((x, y), size, (float(c[0, 0]), float(c[1, 1]), float(c[0, 1])), tuple(circle.residuals.tolist()))
@@ -48,7 +48,7 @@ class Hole(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class InPlane:
-    """Where the part lies in the plane. motion: 4 x 4, a shift in X and Y and a turn about Z.
+    """Position and rotation of a part in the plane. motion: 4 x 4, a shift in X and Y and a turn about Z.
 
     off: by how much the distance of the holes differs from the nominal one, mm; None for touches on a side.
     uncertainty: of a, b (mm) and gamma (degrees), 95 %.
@@ -65,10 +65,10 @@ class InPlane:
 
 
 def two_points(nominal: Sequence[Place], measured: Sequence[Place], repeatability: float | None = None) -> InPlane:
-    """By two touches on a side. The shift is across the side; along it the part is taken to lie where it should.
+    """Fit by two points on a side. The shift is across the side; along it the part is assumed in its nominal place.
 
-    >>> found = two_points([(0, 0), (100, 0)], [(0, 0.1), (100, 0.3)])
-    >>> round(found.angle, 6), found.motion[:2, 3].round(6).tolist()
+    >>> fit = two_points([(0, 0), (100, 0)], [(0, 0.1), (100, 0.3)])
+    >>> round(fit.angle, 6), fit.motion[:2, 3].round(6).tolist()
     (0.114591, [-0.0002, 0.1])
     """
     first, second = _pair(nominal)
@@ -78,25 +78,25 @@ def two_points(nominal: Sequence[Place], measured: Sequence[Place], repeatabilit
     across = np.array([-along[1], along[0]])
     away = _pair(measured)[0] - rotation[:2, :2] @ first
     shift = across * float(away @ across)
-    stated = {}
+    uncertainty = {}
     if repeatability:
         lever = float((first @ (second - first)) / distance)  # where the foot of the origin lies along the side
         weights = (1 + lever / distance, -lever / distance)
         off = COVERAGE * repeatability * hypot(*weights)
         turning = COVERAGE * repeatability * sqrt(2) / distance
-        stated = {
+        uncertainty = {
             "a": off * abs(float(across[0])),
             "b": off * abs(float(across[1])),
             "gamma": degrees(turning),
         }
-    return InPlane(frame(rotation, [*shift, 0.0]), None, stated)
+    return InPlane(frame(rotation, [*shift, 0.0]), None, uncertainty)
 
 
 def two_holes(nominal: Sequence[Place], holes: Sequence[Hole], repeatability: float | None = None) -> InPlane:
-    """By the centres of two holes. What their distance is off is shared by both.
+    """Fit by the centres of two holes. Both share the error of their distance.
 
-    >>> found = two_holes([(0, 0), (100, 0)], [Hole((1, 2)), Hole((101.001, 2))])
-    >>> round(found.off, 6), found.motion[:2, 3].round(6).tolist()
+    >>> fit = two_holes([(0, 0), (100, 0)], [Hole((1, 2)), Hole((101.001, 2))])
+    >>> round(fit.off, 6), fit.motion[:2, 3].round(6).tolist()
     (0.001, [1.0005, 2.0])
     """
     measured = [hole.centre for hole in holes]
@@ -104,10 +104,10 @@ def two_holes(nominal: Sequence[Place], holes: Sequence[Hole], repeatability: fl
     rotation = from_angles(0.0, 0.0, degrees(turn))
     middle = _pair(nominal).mean(axis=0)
     shift = _pair(measured).mean(axis=0) - rotation[:2, :2] @ middle
-    found = _pair(measured)[1] - _pair(measured)[0]
-    stated = {}
+    direction = _pair(measured)[1] - _pair(measured)[0]
+    uncertainty = {}
     if repeatability:
-        across = np.array([-found[1], found[0]]) / np.linalg.norm(found)
+        across = np.array([-direction[1], direction[0]]) / np.linalg.norm(direction)
         spread = [np.array([[vx, xy], [xy, vy]]) for vx, vy, xy in (hole.cofactors for hole in holes)]
         lever = rotation[:2, :2] @ np.array([-middle[1], middle[0]])
         # Shift at the origin = middle of the centres less the turn times the lever: how each centre moves it.
@@ -118,9 +118,9 @@ def two_holes(nominal: Sequence[Place], holes: Sequence[Hole], repeatability: fl
             squares += np.diag(moved @ mine @ moved.T)
             turning += float(of_turn @ mine @ of_turn)
         a, b = COVERAGE * repeatability * np.sqrt(squares)
-        stated = {"a": float(a), "b": float(b), "gamma": degrees(COVERAGE * repeatability * sqrt(turning))}
-    off = float(np.linalg.norm(found)) - distance
-    return InPlane(frame(rotation, [*shift, 0.0]), off, stated)
+        uncertainty = {"a": float(a), "b": float(b), "gamma": degrees(COVERAGE * repeatability * sqrt(turning))}
+    off = float(np.linalg.norm(direction)) - distance
+    return InPlane(frame(rotation, [*shift, 0.0]), off, uncertainty)
 
 
 def _pair(places: Sequence[Place]) -> Floats:
@@ -128,10 +128,12 @@ def _pair(places: Sequence[Place]) -> Floats:
 
 
 def _turn(nominal: Sequence[Place], measured: Sequence[Place]) -> tuple[float, float]:
-    """By what the line through both has turned, radians, and how far apart they are to be. Raises `Degenerate`."""
-    wanted, found = (np.diff(_pair(places), axis=0)[0] for places in (nominal, measured))
-    turn = atan2(wanted[0] * found[1] - wanted[1] * found[0], float(wanted @ found))
-    return turn, float(np.linalg.norm(wanted))
+    """Turn of the line through both points, radians, and their nominal distance. Raises `Degenerate`."""
+    nominal_line, measured_line = (np.diff(_pair(places), axis=0)[0] for places in (nominal, measured))
+    turn = atan2(
+        nominal_line[0] * measured_line[1] - nominal_line[1] * measured_line[0], float(nominal_line @ measured_line)
+    )
+    return turn, float(np.linalg.norm(nominal_line))
 
 
 class Table(NamedTuple):
@@ -147,7 +149,7 @@ class Table(NamedTuple):
 
 
 class Turned(NamedTuple):
-    """What is to be done. turn: of the part about Z, degrees, counter-clockwise positive. position: to command.
+    """Command for a rotary table. turn: of the part about Z, degrees, counter-clockwise positive. position: to command.
 
     motion: what is left for the frame after that.
     """

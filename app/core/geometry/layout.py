@@ -1,4 +1,4 @@
-"""How touches lie on a part: whether they hold it, how well, and which touch more would help most.
+"""Layout of probed points on a part: if they hold it, how well, and which further point would help most.
 
 The rows ``[n, (r - g) x n]`` are taken about the middle g of the touches and turns are counted in the touches' reach L, so
 that shifts and turns compare: a unit of either moves a touch by about as much. The ratio of the largest to the smallest
@@ -19,7 +19,7 @@ SAME_NORMAL = 0.999  # cosine: a face
 
 
 class Loose(StrEnum):
-    """Why touches do not hold the part. Worded at the edge."""
+    """Reasons for which points do not hold the part. Worded at the edge."""
 
     TOO_FEW = "too_few"
     PARALLEL_NORMALS = "parallel_normals"  # no touch in some direction
@@ -74,7 +74,7 @@ class Layout:
 
     @property
     def factors(self) -> Floats:
-        """What turns the scaled unknowns into mm and radians."""
+        """Factors that turn the scaled unknowns into mm and radians."""
         return np.array([1.0, 1.0, 1.0, *([1 / self.reach] * 3)])
 
     def scale(self, facing: Floats, moments: Floats) -> Floats:
@@ -82,10 +82,10 @@ class Layout:
         rows: Floats = (np.column_stack([facing, moments]) * self.factors)[:, self.columns]
         return rows
 
-    def spread(self, found: Floats) -> Floats:
+    def spread(self, scaled: Floats) -> Floats:
         """Scaled unknowns as all six motions, mm and radians."""
         motions = np.zeros(6)
-        motions[list(self.columns)] = found
+        motions[list(self.columns)] = scaled
         return motions * self.factors
 
     @property
@@ -110,15 +110,15 @@ class Layout:
 
     @property
     def covariance(self) -> Floats:
-        """Of all six motions about the middle, mm and radians, for touches with variance 1."""
+        """Covariance of all six motions about the middle, mm and radians, for points with variance 1."""
         full = np.zeros((6, 6))
         full[np.ix_(self.columns, self.columns)] = np.linalg.inv(self.scaled.T @ self.scaled)
-        made: Floats = full * np.outer(self.factors, self.factors)
-        return made
+        covariance: Floats = full * np.outer(self.factors, self.factors)
+        return covariance
 
     @property
     def leverage(self) -> Floats:
-        """How much of its own finding each touch decides: 1 where no other checks it."""
+        """Share of each point in its own fitted value: 1 where no other checks it."""
         q = np.linalg.qr(self.scaled)[0]
         held: Floats = (q**2).sum(axis=1)
         return held
@@ -139,8 +139,8 @@ class Layout:
         if best is None or best[0] <= before * 1.001:
             return None
         gain = best[0] / before if before > best[0] / WORST_CONDITION else float("inf")
-        x, y, z = (float(each) for each in best[2])
-        i, j, k = (float(each) for each in best[3])
+        x, y, z = (float(value) for value in best[2])
+        i, j, k = (float(value) for value in best[3])
         return (x, y, z), (i, j, k), gain
 
 
@@ -152,10 +152,10 @@ def layout_of(places: Floats, normals: Floats, solve_for: Sequence[str] = MOTION
     about = places - middle
     reach = float(np.sqrt((about**2).sum(axis=1).mean())) or 1.0
     rows = np.column_stack([normals, np.cross(about, normals) / reach])[:, columns]
-    made = Layout(places, normals, middle, reach, columns, rows)
+    layout = Layout(places, normals, middle, reach, columns, rows)
     if len(places) < len(columns):
-        raise NotLaidOut(Loose.TOO_FEW, have=len(places), needed=len(columns), helpful=made.helpful)
-    return made
+        raise NotLaidOut(Loose.TOO_FEW, have=len(places), needed=len(columns), helpful=layout.helpful)
+    return layout
 
 
 def refuse_loose(layout: Layout) -> None:
@@ -180,10 +180,10 @@ def faces_of(normals: Floats) -> list[list[int]]:
 
 
 def _cause(layout: Layout) -> tuple[Loose, tuple[int, ...], int | None]:
-    """What is wrong with the layout, which touches it is about, and which of them to move."""
-    wanted = layout.normals if len(layout.columns) == len(MOTIONS) else np.eye(3)
+    """Fault of the layout, the points concerned, and the one of them to move."""
+    directions = layout.normals if len(layout.columns) == len(MOTIONS) else np.eye(3)
     faces = faces_of(layout.normals)
-    if np.linalg.svd(wanted, compute_uv=False)[-1] < 1e-6 or len(wanted) < 3:
+    if np.linalg.svd(directions, compute_uv=False)[-1] < 1e-6 or len(directions) < 3:
         spare = _spare(layout)
         mine = next(face for face in faces if spare in face)
         return Loose.PARALLEL_NORMALS, tuple(at + 1 for at in mine), spare + 1
@@ -222,14 +222,14 @@ def _guiding(layout: Layout, face: list[int]) -> Floats | None:
 
 
 def _candidates(places: Floats, normals: Floats) -> list[tuple[Floats, Floats]]:
-    """Where a touch more might be: the corners of each face, as far as touches reach, and across axes without a touch."""
+    """Places for a further point: the corners of each face, as far as points reach, and across axes without a point."""
     low, high = places.min(axis=0), places.max(axis=0)
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
-    found = []
+    candidates = []
     for face in faces_of(normals):
         normal = normals[face[0]]
         level = float((places[face] @ normal).mean())
         onto = corners - np.outer(corners @ normal - level, normal)
-        found.append((normal, np.unique(onto.round(9), axis=0)))
+        candidates.append((normal, np.unique(onto.round(9), axis=0)))
     bare = [axis for axis in np.eye(3) if np.abs(normals @ axis).max() < 0.5]
-    return found + [(axis, np.unique(corners.round(9), axis=0)) for axis in bare]
+    return candidates + [(axis, np.unique(corners.round(9), axis=0)) for axis in bare]

@@ -70,7 +70,7 @@ def line_through(point: Floats, direction: Floats, points: Floats) -> Line:
 
 
 def distances(points: ArrayLike, point: ArrayLike, direction: ArrayLike) -> Floats:
-    """How far points lie from a line in space, mm. direction: of any length.
+    """Distances of points from a line in space, mm. direction: of any length.
 
     >>> distances([(3, 4, 9)], (0, 0, 0), (0, 0, 2)).tolist()
     [5.0]

@@ -15,7 +15,7 @@ NARROW, NARROW_SHARE = 0.5, 0.01  # mm, and of their length: what is narrower in
 
 
 class Reason(StrEnum):
-    """Why nothing can be fitted. The sentences, and what to do, are worded at the edge."""
+    """Reasons for which nothing can be fitted. The sentences, and what to do, are worded at the edge."""
 
     TOO_FEW = "too_few"
     NOT_FINITE = "not_finite"
@@ -36,8 +36,8 @@ class Degenerate(ValueError):
 
     def __init__(self, reason: Reason, *, have: float = 0, needed: float = 0, at: tuple[int, ...] = ()) -> None:
         """Say why, and where it can be said how much is missing and which points are meant."""
-        told = f": {have:g} of {needed:g}" if needed else f": points {', '.join(map(str, at))}" if at else ""
-        super().__init__(reason.value + told)
+        detail = f": {have:g} of {needed:g}" if needed else f": points {', '.join(map(str, at))}" if at else ""
+        super().__init__(reason.value + detail)
         self.reason, self.have, self.needed, self.at = reason, have, needed, at
 
 
@@ -68,7 +68,7 @@ def points_of(points: ArrayLike, dimension: int, at_least: int) -> Floats:
 
 
 def extents(points: Floats) -> tuple[Floats, Floats]:
-    """How far points reach along their principal directions, greatest first, and these directions as rows.
+    """Reach of points along their principal directions, greatest first, and these directions as rows.
 
     points: already about their centroid.
     """
@@ -103,8 +103,8 @@ def unit(vector: ArrayLike) -> Floats:
     """
     array = np.asarray(vector, dtype=np.float64)
     array = array / np.linalg.norm(array)
-    found: Floats = (-array if array[np.abs(array).argmax()] < 0 else array) + 0.0
-    return found
+    direction: Floats = (-array if array[np.abs(array).argmax()] < 0 else array) + 0.0
+    return direction
 
 
 def frame(axis: Floats) -> Floats:

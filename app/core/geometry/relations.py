@@ -14,22 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from app.core.geometry.certainty import zone_multipliers
 from app.core.geometry.discs import circumscribed
-from app.core.geometry.elements import (
-    Element,
-    Point,
-    WrongSection,
-    axis_through,
-    centres_of,
-    heights_of,
-    plane_through,
-)
+from app.core.geometry.elements import Element, Point, WrongSection, axis_through, centres_of, heights_of, plane_through
 from app.core.geometry.form import (
     Form,
     Kind,
     Method,
-    Touched,
+    ProbedFeature,
     Value,
     across,
     axis_straightness,
@@ -40,23 +31,24 @@ from app.core.geometry.form import (
     sections_told,
     straightness,
 )
+from app.core.geometry.form_uncertainty import zone_multipliers
+from app.core.geometry.minimum_zones import minimum_zone_line
 from app.core.geometry.points import Degenerate, Reason, frame
-from app.core.geometry.suspicion import in_bore, in_plane
-from app.core.geometry.zones import minimum_zone_line
+from app.core.geometry.suspect_points import in_bore, in_plane
 
 ENGINE = 1  # counts up when a change makes stored touches evaluate otherwise
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What is asked: the kind, what was touched, and what it is held against.
+    """Request for one deviation: its kind, the feature, and the datum or tolerance it refers to.
 
     nominal: where the centre should be, mm, for position. length: over which a tilt counts, mm; else over the feature.
     """
 
     kind: Kind
-    feature: Touched
-    datum: Touched | None = None
+    feature: ProbedFeature
+    datum: ProbedFeature | None = None
     nominal: Point | None = None
     length: float | None = None
 
@@ -75,8 +67,8 @@ def evaluate(task: Task) -> Form:
 
     >>> from app.core.geometry.elements import Section
     >>> bore = lambda x, z: Section(((x + 5.0, 0.0), (x, 5.0), (x - 5.0, 0.0)), z)
-    >>> datum = Touched((bore(0.0, 0.0), bore(0.0, 20.0)))
-    >>> round(evaluate(Task(Kind.COAXIALITY, Touched((bore(0.003, 40.0),)), datum)).values[0].value, 6)
+    >>> datum = ProbedFeature((bore(0.0, 0.0), bore(0.0, 20.0)))
+    >>> round(evaluate(Task(Kind.COAXIALITY, ProbedFeature((bore(0.003, 40.0),)), datum)).values[0].value, 6)
     0.006
     """
     match task.kind:
@@ -90,25 +82,25 @@ def evaluate(task: Task) -> Form:
             return flatness(task.feature)
         case Kind.POSITION:
             return position(task.feature, task.nominal or (0.0, 0.0))
-    datum = task.datum or Touched()
+    datum = task.datum or ProbedFeature()
     try:
         against = _element(datum)
     except (Degenerate, WrongSection) as reason:
         raise DatumRefused(reason) from None
-    doubted = in_bore(datum.sections) if datum.sections else in_plane(datum.points)
-    found = coaxiality(task.feature, datum, against) if task.kind is Kind.COAXIALITY else orientation(task, against)
-    return replace(found, datum=doubted)
+    suspect = in_bore(datum.sections) if datum.sections else in_plane(datum.points)
+    form = coaxiality(task.feature, datum, against) if task.kind is Kind.COAXIALITY else orientation(task, against)
+    return replace(form, datum=suspect)
 
 
-def corrected(task: Task, found: Form) -> Form | None:
+def corrected(task: Task, form: Form) -> Form | None:
     """The same with suspected touches where they would have to be; None where there are none."""
-    if not found.suspicion.suspects and not found.datum.suspects:
+    if not form.suspicion.suspects and not form.datum.suspects:
         return None
-    datum = task.datum and replaced(task.datum, found.datum.suspects)
-    return evaluate(replace(task, feature=replaced(task.feature, found.suspicion.suspects), datum=datum))
+    datum = task.datum and replaced(task.datum, form.datum.suspects)
+    return evaluate(replace(task, feature=replaced(task.feature, form.suspicion.suspects), datum=datum))
 
 
-def coaxiality(feature: Touched, datum: Touched, axis: Element) -> Form:
+def coaxiality(feature: ProbedFeature, datum: ProbedFeature, axis: Element) -> Form:
     """Twice the greatest distance of the feature's centres from the datum's axis. Raises `Degenerate`, `WrongSection`."""
     heights = heights_of(feature.sections) if len(feature.sections) > 1 else None
     if heights is None and [section.height for section in feature.sections if section.height is not None]:
@@ -128,15 +120,19 @@ def coaxiality(feature: Touched, datum: Touched, axis: Element) -> Form:
     rests = float(unit @ axis.cofactors.mean(axis=0) @ unit) / len(axis.points) + lever**2 * float(
         unit @ axis.tilt @ unit
     )
-    told = sections_told(feature.sections)
-    for each, off in zip(told, away.tolist(), strict=True):
-        each["off"] = off
-    details = {"sections": told, "datum": axis_told(axis), "datum_sections": sections_told(datum.sections)}
+    details_of_sections = sections_told(feature.sections)
+    for section, off in zip(details_of_sections, away.tolist(), strict=True):
+        section["off"] = off
+    details = {
+        "sections": details_of_sections,
+        "datum": axis_told(axis),
+        "datum_sections": sections_told(datum.sections),
+    }
     value = Value(Method.LEAST_SQUARES, 2 * float(distances[worst]), 4 * (own + rests))
     return Form((value,), in_bore(feature.sections), details=details)
 
 
-def position(feature: Touched, nominal: Point) -> Form:
+def position(feature: ProbedFeature, nominal: Point) -> Form:
     """Twice the greatest distance of the feature's centres from where they should be. Raises `Degenerate`."""
     if not feature.sections:
         raise Degenerate(Reason.TOO_FEW, have=0, needed=1)
@@ -145,12 +141,14 @@ def position(feature: Touched, nominal: Point) -> Form:
     distances = np.linalg.norm(away, axis=1)
     worst = int(distances.argmax())
     unit = away[worst] / distances[worst] if distances[worst] > 0 else np.array([1.0, 0.0])
-    told = sections_told(feature.sections)
-    for each, off in zip(told, away.tolist(), strict=True):
-        each["off"] = off
+    details_of_sections = sections_told(feature.sections)
+    for section, off in zip(details_of_sections, away.tolist(), strict=True):
+        section["off"] = off
     own = float(unit @ centres[worst].cofactors @ unit)
     value = Value(Method.LEAST_SQUARES, 2 * float(distances[worst]), 4 * own)
-    return Form((value,), in_bore(feature.sections), details={"sections": told, "nominal": list(nominal[:2])})
+    return Form(
+        (value,), in_bore(feature.sections), details={"sections": details_of_sections, "nominal": list(nominal[:2])}
+    )
 
 
 def orientation(task: Task, datum: Element) -> Form:
@@ -180,10 +178,10 @@ def orientation(task: Task, datum: Element) -> Form:
     if feature.lengthwise:
         about = feature.points - feature.point
         wrong = across(about, np.zeros(3), d) if agree else np.outer(about @ d, d)
-        told = sections_told(task.feature.sections)
-        for each, out in zip(told, wrong.tolist(), strict=True):
-            each["off"] = out
-        details["sections"] = told
+        details_of_sections = sections_told(task.feature.sections)
+        for section, out in zip(details_of_sections, wrong.tolist(), strict=True):
+            section["off"] = out
+        details["sections"] = details_of_sections
     else:
         details["residuals"] = ((feature.points - feature.point) @ f).tolist()
     return Form(values, suspicion, details=details)
@@ -221,6 +219,6 @@ def _zone(feature: Element, datum: Element, *, agree: bool) -> Value:
     return Value(Method.MINIMUM_ZONE, width, own + float(moment @ datum.tilt @ moment))
 
 
-def _element(touched: Touched) -> Element:
+def _element(touched: ProbedFeature) -> Element:
     """An axis where there are sections, a plane where there are points."""
     return axis_through(touched.sections) if touched.sections else plane_through(touched.points)

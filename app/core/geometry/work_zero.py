@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.core.compensation import DECIMALS
+from app.core.decision.step import DECIMALS
 from app.core.geometry.circle import fit_circle
 from app.core.geometry.edges import (
     Approach,
@@ -45,7 +45,7 @@ ONE_SIDED = 120.0  # degrees of a circle; on less its centre is uncertain by sev
 
 
 class Height(NamedTuple):
-    """Where Z stood when the feeler was pinched or the probe triggered, mm. feeler: its thickness, 0 without one."""
+    """Height Z at which the feeler was pinched or the probe triggered, mm. feeler: its thickness, 0 without one."""
 
     touched: float
     feeler: float = 0.0
@@ -56,7 +56,7 @@ MISFIT = 5.0  # standard deviations of a touch; of a million good touches not on
 
 
 class Notice(StrEnum):
-    """What a zero should not be used without looking at."""
+    """Reasons to check a zero before it is used."""
 
     ONE_SIDED = "one_sided"  # touches on a short arc
     NOT_SQUARE = "not_square"  # the two sides of a corner are not at a right angle
@@ -69,7 +69,7 @@ class Notice(StrEnum):
 
 @dataclass(frozen=True)
 class Zero:
-    """What the touches come to; None where they do not say it.
+    """Result of the probed points; None where they do not determine a value.
 
     length: size along X, width: along Y. squareness: by how much the angle of a corner differs from 90°.
     residuals: per touch, what is left of it, mm, positive into the material. uncertainty: by name, 95 %; empty where the
@@ -110,7 +110,7 @@ def find_zero(
         raise Unfit(Problem.SMALLER_THAN_TIP, needed=tip)
     paired = kind.is_round and is_paired(touches)
     if kind.is_round and not paired:
-        made = _round_zero(kind, touches, tip, repeatability)
+        zero = _round_zero(kind, touches, tip, repeatability)
     else:
         check(kind, touches)
         solve = corner if kind is Kind.CORNER else across(kind) if paired else sides(kind)
@@ -118,18 +118,18 @@ def find_zero(
         _check_sizes(values, tip, outside=not kind.inside)
         if abs(values.get("rotation", 0.0)) > MOST_TURNED or abs(values.get("squareness", 0.0)) > MOST_TURNED:
             raise Unfit(Problem.TURNED_TOO_FAR, have=values["rotation"], needed=MOST_TURNED)
-        stated = _uncertainty(solve, touches, tip, values, repeatability)
+        uncertainty = _uncertainty(solve, touches, tip, values, repeatability)
         square = abs(values.get("squareness", 0.0))
-        skew = square > 0.05 and square > stated.get("squareness", 0.0)
-        made = Zero(
+        skew = square > 0.05 and square > uncertainty.get("squareness", 0.0)
+        zero = Zero(
             **{name: _rounded(value) for name, value in values.items()},
-            residuals=tuple(_rounded(each) for each in residuals),
-            uncertainty=stated,
+            residuals=tuple(_rounded(residual) for residual in residuals),
+            uncertainty=uncertainty,
             notices=tuple(_notices(values, paired=paired, skew=skew)),
         )
-    if repeatability and max(map(abs, made.residuals), default=0.0) > MISFIT * repeatability:
-        made = replace(made, notices=(Notice.MISFIT, *made.notices))
-    return made if height is None else replace(made, z=zero_in_z(height))
+    if repeatability and max(map(abs, zero.residuals), default=0.0) > MISFIT * repeatability:
+        zero = replace(zero, notices=(Notice.MISFIT, *zero.notices))
+    return zero if height is None else replace(zero, z=zero_in_z(height))
 
 
 def _notices(values: Values, *, paired: bool, skew: bool) -> Iterator[Notice]:
@@ -191,16 +191,16 @@ def _round_zero(kind: Kind, touches: Sequence[Touch], tip: float, repeatability:
         raise Unfit(Problem.WRONG_SIDE, wrong)
     size = 2 * circle.radius + side * tip
     _check_sizes({"diameter": size}, tip, outside=not kind.inside)
-    stated = {}
+    uncertainty = {}
     if repeatability:
         deviations = COVERAGE * repeatability * np.sqrt(np.diag(circle.cofactors))
-        stated = {"x": float(deviations[0]), "y": float(deviations[1]), "diameter": 2 * float(deviations[2])}
+        uncertainty = {"x": float(deviations[0]), "y": float(deviations[1]), "diameter": 2 * float(deviations[2])}
     return Zero(
         x=_rounded(circle.centre[0]),
         y=_rounded(circle.centre[1]),
         diameter=_rounded(size),
-        residuals=tuple(_rounded(side * each) for each in circle.residuals),
-        uncertainty=stated,
+        residuals=tuple(_rounded(side * residual) for residual in circle.residuals),
+        uncertainty=uncertainty,
         notices=(Notice.ONE_SIDED,) if circle.arc < ONE_SIDED else (),
     )
 
@@ -215,7 +215,7 @@ def _check_sizes(values: Values, tip: float, *, outside: bool) -> None:
 def _uncertainty(
     solve: Solver, touches: Sequence[Touch], tip: float, values: Values, repeatability: float | None
 ) -> Values:
-    """What a touch that is off by its repeatability makes of each value, all touches together."""
+    """Uncertainty of each value from the repeatability of a point, all points together."""
     if not repeatability:
         return {}
     squares = dict.fromkeys(values, 0.0)
@@ -239,7 +239,7 @@ def _moved(touch: Touch, way: float) -> Touch:
 
 
 class Shift(StrEnum):
-    """How far a fixture is from where it was."""
+    """Verdict on a fixture's shift from its reference."""
 
     UNKNOWN = "unknown"  # nothing to compare with, or no limit
     STEADY = "steady"
@@ -248,7 +248,7 @@ class Shift(StrEnum):
 
 
 def judge_shift(shifts: Sequence[float], warning: float | None, alarm: float | None) -> Shift:
-    """How far the zero has shifted in all, ``hypot`` of its axes, against the limits, mm; on a limit is the milder.
+    """Compare the shift of the zero, ``hypot`` of its axes, with the limits, mm; on a limit is the milder verdict.
 
     >>> judge_shift([0.012, -0.009], 0.01, 0.03).value, judge_shift([0.001], 0.01, 0.03).value
     ('warning', 'steady')

@@ -13,30 +13,40 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from app.core.number_text import has_printed_minus, plain
 from app.core.parameters import BY_NAME, Kind, Parameters, mean_nominal
+from app.core.programs import printed_macros, unit_check
 from app.core.programs.lines import (
     DESCRIBING,
     LONGEST_LINE,
     NUMBER,
+    UNIT,
     Note,
     Program,
     ProgramKind,
     ProgramText,
     describing,
+    in_mm,
     line_of,
+    mixed,
+    no_number,
     number_in,
+    says_inch,
     setting_in,
     settings,
     split,
+    unit_note,
     written,
 )
 
 INPUTS = {505: "nominal", 506: "upper_deviation", 507: "lower_deviation", 1: "tool_memory"}
 VALUES = {500: "START X", 501: "START Z", 502: "PROBE RADIUS TERM", 503: "RADIUS", 504: "PROBING FEED"}
 RESULTS = (510, 511, 512, 513)
+WITHOUT_UNIT = (1, 513)
 CALIBRATING_MACRO, MEASURING_MACRO = 9010, 9011
 SECTIONS = 3
 WEAR_LIMIT, CONFIDENCE_LIMIT = 0.3, 1.0  # mm, the least of the ranges printed for R37 and R36
+FEELER, MOST_FEELER = 2, 1.0  # variable of the printed edge finder's macro, and the mm from which it raises an alarm
 RING_DEVIATION = 0.01  # mm, until somebody says what the ring may deviate
 
 _ENDS = r"(?=\s*(?:$|[A-Z#(%\[]))"
@@ -46,8 +56,12 @@ _COMPUTED = re.compile(
     r"(?:#\s*\[.*\]\s*=|IF\b|IF\[|WHILE\b|WHILE\[|GOTO\s*\d|DO\s*\d|END\s*\d|THEN\b).*", re.IGNORECASE
 )
 _MACRO = re.compile(rf"G\s*65\s*P\s*(\d{{1,5}})((?:\s*[A-Z]\s*{NUMBER})*)(?![\w.])", re.IGNORECASE | re.ASCII)
+_BROKEN_ARGUMENT = re.compile(r"\s+[\d.,]+", re.ASCII)
+# On lathes G70 and G71 are the finishing and the roughing cycle, with words of their own.
+_TURNING_CYCLE = re.compile(r"\s*(?:[PQUWRDIK]\s*[-\d.#\[]|[A-Z]\s*\d*\.?\s*[PQUWD]\s*[-\d.#\[])", re.IGNORECASE)
 _ARGUMENT = re.compile(rf"A\s*({NUMBER})", re.IGNORECASE | re.ASCII)
 _WORD = re.compile(rf"[A-Z]\s*(?:{NUMBER}|#\s*\d+)(?![\w.])|%\S*", re.IGNORECASE | re.ASCII)
+_CHOOSES_OFFSET = re.compile(r"IF\s*\[\s*#1\s+EQ\s*5[4-9]\.?0*\s*\]", re.IGNORECASE)
 _BRACKET = re.compile(r"[A-Z]\s*-?\[", re.IGNORECASE | re.ASCII)
 _COMMENT = re.compile(r";(.*)$|\(([^()]*)\)|\((.*)$")
 
@@ -60,32 +74,72 @@ class _Reader:
         self.values: dict[str, float] = {}
         self.results: dict[str, float] = {}
         self.kind: ProgramKind | None = None
+        self.inch: bool | None = None
+        self.lengths: dict[str, tuple[int, bool | None]] = {}  # variable: line and unit of its value
+        self.called_in: list[bool | None] = []
+        self.chooses_offset = any(map(_CHOOSES_OFFSET.search, self.texts))  # #1 is 54 for G54 there, and no tool
+        self.feeler: tuple[int, float] | None = None  # line and mm of #2, which the edge finder's macro takes off Z
 
     def read(self) -> ProgramText:
         for number, text in enumerate(self.texts, start=1):
             self._line(number, text, self.notes[number - 1])
         programs = (self._program(),) if self.assigned or self.values or self.results or self.kind else ()
-        lines = [line_of(number, *each) for number, each in enumerate(zip(self.texts, self.notes, strict=True), 1)]
+        zero = printed_macros.work_zero(note for notes in self.notes for note in notes)
+        if zero and self.kind is None and "nominal" not in self.assigned:  # #1 is no tool there, #502 no radius
+            programs = (self._work_zero(zero),)
+        lines = [line_of(number, *line) for number, line in enumerate(zip(self.texts, self.notes, strict=True), 1)]
         return ProgramText(tuple(lines), programs)
+
+    def _work_zero(self, zero: dict[str, Any]) -> Program:
+        """The work zero of an edge finder's macro, with the feeler that it takes off Z."""
+        notes: list[Note] = []
+        inch = self.inch is True
+        if "tip" in zero:
+            zero["tip"] = in_mm(zero["tip"], inch)
+        if self.feeler is not None:
+            line, zero["feeler"] = self.feeler
+            step = Note("step", {"step": "feeler", "r": "#2", "value": zero["feeler"]})
+            at = self.notes[line - 1]
+            self.notes[line - 1] = [step if note == Note("not_used", {"r": "#2"}) else note for note in at]
+            if not 0 <= zero["feeler"] <= MOST_FEELER:
+                notes.append(Note("feeler_range", {"value": f"{zero['feeler']:g}", "highest": f"{MOST_FEELER:g}"}))
+        return Program(ProgramKind.WORK_ZERO, 1, len(self.texts), zero, {}, {}, {}, tuple(notes), inch=inch)
 
     def _line(self, number: int, text: str, notes: list[Note]) -> None:
         if len(text) > LONGEST_LINE:
             notes.append(Note("too_long", {"most": LONGEST_LINE, "got": len(text)}))
             return
-        comments = [next(each for each in found.groups() if each is not None) for found in _COMMENT.finditer(text)]
+        comments = [next(group for group in match.groups() if group is not None) for match in _COMMENT.finditer(text)]
         for comment in comments:
             setting = setting_in(comment)
             if setting is None:
                 notes.append(Note("comment", {}))
             elif setting[1] is None:
+                self.assigned.pop(setting[0], None)
                 notes.append(Note("bad_setting", {"text": comment.strip()[:80]}))
             else:
                 self._assign(number, setting[0], setting[0], setting[1], notes)
                 notes.append(Note("setting", {"name": setting[0], "value": setting[1]}))
-        body = _COMMENT.sub(" ", text).strip()
-        self._words(number, re.sub(r"^/?\s*(?:[NO]\s*\d+)?\s*", "", body, flags=re.IGNORECASE), notes)
+        body = _COMMENT.sub(" ", text)
+        if has_printed_minus(body):
+            notes.append(Note("printed_minus", {}))
+        body = re.sub(r"^/?\s*(?:[NO]\s*\d+)?\s*", "", plain(body), flags=re.IGNORECASE)
+        self._words(number, self._steps(body, notes), notes)
         if not notes:
             notes.append(Note("words", {"words": body}) if body else Note("empty", {}))
+
+    def _steps(self, body: str, notes: list[Note]) -> str:
+        """Note the steps of a printed macro; return what else stands in the block."""
+        steps, rest = printed_macros.steps(body, printed_macros.FANUC)
+        for step in steps:
+            if step.data["step"] in {"measured", "size", "centre"} and step.data["r"] in self.results:
+                self._lose(int(step.data["r"][1:]))
+            nominal, radius = self.assigned.get("nominal"), self.values.get("#503")
+            if step.data["step"] == "probing_target" and nominal is not None and radius is not None:
+                sign = -1 if step.data.get("sign") else 1
+                step.data["value"] = sign * round(printed_macros.target(nominal[0], radius), 6)
+        notes += steps
+        return rest
 
     def _words(self, number: int, body: str, notes: list[Note]) -> None:
         at = 0
@@ -94,18 +148,26 @@ class _Reader:
         while at < len(body):
             if body[at].isspace():
                 at += 1
-            elif found := _VARIABLE.match(body, at):
-                at = self._variable(number, int(found[1]), body, found.end(), notes)
-            elif found := _COMPUTED.match(body, at):
-                notes.append(Note("computed", {"text": found[0][:80]}))
-                at = found.end()
-            elif found := _MACRO.match(body, at):
-                self._macro(number, found, notes)
-                at = found.end()
-            elif found := _WORD.match(body, at):
-                passed.append(found[0])
-                at = found.end()
-            elif (found := _BRACKET.match(body, at)) and (end := _closing(body, found.end())):
+            elif match := _VARIABLE.match(body, at):
+                at = self._variable(number, int(match[1]), body, match.end(), notes)
+            elif match := _COMPUTED.match(body, at):
+                notes.append(Note("computed", {"text": match[0][:80]}))
+                at = match.end()
+            elif match := _MACRO.match(body, at):
+                self._macro(number, match, notes)
+                at = match.end()
+                if match[2] and (broken := _BROKEN_ARGUMENT.match(body, at)):
+                    self._lose(1)
+                    notes.append(no_number("#1", match[2].strip() + broken[0]))
+                    at = broken.end()
+            elif (match := UNIT.match(body, at)) and not self._turning_cycle(body, match):
+                self.inch = says_inch(match)
+                notes.append(unit_note(match))
+                at = match.end()
+            elif match := _WORD.match(body, at):
+                passed.append(match[0])
+                at = match.end()
+            elif (match := _BRACKET.match(body, at)) and (end := _closing(body, match.end())):
                 passed.append(body[at:end])
                 at = end
             else:
@@ -117,41 +179,72 @@ class _Reader:
         if unknown:
             notes.append(Note("unknown", {"text": " ".join(unknown)[:200]}))
 
+    @staticmethod
+    def _turning_cycle(body: str, word: re.Match[str]) -> bool:
+        return "7" in word[0] and _TURNING_CYCLE.match(body, word.end()) is not None
+
     def _variable(self, number: int, variable: int, body: str, at: int, notes: list[Note]) -> int:
-        """What is assigned to a variable; where the next word begins."""
+        """Read the value that is assigned to a variable; return the index of the next word."""
         known = variable in INPUTS or variable in VALUES or variable in RESULTS
-        found = _VALUE.match(body, at)
-        if found is None:
+        match = _VALUE.match(body, at)
+        if match is None:
             text = body[at:].strip()
             name = f"#{variable}"
-            if not known or variable in RESULTS or variable == 1:
+            reason = no_number(name, text)
+            self._lose(variable)
+            if not known or (reason.code == "expression" and (variable in RESULTS or variable == 1)):
                 notes.append(Note("computed", {"text": f"{name}={text}"[:80]}))
             else:
-                self.assigned.pop(INPUTS.get(variable, ""), None)
-                self.values.pop(name, None)
-                notes.append(
-                    Note("expression", {"r": name, "text": text[:80]}) if text else Note("no_value", {"r": name})
-                )
+                notes.append(reason)
             return len(body)
-        self._number(number, variable, found[1], notes)
-        return found.end()
+        self._number(number, variable, match[1], notes)
+        return match.end()
+
+    def _lose(self, variable: int) -> None:
+        """On the control it has another value now, one that is not known here: the one before must not stand for it."""
+        self.assigned.pop(INPUTS.get(variable, ""), None)
+        self.values.pop(f"#{variable}", None)
+        self.results.pop(f"#{variable}", None)
+        self.lengths.pop(f"#{variable}", None)
 
     def _number(self, number: int, variable: int, text: str, notes: list[Note]) -> None:
         r, value = f"#{variable}", number_in(text)
         if value is None:
-            self.assigned.pop(INPUTS.get(variable, ""), None)
+            self._lose(variable)
             notes.append(Note("too_large", {"r": r}))
+            return
+        inches: dict[str, float] = {}
+        if variable in {*INPUTS, *VALUES, *RESULTS} and variable not in WITHOUT_UNIT:
+            self.lengths[r] = (number, self.inch)
+            if self.inch:
+                inches, value = {"inch": value}, in_mm(value, True)
+        if variable == 1 and self.chooses_offset:
+            notes.append(Note("not_used", {"r": r}))
         elif variable in INPUTS:
             self._assign(number, INPUTS[variable], r, value, notes)
-            notes.append(Note("assigned", _assigned(r, INPUTS[variable], value)))
+            notes.append(Note("assigned", _assigned(r, INPUTS[variable], value) | inches))
         elif variable in VALUES:
             self.values[r] = value
-            notes.append(Note("assigned", _assigned(r, None, value)))
+            notes.append(Note("assigned", _assigned(r, None, value) | inches))
         elif variable in RESULTS:
             self.results[r] = value
-            notes.append(Note("result", {"r": r, "value": value}))
+            notes.append(Note("result", {"r": r, "value": value} | inches))
         else:
+            if variable == FEELER:
+                self.feeler = (number, in_mm(value, self.inch is True))
             notes.append(Note("not_used", {"r": r}))
+
+    def _unit(self, notes: list[Note]) -> bool:
+        """Tell if the lengths were in inches. Lengths of an ambiguous unit are dropped, and named."""
+        units = [unit for _line, unit in self.lengths.values()]
+        if units and mixed([*units, *(self.called_in or [self.inch])]):
+            for r, (line, _unit) in list(self.lengths.items()):
+                self.notes[line - 1].append(Note("unit_mixed", {"r": r}))
+                self._lose(int(r[1:]))
+            return False
+        if any(units):
+            notes.append(Note("from_inch", {}))
+        return any(units)
 
     def _macro(self, number: int, found: re.Match[str], notes: list[Note]) -> None:
         macro, argument = int(found[1]), _ARGUMENT.search(found[2])
@@ -159,6 +252,7 @@ class _Reader:
             self.kind = self.kind or ProgramKind.CALIBRATION
         else:
             self.kind = ProgramKind.MEASURING
+        self.called_in.append(self.inch)
         notes.append(Note("call", {"word": f"G65 P{macro}"}))
         if argument:
             self._number(number, 1, argument[1], notes)
@@ -170,9 +264,10 @@ class _Reader:
         self.assigned[name] = (value, number)
 
     def _program(self) -> Program:
+        notes: list[Note] = []
+        inch = self._unit(notes)
         parameters = {name: value for name, (value, _line) in self.assigned.items()}
         about: dict[str, str] = {name: parameters.pop(name) for name in DESCRIBING if name in parameters}
-        notes: list[Note] = []
         kind = self.kind
         if kind is None:
             kind = ProgramKind.ASSIGNMENTS if parameters or self.values else ProgramKind.RESULTS
@@ -184,7 +279,7 @@ class _Reader:
             field = BY_NAME.get(name)
             if field and field.kind is Kind.WHOLE and isinstance(value, float) and value == int(value):
                 parameters[name] = int(value)
-        return Program(kind, 1, len(self.texts), parameters, about, self.values, self.results, tuple(notes))
+        return Program(kind, 1, len(self.texts), parameters, about, self.values, self.results, tuple(notes), inch)
 
 
 def _assigned(r: str, name: str | None, value: float) -> dict[str, Any]:
@@ -202,7 +297,7 @@ def _closing(body: str, at: int) -> int | None:
 
 
 def implied() -> dict[str, Any]:
-    """What the macros of the line do, said in our parameters."""
+    """The fixed behaviour of the line's macros as parameters."""
     values = {
         "variant": "along",
         "points": SECTIONS,
@@ -220,10 +315,10 @@ def _complete(parameters: dict[str, Any], notes: list[Note]) -> None:
     if "target" in parameters:
         for name in ("nominal", "upper_deviation", "lower_deviation"):
             parameters.pop(name, None)
-    taken = {name: value for name, value in implied().items() if name not in parameters}
-    if taken:
-        notes.append(Note("macro", {"parameters": taken}))
-    parameters |= taken
+    added = {name: value for name, value in implied().items() if name not in parameters}
+    if added:
+        notes.append(Note("macro", {"parameters": added}))
+    parameters |= added
     width = parameters.get("tolerance_width")
     if all(name in parameters for name in ("nominal", "upper_deviation", "lower_deviation")):
         width = mean_nominal(*(parameters[name] for name in ("nominal", "upper_deviation", "lower_deviation")))[1]
@@ -274,8 +369,8 @@ def write_measuring(parameters: Parameters, about: Mapping[str, str], values: Ma
     upper = parameters.upper_deviation if parameters.nominal is not None else parameters.tolerance_width / 2
     lower = parameters.lower_deviation if parameters.nominal is not None else -parameters.tolerance_width / 2
     nominal = parameters.nominal if parameters.nominal is not None else parameters.target
-    said = {"tool_memory", "nominal", "upper_deviation", "lower_deviation"}
-    comments = [*describing(about), *settings(parameters, said, implied())]
+    written = {"tool_memory", "nominal", "upper_deviation", "lower_deviation"}
+    comments = [*describing(about), *settings(parameters, written, implied())]
     block = [
         (505, nominal, "NOMINAL"),
         (506, upper or 0.0, "UPPER DEVIATION ES"),
@@ -300,6 +395,7 @@ def _text(
 ) -> str:
     def lines() -> Iterator[str]:
         yield f"({title}, LATHE LINE)"
+        yield from unit_check.fanuc(unit_check.LATHE_LINE_ALARM)
         for comment in comments:
             yield f"({comment})"
         for variable, meaning in VALUES.items():

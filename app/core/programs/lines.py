@@ -1,4 +1,4 @@
-"""What the readers and writers of all controls share: a verdict on every line, numbers, and what R text cannot say.
+"""Shared base of the readers and writers of all controls: line verdicts, numbers, and parameters without R number.
 
 Our parameters hold more than the cycles' R numbers can: the factor, the mode, n of m. What has no R number is written as
 a comment ``(INBAND FACTOR=-1)``, which controls skip and our readers understand, so that nothing is lost on the way.
@@ -9,23 +9,29 @@ import re
 from collections.abc import Container, Iterable, Iterator, Mapping
 from decimal import Decimal
 from enum import StrEnum
-from math import isfinite
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from app.core.number_text import number_or_none, plain
 from app.core.parameters import BY_NAME, FIELDS, Field, Kind, Parameters
 
 MOST_CHARACTERS = 65_536
 MOST_LINES = 4_000
 LONGEST_LINE = 1_000  # no control takes half of it
 NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)"
+MM_PER_INCH = 25.4
+UNIT = re.compile(
+    r"G\s*0*(?:(20|70|700)|21|71|710)(?![\d.])|BEGIN\s+PGM\s+\S+\s+(?:(INCH)|MM)\b", re.IGNORECASE | re.ASCII
+)
+_DIGITS_ONLY = re.compile(r"[+-]?\s*[\w.,]*\d[\d.,\s]*")
+_BLANK_INSIDE = re.compile(r"[\d.,+-]\s+[\d.,]")
 PLAIN = re.compile(r"[ -$&'*-:<-z|~]")  # ASCII that no control takes for the end of a comment; others travel as {D8}
 SETTING = re.compile(r"\s*INBAND\s+([A-Za-z_]+)\s*=(.*)", re.IGNORECASE)
 DESCRIBING = ("characteristic", "name", "part")
 
 
 class Verdict(StrEnum):
-    """What became of a line."""
+    """Verdict on a line."""
 
     UNDERSTOOD = "understood"
     IGNORED = "ignored"
@@ -35,23 +41,31 @@ class Verdict(StrEnum):
 class Note(NamedTuple):
     """Something said about a line or a program: a code with values, worded at the edge.
 
-    Taken: ``assigned``, ``setting``, ``call``, ``result``. Warnings about what was taken: ``r44_for_r34``, ``again``,
-    ``skip_block``, ``not_used``, ``macro``, ``assumed``, ``l75_missing``, ``l75_wins``, ``two_point``,
-    ``no_tool``. Passed over: ``comment``, ``empty``, ``words``, ``computed``. Not understood: ``expression``,
-    ``no_value``, ``placeholder``, ``unknown_r``, ``unknown``, ``too_large``, ``too_long``, ``bad_setting``.
+    Taken: ``assigned``, ``setting``, ``call``, ``result``, ``unit_inch``, ``unit_mm``; of Heidenhain ``cycle``,
+    ``q_assigned``, ``cut_out``, ``as_number``, and the warnings ``q_range``, ``q_missing``, ``tcpm_active``, ``tilted``,
+    ``rotated``, and not understood ``unknown_q``, ``cut_wrong``. Warnings about what was taken:
+    ``r44_for_r34``, ``again``, ``skip_block``, ``not_used``, ``macro``, ``assumed``, ``l75_missing``, ``l75_wins``,
+    ``two_point``, ``no_tool``, ``from_inch``, ``printed_minus``. Passed over: ``comment``, ``empty``, ``words``,
+    ``computed``. Not understood: ``expression``, ``no_value``, ``no_number``, ``blank_in_number``, ``unit_mixed``,
+    ``placeholder``, ``unknown_r``, ``unknown``, ``too_large``, ``too_long``, ``bad_setting``.
     """
 
     code: str
     data: dict[str, Any]
 
 
-TAKEN = frozenset({"assigned", "setting", "call", "result"})
+TAKEN = frozenset(
+    {"assigned", "setting", "call", "result", "unit_inch", "unit_mm", "cycle", "q_assigned", "cut_out", "as_number"}
+    | {"step"}  # of a printed macro
+)
 WARNINGS = frozenset(
     {"r44_for_r34", "again", "skip_block", "not_used", "macro", "assumed", "l75_missing", "l75_wins", "two_point"}
-    | {"no_tool"}  # of the whole program
+    | {"unit_inch", "printed_minus", "q_range", "q_missing", "tcpm_active", "tilted", "rotated"}
+    | {"no_tool", "from_inch", "feeler_range"}  # of the whole program
 )
 NOT_UNDERSTOOD = frozenset(
-    {"expression", "no_value", "placeholder", "unknown_r", "unknown", "too_large", "too_long", "bad_setting"}
+    {"expression", "no_value", "no_number", "blank_in_number", "unit_mixed", "placeholder", "unknown_r", "unknown"}
+    | {"too_large", "too_long", "bad_setting", "unknown_q", "cut_wrong"}
 )
 
 
@@ -65,19 +79,22 @@ class Line(NamedTuple):
 
 
 class ProgramKind(StrEnum):
-    """What a text holds."""
+    """Kind of a program text."""
 
     CALIBRATION = "calibration"
     MEASURING = "measuring"
     ASSIGNMENTS = "assignments"
     RESULTS = "results"
+    KINEMATICS = "kinematics"
+    WORK_ZERO = "work_zero"
 
 
 class Program(NamedTuple):
     """One program of a text. parameters: as `core.parameters.read` takes them, or as a calibration has them.
 
     about: ``characteristic``, ``name`` and ``part``, where the text says them. values: what only the control knows, by
-    its own names. results: what the cycle found, by its own names.
+    its own names. results: what the cycle found, by its own names. All lengths are mm; inch says that the text has them
+    in inches, and that they were converted.
     """
 
     kind: ProgramKind
@@ -88,6 +105,7 @@ class Program(NamedTuple):
     values: dict[str, float]
     results: dict[str, float]
     notes: tuple[Note, ...]
+    inch: bool = False
 
 
 class ProgramText(NamedTuple):
@@ -99,7 +117,14 @@ class ProgramText(NamedTuple):
     @property
     def program(self) -> Program | None:
         """The one that makes a characteristic: the first that measures, else what there is."""
-        order = (ProgramKind.MEASURING, ProgramKind.ASSIGNMENTS, ProgramKind.CALIBRATION, ProgramKind.RESULTS)
+        order = (
+            ProgramKind.MEASURING,
+            ProgramKind.ASSIGNMENTS,
+            ProgramKind.CALIBRATION,
+            ProgramKind.KINEMATICS,
+            ProgramKind.WORK_ZERO,
+            ProgramKind.RESULTS,
+        )
         return min(self.programs, key=lambda program: order.index(program.kind), default=None)
 
 
@@ -133,21 +158,59 @@ def split(text: str) -> list[str]:
 
 def line_of(number: int, text: str, notes: Iterable[Note]) -> Line:
     """The line with the verdict that its notes come to: one word not understood is enough."""
-    said = tuple(notes)
-    codes = {note.code for note in said}
+    line_notes = tuple(notes)
+    codes = {note.code for note in line_notes}
     if codes & NOT_UNDERSTOOD:
-        return Line(number, text, Verdict.NOT_UNDERSTOOD, said)
-    return Line(number, text, Verdict.UNDERSTOOD if codes & TAKEN else Verdict.IGNORED, said)
+        return Line(number, text, Verdict.NOT_UNDERSTOOD, line_notes)
+    return Line(number, text, Verdict.UNDERSTOOD if codes & TAKEN else Verdict.IGNORED, line_notes)
 
 
 def number_in(text: str) -> float | None:
     """The number of a plain piece of text, with point or comma; None when it is beyond any float.
 
-    >>> number_in("0,001"), number_in("+40."), number_in("9" * 400)
-    (0.001, 40.0, None)
+    >>> number_in("0,001"), number_in("-40."), number_in("9" * 400)
+    (0.001, -40.0, None)
     """
-    value = float(text.replace(",", "."))
-    return value + 0.0 if isfinite(value) else None
+    return number_or_none(text)
+
+
+def in_mm(value: float, inch: bool | None) -> float:
+    """A length in mm, converted to the picometre where it is in inches.
+
+    >>> in_mm(1.5748, True), in_mm(40.0, None)
+    (39.99992, 40.0)
+    """
+    return round(value * MM_PER_INCH, 9) + 0.0 if inch else value
+
+
+def says_inch(word: re.Match[str]) -> bool:
+    """Tell inch (G20, G70, G700, BEGIN PGM … INCH) from mm (G21, G71, G710, BEGIN PGM … MM) in a match of `UNIT`."""
+    return bool(word[1] or word[2])
+
+
+def unit_note(word: re.Match[str]) -> Note:
+    """The note on a line that says in which unit the lengths are from there on."""
+    text = re.sub(r"\s+", " " if word[0].upper().startswith("B") else "", word[0]).upper()
+    return Note("unit_inch" if says_inch(word) else "unit_mm", {"word": text[:60]})
+
+
+def mixed(units: Iterable[bool | None]) -> bool:
+    """Tell that lengths of one program were assigned in several units; where nothing is said they are mm.
+
+    >>> mixed([None, False]), mixed([True, True]), mixed([None, True])
+    (False, False, True)
+    """
+    return len({bool(unit) for unit in units}) > 1
+
+
+def no_number(r: str, text: str) -> Note:
+    """The reason why what is assigned to a variable is no number: nothing there, a blank inside, or a calculation."""
+    text = text.strip()
+    if not text:
+        return Note("no_value", {"r": r})
+    if _DIGITS_ONLY.fullmatch(text):
+        return Note("blank_in_number" if _BLANK_INSIDE.search(text) else "no_number", {"r": r, "text": text[:80]})
+    return Note("expression", {"r": r, "text": text[:80]})
 
 
 def written(value: float) -> str:
@@ -201,17 +264,17 @@ def setting_in(comment: str) -> tuple[str, Any] | None:
     >>> setting_in("INBAND FACTOR=-0.5"), setting_in("INBAND ACCEPT=2/3"), setting_in("roughing")
     (('factor', -0.5), ('accept', {'n': 2, 'm': 3}), None)
     """
-    found = SETTING.fullmatch(comment)
-    if found is None:
+    match = SETTING.fullmatch(comment)
+    if match is None:
         return None
-    name, text = found[1].lower(), found[2].strip()
+    name, text = match[1].lower(), match[2].strip()
     if name in DESCRIBING:
         return name, (_unescaped(text).lower() if name == "characteristic" else _unescaped(text)) or None
     if name == "accept":
         parts = re.fullmatch(r"(\d{1,3})\s*/\s*(\d{1,3})", text, re.ASCII)
         return name, {"n": int(parts[1]), "m": int(parts[2])} if parts else None
     field = BY_NAME.get(name)
-    return name, None if field is None else _value(field, text)
+    return name, None if field is None else _value(field, plain(text))
 
 
 def _value(field: Field, text: str) -> Any:
@@ -219,7 +282,7 @@ def _value(field: Field, text: str) -> Any:
         return next((choice for choice in field.choices if choice.upper() == text.upper()), None)
     if field.kind is Kind.YES_NO:
         return {"YES": True, "NO": False}.get(text.upper())
-    return number_in(text) if re.fullmatch(NUMBER, text, re.ASCII) else None
+    return number_or_none(text)
 
 
 def _escaped(text: str) -> str:

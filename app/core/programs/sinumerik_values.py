@@ -3,18 +3,22 @@
 from typing import Any, NamedTuple
 
 from app.core.parameters import BY_NAME, TWO_POINT_SWITCH, Kind, Variant
-from app.core.programs.lines import DESCRIBING, Note, Program, ProgramKind
+from app.core.programs.lines import DESCRIBING, Note, Program, ProgramKind, in_mm, mixed
 
 ONLY_CALIBRATION = ("R21", "R22")
 PROBES = {1: "axial", 2: "radial"}
 RESULTS = ("R43", "R44", "R46", "R47", "R49")
+RESULT_LENGTHS = ("R43", "R44", "R49")
 OF_CALIBRATION = (*ONLY_CALIBRATION, *RESULTS, "points")
 
 
 class Assigned(NamedTuple):
+    """A value as it was assigned, lengths in mm. inch: the unit in effect was the inch; None where nothing said."""
+
     value: Any
     line: int
     r: str | None
+    inch: bool | None = None
 
 
 class Building:
@@ -25,6 +29,7 @@ class Building:
         self.kind: ProgramKind | None = None
         self.called = False
         self.mean_nominal = False
+        self.called_in: list[bool | None] = []  # the unit in effect at each call
         self.assigned: dict[str, Assigned] = {}
 
     def __bool__(self) -> bool:
@@ -40,6 +45,7 @@ class _Assembly:
         self.notes: list[Note] = []
 
     def made(self) -> Program:
+        inch = self._unit()
         results = self._results()
         self._misprint()
         kind = self.built.kind or (ProgramKind.RESULTS if results else ProgramKind.ASSIGNMENTS)
@@ -61,11 +67,32 @@ class _Assembly:
             {},
             results,
             tuple(self.notes),
+            inch,
         )
 
+    def _unit(self) -> bool:
+        """Tell if the lengths were in inches. Lengths of an ambiguous unit are dropped."""
+        lengths = [
+            name for name, assigned in self.values.items() if assigned.r is not None and _is_length(name, self.values)
+        ]
+        if not lengths:
+            return False
+        if mixed([*(self.values[name].inch for name in lengths), *self.built.called_in]):
+            for name in lengths:
+                self._drop(name, "unit_mixed")
+            return False
+        if not self.values[lengths[0]].inch:
+            return False
+        if "index" in lengths:  # R26 along the part: a distance, which only the variant tells
+            index = self.values["index"]
+            self.values["index"] = index._replace(value=in_mm(index.value, True))
+            self._beside("index", "from_inch", value=self.values["index"].value)
+        self.notes.append(Note("from_inch", {}))
+        return True
+
     def _beside(self, name: str, code: str, **data: Any) -> None:
-        each = self.values[name]
-        self.line_notes[each.line - 1].append(Note(code, {"r": each.r or name} | data))
+        assigned = self.values[name]
+        self.line_notes[assigned.line - 1].append(Note(code, {"r": assigned.r or name} | data))
 
     def _drop(self, name: str, code: str = "not_used") -> None:
         if name in self.values:
@@ -73,7 +100,7 @@ class _Assembly:
             del self.values[name]
 
     def _results(self) -> dict[str, float]:
-        """What L92 leaves in R42 to R49. R43, the measured size, tells it from the input of L75."""
+        """Results that L92 leaves in R42 to R49. R43, the measured size, distinguishes them from the input of L75."""
         if "R43" not in self.values:
             for name in ("R46", "R47", "R49"):
                 self._drop(name)
@@ -101,15 +128,15 @@ class _Assembly:
             self._drop("R22")
             probe = None
         self._drop(TWO_POINT_SWITCH)
-        made = self._named()
+        parameters = self._named()
         if size is not None:
-            made["gauge"] = size.value
+            parameters["gauge"] = size.value
         if surface is not None or points is not None:
             free = (surface is None or surface.value == 1) and (points is None or points.value == 0)
-            made["surface"] = "free" if free else "groove"
+            parameters["surface"] = "free" if free else "groove"
         if probe is not None:
-            made["probe"] = PROBES[probe.value]
-        return made
+            parameters["probe"] = PROBES[probe.value]
+        return parameters
 
     def _measuring(self) -> dict[str, Any]:
         for name in ONLY_CALIBRATION:
@@ -123,7 +150,7 @@ class _Assembly:
         return self._named()
 
     def _size(self) -> None:
-        """Which of drawing (L75) and target counts."""
+        """Choose between the size of the drawing (L75) and the target."""
         drawing = ("nominal", "upper_deviation", "lower_deviation")
         direct = ("target", "tolerance_width")
         here = self.values
@@ -146,6 +173,14 @@ class _Assembly:
     def _named(self) -> dict[str, Any]:
         order = [*BY_NAME, *(name for name in self.values if name not in BY_NAME)]
         return {name: _plain(name, self.values[name].value) for name in order if name in self.values}
+
+
+def _is_length(name: str, values: dict[str, Assigned]) -> bool:
+    if name == "index":
+        variant = values.get("variant")
+        return variant is not None and variant.value in (3, Variant.ALONG.value)
+    field = BY_NAME.get(name)
+    return name in RESULT_LENGTHS or (field is not None and field.kind is Kind.LENGTH)
 
 
 def _plain(name: str, value: Any) -> Any:

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from app.core.parameters import BY_R, FIELDS, TWO_POINT_SWITCH, Kind, Parameters, Variant
+from app.core.programs import unit_check
 from app.core.programs.lines import describing, settings, written
 
 FIRST_BLOCK = ("R04", "R10", "R11", "R23", "R24", "R25", "R26", "R27", "R28", "R29", "R30", "R31")
@@ -13,7 +14,7 @@ SECOND_BLOCK = ("R32", "R33", "R34", "R35", "R36", "R37", "R40", "R41", "R42")
 def write_measuring(parameters: Parameters, about: Mapping[str, str]) -> str:
     """The measuring subprogram L15 of a characteristic; `read` makes the same parameters of it."""
     values = _r_values(parameters)
-    said = {BY_R.get(r, r) for r in values} | ({"variant"} if TWO_POINT_SWITCH in values else set())
+    written = {BY_R.get(r, r) for r in values} | ({"variant"} if TWO_POINT_SWITCH in values else set())
     extra = sorted(values.keys() - {*FIRST_BLOCK, *SECOND_BLOCK})
     blocks = [
         _assignments(values, (*FIRST_BLOCK, *extra)),
@@ -22,11 +23,11 @@ def write_measuring(parameters: Parameters, about: Mapping[str, str]) -> str:
         "L93",
         "M17",
     ]
-    return _text("L15", "MEASURING SUBPROGRAM", [*describing(about), *settings(parameters, said)], blocks)
+    return _text("L15", "MEASURING SUBPROGRAM", [*describing(about), *settings(parameters, written)], blocks)
 
 
 def _r_values(parameters: Parameters) -> dict[str, float]:
-    """What has an R number and a number to go with it. R32 and R35 follow from the drawing (L75) where there is one."""
+    """Values of the parameters that have an R number. R32 and R35 follow from the drawing (L75) where there is one."""
     values: dict[str, float] = {}
     for field in FIELDS:
         value = getattr(parameters, field.name)
@@ -47,7 +48,7 @@ def _r_values(parameters: Parameters) -> dict[str, float]:
 
 
 class Calibration(NamedTuple):
-    """What the calibration subprogram L05 says. gauge: R32, mm; free: on a free surface, else in the reference groove."""
+    """Content of the calibration subprogram L05. gauge: R32, mm; free: on a free surface, else in the reference groove."""
 
     parameters: Parameters
     gauge: float
@@ -84,6 +85,7 @@ def _assignments(values: Mapping[str, float], names: tuple[str, ...]) -> str:
 def _text(head: str, title: str, comments: list[str], blocks: list[str]) -> str:
     def lines() -> Iterator[str]:
         yield f"{head} ({title})"
+        yield f"({unit_check.said('G71')})"
         for comment in comments:
             yield f"({comment})"
         for place, block in enumerate(blocks, start=1):

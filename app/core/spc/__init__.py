@@ -6,6 +6,7 @@ Constants are computed (`constants`), results are frozen and say where they come
 readings is refused with a `Refusal` that says how many are missing.
 
     constants    d2, d3, c4 and the factors of control charts, for any subgroup size
+    variation    spread or rounding noise: the one threshold of no variation
     spread       estimates of sigma, each with its degrees of freedom
     shewhart     individuals, moving range, X-bar, R and S charts, unequal subgroups too
     ewma         exponentially weighted and plain moving averages
@@ -19,3 +20,6 @@ readings is refused with a `Refusal` that says how many are missing.
     normality    Anderson-Darling, Shapiro-Wilk
     gauge        type 1, bias, linearity, gauge R&R, and what they say about R33
 """
+
+USUAL_READINGS = 1000
+"""The default window of every index, in all rooms: the last so many readings, as many as percentiles want."""

@@ -24,7 +24,9 @@ from scipy.special import bdtrc, gammaincinv, ndtr, ndtri
 from app.core.spc.constants import NODES, WEIGHTS
 from app.core.spc.normality import FEWEST_FOR_ANDERSON, anderson_darling
 from app.core.spc.refusal import Floats, Reason, Refused, checked
+from app.core.spc.resolution import must_resolve
 from app.core.spc.spread import Estimator, Sigma, mean_of, moving_range, overall
+from app.core.spc.variation import varies
 
 FEWEST_READINGS = 20
 """Below it there is no index at all: with 20 readings the interval of Cp already reaches from 0.69 to 1.31 of it."""
@@ -37,13 +39,14 @@ BELOW, ABOVE = 0.00135, 0.99865
 
 
 class Caution(StrEnum):
-    """What a number should not be read without."""
+    """Caution that belongs to a number."""
 
     FEW_READINGS = "few_readings"
     NOT_IN_CONTROL = "not_in_control"
     NOT_NORMAL = "not_normal"
     FEW_FOR_PERCENTILES = "few_for_percentiles"
     COMPENSATED = "compensated"
+    COARSE = "coarse"
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +110,9 @@ def capability(
     """All indices. `within`: sigma from subgroups; without it the mean moving range gives it.
 
     `cautions`: what the caller knows (a compensated process, a chart of its own that is out of control); passed on with what
-    is found here: few readings, more of them beyond 3 sigma than chance explains, a distribution that is not normal.
+    is found here: few readings, a step between them that is coarse, more of them beyond 3 sigma than chance explains, a distribution that is not normal.
+
+    Raises `Refused` for too few readings, and for those that do not vary or are too coarse to tell of a spread.
 
     >>> c = capability([10, 12, 11, 13, 12], Limits(6, 16), minimum=5)
     >>> round(c.cp.value, 4), round(c.cpk.value, 4), round(c.pp.value, 4), round(c.ppk.value, 4)
@@ -118,15 +123,19 @@ def capability(
     x = checked(values, at_least=max(2, minimum))
     mean, total = mean_of(x), overall(x)
     inner = within or moving_range(x)
-    if not (inner.value > 0 and total.value > 0):
+    numbers = [limit for limit in (limits.lower, limits.upper) if limit is not None]
+    if not (varies(total.value, x, numbers) and varies(inner.value, x, numbers)):
         raise Refused(Reason.NO_VARIATION)
-    found = [*cautions]
+    resolution = must_resolve(x, scale=max(map(abs, numbers)))
+    warnings = [*cautions]
+    if resolution.coarse(inner.value, None if len(numbers) < 2 else numbers[1] - numbers[0]):
+        warnings.append(Caution.COARSE)
     if len(x) < ENOUGH_READINGS:
-        found.append(Caution.FEW_READINGS)
+        warnings.append(Caution.FEW_READINGS)
     if not in_control(x, mean, inner):
-        found.append(Caution.NOT_IN_CONTROL)
+        warnings.append(Caution.NOT_IN_CONTROL)
     if not looks_normal(x):
-        found.append(Caution.NOT_NORMAL)
+        warnings.append(Caution.NOT_NORMAL)
     return Capability(
         readings=len(x),
         mean=mean,
@@ -141,7 +150,7 @@ def capability(
         ppm_within=expected_ppm(limits, mean, inner.value),
         ppm_overall=expected_ppm(limits, mean, total.value),
         ppm_observed=observed_ppm(limits, x),
-        cautions=tuple(dict.fromkeys(found)),
+        cautions=tuple(dict.fromkeys(warnings)),
     )
 
 
@@ -281,13 +290,13 @@ def observed_ppm(limits: Limits, values: Floats) -> float:
 
 
 def in_control(values: Floats, mean: float, within: Sigma) -> bool:
-    """Whether no more readings lie beyond 3 sigma than chance brings in 999 of 1000 cases (binomial, 0.27 % each)."""
+    """True if no more readings lie beyond 3 sigma than chance brings in 999 of 1000 cases (binomial, 0.27 % each)."""
     beyond = int((np.abs(values - mean) > 3 * within.value).sum())
     return float(bdtrc(beyond - 1, len(values), 2 * ndtr(-3.0))) > 0.001
 
 
 def looks_normal(values: Floats) -> bool:
-    """Whether Anderson-Darling leaves p >= 0.005, on at most 5000 readings taken evenly: of more, rounding alone would be seen."""
+    """True if Anderson-Darling leaves p >= 0.005, on at most 5000 readings taken evenly: of more, rounding alone would be seen."""
     if len(values) < FEWEST_FOR_ANDERSON:
         return True
     at = np.linspace(0, len(values) - 1, min(len(values), 5000)).round().astype(np.int64)
@@ -331,9 +340,10 @@ def percentile(values: ArrayLike, limits: Limits, *, minimum: int = ENOUGH_READI
     (1000, 1.503)
     """
     x = checked(values, at_least=max(2, minimum))
-    low, median, high = (float(each) for each in np.quantile(x, [BELOW, 0.5, ABOVE], method="median_unbiased"))
+    low, median, high = (float(quantile) for quantile in np.quantile(x, [BELOW, 0.5, ABOVE], method="median_unbiased"))
+    must_resolve(x, scale=max(abs(limit) for limit in (limits.lower, limits.upper) if limit is not None))
     if not low < median < high:
-        raise Refused(Reason.NO_VARIATION)
+        raise Refused(Reason.UNRESOLVED)
     pp, ppk = of_percentiles(low, median, high, limits)
     return PercentileCapability(
         readings=len(x),

@@ -1,4 +1,4 @@
-"""How often a rule fires though nothing has happened: on independent, normally distributed points about the right centre.
+"""False alarms of a rule: on independent, normally distributed points about the right centre.
 
 Two numbers. *Per window*: the probability that any n points in a row show the pattern, as Nelson tabulates it (Interpreting
 Shewhart X-bar control charts, J. Qual. Technol. 17 (1985) 114-116). *Average run length*: after how many points the first
@@ -27,7 +27,7 @@ MOST_STATES = 60_000
 
 @dataclass(frozen=True, slots=True)
 class Chance:
-    """How often one rule fires by chance."""
+    """Rate at which one rule fires by chance."""
 
     rule: RuleName
     per_window: float
@@ -36,7 +36,7 @@ class Chance:
 
 @cache
 def chance(rule: Rule) -> Chance:
-    """What a rule does on a process that is in control.
+    """Rate at which a rule fires on a process that is in control.
 
     >>> from app.core.spc.rules import RULES
     >>> nelson_2 = chance(RULES[RuleName.NELSON_2])
@@ -74,7 +74,7 @@ def per_window(rule: Rule) -> float:
 
 
 def _zigzag(n: int) -> int:
-    """How many orders of n values alternate, beginning with a rise (Euler's zigzag numbers), by Seidel's triangle."""
+    """Number of orders of n values that alternate, beginning with a rise (Euler's zigzag numbers), by Seidel's triangle."""
     row = [1]
     for _ in range(n - 1):
         sums = [0]
@@ -85,7 +85,7 @@ def _zigzag(n: int) -> int:
 
 
 def average_run_length(rules: Iterable[Rule], shift: float = 0.0) -> float:
-    """How many points on average until the first of these rules fires; `shift` of the mean in sigma.
+    """Average number of points until the first of these rules fires; `shift` of the mean in sigma.
 
     Raises `Refused` with rules that look at steps, or with so many that the chain would not end.
 
@@ -119,6 +119,8 @@ def average_run_length(rules: Iterable[Rule], shift: float = 0.0) -> float:
         if len(todo) > MOST_STATES:
             raise Refused(Reason.BEYOND_RANGE)
     count = len(todo)
+    if (np.bincount(rows, shares, minlength=count) >= 1.0).all():  # no state ends within what numbers resolve
+        return float("inf")
     chain = csc_array((shares, (rows, columns)), shape=(count, count))
     lengths = spsolve(csc_array(eye_array(count)) - chain, np.ones(count))
     return float(np.atleast_1d(lengths)[0])
@@ -128,7 +130,7 @@ Memory = tuple[tuple[int, int], ...]
 
 
 def _after(rules: tuple[Rule, ...], state: Memory, value: float) -> Memory | None:
-    """What the rules remember after a point at `value`; None when one of them fires."""
+    """Memory of the rules after a point at `value`; None when one of them fires."""
     result = []
     for rule, (first, second) in zip(rules, state, strict=True):
         if rule.kind is Kind.BEYOND:
@@ -163,7 +165,7 @@ def _steps_length(rule: Rule, nodes: int = 24) -> float:
         return 2.0
     x, weights = np.polynomial.legendre.leggauss(nodes)
     integrals = [
-        np.polynomial.legendre.legval(x, np.polynomial.legendre.legint(each, lbnd=-1)) / 2 for each in np.eye(nodes)
+        np.polynomial.legendre.legval(x, np.polynomial.legendre.legint(basis, lbnd=-1)) / 2 for basis in np.eye(nodes)
     ]
     # From values at the nodes to integrals from 0 to each node, from each node to 1, over all; and to f(1 - u).
     below = np.stack(integrals, axis=1) @ np.linalg.inv(np.polynomial.legendre.legvander(x, nodes - 1))

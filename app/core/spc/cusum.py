@@ -5,13 +5,14 @@ In standard units z = (x - target)/sigma: C+_i = max(0, C+_(i-1) + z_i - k), C-_
 """
 
 from dataclasses import dataclass
-from math import sqrt
+from math import exp, inf, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr
 
 from app.core.compiled import compiled
+from app.core.spc.ewma import LONGEST_SOLVED
 from app.core.spc.refusal import Floats, checked
 from app.core.spc.shewhart import Baseline
 
@@ -47,11 +48,11 @@ class Cusum:
 
     @property
     def outside(self) -> NDArray[np.bool_]:
-        """Which points have a sum above the limit."""
+        """Mask of the points where a sum is above the limit."""
         return (self.above > self.limit) | (self.below > self.limit)
 
     def new_mean(self, at: int) -> float | None:
-        """Where the process probably is since its sum left 0: target +/- (K + C/N). None without a signal there.
+        """Probable mean of the process since its sum left 0: target +/- (K + C/N). None without a signal there.
 
         >>> from app.core.spc.shewhart import given
         >>> x = [10.90, 9.33, 12.29, 11.50, 10.60, 11.08, 10.38, 11.62, 11.31]
@@ -95,9 +96,13 @@ def cusum(
 def _one_sided(k: float, h: float, shift: float, start: float) -> tuple[float, float]:
     """Run lengths of the upper sum alone from 0 and from `start`: the integral equation of Page, by Gauss-Legendre.
 
-    L(u) = 1 + L(0) Phi(k - u - shift) + integral over 0..h of L(x) phi(x + k - u - shift).
+    L(u) = 1 + L(0) Phi(k - u - shift) + integral over 0..h of L(x) phi(x + k - u - shift). Infinite where Siegmund's
+    approximation, (exp(2db) - 2db - 1)/(2d^2) with d = k - shift and b = h + 1.166, is beyond `LONGEST_SOLVED`.
     """
-    nodes = int(32 + 8 * h)
+    d, b = k - shift, h + 1.166
+    if d > 0 and (2 * d * b > 100 or exp(2 * d * b) / (2 * d * d) > LONGEST_SOLVED):
+        return inf, inf
+    nodes = int(32 + 3 * h)
     x, weights = np.polynomial.legendre.leggauss(nodes)
     x, weights = h * (x + 1) / 2, h / 2 * weights
     at = np.concatenate(([0.0, start], x))
@@ -106,14 +111,16 @@ def _one_sided(k: float, h: float, shift: float, start: float) -> tuple[float, f
     kernel[:, 0] = ndtr(k - at - shift)
     kernel[:, 2:] = np.exp(-distance * distance / 2) / sqrt(2 * np.pi) * weights
     lengths = np.linalg.solve(np.eye(len(at)) - kernel, np.ones(len(at)))
+    if not 0 < lengths[0] < LONGEST_SOLVED:
+        return inf, inf
     return float(lengths[0]), float(lengths[1])
 
 
 def average_run_length(k: float, h: float, shift: float = 0.0, headstart: float = 0.0) -> float:
-    """How many points on average until one of both sums is above h; `shift` of the mean in sigma.
+    """Average number of points until one of both sums is above h; `shift` of the mean in sigma.
 
     Both sides are put together as Lucas and Crosier do (Technometrics 24, 1982):
-    L = (L+(S) L-(0) + L-(S) L+(0) - L+(0) L-(0)) / (L+(0) + L-(0)).
+    L = (L+(S) L-(0) + L-(S) L+(0) - L+(0) L-(0)) / (L+(0) + L-(0)). Infinite beyond `LONGEST_SOLVED`.
 
     >>> round(average_run_length(0.5, 5)), round(average_run_length(0.5, 5, shift=1.0), 1)
     (465, 10.4)
@@ -122,4 +129,6 @@ def average_run_length(k: float, h: float, shift: float = 0.0, headstart: float 
     """
     up, up_started = _one_sided(k, h, shift, headstart)
     down, down_started = _one_sided(k, h, -shift, headstart)
+    if inf in {up, down}:
+        return inf if up == down else up_started if down == inf else down_started
     return (up_started * down + down_started * up - up * down) / (up + down)

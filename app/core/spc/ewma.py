@@ -5,7 +5,7 @@ exact limits widen with i, the asymptotic ones leave out the last factor (NIST/S
 average of the measuring cycles (R29 = k) is the same recursion with lambda = 1/k.
 """
 
-from math import sqrt
+from math import ceil, inf, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,10 @@ from scipy.special import ndtr
 from app.core.compiled import compiled
 from app.core.spc.refusal import Floats, Reason, Refused, checked
 from app.core.spc.shewhart import Baseline, Chart, ControlChart
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
+LONGEST_SOLVED = 1e12
+"""Average run lengths beyond it are lost in the rounding of the equation that gives them: its condition is the length."""
 
 
 @compiled
@@ -72,10 +76,11 @@ def moving_average(baseline: Baseline, values: ArrayLike, span: int = 5) -> Cont
     if span < 2:
         raise ValueError(f"a moving average spans at least 2 readings, not {span}")
     x = checked(values)
-    summed = np.concatenate(([0.0], np.cumsum(x - baseline.centre)))
+    away, summed = x - baseline.centre, np.zeros(len(x))
+    for lag in range(min(span, len(x))):  # not from a running sum: a point may not depend on where the readings begin
+        summed[lag:] += away[: len(x) - lag]
     count = np.minimum(np.arange(1, len(x) + 1), span)
-    last = np.arange(1, len(x) + 1)
-    points = baseline.centre + (summed[last] - summed[last - count]) / count
+    points = baseline.centre + summed / count
     return _chart(Chart.MOVING_AVERAGE, baseline, points, baseline.sigma.value / np.sqrt(count))
 
 
@@ -89,10 +94,11 @@ def _chart(chart: Chart, baseline: Baseline, points: Floats, deviation: Floats) 
 
 
 def average_run_length(weight: float, width: float, shift: float = 0.0) -> float:
-    """How many points on average until the EWMA leaves its asymptotic limits; `shift` of the mean in sigma.
+    """Average number of points until the EWMA leaves its asymptotic limits; `shift` of the mean in sigma.
 
     Solves Crowder's integral equation L(u) = 1 + 1/lambda * integral of L(y) phi((y - (1 - lambda)u)/lambda - shift)
-    over the limits (Technometrics 29, 1987), with as many Gauss-Legendre nodes as its narrowness asks for.
+    over the limits (Technometrics 29, 1987), by Gauss-Legendre in pieces. Infinite where
+    it is so long that sixteen digits cannot solve the equation (`LONGEST_SOLVED`).
 
     >>> round(average_run_length(0.1, 2.814)), round(average_run_length(0.1, 2.814, shift=1.0), 1)
     (500, 10.3)
@@ -101,13 +107,19 @@ def average_run_length(weight: float, width: float, shift: float = 0.0) -> float
     if weight == 1:
         return 1 / (ndtr(-width - shift) + ndtr(-width + shift))
     limit = width * sqrt(weight / (2 - weight))
-    nodes = int(min(2000, 32 + 12 * limit / weight))
+    # The first exit is no earlier than that of independent points: no equation is set up for what it could not solve.
+    if 1 / (2 * (ndtr(-width - shift) + ndtr(-width + shift))) > LONGEST_SOLVED:
+        return inf
     if limit / weight > 1e3:
         raise Refused(Reason.BEYOND_RANGE)
-    x, weights = np.polynomial.legendre.leggauss(nodes)
-    y, weights = limit * x, limit * weights
+    pieces = ceil(limit / (4 * weight))  # each 8 deviations of a reading wide, or less
+    middles = limit * (2 * np.arange(pieces) + 1 - pieces) / pieces
+    y = (middles[:, None] + limit / pieces * NODES).reshape(-1)
+    weights = limit / pieces * np.tile(WEIGHTS, pieces)
+    nodes = len(y)
     distance = (y - (1 - weight) * y[:, None]) / weight - shift
     kernel = np.exp(-distance * distance / 2) / sqrt(2 * np.pi) / weight * weights
     lengths = np.linalg.solve(np.eye(nodes) - kernel, np.ones(nodes))
     first = y / weight - shift
-    return float(1 + (np.exp(-first * first / 2) / sqrt(2 * np.pi) / weight * weights) @ lengths)
+    length = float(1 + (np.exp(-first * first / 2) / sqrt(2 * np.pi) / weight * weights) @ lengths)
+    return length if 0 < length < LONGEST_SOLVED else inf

@@ -1,4 +1,4 @@
-"""How often what is watched fires though nothing has happened: several rules together, and the limits of any chart.
+"""False alarms of all that is watched: several rules together, and the limits of any chart.
 
 As in `chance`, for independent, normally distributed readings about the right centre with the right sigma. Where no exact
 number is known, `exact` is False and the number is what follows from the rates of the parts.
@@ -14,42 +14,53 @@ from scipy.special import chdtr, ndtr
 
 from app.core.spc import cusum, ewma
 from app.core.spc.chance import STEPS, average_run_length, chance
-from app.core.spc.constants import c4, d2, d3
-from app.core.spc.points import Drawn
+from app.core.spc.constants import c4, d2, d3, range_at_most
+from app.core.spc.points import ChartSettings
 from app.core.spc.refusal import Floats, Refused
 from app.core.spc.rules import RULES, Rule, RuleName
 from app.core.spc.shewhart import Chart
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(200)
+LONGEST = 1e9
+"""Points: rarer than once in so many is not told apart. A process of a part per second takes thirty years for them, and
+the equations behind the longer run lengths cannot be solved with sixteen digits."""
 FARTHEST = 9.0  # sigma; beyond it lies nothing
 
 
 class FalseAlarms(NamedTuple):
-    """How many points there are on average from one signal to the next; infinite where nothing is watched."""
+    """Average number of points from one signal to the next; infinite where nothing is watched.
+
+    `LONGEST`, and not exact: so many or more.
+    """
 
     every: float
     exact: bool = True
 
+    @property
+    def rarely(self) -> bool:
+        """Once in `LONGEST` points, or less often."""
+        return LONGEST <= self.every < float("inf")
+
     def expected(self, points: int) -> float:
-        """How many signals so many points bring by chance."""
+        """Number of signals that so many points bring by chance."""
         return points / self.every
 
 
-def by_chance(drawn: Drawn, names: Iterable[RuleName], size: int = 1) -> FalseAlarms:
+def by_chance(settings: ChartSettings, names: Iterable[RuleName], size: int = 1) -> FalseAlarms:
     """Of a chart that these rules watch together; of a chart whose limits alone have a meaning, of these. size: of subgroups.
 
     >>> western = [RuleName.NELSON_1, RuleName.NELSON_5, RuleName.NELSON_6, RuleName.WESTERN_4]
-    >>> round(by_chance(Drawn(Chart.INDIVIDUALS), western).every, 2)
+    >>> round(by_chance(ChartSettings(Chart.INDIVIDUALS), western).every, 2)
     91.75
-    >>> round(by_chance(Drawn(Chart.CUSUM), [RuleName.NELSON_1]).every)
+    >>> round(by_chance(ChartSettings(Chart.CUSUM), [RuleName.NELSON_1]).every)
     465
     """
     watched = tuple(sorted(set(names)))
     if not watched:
         return FalseAlarms(float("inf"))
-    if drawn.chart in {Chart.INDIVIDUALS, Chart.XBAR}:
-        return together(tuple(_at(name, drawn.width) for name in watched))
-    return of_limits(drawn, size)
+    if settings.chart in {Chart.INDIVIDUALS, Chart.XBAR}:
+        return together(tuple(_at(name, settings.width) for name in watched))
+    return of_limits(settings, size)
 
 
 def _at(name: RuleName, width: float) -> Rule:
@@ -71,26 +82,34 @@ def together(rules: tuple[Rule, ...]) -> FalseAlarms:
     except Refused:
         rate, exact = sum(1 / average_run_length([rule]) for rule in plain), False
     rate += sum(1 / chance(rule).average_run_length for rule in steps)
-    return FalseAlarms(1 / rate, exact)
+    return _at_rate(rate, exact=exact)
 
 
 @cache
-def of_limits(drawn: Drawn, size: int = 1) -> FalseAlarms:
+def of_limits(settings: ChartSettings, size: int = 1) -> FalseAlarms:
     """Points of a chart beyond its limits, those in a row counted as one where neighbours share readings."""
-    match drawn.chart:
+    match settings.chart:
         case Chart.EWMA:
-            return FalseAlarms(ewma.average_run_length(drawn.weight, drawn.width))
+            return _once_in(ewma.average_run_length(settings.weight, settings.width))
         case Chart.CUSUM:
-            return FalseAlarms(cusum.average_run_length(drawn.reference, drawn.limit, headstart=drawn.headstart))
+            return _once_in(cusum.average_run_length(settings.reference, settings.limit, headstart=settings.headstart))
         case Chart.MOVING_RANGE:
-            return FalseAlarms(1 / _moving_ranges(drawn.width), exact=False)
+            return _at_rate(_moving_ranges(settings.width), exact=False)
         case Chart.MOVING_AVERAGE:
-            return FalseAlarms(1 / _moving_averages(drawn.width, drawn.span), exact=False)
+            return _at_rate(_moving_averages(settings.width, settings.span), exact=False)
         case Chart.RANGES:
-            return FalseAlarms(1 / _ranges(drawn.width, size))
+            return _at_rate(_ranges(settings.width, size))
         case Chart.DEVIATIONS:
-            return FalseAlarms(1 / _deviations(drawn.width, size))
-    return FalseAlarms(1 / float(2 * ndtr(-drawn.width)))
+            return _at_rate(_deviations(settings.width, size))
+    return _at_rate(float(2 * ndtr(-settings.width)))
+
+
+def _once_in(length: float, *, exact: bool = True) -> FalseAlarms:
+    return FalseAlarms(length, exact) if length < LONGEST else FalseAlarms(LONGEST, exact=False)
+
+
+def _at_rate(rate: float, *, exact: bool = True) -> FalseAlarms:
+    return _once_in(1 / rate if rate > 0 else LONGEST, exact=exact)
 
 
 def _density(x: Floats) -> Floats:
@@ -118,13 +137,10 @@ def _moving_averages(width: float, span: int) -> float:
 
 
 def _ranges(width: float, size: int) -> float:
-    """Range of n values beyond d2 -/+ width d3: P(R <= w) = n * integral of phi(x) (Phi(x + w) - Phi(x))^(n-1)."""
-    x, weights = FARTHEST * NODES, FARTHEST * WEIGHTS
-
-    def up_to(reach: float) -> float:
-        return float(size * (weights * _density(x)) @ (ndtr(x + reach) - ndtr(x)) ** (size - 1))
-
-    return 1 - up_to(d2(size) + width * d3(size)) + up_to(max(0.0, d2(size) - width * d3(size)))
+    """Range of n values beyond d2 -/+ width d3."""
+    mean, reach = d2(size), width * d3(size)
+    below, above = range_at_most(np.array([max(0.0, mean - reach), mean + reach]), size)
+    return float(1 - above + below)
 
 
 def _deviations(width: float, size: int) -> float:

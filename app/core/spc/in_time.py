@@ -1,4 +1,4 @@
-"""How a process behaves in time: the time-dependent distribution models A1 to D of ISO 22514-2, chosen by tests.
+"""Behaviour of a process in time: the time-dependent distribution models A1 to D of ISO 22514-2, chosen by tests.
 
 Readings are looked at in subgroups of neighbours, because what changes with time changes between them, not inside. The
 eight models say whether the mean stays (constant), wanders (random) or is driven (systematic: wear, saw-tooth of corrections),
@@ -37,6 +37,7 @@ from scipy.special import fdtrc, ndtr
 
 from app.core.spc.capability import looks_normal
 from app.core.spc.refusal import Floats, Reason, Refused, checked
+from app.core.spc.variation import varies
 
 ALPHA = 0.01
 SIZE = 5
@@ -75,7 +76,7 @@ class Model(StrEnum):
 
 
 class Location(StrEnum):
-    """What the mean does."""
+    """Behaviour of the mean."""
 
     CONSTANT = "constant"
     RANDOM = "random"
@@ -93,7 +94,7 @@ class Test(NamedTuple):
 
     @property
     def significant(self) -> bool:
-        """Whether chance explains it no longer."""
+        """True if chance no longer explains it."""
         return self.p_value < ALPHA
 
 
@@ -140,7 +141,7 @@ def in_time(values: ArrayLike) -> InTime:
         starts = np.arange(many) * SIZE
     groups = x[starts[:, None] + np.arange(SIZE)]
     within = groups - groups.mean(axis=1, keepdims=True)
-    if not float((within**2).sum()) > 0:
+    if not varies(float(within.std()), x):
         raise Refused(Reason.NO_VARIATION)
     parts = decompose(list(groups), starts + (SIZE - 1) / 2)
     scatter = brown_forsythe(_differences(groups))
@@ -198,17 +199,20 @@ def decompose(groups: Sequence[ArrayLike], at: ArrayLike) -> Parts:
     >>> parts.between, parts.regression, parts.lack_of_fit, parts.within, parts.slope
     (28.0, 25.0, 3.0, 1.5, 2.5)
     """
-    taken = [checked(group) for group in groups]
-    sizes = np.array([len(group) for group in taken])
-    k, n = len(taken), int(sizes.sum())
-    if k < 3 or n <= k:
-        raise Refused(Reason.TOO_FEW_SUBGROUPS, have=k, needed=3)
+    arrays = [np.asarray(group, dtype=np.float64) for group in groups]
+    sizes = np.array([len(group) for group in arrays])
+    k, n = len(sizes), int(sizes.sum())
+    if k < 3 or n <= k or not sizes.all():
+        raise Refused(Reason.TOO_FEW_SUBGROUPS, have=int((sizes > 0).sum()), needed=3)
+    values, first = checked(np.concatenate(arrays)), np.cumsum(sizes) - sizes
     # Around the middle of all, so that a large common offset costs no digits.
-    grand = float(sum(group.sum() for group in taken)) / n
-    means = np.array([float((group - grand).mean()) for group in taken])
+    values = values - float(values.mean())
+    means = np.add.reduceat(values, first) / sizes
+    left = values - np.repeat(means, sizes)
+    within = float(left @ left)
     means -= float(sizes @ means) / n
-    within = sum(float(((group - group.mean()) ** 2).sum()) for group in taken)
     between = float(sizes @ means**2)
+    reach = float(np.abs(values).max())
     places = np.asarray(at, dtype=np.float64)
     off = places - float(sizes @ places) / n
     squares = float(sizes @ off**2)
@@ -220,40 +224,40 @@ def decompose(groups: Sequence[ArrayLike], at: ArrayLike) -> Parts:
         between - regression,
         within,
         slope,
-        _f(between, k - 1, within, n - k),
-        _f(regression, 1, within, n - k),
-        _f(between - regression, k - 2, within, n - k),
-        _f(regression, 1, between - regression, k - 2),
+        _f(between, k - 1, within, n - k, reach),
+        _f(regression, 1, within, n - k, reach),
+        _f(between - regression, k - 2, within, n - k, reach),
+        _f(regression, 1, between - regression, k - 2, reach),
     )
 
 
-def _f(squares: float, freedom: int, error: float, freedom_error: int) -> Test:
-    if freedom <= 0 or not error > 0:
+def _f(squares: float, freedom: int, error: float, freedom_error: int, reach: float) -> Test:
+    if freedom <= 0 or not (error > 0 and varies(sqrt(error / freedom_error), reach)):
         return Test(nan, nan, freedom, freedom_error)
     ratio = (squares / freedom) / (error / freedom_error)
     return Test(ratio, float(fdtrc(freedom, freedom_error, ratio)), freedom, freedom_error)
 
 
 def brown_forsythe(groups: Sequence[ArrayLike]) -> Test:
-    """Whether groups scatter alike: analysis of variance of the distances from the median of each group.
+    """Test if groups have the same standard deviation: analysis of variance of the distances from the median of each group.
 
     >>> test = brown_forsythe([[1.0, 2.0, 3.0, 4.0], [1.0, 5.0, 9.0, 13.0]])
     >>> round(test.statistic, 4), (test.freedom, test.freedom_error)
     (6.3529, (1, 6))
     """
-    taken = [checked(group) for group in groups]
-    away = [np.abs(group - np.median(group)) for group in taken]
+    arrays = [checked(group) for group in groups]
+    away = [np.abs(group - np.median(group)) for group in arrays]
     n, k = sum(len(group) for group in away), len(away)
     if k < 2 or n <= k:
         raise Refused(Reason.TOO_FEW_SUBGROUPS, have=k, needed=2)
     grand = float(sum(group.sum() for group in away)) / n
     between = sum(len(group) * (float(group.mean()) - grand) ** 2 for group in away)
     within = sum(float(((group - group.mean()) ** 2).sum()) for group in away)
-    return _f(between, k - 1, within, n - k)
+    return _f(between, k - 1, within, n - k, max(float(np.abs(group).max()) for group in arrays))
 
 
 def successive(values: ArrayLike) -> Test:
-    """Whether values follow each other: von Neumann's C = 1 - sum (x_i+1 - x_i)^2 / (2 sum (x - mean)^2), 0 by chance.
+    """Test if values follow each other: von Neumann's C = 1 - sum (x_i+1 - x_i)^2 / (2 sum (x - mean)^2), 0 by chance.
 
     Its standard error is sqrt((n - 2)/(n^2 - 1)) (Young 1941); one-sided: only values that are near to their neighbours
     count, as those of a drift or a saw-tooth are.
@@ -265,7 +269,7 @@ def successive(values: ArrayLike) -> Test:
     x = checked(values, at_least=4)
     left = x - x.mean()
     squares = float(left @ left)
-    if not squares > 0:
+    if not varies(sqrt(squares / len(x)), x):
         return Test(nan, nan)
     n, steps = len(x), np.diff(x)
     c = 1 - float(steps @ steps) / (2 * squares)
@@ -289,7 +293,7 @@ def _evened(groups: Floats) -> Floats:
 
 
 def _location(parts: Parts, line: Test, following: Test) -> Location:
-    """What the mean does. A line is seen before the analysis of variance sees it, so it counts by itself."""
+    """Behaviour of the mean. A line is seen before the analysis of variance sees it, so it counts by itself."""
     if not (parts.means.significant or line.significant):
         return Location.CONSTANT
     if not (line.significant or following.significant):

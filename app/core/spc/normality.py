@@ -1,4 +1,4 @@
-"""Whether readings look normal: Anderson-Darling with the mean and sigma of the readings, and Shapiro-Wilk.
+"""Tests of normality: Anderson-Darling with the mean and sigma of the readings, and Shapiro-Wilk.
 
 A test can speak against normality, never for it: with few readings hardly anything is rejected, with very many everything
 is, because readings are rounded. What follows from a small p is the percentile method (`capability.percentile`), not doubt in the readings.
@@ -13,6 +13,7 @@ from scipy.special import log_ndtr
 
 from app.core.spc.refusal import Reason, Refused, checked
 from app.core.spc.spread import summary
+from app.core.spc.variation import varies
 
 FEWEST_FOR_ANDERSON = 8  # D'Agostino and Stephens: their approximation holds from here on
 FEWEST_FOR_SHAPIRO = 3
@@ -40,7 +41,7 @@ def anderson_darling(values: ArrayLike) -> Normality:
     """
     x = checked(values, at_least=FEWEST_FOR_ANDERSON)
     numbers = summary(x)
-    if not numbers.standard_deviation:
+    if not numbers.standard_deviation or not varies(numbers.standard_deviation, x):
         raise Refused(Reason.NO_VARIATION)
     z = np.sort((x - numbers.mean) / numbers.standard_deviation)
     n = len(z)
@@ -74,9 +75,9 @@ def shapiro_wilk(values: ArrayLike) -> Normality:
     x = checked(values, at_least=FEWEST_FOR_SHAPIRO)
     if len(x) > MOST_FOR_SHAPIRO:
         raise Refused(Reason.BEYOND_RANGE, have=len(x), needed=MOST_FOR_SHAPIRO)
-    if x.min() == x.max():
+    if not varies(float(np.ptp(x)), x):
         raise Refused(Reason.NO_VARIATION)
     # Centred and scaled by a power of two: the same W, and no digits lost on a large size.
     centred = x - np.median(x)
-    found = shapiro(centred * 2.0 ** -round(log2(np.abs(centred).max())))
-    return Normality("shapiro_wilk", float(found.statistic), float(found.pvalue), len(x))
+    result = shapiro(centred * 2.0 ** -round(log2(np.abs(centred).max())))
+    return Normality("shapiro_wilk", float(result.statistic), float(result.pvalue), len(x))

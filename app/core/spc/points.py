@@ -21,8 +21,8 @@ Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
-    """How a chart is drawn. width: of its limits, in sigma. weight: lambda of the EWMA. span: of the moving average, in points.
+class ChartSettings:
+    """Parameters of a chart. width: of its limits, in sigma. weight: lambda of the EWMA. span: of the moving average, in points.
 
     reference, limit, headstart: k, h and headstart of the CUSUM, in sigma.
     """
@@ -38,12 +38,12 @@ class Drawn:
 
     @property
     def reach(self) -> float:
-        """Where the limits lie, in the unit of `Piece.rows`."""
+        """Distance of the limits from the centre, in the unit of `Piece.rows`."""
         return self.limit if self.chart is Chart.CUSUM else self.width
 
     @property
     def baseline(self) -> Baseline:
-        """What z is judged by."""
+        """Baseline that judges z."""
         return given(0.0, 1.0, self.width)
 
 
@@ -67,13 +67,13 @@ class Piece(NamedTuple):
 class Points:
     """One chart, fed with z.
 
-    >>> points = Points(Drawn(Chart.MOVING_AVERAGE, span=2))
+    >>> points = Points(ChartSettings(Chart.MOVING_AVERAGE, span=2))
     >>> one, at = np.array([1.0, 3.0]), np.array([1, 2])
     >>> points.feed(Piece([one], at, at, at < 0)).rows[0].round(3).tolist()
     [1.0, 2.828]
     """
 
-    drawn: Drawn
+    settings: ChartSettings
     waiting: list[float] = field(default_factory=list)  # z of the last points, as far as the next ones need them
     waiting_at: int = 0
     state: list[float] = field(default_factory=list)
@@ -88,23 +88,25 @@ class Points:
         return fed
 
     def _fed(self, piece: Piece) -> Piece:
-        drawn, z = self.drawn, piece.rows[0]
-        match drawn.chart:
+        settings, z = self.settings, piece.rows[0]
+        match settings.chart:
             case Chart.EWMA:
                 start = self.state[0] if self.state else None
-                chart = ewma(drawn.baseline, z, drawn.weight, exact=drawn.exact, start=start, seen=self.seen)
+                chart = ewma(settings.baseline, z, settings.weight, exact=settings.exact, start=start, seen=self.seen)
                 self.state = [float(chart.points[-1])]
                 return piece._replace(rows=[chart.z])
             case Chart.CUSUM:
                 state = (self.state[0], self.state[1]) if self.state else None
-                sums = cusum(drawn.baseline, z, drawn.reference, drawn.limit, headstart=drawn.headstart, state=state)
+                sums = cusum(
+                    settings.baseline, z, settings.reference, settings.limit, headstart=settings.headstart, state=state
+                )
                 self.state = [float(sums.above[-1]), float(sums.below[-1])]
                 return piece._replace(rows=[sums.above, -sums.below])
             case Chart.MOVING_AVERAGE:
                 before = len(self.waiting)
                 together = np.concatenate((np.array(self.waiting, np.float64), z))
-                self.waiting = together[len(together) - min(len(together), drawn.span - 1) :].tolist()
-                return piece._replace(rows=[moving_average(drawn.baseline, together, drawn.span).z[before:]])
+                self.waiting = together[len(together) - min(len(together), settings.span - 1) :].tolist()
+                return piece._replace(rows=[moving_average(settings.baseline, together, settings.span).z[before:]])
             case Chart.MOVING_RANGE:
                 return self._ranges(piece)
         return piece
@@ -118,12 +120,12 @@ class Points:
         self.waiting, self.waiting_at = [float(z[-1])], int(first[-1])
         if len(z) < 2:
             return Piece([z[:0]], first[:0], first[:0], begins[:0])
-        ranges = moving_ranges(self.drawn.baseline, z).z
+        ranges = moving_ranges(self.settings.baseline, z).z
         last = piece.last[-len(ranges) :]
         return Piece([ranges], first[:-1], last, begins[1:]).only(~begins[1:])
 
     def memory(self) -> dict[str, Any]:
-        """What it takes to go on, as JSON."""
+        """State to go on from, as JSON."""
         return {
             "waiting": self.waiting,
             "waiting_at": self.waiting_at,
@@ -132,6 +134,6 @@ class Points:
         }
 
     def recall(self, memory: Mapping[str, Any]) -> None:
-        """Go on where another one has left off that is drawn alike."""
+        """Go on where another one has left off with the same settings."""
         self.waiting, self.waiting_at = list(memory["waiting"]), memory["waiting_at"]
         self.state, self.seen = list(memory["state"]), memory["seen"]

@@ -1,4 +1,4 @@
-"""What is charted: sizes as they are, or the process as it would be without the loop that corrects it.
+"""Quantities to chart: sizes as they are, or the process as it would be without the loop that corrects it.
 
 A loop that corrects makes ordinary charts lie: it takes out what a chart should show, and its corrections are steps of
 their own. With w the wear curve (`app.core.wear`: the deviation had nothing been corrected since the tool was changed)
@@ -31,6 +31,7 @@ from app.core.spc.refusal import Floats, Reason, Refused
 from app.core.spc.rules import FITTING, RuleName
 from app.core.spc.shewhart import ENOUGH_READINGS, FEWEST_READINGS, Baseline, Chart
 from app.core.spc.spread import Estimator, Sigma, mean_of, moving_range, overall
+from app.core.spc.variation import varies
 
 SETTLE = 20
 """Readings that set the level of an edge: it is then known to sigma/sqrt(20), a fifth of sigma."""
@@ -40,7 +41,7 @@ NEARLY = 1.5  # times as far from the level as with the best of them
 
 
 class Quantity(StrEnum):
-    """What a control chart may be of."""
+    """Quantity of a control chart."""
 
     DEVIATION = "deviation"
     WITHOUT_CORRECTIONS = "without_corrections"
@@ -49,7 +50,7 @@ class Quantity(StrEnum):
 
 
 def fitting(quantity: Quantity, chart: Chart) -> tuple[RuleName, ...]:
-    """Which rules have a sense on a chart of this quantity; empty where the chart itself has none.
+    """Rules that make sense on a chart of this quantity; empty where the chart itself has none.
 
     >>> [name.value for name in fitting(Quantity.DIFFERENCES, Chart.INDIVIDUALS)], fitting(Quantity.DIFFERENCES, Chart.CUSUM)
     (['nelson_1'], ())
@@ -73,12 +74,12 @@ class Series:
     begins: NDArray[np.bool_]
 
     def __len__(self) -> int:
-        """How many values there are."""
+        """Number of values."""
         return len(self.sequence)
 
     @property
     def edge(self) -> NDArray[np.int64]:
-        """Which stretch between two begins each value belongs to: 0, 1, 2 …"""
+        """Stretch between two begins that each value belongs to: 0, 1, 2 …"""
         return np.cumsum(self.begins) - (self.begins[0] if len(self) else 0)
 
     def only(self, wanted: NDArray[np.bool_]) -> "Series":
@@ -90,7 +91,7 @@ class Series:
 
 
 def differences(series: Series) -> Series:
-    """What each value is more than the one before it, within one stretch.
+    """Difference of each value from the one before it, within one stretch.
 
     >>> s = Series(np.arange(1, 6), np.array([1.0, 3.0, 9.0, 9.5, 9.0]), np.array([True, False, True, False, False]))
     >>> d = differences(s); d.sequence.tolist(), d.values.tolist(), d.begins.tolist()
@@ -136,7 +137,7 @@ def wear_line(series: Series) -> WearLine:
 
 
 def residuals(series: Series, slope: float, settle: int = SETTLE) -> Series:
-    """What is left of the wear curve without its wear: of every stretch what comes after its first `settle` values.
+    """Wear curve without its wear: of every stretch the values after its first `settle` values.
 
     They let the edge run in; the last `SETTLE` of them set its level.
 
@@ -218,7 +219,7 @@ def individuals_of(
         flat = series.values - slope * (series.sequence - series.sequence[0])
         centre = 0.0 if quantity is Quantity.WEAR_RESIDUALS else mean_of(series.values)
         sigma = moving_range_within(Series(series.sequence, flat, series.begins))
-    if not sigma.value > 0:
+    if not varies(sigma.value, series.values):
         raise Refused(Reason.NO_VARIATION)
     return Baseline(centre, sigma, provisional=sigma.readings < ENOUGH_READINGS)
 

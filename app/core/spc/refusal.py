@@ -1,4 +1,4 @@
-"""What statistics refuse to say, and what they warn of. Codes; the sentences are worded at the edge."""
+"""Refusals and warnings of statistics. Codes; the sentences are worded at the edge."""
 
 from enum import StrEnum
 
@@ -9,11 +9,12 @@ Floats = NDArray[np.float64]
 
 
 class Reason(StrEnum):
-    """Why there is no result."""
+    """Reason why there is no result."""
 
     TOO_FEW_READINGS = "too_few_readings"
     TOO_FEW_SUBGROUPS = "too_few_subgroups"
     NO_VARIATION = "no_variation"
+    UNRESOLVED = "unresolved"
     NOT_FINITE = "not_finite"
     NO_LIMITS = "no_limits"
     LIMITS_CROSSED = "limits_crossed"
@@ -33,7 +34,7 @@ class Refused(ValueError):
 
     @property
     def missing(self) -> int:
-        """How many more it takes."""
+        """Number of values that are missing."""
         return max(0, self.needed - self.have)
 
 

@@ -36,7 +36,7 @@ from app.core.spc.shewhart import Chart, ControlChart
 
 
 class Kind(IntEnum):
-    """What a rule looks for."""
+    """Pattern that a rule looks for."""
 
     BEYOND = 0  # k of n beyond a limit, on one side
     SIDE = 1
@@ -139,7 +139,7 @@ class Signals:
                 yield Run(name, side, start, end, points)
 
     def count(self, name: RuleName) -> int:
-        """How many signals of a rule there are; a run that goes on counts once."""
+        """Number of signals of a rule; a run that goes on counts once."""
         return len(self.runs[name])
 
     def newest(self, most: int) -> list[Run]:
@@ -155,13 +155,13 @@ class Signals:
 
     def sides(self, nowhere: int) -> NDArray[np.int8]:
         """Of each point the side of its signal, of several that of the last rule; `nowhere` where there is none."""
-        found = np.full(self.length, nowhere, np.int8)
+        sides = np.full(self.length, nowhere, np.int8)
         for rows in self.runs.values():
-            painted(found, rows)
-        return found
+            painted(sides, rows)
+        return sides
 
     def flagged(self, name: RuleName) -> NDArray[np.bool_]:
-        """Which points lie inside a run of this rule."""
+        """Mask of the points inside a run of this rule."""
         edges = np.zeros(self.length + 1, np.int64)
         rows = self.runs[name]
         np.add.at(edges, rows[:, 1], 1)
@@ -208,7 +208,7 @@ class Scan:
         return Signals(self.length, dict(self._runs))
 
     def memory(self) -> dict[str, Any]:
-        """What it takes to go on without the points seen so far, as JSON. Only runs that may still grow are in it.
+        """State to go on from without the points seen so far, as JSON. Only runs that may still grow are in it.
 
         >>> first, second = Scan(NELSON), Scan(NELSON)
         >>> first.feed([0.5, 2.2]); second.recall(first.memory()); second.feed([2.1])
@@ -228,9 +228,9 @@ class Scan:
         """Go on where another scan of the same rules has left off."""
         self.length, self._last = memory["length"], memory["last"]
         for rule in self.rules:
-            kept = memory["rules"][rule.name.value]
-            self._states[rule.name] = np.array(kept["state"], np.int64).reshape(2, STATE)
-            self._runs[rule.name] = np.array(kept["runs"], np.int64).reshape(-1, 4)
+            state = memory["rules"][rule.name.value]
+            self._states[rule.name] = np.array(state["state"], np.int64).reshape(2, STATE)
+            self._runs[rule.name] = np.array(state["runs"], np.int64).reshape(-1, 4)
 
 
 def _newest(rows: NDArray[np.int64]) -> list[list[int]]:
@@ -246,8 +246,8 @@ def _fed(
     if rule.kind is Kind.BEYOND:
         sides = []
         for row, side in enumerate((1, -1)):
-            found = earlier[earlier[:, 0] == side]
-            sides.append(beyond_runs(z, offset, side, rule.n, rule.k, rule.limit, state[row], found))
+            runs = earlier[earlier[:, 0] == side]
+            sides.append(beyond_runs(z, offset, side, rule.n, rule.k, rule.limit, state[row], runs))
         rows = np.concatenate(sides)
         return rows[np.argsort(rows[:, 1], kind="stable")]
     return equal_runs(z, offset, last, int(rule.kind), rule.n, rule.limit, state[0], earlier)
@@ -288,8 +288,8 @@ def signals_of_cusum(chart: Cusum) -> Signals:
     none = np.empty((0, 4), np.int64)
     rows = []
     for side, sums in ((1, chart.above), (-1, chart.below)):
-        found = beyond_runs(sums, 0, 1, 1, 1, chart.limit, np.zeros(STATE, np.int64), none)
-        found[:, 0] = side
-        rows.append(found)
+        runs = beyond_runs(sums, 0, 1, 1, 1, chart.limit, np.zeros(STATE, np.int64), none)
+        runs[:, 0] = side
+        rows.append(runs)
     together = np.concatenate(rows)
     return Signals(len(chart.above), {RuleName.NELSON_1: together[np.argsort(together[:, 1], kind="stable")]})

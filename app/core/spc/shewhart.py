@@ -29,6 +29,7 @@ from app.core.spc.spread import (
     moving_range,
     pooled,
 )
+from app.core.spc.variation import varies
 
 FEWEST_READINGS = 20
 """Individuals: below it there are no limits. Sigma would be uncertain by a fifth and more."""
@@ -53,7 +54,7 @@ class Chart(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """What later readings are judged by: centre and sigma, and how far from the centre the limits lie (in sigma).
+    """Centre and sigma that judge later readings, and the distance of the limits from the centre (in sigma).
 
     `provisional`: made of fewer than 100 readings.
     """
@@ -82,13 +83,13 @@ class ControlChart:
 
     @property
     def outside(self) -> NDArray[np.bool_]:
-        """Which points lie beyond a limit; a point on it does not."""
+        """Mask of the points beyond a limit; a point on it is not beyond."""
         return (self.points > self.upper) | (self.points < self.lower)
 
 
 def given(centre: float, sigma: float, width: float = 3.0) -> Baseline:
     """A baseline that is known from elsewhere: a standard, a former study."""
-    if not sigma > 0:
+    if not (sigma > 0 and varies(sigma, centre)):
         raise Refused(Reason.NO_VARIATION)
     return Baseline(centre, Sigma(sigma, Estimator.GIVEN, 0, 0, float("inf")), width)
 
@@ -100,7 +101,7 @@ def individuals_baseline(values: ArrayLike, *, minimum: int = FEWEST_READINGS, w
     the process, not that it does not vary.
     """
     x = checked(values, at_least=max(2, minimum))
-    return _baseline(mean_of(x), moving_range(x), width)
+    return _baseline(mean_of(x), moving_range(x), width, x)
 
 
 def subgroup_baseline(
@@ -123,11 +124,11 @@ def subgroup_baseline(
         Estimator.POOLED: pooled,
     }[estimator]
     centre = float((groups.sizes * groups.means).sum() / groups.sizes.sum())
-    return _baseline(centre, estimate(groups), width)
+    return _baseline(centre, estimate(groups), width, groups.means)
 
 
-def _baseline(centre: float, sigma: Sigma, width: float) -> Baseline:
-    if not sigma.value > 0:
+def _baseline(centre: float, sigma: Sigma, width: float, values: Floats) -> Baseline:
+    if not varies(sigma.value, values):
         raise Refused(Reason.NO_VARIATION)
     return Baseline(centre, sigma, width, provisional=sigma.readings < ENOUGH_READINGS)
 

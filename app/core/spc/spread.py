@@ -18,6 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from app.core.spc.constants import c4, d2, d3
 from app.core.spc.refusal import Floats, Reason, Refused, checked
+from app.core.spc.resolution import resolution_of
+from app.core.spc.variation import varies
 
 Factor = Callable[[int], float]
 
@@ -27,7 +29,7 @@ FEWEST_TO_STAND_OUT = 8
 
 
 class Estimator(StrEnum):
-    """How a sigma was come by."""
+    """Method of estimating a sigma."""
 
     MOVING_RANGE = "moving_range"
     RANGES = "ranges"
@@ -85,7 +87,7 @@ def summary(values: ArrayLike) -> Summary:
         standard_deviation=sqrt(squares / (len(x) - 1)) if len(x) > 1 else None,
         minimum=float(x.min()),
         maximum=float(x.max()),
-        autocorrelation=float(left[:-1] @ left[1:]) / squares if squares > 0 else None,
+        autocorrelation=float(left[:-1] @ left[1:]) / squares if varies(sqrt(squares / len(x)), x) else None,
     )
 
 
@@ -137,7 +139,7 @@ class Subgroups:
     deviations: Floats
 
     def __len__(self) -> int:
-        """How many subgroups there are."""
+        """Number of subgroups."""
         return len(self.sizes)
 
 
@@ -149,24 +151,24 @@ def subgroups(values: ArrayLike, sizes: int | ArrayLike) -> Subgroups:
     ([11.0, 13.0], [2.0, 4.0], [1.414, 2.0])
     """
     x = checked(values)
-    each = np.asarray(sizes, dtype=np.int64)
-    if each.ndim == 0:
-        each = np.full(len(x) // max(int(each), 1), each)
-    if len(each) == 0:
+    lengths = np.asarray(sizes, dtype=np.int64)
+    if lengths.ndim == 0:
+        lengths = np.full(len(x) // max(int(lengths), 1), lengths)
+    if len(lengths) == 0:
         raise Refused(Reason.TOO_FEW_SUBGROUPS, have=0, needed=1)
-    if (each < 1).any() or each.sum() > len(x):
-        raise ValueError(f"subgroups of {each.sum()} readings do not fit {len(x)}")
-    x = x[: each.sum()]
-    starts = np.concatenate(([0], np.cumsum(each)[:-1]))
+    if (lengths < 1).any() or lengths.sum() > len(x):
+        raise ValueError(f"subgroups of {lengths.sum()} readings do not fit {len(x)}")
+    x = x[: lengths.sum()]
+    starts = np.concatenate(([0], np.cumsum(lengths)[:-1]))
     centred = x - mean_of(x)  # large offsets cost no digits
-    means = np.add.reduceat(centred, starts) / each
-    left = centred - np.repeat(means, each)
+    means = np.add.reduceat(centred, starts) / lengths
+    left = centred - np.repeat(means, lengths)
     squares = np.add.reduceat(left * left, starts)
     return Subgroups(
-        sizes=each,
+        sizes=lengths,
         means=means + mean_of(x),
         ranges=np.maximum.reduceat(x, starts) - np.minimum.reduceat(x, starts),
-        deviations=np.sqrt(squares / np.maximum(each - 1, 1)),
+        deviations=np.sqrt(squares / np.maximum(lengths - 1, 1)),
     )
 
 
@@ -216,16 +218,29 @@ def _weighted(groups: Subgroups, statistic: Floats, estimator: Estimator, *, mea
 
 
 def far_off(values: Floats) -> NDArray[np.bool_]:
-    """Which readings lie more than ten sigma of the middle half (quartile distance/1.349) from the median.
+    """Mark the readings that lie far from all others.
 
-    No process of one mode brings such readings; a chip under the stylus does, a broken edge, a part of another kind. They
-    are named, never left out: whether the part was so is for a person to say.
+    They lie more than ten sigma of the middle half (quartile distance/1.349) from the median, and further from the nearest
+    of the other readings than that one from the median: the long tail of a skewed process has no such gap. No process of one
+    mode brings such readings; a chip under the stylus does, a broken edge, a part of another kind. They are named, never left
+    out: whether the part was so is for a person to say.
 
     >>> far_off(np.array([1.0, 2, 3, 4, 5, 6, 7, 8, 400])).nonzero()[0].tolist()
     [8]
     """
+    far = np.zeros(len(values), np.bool_)
     if len(values) < FEWEST_TO_STAND_OUT:
-        return np.zeros(len(values), np.bool_)
+        return far
     quarter, median, three = np.quantile(values, [0.25, 0.5, 0.75])
     sigma = float(three - quarter) / QUARTILES
-    return np.asarray(np.abs(values - median) > FAR * sigma) if sigma > 0 else np.zeros(len(values), np.bool_)
+    if not varies(sigma, values):
+        sigma = resolution_of(values).step
+    if sigma == 0:
+        return far
+    for distance in (values - median, median - values):
+        beyond = distance > FAR * sigma
+        if beyond.any():
+            last = float(distance[~beyond].max())
+            if float(distance[beyond].min()) > 2 * last:
+                far |= beyond
+    return far

@@ -1,4 +1,4 @@
-"""What a compensated process would be without its compensation, and what the machine could do with an ideal one.
+"""A compensated process without its compensation, and with an ideal one.
 
 Corrections make two questions of one. What left the machine is the deviations as they are: their spread holds scatter, wear
 that was not yet corrected, and whatever the corrections added. What the tool did is the wear curve (`core.wear`): each
@@ -21,6 +21,7 @@ from app.core.spc.capability import FEWEST_READINGS, Caution, Index, Limits, cap
 from app.core.spc.constants import d2
 from app.core.spc.refusal import Floats, Reason, Refused, checked
 from app.core.spc.spread import Estimator, Sigma, freedom_of_moving_ranges, overall
+from app.core.spc.variation import varies
 
 Flags = NDArray[np.bool_]
 BEYOND = 4.0
@@ -60,20 +61,20 @@ def uncompensated(
     whole = checked(values, at_least=FEWEST_READINGS)
     ideal = scatter(whole, begins)
     now, tool = overall(controlled), overall(whole)
-    if not (now.value > 0 and tool.value > 0):
+    if not (varies(now.value, controlled) and varies(tool.value, whole)):
         raise Refused(Reason.NO_VARIATION)
-    told = capability(whole, limits, confidence=confidence)
+    indices = capability(whole, limits, confidence=confidence)
     return Uncompensated(
         readings=len(whole),
         lives=len(_lengths(begins)),
-        mean=told.mean,
+        mean=indices.mean,
         tool=tool,
         ideal_sigma=ideal,
-        ppk=told.ppk,
+        ppk=indices.ppk,
         ideal=spread_index(limits, ideal, confidence),
         gain=tool.value / now.value,
         price=now.value / ideal.value,
-        cautions=told.cautions,
+        cautions=indices.cautions,
     )
 
 
@@ -88,7 +89,7 @@ def scatter(values: Floats, begins: Flags) -> Sigma:
     for _pass in range(2):
         if len(ranges):
             ranges = ranges[ranges <= BEYOND * ranges.mean()]
-    if not len(ranges) or not ranges.mean() > 0:
+    if not len(ranges) or not varies(float(ranges.mean()), values):
         raise Refused(Reason.NO_VARIATION)
     lengths, lives = np.unique(_lengths(begins), return_counts=True)  # a million readings may be thousands of lives
     freedom = fsum(

@@ -13,7 +13,7 @@ async function ask(link) {
   asking = true;
   link.setAttribute("aria-busy", "true");
   try {
-    const answer = await fetch(link.href);
+    const answer = await fetch(link.href, { signal: AbortSignal.timeout(15_000) });
     const page = new DOMParser().parseFromString(await answer.text(), "text/html");
     const part = page.getElementById("confirm");
     if (!answer.ok || !part) return void location.assign(link.href);

@@ -39,7 +39,10 @@ class LivePart extends HTMLElement {
   async load() {
     if (this.busy) return void setTimeout(() => this.isConnected && this.refresh(), 1_000);
     try {
-      const answer = await fetch(this.getAttribute("src") || location.href, { headers: { "X-Live-Part": this.id || "yes" } });
+      const answer = await fetch(this.getAttribute("src") || location.href, {
+        headers: { "X-Live-Part": this.id || "yes" },
+        signal: AbortSignal.timeout(60_000), // a line that swallows everything would keep the part from ever asking again
+      });
       if (!answer.ok) throw new Error(`${answer.status}`);
       const page = new DOMParser().parseFromString(await answer.text(), "text/html");
       if (this.busy) return void this.refresh();

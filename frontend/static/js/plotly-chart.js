@@ -40,13 +40,10 @@ function loadPlotly() {
   return loading;
 }
 
-// Plotly shows times as they are written: moments with an offset become the reader's wall clock.
+// Plotly shows times as they are written. They come in the time zone of the plant: without the offset they are its wall clock.
 function wallClock(figure) {
   if (figure.layout.xaxis?.type !== "date") return figure;
-  const local = (moment) => {
-    const date = new Date(moment);
-    return new Date(date.getTime() - date.getTimezoneOffset() * 60_000).toISOString().slice(0, -1);
-  };
+  const local = (moment) => moment.replace(/(Z|[+-]\d\d:\d\d(:\d\d)?)$/, "");
   for (const trace of figure.data) trace.x = trace.x?.map(local);
   if (figure.layout.xaxis.range) figure.layout.xaxis.range = figure.layout.xaxis.range.map(local);
   for (const shape of figure.layout.shapes ?? []) {
@@ -95,7 +92,7 @@ class PlotlyChart extends HTMLElement {
       url.searchParams.set("theme", theme());
       const width = this.clientWidth; // 0 before the page is laid out
       url.searchParams.set("width", Math.max(200, Math.round(width)));
-      const [Plotly, answer] = await Promise.all([loadPlotly(), fetch(url, { headers: { Accept: "application/json" } })]);
+      const [Plotly, answer] = await Promise.all([loadPlotly(), fetch(url, { headers: { Accept: "application/json" }, signal: AbortSignal.timeout(60_000) })]);
       if (!answer.ok) throw new Error(`${answer.status}`);
       const figure = wallClock(await answer.json());
       await document.fonts.ready; // letters are measured when drawn

@@ -1,27 +1,10 @@
-// Times as the reader's clock has them.
+// How long ago something was; moments themselves are written by the server, in the time zone of the plant.
 //
-//   <local-time datetime="ISO" show="seconds|minutes|date"><time>…UTC…</time></local-time>   in the reader's zone and language
-//   <time-ago datetime="ISO">12 s ago</time-ago>                                             keeps counting
+//   <time-ago datetime="ISO">12 s ago</time-ago>   keeps counting
 //
 // Without script the server's words stay.
 
-const FORMATS = {
-  seconds: { day: "numeric", month: "short", year: "numeric", hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" },
-  minutes: { day: "numeric", month: "short", year: "numeric", hour: "2-digit", minute: "2-digit", hourCycle: "h23" },
-  date: { day: "numeric", month: "short", year: "numeric" },
-};
-const language = document.documentElement.lang === "en" ? "en-GB" : document.documentElement.lang;
-
-class LocalTime extends HTMLElement {
-  connectedCallback() {
-    const moment = new Date(this.getAttribute("datetime"));
-    if (Number.isNaN(moment.getTime())) return;
-    const time = this.querySelector("time") ?? this.appendChild(document.createElement("time"));
-    time.textContent = new Intl.DateTimeFormat(language, FORMATS[this.getAttribute("show")] ?? FORMATS.seconds).format(moment);
-  }
-}
-
-// One unit, no more: read from two metres away. The symbols are those of app/web/numbers.py.
+// One unit, no more: read from two metres away. The symbols are those of app/language/numbers.py.
 export function age(seconds) {
   if (seconds < 60) return `${Math.max(0, Math.floor(seconds))} s`;
   if (seconds < 3600) return `${Math.floor(seconds / 60)} min`;
@@ -51,5 +34,4 @@ class TimeAgo extends HTMLElement {
 }
 
 setInterval(() => clocks.forEach((clock) => clock.tick()), 1_000);
-customElements.define("local-time", LocalTime);
 customElements.define("time-ago", TimeAgo);

@@ -1,6 +1,6 @@
 """Set-up error: the printed formulas, simulated displacements recovered, layouts that do not hold, touches that misfit."""
 
-from math import degrees, hypot, radians
+from math import degrees, hypot, pi, radians
 
 import numpy as np
 import pytest
@@ -25,6 +25,7 @@ SIX: list[Face] = [
 MORE: list[Face] = [*SIX, ((30, 125, 0), (0, 0, 1)), ((100, 0, -15), (0, 1, 0)), ((0, 100, -15), (1, 0, 0))]
 lengths = st.floats(-3, 3)
 small = st.floats(-0.02, 0.02)
+directions = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda each: hypot(*each) > 0.01)
 
 
 def touched(faces: list[Face], motion: Floats, noise: list[float] | None = None) -> list[Touch]:
@@ -197,6 +198,8 @@ class TestHowWell:
             ((60.0, 0.0, -5.0), (0.0, 1.0, 0.0)),
             ((0.0, 20.0, -5.0), (1.0, 0.0, 0.0)),
         ]
+        rounding = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-10] + [0.0] * (len(faces) - 7)
+        assert align(touched(faces, np.eye(4), rounding)).misfits == ()
         noise = np.random.default_rng(2).normal(0, 0.001, len(faces))
         assert align(touched(faces, np.eye(4), noise.tolist())).misfits == ()
         noise[8] += 0.1
@@ -322,6 +325,25 @@ class TestInPlane:
     def test_coincident_points_are_refused(self) -> None:
         with pytest.raises(Degenerate):
             in_plane.two_points([(0, 0), (0, 0)], [(0, 0), (1, 1)])
+
+
+NEAR_HALF_A_TURN = st.builds(lambda small, sign: pi - sign * 10.0**-small, st.floats(1, 16), st.sampled_from([0, 1]))
+
+
+class TestRotationVectors:
+    @given(directions, st.floats(0, pi) | NEAR_HALF_A_TURN)
+    def test_the_vector_makes_the_rotation_again(self, direction: tuple[float, float, float], angle: float) -> None:
+        way = np.array(direction) / np.linalg.norm(direction)
+        rotation = turned(way * angle)
+        vector = vector_of(rotation)
+        assert np.abs(turned(vector) - rotation).max() < 1e-12
+        assert np.linalg.norm(vector) == pytest.approx(angle, abs=1e-9)
+        if pi - angle > 1e-6:  # nearer to half a turn both senses are the same
+            assert vector == pytest.approx(way * angle, abs=1e-9)
+
+    def test_half_a_turn_about_z(self) -> None:
+        made = in_plane.two_points([(0, 0), (100, 0)], [(100, 0), (0, 0)])
+        assert np.degrees(vector_of(made.motion[:3, :3])) == pytest.approx([0, 0, 180])
 
 
 class TestPallets:

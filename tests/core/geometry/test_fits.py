@@ -1,6 +1,6 @@
 """Circle, line, plane by least squares: published numbers, reference data whose solution is known, refusals.
 
-Published examples lie in app/proof/cases/geometry.json and run in tests/proof. Here are reference pairs made as M. G. Cox
+Published examples lie in app/quality/proof/cases/geometry.json and run in tests/quality/proof. Here are reference pairs made as M. G. Cox
 and A. B. Forbes do (Strategies for testing assessment software, NPL DITC 211/92): an element is chosen, points are laid
 about it with residuals orthogonal to everything the element could change by, so that its least-squares fit is that very
 element, to the last digit.

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.core.geometry.elements import Section, WrongSection
-from app.core.geometry.form import Form, Kind, Method, Touched, Verdict, printed_straightness, verdict
+from app.core.geometry.form import Form, Kind, Method, ProbedFeature, Verdict, printed_straightness, verdict
 from app.core.geometry.points import Degenerate, Reason
 from app.core.geometry.relations import DatumRefused, Task, corrected, evaluate
-from app.core.geometry.suspicion import in_bore
+from app.core.geometry.suspect_points import in_bore
 from tests.core.geometry.test_fits import rotation
 
 seeds = st.integers(0, 2**32 - 1)
@@ -28,8 +28,8 @@ def section(x: float, y: float, z: float | None, count: int = 4, radius: float =
     return Section(tuple((x + radius * cos(a), y + radius * sin(a)) for a in angles), z)
 
 
-def bore(centres: list[tuple[float, float, float | None]], count: int = 4) -> Touched:
-    return Touched(tuple(section(*centre, count=count) for centre in centres))
+def bore(centres: list[tuple[float, float, float | None]], count: int = 4) -> ProbedFeature:
+    return ProbedFeature(tuple(section(*centre, count=count) for centre in centres))
 
 
 def plate(tilt: float = 0.0, about: str = "y", size: float = 100.0) -> tuple[tuple[float, float, float], ...]:
@@ -48,13 +48,13 @@ RING = ((10.0, 0.0), (0.0, 10.0), (-10.0, 0.0))
 @pytest.mark.parametrize(
     ("kind", "feature"),
     [
-        (Kind.ROUNDNESS, Touched((Section((*RING, RING[0])),))),
-        (Kind.FLATNESS, Touched(points=((0, 0, 0), (9, 0, 0.1), (0, 9, 0), (0, 9, 0)))),
-        (Kind.STRAIGHTNESS, Touched(points=((0, 0), (9, 0.1), (9, 0.1)))),
-        (Kind.AXIS_STRAIGHTNESS, Touched((Section(RING, 0.0), Section(RING, 20.0), Section(RING, 0.0)))),
+        (Kind.ROUNDNESS, ProbedFeature((Section((*RING, RING[0])),))),
+        (Kind.FLATNESS, ProbedFeature(points=((0, 0, 0), (9, 0, 0.1), (0, 9, 0), (0, 9, 0)))),
+        (Kind.STRAIGHTNESS, ProbedFeature(points=((0, 0), (9, 0.1), (9, 0.1)))),
+        (Kind.AXIS_STRAIGHTNESS, ProbedFeature((Section(RING, 0.0), Section(RING, 20.0), Section(RING, 0.0)))),
     ],
 )
-def test_a_touch_that_was_copied_is_no_further_touch(kind: Kind, feature: Touched) -> None:
+def test_a_touch_that_was_copied_is_no_further_touch(kind: Kind, feature: ProbedFeature) -> None:
     """Three points lie on a circle and a plane, two on a line: the same again would make a perfect form."""
     with pytest.raises((Degenerate, WrongSection)) as refused:
         evaluate(Task(kind, feature))
@@ -68,39 +68,41 @@ def test_touches_in_a_row_are_no_surface() -> None:
     aside = (0.0004, -0.0003, 0.0005, -0.0005, 0.0001, 0.0002)
     row = tuple((20.0 * at, 5.0 + y, 0.05 * (at / 2.5 - 1) ** 2) for at, y in enumerate(aside))
     tasks = (
-        Task(Kind.FLATNESS, Touched(points=row)),
-        Task(Kind.PARALLELISM, Touched(points=row), Touched(points=plate())),
-        Task(Kind.PERPENDICULARITY, Touched(points=plate()), Touched(points=row)),
+        Task(Kind.FLATNESS, ProbedFeature(points=row)),
+        Task(Kind.PARALLELISM, ProbedFeature(points=row), ProbedFeature(points=plate())),
+        Task(Kind.PERPENDICULARITY, ProbedFeature(points=plate()), ProbedFeature(points=row)),
     )
     for task in tasks:
         with pytest.raises((Degenerate, DatumRefused), match="collinear"):
             evaluate(task)
     rail = tuple((x, y, z) for x, _y, z in row for y in (0.0, 2.0))
-    assert by(evaluate(Task(Kind.FLATNESS, Touched(points=rail))))[Method.MINIMUM_ZONE] == pytest.approx(0.048)
+    assert by(evaluate(Task(Kind.FLATNESS, ProbedFeature(points=rail))))[Method.MINIMUM_ZONE] == pytest.approx(0.048)
 
 
 class TestByHand:
     def test_an_oval(self) -> None:
-        oval = Touched((Section(((10.01, 0.0), (0.0, 9.99), (-10.01, 0.0), (0.0, -9.99))),))
+        oval = ProbedFeature((Section(((10.01, 0.0), (0.0, 9.99), (-10.01, 0.0), (0.0, -9.99))),))
         assert by(evaluate(Task(Kind.ROUNDNESS, oval))) == pytest.approx(
             dict.fromkeys([Method.MINIMUM_ZONE, Method.LEAST_SQUARES, Method.INSCRIBED, Method.CIRCUMSCRIBED], 0.02)
         )
 
     def test_of_several_sections_the_worst_counts(self) -> None:
         bad = Section(((10.03, 0.0), (0.0, 9.99), (-10.03, 0.0), (0.0, -9.99)), 20.0)
-        found = evaluate(Task(Kind.ROUNDNESS, Touched((section(0, 0, 0.0), bad, section(0, 0, 40.0)))))
+        found = evaluate(Task(Kind.ROUNDNESS, ProbedFeature((section(0, 0, 0.0), bad, section(0, 0, 40.0)))))
         assert by(found)[Method.MINIMUM_ZONE] == pytest.approx(0.04)
         assert found.details["sections"][1]["minimum_zone"] == pytest.approx(0.04)
 
     def test_a_profile_in_a_bow(self) -> None:
         """Heights 0, 0.01, 0.01, 0: the strip is 0.01 wide, and so is the range about the fitted line."""
-        found = evaluate(Task(Kind.STRAIGHTNESS, Touched(points=((0.0, 0.0), (10.0, 0.01), (20.0, 0.01), (30.0, 0.0)))))
+        found = evaluate(
+            Task(Kind.STRAIGHTNESS, ProbedFeature(points=((0.0, 0.0), (10.0, 0.01), (20.0, 0.01), (30.0, 0.0))))
+        )
         assert by(found) == pytest.approx({Method.MINIMUM_ZONE: 0.01, Method.LEAST_SQUARES: 0.01})
 
     def test_a_saddle(self) -> None:
         """Corners up, corners down: two opposite corners on either plane."""
         corners = ((0.0, 0.0, 0.02), (10.0, 0.0, 0.0), (0.0, 10.0, 0.0), (10.0, 10.0, 0.02))
-        found = evaluate(Task(Kind.FLATNESS, Touched(points=corners)))
+        found = evaluate(Task(Kind.FLATNESS, ProbedFeature(points=corners)))
         assert by(found) == pytest.approx({Method.MINIMUM_ZONE: 0.02, Method.LEAST_SQUARES: 0.02})
 
     def test_a_bent_axis(self) -> None:
@@ -130,26 +132,26 @@ class TestByHand:
     @pytest.mark.parametrize(
         ("kind", "feature", "datum"),
         [
-            (Kind.PARALLELISM, Touched(points=plate(1e-4)), Touched(points=plate())),
+            (Kind.PARALLELISM, ProbedFeature(points=plate(1e-4)), ProbedFeature(points=plate())),
             (Kind.PARALLELISM, bore([(0, 0, 0), (0.01, 0, 100)]), bore([(50, 0, 0), (50, 0, 100)])),
             (
                 Kind.PERPENDICULARITY,
                 bore([(0, 0, 0), (0.01, 0, 100)]),
-                Touched(points=plate()),
+                ProbedFeature(points=plate()),
             ),
             (
                 Kind.PERPENDICULARITY,
-                Touched(points=plate(1e-4)),
+                ProbedFeature(points=plate(1e-4)),
                 bore([(0, 0, 0), (0, 0, 100)]),
             ),
             (
                 Kind.PERPENDICULARITY,
-                Touched(points=tuple((1e-4 * z, y, z) for y in (0.0, 50.0, 100.0) for z in (0.0, 50.0, 100.0))),
-                Touched(points=plate()),
+                ProbedFeature(points=tuple((1e-4 * z, y, z) for y in (0.0, 50.0, 100.0) for z in (0.0, 50.0, 100.0))),
+                ProbedFeature(points=plate()),
             ),
         ],
     )
-    def test_a_tilt_of_a_tenth_per_metre(self, kind: Kind, feature: Touched, datum: Touched) -> None:
+    def test_a_tilt_of_a_tenth_per_metre(self, kind: Kind, feature: ProbedFeature, datum: ProbedFeature) -> None:
         found = evaluate(Task(kind, feature, datum))
         assert found.values[0].value == pytest.approx(0.01, rel=1e-4)
         assert found.details["angle"] == pytest.approx(np.degrees(1e-4), rel=1e-4)
@@ -158,21 +160,21 @@ class TestByHand:
 
     def test_an_axis_lying_along_a_plane(self) -> None:
         """An axis upright, a plane upright: parallel; tilted towards the plane by 0.02 on 100."""
-        wall = Touched(points=tuple((0.0, y, z) for y in (0.0, 40.0, 80.0) for z in (0.0, 50.0, 100.0)))
+        wall = ProbedFeature(points=tuple((0.0, y, z) for y in (0.0, 40.0, 80.0) for z in (0.0, 50.0, 100.0)))
         found = evaluate(Task(Kind.PARALLELISM, bore([(30, 0, 0), (30.02, 0.5, 100)]), wall))
         assert found.values[0].value == pytest.approx(0.02, rel=1e-3)
 
 
 class TestPrinted:
     def test_the_table_gives_0_1555_by_its_own_method(self) -> None:
-        found = evaluate(Task(Kind.AXIS_STRAIGHTNESS, Touched(tuple(Section(touches) for touches in PRINTED))))
+        found = evaluate(Task(Kind.AXIS_STRAIGHTNESS, ProbedFeature(tuple(Section(touches) for touches in PRINTED))))
         assert round(by(found)[Method.PRINTED], 4) == 0.1555
         assert verdict(by(found)[Method.PRINTED], 0.005, None) is Verdict.BAD
 
     @pytest.mark.parametrize("heights", [None, (0.0, 20.0, 40.0, 60.0), (0.0, 5.0, 40.0, 90.0)])
     def test_and_is_seen_through(self, heights: tuple[float, ...] | None) -> None:
         sections = tuple(Section(touches, heights[at] if heights else None) for at, touches in enumerate(PRINTED))
-        task = Task(Kind.AXIS_STRAIGHTNESS, Touched(sections))
+        task = Task(Kind.AXIS_STRAIGHTNESS, ProbedFeature(sections))
         found = evaluate(task)
         (suspect,) = found.suspicion.suspects
         assert (suspect.section, suspect.touch, suspect.given) == (2, 1, (23.99, -7.346))
@@ -185,7 +187,7 @@ class TestPrinted:
 
     def test_with_23_896_nothing_is_suspected(self) -> None:
         repaired = ((PRINTED[0]), ((23.896, -7.346), *PRINTED[1][1:]), *PRINTED[2:])
-        found = evaluate(Task(Kind.AXIS_STRAIGHTNESS, Touched(tuple(Section(touches) for touches in repaired))))
+        found = evaluate(Task(Kind.AXIS_STRAIGHTNESS, ProbedFeature(tuple(Section(touches) for touches in repaired))))
         assert found.suspicion.suspects == ()
         assert by(found)[Method.PRINTED] < 0.01
 
@@ -221,8 +223,8 @@ class TestMoved:
         turn, shift = rotation(random), np.array([far, far / 2, -far])
         points = np.column_stack([random.uniform(-80, 80, (9, 2)), random.normal(0, 0.01, 9)])
         moved = tuple(map(tuple, (points @ turn.T + shift).tolist()))
-        here = by(evaluate(Task(Kind.FLATNESS, Touched(points=tuple(map(tuple, points.tolist()))))))
-        assert by(evaluate(Task(Kind.FLATNESS, Touched(points=moved)))) == pytest.approx(here, abs=1e-8)
+        here = by(evaluate(Task(Kind.FLATNESS, ProbedFeature(points=tuple(map(tuple, points.tolist()))))))
+        assert by(evaluate(Task(Kind.FLATNESS, ProbedFeature(points=moved)))) == pytest.approx(here, abs=1e-8)
 
     @settings(max_examples=8)
     @given(seeds, st.floats(0, 360), st.floats(-3000, 3000))
@@ -230,8 +232,8 @@ class TestMoved:
         random = np.random.default_rng(seed)
         c, s = cos(radians(angle)), sin(radians(angle))
 
-        def moved(touched: Touched) -> Touched:
-            return Touched(
+        def moved(touched: ProbedFeature) -> ProbedFeature:
+            return ProbedFeature(
                 tuple(
                     Section(
                         tuple((c * x - s * y + far, s * x + c * y - far) for x, y in each.touches), each.height + far
@@ -275,10 +277,10 @@ class TestUncertainty:
         )
         twisted = tuple((x, y, 5e-6 * (x - 50) * (y - 50)) for x, y, _z in plate())
         for task in (
-            Task(Kind.ROUNDNESS, Touched((Section(oval),))),
-            Task(Kind.FLATNESS, Touched(points=twisted)),
+            Task(Kind.ROUNDNESS, ProbedFeature((Section(oval),))),
+            Task(Kind.FLATNESS, ProbedFeature(points=twisted)),
             Task(Kind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0.05, 0, 30), (0, 0, 60)])),
-            Task(Kind.PERPENDICULARITY, bore([(0, 0, 0), (0.05, 0, 60)]), Touched(points=plate())),
+            Task(Kind.PERPENDICULARITY, bore([(0, 0, 0), (0.05, 0, 60)]), ProbedFeature(points=plate())),
         ):
             assert 0.88 < self.covered(task, method) <= 1.0, task.kind
 
@@ -297,10 +299,10 @@ class TestUncertainty:
 
 
 def scattered(task: Task, sigma: float, random: np.random.Generator) -> Task:
-    def moved(touched: Touched | None) -> Touched | None:
+    def moved(touched: ProbedFeature | None) -> ProbedFeature | None:
         if touched is None:
             return None
-        return Touched(
+        return ProbedFeature(
             tuple(
                 Section(tuple(_felt(touch, each, random.normal(0, sigma)) for touch in each.touches), each.height)
                 for each in touched.sections
@@ -332,11 +334,11 @@ class TestSuspicion:
         [
             (Kind.ROUNDNESS, bore([(0, 0, 0)], 12)),
             (Kind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0, 0, 30), (0, 0, 60)])),
-            (Kind.FLATNESS, Touched(points=plate())),
+            (Kind.FLATNESS, ProbedFeature(points=plate())),
             (Kind.POSITION, bore([(0, 0, 0)], 8)),
         ],
     )
-    def test_a_chip_of_30_um_is_named(self, kind: Kind, feature: Touched) -> None:
+    def test_a_chip_of_30_um_is_named(self, kind: Kind, feature: ProbedFeature) -> None:
         random, named = np.random.default_rng(5), 0
         for _ in range(30):
             task = scattered(Task(kind, feature, nominal=(0.0, 0.0)), 0.001, random)
@@ -344,10 +346,10 @@ class TestSuspicion:
                 first = task.feature.sections[0]
                 chip = _felt(first.touches[1], first, -0.03)
                 touches = (first.touches[0], chip, *first.touches[2:])
-                bad = Touched((first._replace(touches=touches), *task.feature.sections[1:]))
+                bad = ProbedFeature((first._replace(touches=touches), *task.feature.sections[1:]))
             else:
                 x, y, z = task.feature.points[1]
-                bad = Touched(points=(task.feature.points[0], (x, y, z + 0.03), *task.feature.points[2:]))
+                bad = ProbedFeature(points=(task.feature.points[0], (x, y, z + 0.03), *task.feature.points[2:]))
             (*found,) = evaluate(Task(kind, bad, nominal=(0.0, 0.0))).suspicion.suspects
             named += [each.touch for each in found] == [2]
         assert named >= 28
@@ -358,8 +360,8 @@ class TestSuspicion:
         for point in points:
             point[2] += random.normal(0, 0.001)
         points[5][2] += 0.05
-        datum = Touched(points=tuple(map(tuple, points)))
-        found = evaluate(Task(Kind.PARALLELISM, Touched(points=plate()), datum))
+        datum = ProbedFeature(points=tuple(map(tuple, points)))
+        found = evaluate(Task(Kind.PARALLELISM, ProbedFeature(points=plate()), datum))
         assert [each.touch for each in found.datum.suspects] == [6]
         assert found.suspicion.suspects == ()
 
@@ -372,13 +374,16 @@ class TestRefused:
     @pytest.mark.parametrize(
         ("task", "reason"),
         [
-            (Task(Kind.ROUNDNESS, Touched()), Reason.TOO_FEW),
-            (Task(Kind.STRAIGHTNESS, Touched(points=((0.0, 0.0), (1.0, 0.0)))), Reason.TOO_FEW),
-            (Task(Kind.FLATNESS, Touched(points=((0.0, 0.0, 0.0),) * 3)), Reason.TOO_FEW),
-            (Task(Kind.FLATNESS, Touched(points=tuple((float(x), 0.0, 0.0) for x in range(5)))), Reason.COLLINEAR),
+            (Task(Kind.ROUNDNESS, ProbedFeature()), Reason.TOO_FEW),
+            (Task(Kind.STRAIGHTNESS, ProbedFeature(points=((0.0, 0.0), (1.0, 0.0)))), Reason.TOO_FEW),
+            (Task(Kind.FLATNESS, ProbedFeature(points=((0.0, 0.0, 0.0),) * 3)), Reason.TOO_FEW),
+            (
+                Task(Kind.FLATNESS, ProbedFeature(points=tuple((float(x), 0.0, 0.0) for x in range(5)))),
+                Reason.COLLINEAR,
+            ),
             (Task(Kind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0, 0, 10)])), Reason.TOO_FEW),
             (Task(Kind.AXIS_STRAIGHTNESS, bore([(0, 0, 5), (0, 0, 5), (0, 0, 5)])), Reason.COINCIDENT),
-            (Task(Kind.POSITION, Touched(), nominal=(0.0, 0.0)), Reason.TOO_FEW),
+            (Task(Kind.POSITION, ProbedFeature(), nominal=(0.0, 0.0)), Reason.TOO_FEW),
         ],
     )
     def test_with_a_reason(self, task: Task, reason: Reason) -> None:
@@ -390,10 +395,12 @@ class TestRefused:
         line = Section(((0.0, 0.0), (1.0, 1.0), (2.0, 2.0)), 30.0)
         good = bore([(0, 0, 0), (0, 0, 20)])
         with pytest.raises(WrongSection) as refused:
-            evaluate(Task(Kind.AXIS_STRAIGHTNESS, Touched((*good.sections, line))))
+            evaluate(Task(Kind.AXIS_STRAIGHTNESS, ProbedFeature((*good.sections, line))))
         assert (refused.value.number, refused.value.reason.reason) == (3, Reason.COLLINEAR)
         with pytest.raises(DatumRefused) as datum:
-            evaluate(Task(Kind.COAXIALITY, good, Touched((good.sections[0], line))))
+            evaluate(Task(Kind.COAXIALITY, good, ProbedFeature((good.sections[0], line))))
         assert isinstance(datum.value.reason, WrongSection)
         with pytest.raises(DatumRefused):
-            evaluate(Task(Kind.PARALLELISM, good, Touched(points=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)))))
+            evaluate(
+                Task(Kind.PARALLELISM, good, ProbedFeature(points=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))))
+            )

@@ -10,9 +10,10 @@ class Stopped(Exception):
 
 
 class Control:
-    """Wear by (tool, axis) and the variables. ``blocks``: after so many blocks the power goes."""
+    """Wear by (tool, axis) and the variables. ``blocks``: after so many blocks the power goes. inch: it works in inch."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, inch: bool = False) -> None:
+        self.inch = inch
         self.variables: dict[int, float] = {}
         self.wear: dict[str, float] = {}
         self.messages: list[str] = []
@@ -55,7 +56,7 @@ class Sinumerik(Control):
     def _do(self, block: str) -> str | None:
         if found := re.fullmatch(r"IF (.+) GOTOF (\w+)", block):
             return found[2] if self._value(found[1]) else None
-        if found := re.fullmatch(r"(R\d+|\$TC_DP\d+\[\d+,\d+\])=(.+)", block):
+        if found := re.fullmatch(r"(R\d+|\$TC_DP\d+\[\d+,\d+\]|\$P_UIFR\[\d+,[XYZ],(?:TR|RT)\])=(.+)", block):
             value = float(self._value(found[2]))
             if found[1].startswith("R"):
                 self.variables[int(found[1][1:])] = value
@@ -70,7 +71,11 @@ class Sinumerik(Control):
         return None
 
     def _value(self, expression: str) -> Any:
-        expression = re.sub(r"\$TC_DP\d+\[\d+,\d+\]", lambda found: f"W('{found[0][1:]}')", expression)
+        unit = {"$MN_SCALING_SYSTEM_IS_METRIC": "1", "$P_GG[13]": "1" if self.inch else "2"}
+        for name, value in unit.items():
+            expression = expression.replace(name, value)
+        stored = r"\$TC_DP\d+\[\d+,\d+\]|\$P_UIFR\[\d+,[XYZ],(?:TR|RT)\]"
+        expression = re.sub(stored, lambda found: f"W('{found[0][1:]}')", expression)
         expression = re.sub(r"\bR(\d+)", r"V(\1)", expression).replace("<>", "!=").replace(" AND ", " and ")
         names: dict[str, Callable[..., float]] = {
             "W": lambda name: self.wear.get(f"${name}", 0.0),
@@ -92,7 +97,7 @@ class Fanuc(Control):
         return re.sub(r"\([^)]*\)", "", line).strip()
 
     def _do(self, block: str) -> str | None:
-        if block.startswith(("#3000", "N9999")):
+        if block.startswith(("#3000", "N9999", "N8020")):
             raise Stopped(block)
         if found := re.fullmatch(r"IF\[(.+)\]GOTO(\d+)", block):
             return found[2] if self._value(found[1]) else None
@@ -105,14 +110,18 @@ class Fanuc(Control):
             where = {"X": 2000, "U": 2000, "Z": 2100, "W": 2100}[found[2]] + int(found[1])
             before = self.variables.get(where, 0.0) if found[2] in "UW" else 0.0
             self.variables[where] = round(before + float(found[3]), self.decimals)
+        elif found := re.fullmatch(r"G90 G10 L2 P(\d)(.*)", block):
+            for axis, value in re.findall(r"([XYZ])(\S+)", found[2]):
+                self.variables[5200 + 20 * int(found[1]) + " XYZ".index(axis)] = float(self._value(value))
         else:
-            assert not block, block
+            assert not block or re.match(r"G(5\d|6[89])", block), block
         return None
 
     def _value(self, expression: str) -> Any:
+        expression = expression.replace("#4006", "20" if self.inch else "21")
         expression = re.sub(r"#\[(\d+)\+(\d+)\]", r"V(\1+\2)", expression)
         expression = re.sub(r"#(\d+)", r"V(\1)", expression).replace("[", "(").replace("]", ")")
-        for word, sign in (("GE", ">="), ("LE", "<="), ("GT", ">"), ("NE", "!=")):
+        for word, sign in (("GE", ">="), ("LE", "<="), ("GT", ">"), ("NE", "!="), ("EQ", "==")):
             expression = re.sub(rf"{word}(?=[\d(V-])", f" {sign} ", expression)
         return evaluate(expression, {"V": lambda n: self.variables.get(n, 0.0), "ABS": abs})
 

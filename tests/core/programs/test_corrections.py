@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.parameters import Axis
-from app.core.programs.corrections import FORMS, Form, Step, Wanted, steps, write
+from app.core.programs.corrections import FORMS, Form, OffsetStep, PendingCorrection, steps, write
 from tests.core.programs.controls import Control, Fanuc, Sinumerik, Stopped
 
 GUARDED = (Form.TURNING, Form.MILLING, Form.WEAR_VARIABLES, Form.WEAR_VARIABLES_2000, Form.G10)
@@ -46,8 +46,8 @@ def last_applied(control: Control, form: Form) -> float:
     return control.variables.get(LAST.get(form, 599), 0)
 
 
-def chain_of(changes: list[tuple[int, float]], offsets: dict[int, float], first: int = 1) -> list[Step]:
-    wanted = [Wanted(number, tool, amount, Axis.X) for number, (tool, amount) in enumerate(changes, first)]
+def chain_of(changes: list[tuple[int, float]], offsets: dict[int, float], first: int = 1) -> list[OffsetStep]:
+    wanted = [PendingCorrection(number, tool, amount, Axis.X) for number, (tool, amount) in enumerate(changes, first)]
     return steps(wanted, offsets, first - 1, first - 1)
 
 
@@ -111,7 +111,7 @@ def test_an_older_text_after_a_newer_one_changes_nothing(
 def test_a_stale_text_is_passed_over_where_the_offset_has_come_back_by_chance(form: Form) -> None:
     """+20, +10, −30 µm leads back to 0. The offset alone would let the first text run again."""
     first = chain_of([(3, 0.02), (3, 0.01)], {3: 0.0})
-    second = steps([Wanted(3, 3, -0.03, Axis.X)], {3: 0.03}, 2, 2)
+    second = steps([PendingCorrection(3, 3, -0.03, Axis.X)], {3: 0.03}, 2, 2)
     control = control_for(form)
     for chain in (first, second):
         control.run(write(form, "m", chain))
@@ -128,13 +128,13 @@ def test_a_stale_text_is_passed_over_where_the_offset_has_come_back_by_chance(fo
 def test_a_correction_that_was_released_late_is_applied_once(form: Form, times: int) -> None:
     """17 was held until 18 was applied: it has the lower number, and comes after."""
     control = control_for(form)
-    control.run(write(form, "m", steps([Wanted(18, 5, 0.01, Axis.X)], {3: 0.0, 5: 0.0}, 16, 16)))
-    late = write(form, "m", steps([Wanted(17, 3, -0.02, Axis.X)], {3: 0.0, 5: 0.01}, 18, 18))
+    control.run(write(form, "m", steps([PendingCorrection(18, 5, 0.01, Axis.X)], {3: 0.0, 5: 0.0}, 16, 16)))
+    late = write(form, "m", steps([PendingCorrection(17, 3, -0.02, Axis.X)], {3: 0.0, 5: 0.01}, 18, 18))
     for _ in range(times):
         control.run(late)
     assert (offset(control, form, 3), offset(control, form, 5)) == (-0.02, 0.01)
     assert last_applied(control, form) == 17
-    control.run(write(form, "m", steps([Wanted(19, 3, 0.005, Axis.X)], {3: -0.02, 5: 0.01}, 18, 17)))
+    control.run(write(form, "m", steps([PendingCorrection(19, 3, 0.005, Axis.X)], {3: -0.02, 5: 0.01}, 18, 17)))
     with nullcontext() if form is Form.G10 else pytest.raises(Stopped):
         control.run(late)
     assert (offset(control, form, 3), last_applied(control, form)) == (-0.015, 19)
@@ -144,8 +144,8 @@ def test_a_correction_that_was_released_late_is_applied_once(form: Form, times: 
 def test_a_late_one_joins_a_text_that_is_out_already(form: Form) -> None:
     """18 was fetched and run; before anybody confirmed it, 17 was released. The next text holds both, 18 first."""
     control, offsets = control_for(form), {3: 0.0, 5: 0.0}
-    control.run(write(form, "m", steps([Wanted(18, 5, 0.01, Axis.X)], offsets, 16, 16)))
-    both = [Wanted(18, 5, 0.01, Axis.X), Wanted(17, 3, -0.02, Axis.X)]
+    control.run(write(form, "m", steps([PendingCorrection(18, 5, 0.01, Axis.X)], offsets, 16, 16)))
+    both = [PendingCorrection(18, 5, 0.01, Axis.X), PendingCorrection(17, 3, -0.02, Axis.X)]
     for _ in range(2):
         control.run(write(form, "m", steps(both, offsets, 16, 16)))
     assert (offset(control, form, 3), offset(control, form, 5)) == (-0.02, 0.01)
@@ -168,6 +168,20 @@ def test_what_a_control_rounds_is_not_a_difference() -> None:
     assert control.variables[599] == 2
 
 
+@pytest.mark.parametrize("form", GUARDED)
+def test_a_control_in_inch_stops_before_anything_is_changed(form: Form) -> None:
+    text = write(form, "m", chain_of([(3, -0.0061)], {3: 0.0}))
+    control = (Sinumerik if form in {Form.TURNING, Form.MILLING} else Fanuc)(inch=True)
+    with pytest.raises(Stopped, match=r"INCH|N8020"):
+        control.run(text)
+    assert (control.variables, control.wear) == ({}, {})
+
+
+def test_where_a_control_cannot_be_asked_the_text_says_mm() -> None:
+    for form in (Form.G10_ABSOLUTE, Form.LIST):
+        assert " MM" in "".join(write(form, "m", chain_of([(3, -0.0061)], {3: 0.0})).splitlines()[:2])
+
+
 def test_absolute_g10_needs_no_guard() -> None:
     text, control = write(Form.G10_ABSOLUTE, "m", chain_of([(3, -0.0061), (3, -0.0054)], {3: 0.0})), Fanuc()
     for _ in range(3):
@@ -176,7 +190,7 @@ def test_absolute_g10_needs_no_guard() -> None:
 
 
 def test_the_axis_says_which_offset() -> None:
-    along = steps([Wanted(1, 7, 0.01, Axis.Z)], {7: 0.0}, 0, 0)
+    along = steps([PendingCorrection(1, 7, 0.01, Axis.Z)], {7: 0.0}, 0, 0)
     for form, words in (
         (Form.TURNING, "$TC_DP13[7,1]=0.01"),
         (Form.MILLING, "$TC_DP12[7,1]=0.01"),
@@ -190,7 +204,7 @@ def test_the_axis_says_which_offset() -> None:
 
 
 def test_numbers_have_no_exponent_and_comments_no_lower_case() -> None:
-    tiny = steps([Wanted(1, 3, 1e-6, Axis.X)], {3: 0.0}, 0, 0)
+    tiny = steps([PendingCorrection(1, 3, 1e-6, Axis.X)], {3: 0.0}, 0, 0)
     for form in Form:
         text = write(form, "lathe-1", tiny)
         assert "0.000001" in text

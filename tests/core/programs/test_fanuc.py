@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.core.parameters import Parameters, read
+from app.core.parameters import Axis, Parameters, read
 from app.core.programs import fanuc
-from app.core.programs.lines import Program, ProgramError, ProgramKind, Verdict
+from app.core.programs.corrections import Form, PendingCorrection, steps, write
+from app.core.programs.lines import Program, ProgramError, ProgramKind, ProgramText, Verdict
 from tests.core.programs.conftest import parameter_sets
 
 # The modules of the source, as it prints them.
@@ -61,10 +62,112 @@ def program_of(text: str) -> Program:
     return program
 
 
-def test_the_macro_of_the_source_is_passed_over_line_by_line() -> None:
+def step_lines(text: ProgramText) -> dict[int, list[str]]:
+    return {
+        line.number: [note.data["step"] for note in line.notes if note.code == "step"]
+        for line in text.lines
+        if any(note.code == "step" for note in line.notes)
+    }
+
+
+def test_the_macro_of_the_source_is_read_step_by_step() -> None:
     text = fanuc.read(MACRO)
-    assert {line.verdict for line in text.lines} == {Verdict.IGNORED}
+    assert Verdict.NOT_UNDERSTOOD not in {line.verdict for line in text.lines}
     assert text.programs == ()
+    found = step_lines(text)
+    assert [found.get(number) for number in (6, 7, 12, 13, 14, 15, 16, 26, 30)] == [
+        ["limit_size"],
+        ["limit_size"],
+        ["not_a_bore"],
+        ["probing_target"],
+        ["touch"],
+        ["measured"],
+        ["compared"],
+        ["corrected"],
+        ["alarm"],
+    ]
+
+
+def test_the_probing_target_is_computed_where_its_variables_stand() -> None:
+    text = fanuc.read("#505=40.\n#503=2.5\nG31 X[#505+#503*COS[12.5]-1] F#504\nG31 X[-[#505+#503*COS[12.5]-1]] F#504")
+    assert [line.notes[0].data["step"] for line in text.lines[2:]] == ["probing_target", "probing_target"]
+    assert [line.notes[0].data["value"] for line in text.lines[2:]] == [41.44074, -41.44074]
+
+
+EDGE_FINDER = """O0999
+N1 #1=54.
+#2=0.1
+IF [#2 LT 0] GOTO2
+IF [#1 EQ 54] GOTO54
+#3000 =1(YOU INPUT ERR, INPUT 54-55)
+N2 #3000=2(YOU INPUT ERR, INPUT 0.0-1.0)
+N54 M3 S60
+M00
+#501 =#5021
+#502 =#5021
+#503 =[#501+#502]/2
+#801 =#5221
+#5221 =#503
+#504 =#5022
+#505=#5022
+#506 =[#504+#505]/2
+#802 =#5222
+#5222 =#506
+#508 =#5023
+#509 =#508-#2-#[11000+#4120]
+#803 =#5223
+#5223 =#509
+#510=2*SQRT[[#5021-#5221]*[#5021-#5221]+[#5022-#5222]*[#5022-#5222]]+ 6
+#511=ABS[#502-#501]-6
+#512=ABS[#505-#504]-6
+N100 #3006=1(D=#510 L=#511 W=#512)
+GOTO 200
+N200 M30
+"""
+
+
+def test_the_choice_of_a_work_offset_is_no_tool() -> None:
+    fragment = fanuc.read("#1=54.\n#2=0.\nIF [#1 EQ 54] GOTO54\nN54 M3 S60")
+    assert fragment.programs == ()
+
+
+def test_the_edge_finder_macro_of_the_source_is_read() -> None:
+    text = fanuc.read(EDGE_FINDER)
+    assert Verdict.NOT_UNDERSTOOD not in {line.verdict for line in text.lines}
+    (program,) = text.programs
+    assert program.kind is ProgramKind.WORK_ZERO
+    assert program.parameters == {
+        "work_offset": "G54",
+        "axes": "XYZ",
+        "tip": 6.0,
+        "feeler": 0.1,
+        "old_kept": "X #801, Y #802, Z #803",
+    }
+    assert program.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("head", "feeler", "tip", "warned"),
+    [("#2=5.", 5.0, 6.0, True), ("G20\n#2=0.01", 0.254, 152.4, False), ("#2=-0.1", -0.1, 6.0, True)],
+)
+def test_the_feeler_of_the_edge_finder_is_held_to_the_range_of_the_source(
+    head: str, feeler: float, tip: float, warned: bool
+) -> None:
+    """The macro takes 0 to 1 mm and raises an alarm outside; in a text in inch, tip and feeler are inches as well."""
+    program = program_of(EDGE_FINDER.replace("#2=0.1", head))
+    assert (program.parameters["feeler"], program.parameters["tip"]) == (feeler, tip)
+    assert ["feeler_range"] * warned == [note.code for note in program.notes]
+
+
+def test_the_alarm_of_a_correction_text_is_read_as_one() -> None:
+    chain = steps([PendingCorrection(18, 3, -0.0061, Axis.X)], {3: -0.0081}, 17, 17)
+    lathe_line, fanuc_lathe = (
+        write(form, "lathe-1", chain) for form in (Form.WEAR_VARIABLES, Form.WEAR_VARIABLES_2000)
+    )
+    assert "N9999 G65 H99 P0(/INBAND OFFSET NOT AS EXPECTED)" in lathe_line
+    assert "N9999 #3000=1(INBAND OFFSET NOT AS EXPECTED)" in fanuc_lathe
+    for text in (lathe_line, fanuc_lathe):
+        assert ["alarm"] in step_lines(fanuc.read(text)).values()
 
 
 def test_the_variables_make_the_lathe_line() -> None:
@@ -109,7 +212,10 @@ def test_results_become_the_touches_of_a_reading() -> None:
     ("text", "code"),
     [
         ("#505=#500+1", "expression"),
-        ("#505=40.0.1", "expression"),
+        ("#505=40.0.1", "no_number"),
+        ("#505=40. 001", "blank_in_number"),
+        ("#511=40. 001", "blank_in_number"),
+        ("G65 P9011 A1 2.", "blank_in_number"),
         ("#505=", "no_value"),
         ("#505=" + "9" * 400, "too_large"),
         ("bore", "unknown"),
@@ -129,6 +235,34 @@ def test_the_last_assignment_counts_and_a_calculation_leaves_nothing_standing() 
     assert [note.code for note in text.lines[1].notes] == ["again", "assigned"]
     assert program_of("#505=40.\n#505=41.").parameters["nominal"] == 41.0
     assert "nominal" not in program_of("#505=40.\n#505=#1+2\n#506=1.").parameters
+
+
+def test_a_number_with_a_blank_leaves_nothing_standing() -> None:
+    assert "nominal" not in program_of("#505=40.\n#505=40. 001\n#506=1.").parameters
+    assert "tool_memory" not in program_of("#505=40.\nG65 P9011 A3.\nG65 P9011 A1 2.").parameters
+    assert fanuc.touches(program_of("#510=40.\n#511=40.\n#512=40.\n#512=4 0.").results) is None
+
+
+def test_a_minus_is_a_minus_however_it_is_printed() -> None:
+    assert program_of("#505=40.\n#507=−0.016\n#506 = - 0.004").parameters["lower_deviation"] == -0.016
+
+
+@pytest.mark.parametrize("word", ["G20", "N1 G70", "G20 G99"])
+def test_inches_become_mm(word: str) -> None:
+    program = program_of(f"{word}\n#504=10.\n#505=1.5\n#506=0.001\n#507=0.\n#510=1.5004\nG65 P9011 A3.")
+    assert program.inch
+    assert (program.parameters["nominal"], program.parameters["upper_deviation"]) == (38.1, 0.0254)
+    assert (program.values["#504"], program.results["#510"]) == (254.0, 38.11016)
+    assert program.parameters["tool_memory"] == 3
+
+
+def test_roughing_and_finishing_cycles_are_no_unit() -> None:
+    for block in ("G70 P10 Q20", "G71 U2. R0.5", "G71 P10 Q20 U0.4 W0.1"):
+        assert program_of(f"{block}\n#505=40.\nG65 P9011 A3.").parameters["nominal"] == 40.0
+    mixed = fanuc.read("#505=1.5748\nG20\nG65 P9011 A3.")
+    assert mixed.program is not None
+    assert "nominal" not in mixed.program.parameters
+    assert "unit_mixed" in [note.code for note in mixed.lines[0].notes]
 
 
 VALUES = st.dictionaries(st.sampled_from(["#500", "#501", "#502", "#503", "#504"]), st.floats(-999, 999))
@@ -153,6 +287,12 @@ def test_the_lathe_line_needs_few_comments() -> None:
     text = fanuc.write_measuring(parameters, {}, program_of(BORE).values)
     assert text.splitlines() == [
         "(MEASURING, LATHE LINE)",
+        "(LENGTHS ARE MM: IT STOPS WHERE THE CONTROL WORKS IN INCH)",
+        "IF[#4006EQ20]GOTO8020",
+        "IF[#4006NE70]GOTO8021",
+        "N8020 G65 H99 P0(/INBAND: CONTROL IS IN INCH)",
+        "M99",
+        "N8021",
         "(INBAND AVERAGING_LIMIT=0.008333333)",
         "(INBAND WEAR_LIMIT=0.3)",
         "(INBAND CONFIDENCE_LIMIT=1)",

@@ -9,10 +9,22 @@ from hypothesis import strategies as st
 
 from app.core.geometry.frames import frame, from_angles, turned
 from app.core.geometry.points import Floats
-from app.core.programs.frames import FrameText, ZeroText, offset_of, write_frame, write_zero
+from app.core.programs import unit_check
+from app.core.programs.frames import FrameText, ZeroText, offset_of, write_frame, write_restored, write_zero
+from tests.core.programs.controls import Fanuc, Sinumerik, Stopped
 
 angles = st.floats(-60, 60)
 lengths = st.floats(-5000, 5000)
+
+
+UNIT = {"sinumerik": unit_check.sinumerik, "fanuc": unit_check.fanuc, "heidenhain": unit_check.heidenhain}
+
+
+def without_unit(control: str, text: str) -> list[str]:
+    """The lines of a text without its check of the unit, which every text has."""
+    check = "\n".join(UNIT[control]()) + "\n"
+    assert text.count(check) == 1
+    return text.replace(check, "").splitlines()
 
 
 def numbers(line: str) -> dict[str, float]:
@@ -51,8 +63,9 @@ def test_offsets_that_a_control_has(control: str, text: str, number: int | None)
 def zero(control: str, offset: str, **values: float) -> list[str]:
     place = offset_of(control, offset)
     assert place is not None
-    given = {"x": None, "y": None, "z": None, "rotation": None} | values
-    return write_zero(control, ZeroText("INBAND WORK ZERO 1 FOR M", place, **given)).splitlines()
+    x, y, z, rotation = (values.get(name) for name in ("x", "y", "z", "rotation"))
+    text = write_zero(control, ZeroText("INBAND WORK ZERO 1 FOR M", place, x, y, z, rotation))
+    return without_unit(control, text) if control in {"sinumerik", "fanuc"} else text.splitlines()
 
 
 def test_fanuc_sets_absolutely() -> None:
@@ -126,13 +139,13 @@ def test_each_control_takes_every_word(a: float, b: float, c: float, x: float, y
 
 def test_in_the_plane_each_control_says_it_its_way() -> None:
     motion = frame(from_angles(0, 0, 0.5), [0.1, -0.2, 0.0])
-    assert write_frame("fanuc", FrameText("T", motion)).splitlines()[1:] == [
+    assert without_unit("fanuc", write_frame("fanuc", FrameText("T", motion)))[1:] == [
         "G69",
         "G52 X0.1 Y-0.2 Z0.",
         "G68 X0. Y0. R0.5",
         "M99",
     ]
-    assert write_frame("heidenhain", FrameText("T", motion)).splitlines()[1:] == [
+    assert without_unit("heidenhain", write_frame("heidenhain", FrameText("T", motion)))[1:] == [
         "CYCL DEF 7.0 DATUM SHIFT",
         "CYCL DEF 7.1 X+0.1",
         "CYCL DEF 7.2 Y-0.2",
@@ -149,3 +162,98 @@ def test_the_table_goes_to_a_place_not_by_an_amount() -> None:
     assert "G90 G0 C360.25" in write_frame("fanuc", table)
     assert "L C+360.25 FMAX" in write_frame("heidenhain", table)
     assert "TABLE C TO 360.25" in write_frame("other", table)
+
+
+@pytest.mark.parametrize(
+    ("control", "stops"),
+    [
+        ("sinumerik", ["INBAND_STOP:", "M0", "GOTOB INBAND_STOP"]),
+        ("fanuc", ["#3000=2(INBAND: POINTS EXCHANGED)"[:37]]),
+        (
+            "heidenhain",
+            ['LBL "INBAND STOP"', "STOP ; INBAND: POINTS EXCHANGED", 'FN 9: IF +0 EQU +0 GOTO LBL "INBAND STOP"'],
+        ),
+        ("other", ["WARNING: POINTS EXCHANGED"]),
+    ],
+)
+def test_warnings_stop_the_control_before_anything_is_set(control: str, stops: list[str]) -> None:
+    text = FrameText("INBAND ALIGNMENT 7 FOR M", frame(np.eye(3), [1.0, 2.0, 3.0]))
+    clean = write_frame(control, text)
+    stopped = write_frame(control, text._replace(stop=("points_exchanged", "turned_far")))
+    block = stopped.removesuffix(clean).splitlines()
+    assert stopped.endswith(clean)
+    assert [line for line in block if line in stops] == stops
+    assert any("TURNED FAR" in line for line in block)
+
+
+def test_a_heidenhain_zero_is_a_list_for_people_and_says_so_as_well() -> None:
+    offset = offset_of("heidenhain", "preset 3")
+    assert offset is not None
+    lines = write_zero("heidenhain", ZeroText("INBAND WORK ZERO 1", offset, 1.0, 2.0, 3.0, None, ("turned_far",)))
+    assert lines.splitlines()[1] == "WARNING: TURNED FAR"
+
+
+def texts_with_a_base(control: str) -> list[ZeroText | FrameText]:
+    offset = offset_of(control, "G55")
+    assert offset is not None
+    shift = frame(np.eye(3), [1.0, 2.0, 3.0])
+    return [
+        ZeroText("T", offset, 11.0, 22.0, 33.0, number=7),
+        FrameText("T", shift, (offset, {"X": 10.0, "Y": 20.0, "Z": 30.0}), number=7),
+    ]
+
+
+@pytest.mark.parametrize("inch", [False, True])
+@pytest.mark.parametrize("at", [0, 1])
+@pytest.mark.parametrize("control", ["sinumerik", "fanuc"])
+def test_run_on_a_control_the_old_offset_comes_back(control: str, at: int, inch: bool) -> None:
+    """Set twice, then set back; in inch nothing happens. The simulated Sinumerik has no whole frames: they are set after."""
+    text = texts_with_a_base(control)[at]
+    machine = (Sinumerik if control == "sinumerik" else Fanuc)(inch=inch)
+    places = [f"$P_UIFR[2,{axis},TR]" for axis in "XYZ"]
+    old = {"X": -1.5, "Y": 2.5, "Z": -300.0}
+    machine.wear = dict(zip(places, old.values(), strict=True))
+    machine.variables = dict(zip((5241, 5242, 5243), old.values(), strict=True))
+
+    def held() -> list[float]:
+        return (
+            [machine.wear[name] for name in places]
+            if control == "sinumerik"
+            else [machine.variables[n] for n in (5241, 5242, 5243)]
+        )
+
+    sets = write_zero(control, text) if isinstance(text, ZeroText) else write_frame(control, text)
+    restores = write_restored(control, text)
+    assert restores is not None
+    if inch:
+        for each in (sets, restores):
+            with pytest.raises(Stopped, match=r"INCH|N8020"):
+                machine.run(each)
+        assert held() == [*old.values()]
+        return
+    with pytest.raises(Stopped):  # nothing is kept yet
+        machine.run(restores)
+    for _ in range(2):
+        whole = next((line for line in sets.splitlines() if "CTRANS" in line), "")
+        machine.run(sets.replace(whole, "") if whole else sets)
+        machine.wear |= dict(zip(places, (11.0, 22.0, 33.0), strict=True)) if whole else {}
+        assert held() == [11.0, 22.0, 33.0]
+    machine.run(restores)
+    assert held() == [*old.values()]
+    with pytest.raises(Stopped):  # it came back once
+        machine.run(restores)
+
+
+def test_an_alignment_that_sets_no_work_offset_has_nothing_to_set_back() -> None:
+    assert write_restored("sinumerik", FrameText("T", np.eye(4), number=7)) is None
+    assert write_restored("heidenhain", texts_with_a_base("fanuc")[1]) is None
+
+
+def test_the_old_offset_of_a_work_zero_is_not_that_of_an_alignment() -> None:
+    zero, frame_ = texts_with_a_base("sinumerik")
+    machine = Sinumerik()
+    machine.run(write_zero("sinumerik", ZeroText("T", zero.offset, 1.0, None, None, number=7)))  # type: ignore[union-attr]
+    restores = write_restored("sinumerik", frame_)
+    assert restores is not None
+    with pytest.raises(Stopped):
+        machine.run(restores)

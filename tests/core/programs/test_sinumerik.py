@@ -171,8 +171,13 @@ def test_forms_of_an_assignment(text: str, found: dict[str, Any]) -> None:
         ("R33=(0.001)", "expression"),
         ("R33=SIN(30)", "expression"),
         ("R33=1 -5", "expression"),
-        ("R33=0.0.1", "expression"),
-        ("R33=0,001,5", "expression"),
+        ("R33=0.0.1", "no_number"),
+        ("R33=0,001,5", "no_number"),
+        ("R33=0. 001", "blank_in_number"),
+        ("R33=0.001 5", "blank_in_number"),
+        ("R33=0 ,001", "blank_in_number"),
+        ("R330. 001", "blank_in_number"),
+        ("R33=0.\u00a0001", "blank_in_number"),
         ("R33=", "no_value"),
         ("R33", "no_value"),
         ("R240=1", "unknown_r"),
@@ -181,7 +186,7 @@ def test_forms_of_an_assignment(text: str, found: dict[str, Any]) -> None:
         ("L99", "unknown"),
         ("R33=" + "9" * 400, "too_large"),
         ("R33=1E999", "too_large"),
-        ("R33=٣", "expression"),
+        ("R33=٣", "no_number"),
         ("(INBAND FACTOR=left)", "bad_setting"),
         ("(INBAND NONSENSE=1)", "bad_setting"),
         ("x" * 2000, "too_long"),
@@ -198,6 +203,65 @@ def test_a_calculation_does_not_leave_the_value_before_it_standing() -> None:
     """On the control R33 has another value by then, and nobody here knows which."""
     assert parameters_of("R33=0.001 R34=0.01\nR33=R50*2") == {"averaging_limit": 0.01}
     assert parameters_of("R33=R50*2\nR33=0.001") == {"zero_range": 0.001}
+
+
+@pytest.mark.parametrize("broken", ["R33=0. 002", "R330. 002", "R33xx", "(INBAND ZERO_RANGE=0. 002)", "_TZL=0. 002"])
+def test_a_number_with_a_blank_leaves_nothing_standing(broken: str) -> None:
+    assert parameters_of(f"R33=0.001 R34=0.01\n{broken}") == {"averaging_limit": 0.01}
+
+
+@pytest.mark.parametrize("text", ["R41=- 0.016", "R41- 0.016", "R41 = − 0,016"])
+def test_a_blank_behind_the_sign_makes_no_number(text: str) -> None:
+    read = sinumerik.read(f"R41=-0.5\n{text}\nR42=40")
+    assert read.program is not None
+    assert dict(read.program.parameters) == {"nominal": 40.0}
+    assert "blank_in_number" in codes(read, 2)
+
+
+@pytest.mark.parametrize(
+    "text", ["R41 = -0.016", "R41=−0.016", "R41= –0,016", "R41−0.016", "(INBAND LOWER_DEVIATION=−0.016)"]
+)
+def test_a_minus_is_a_minus_however_it_is_printed(text: str) -> None:
+    assert parameters_of(text) == {"lower_deviation": -0.016}
+    assert ("printed_minus" in codes(sinumerik.read(text), 1)) == (not text.startswith("(") and not text.isascii())
+
+
+INCH = "R10=3 R25=3 R26=1 R23=3 R28=2 R29=2\nR33=0.0001 R36=0.05 R37=0.02 R40=0 R41=-0.001 R42=1.5\nL75\nL93"
+
+
+@pytest.mark.parametrize("word", ["G70", "N5 G700", "G20 G90", "BEGIN PGM SHAFT INCH"])
+def test_inches_become_mm(word: str) -> None:
+    program = sinumerik.read(f"{word}\n{INCH}\nM17").program
+    assert program is not None
+    assert program.inch
+    assert program.parameters["nominal"] == 38.1
+    assert program.parameters["lower_deviation"] == -0.0254
+    assert (program.parameters["index"], program.parameters["path_factor"]) == (25.4, 2.0)
+    assert "from_inch" in [note.code for note in program.notes]
+    assert "unit_inch" in codes(sinumerik.read(word), 1)
+
+
+@pytest.mark.parametrize("word", ["G71", "G710 G90", "G21", "BEGIN PGM SHAFT MM", ""])
+def test_millimetres_stay(word: str) -> None:
+    program = sinumerik.read(f"{word}\n{INCH}\nM17").program
+    assert program is not None
+    assert (program.parameters["nominal"], program.parameters["index"], program.inch) == (1.5, 1.0, False)
+
+
+@pytest.mark.parametrize(
+    "text", ["R10=3 R42=1.5\nG70\nR33=0.001\nL93", "G71\nR10=3 R33=1.5\nG70\nL93", "R10=3 R33=1.5\nG70"]
+)
+def test_a_unit_that_changes_leaves_no_length_standing(text: str) -> None:
+    found = sinumerik.read(text)
+    assert found.program is not None
+    assert found.program.parameters == {"tool_memory": 3}
+    assert any(note.code == "unit_mixed" for line in found.lines for note in line.notes)
+    assert any(line.verdict is Verdict.NOT_UNDERSTOOD for line in found.lines)
+
+
+def test_a_main_program_ends_with_its_unit() -> None:
+    programs = sinumerik.read("G70\nR32=1 R35=0.1\nL93\nM30\nR32=40 R35=0.1\nL93").programs
+    assert [program.parameters["target"] for program in programs] == [25.4, 40.0]
 
 
 def test_the_last_assignment_counts_and_the_one_before_is_named() -> None:
@@ -299,6 +363,7 @@ def test_the_blocks_are_those_of_the_source() -> None:
     parameters, _warnings = read(parameters_of(L15) | {"factor": -1})
     assert write_measuring(parameters, {"name": "Seat Ø40"}).splitlines() == [
         "L15 (MEASURING SUBPROGRAM)",
+        "(LENGTHS ARE MM: RUN IT WITH G71 ACTIVE)",
         "(INBAND NAME=Seat {D8}40)",
         "(INBAND FACTOR=-1)",
         "N5 R10=3 R11=5 R24=0 R25=1 R26=180 R27=3 R28=1 R29=2 R30=1 R31=0",
@@ -309,6 +374,7 @@ def test_the_blocks_are_those_of_the_source() -> None:
     ]
     assert write_calibration(Calibration(parameters, 199.852), {}).splitlines() == [
         "L05 (CALIBRATION SUBPROGRAM)",
+        "(LENGTHS ARE MM: RUN IT WITH G71 ACTIVE)",
         "N5 M73 (PROBE RECEIVER ON)",
         "N10 G4 X5",
         "N15 R11=5 R21=1 R22=1 R23=0 R27=3 R28=1 R29=2 R30=1 R31=0",
@@ -365,3 +431,38 @@ def test_much_of_anything_is_answered_quickly() -> None:
     for piece in ("R33=R", "(", "R33=1 ", "R24 ", "[[[[", "_A=", "N" * 50, "=" * 30, "IF "):
         text = "\n".join(piece * (900 // len(piece)) for _ in range(60))
         assert len(sinumerik.read(text).lines) == 60
+
+
+EDGE_FINDER = """%_N_WORKPIECE_ZERO_AUTO_SET_MPF
+;$PATH=/_N_MPF_DIR
+IF R20<=0 GOTOF _LIF
+IF R20>4 GOTOF ERROR
+AAA: R20=R20
+CASE R20 OF 1 GOTOF _A 2 GOTOF _AA 3 GOTOF _B 4 GOTOF _BB DEFAULT GOTOF _E
+_A: R[R20]=$AA_IM[X]
+MSG("RECORD R" <<R20<<" POINT X AXIS AND THEN PRESS BUTTON [RESET]")
+R20=R20+1
+M0
+_E: R15=(R1+R2)/2 ; center
+R16=(R3+R4)/2
+R91=$P_UIFR[1,X,TR]
+$P_UIFR[1,X,TR]=R15
+$P_UIFR[1,Y,TR]=R16
+R14=2*SQRT(POT(R1-R15)+POT(R3-R16))+6
+R17=ABS(R2-R1)-6 R18=ABS(R4-R3)-6
+MSG("D="<<R14<<" L="<<R17<<" W="<<R18<<"")
+M0
+GOTOF END
+_LIF: R20=1
+GOTOB AAA
+ERROR: MSG(" FIRST ENTER PART NUMBER 0 OR 1 TO &R20 ")
+END: M30
+"""
+
+
+def test_the_edge_finder_macro_of_the_source_is_read() -> None:
+    text = sinumerik.read(EDGE_FINDER)
+    assert [line.text for line in text.lines if line.verdict is Verdict.NOT_UNDERSTOOD] == []
+    (program,) = text.programs
+    assert program.kind is ProgramKind.WORK_ZERO
+    assert program.parameters == {"work_offset": "G54", "axes": "XY", "tip": 6.0, "old_kept": "X R91"}

@@ -1,5 +1,6 @@
 """Capability and normality: hand cases, invariances, intervals that hold what they promise, refusals and cautions."""
 
+from collections import Counter
 from collections.abc import Callable
 from math import sqrt
 from typing import Any
@@ -10,20 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import anderson, nct
 
-from app.core.spc.capability import (
-    Capability,
-    Caution,
-    Limits,
-    capability,
-    expected_ppm,
-    observed_ppm,
-    percentile,
-)
+from app.core.spc.capability import Capability, Caution, Limits, capability, expected_ppm, observed_ppm, percentile
 from app.core.spc.normality import anderson_darling, shapiro_wilk
 from app.core.spc.refusal import Reason, Refused
 from app.core.spc.spread import far_off, pooled, subgroups
 
-READINGS = st.lists(st.integers(-300, 300), min_size=20, max_size=80).filter(lambda values: len(set(values)) > 8)
+READINGS = st.lists(st.integers(-300, 300), min_size=20, max_size=80).filter(
+    lambda values: len(set(values)) > 8 and 2 * Counter(values).most_common(1)[0][1] <= len(values)  # not too coarse
+)
 
 
 def of(values: list[float], lower: float, upper: float) -> Capability:
@@ -147,6 +142,14 @@ def test_nothing_lies_far_off_by_chance_or_in_a_saw_tooth() -> None:
     assert not far_off(np.tile(np.linspace(0, 1, 50), 20)).any()
     assert not far_off(np.array([1.0, 400.0])).any()
     assert not far_off(np.full(50, 1.0)).any()
+
+
+def test_a_chip_is_seen_though_the_middle_half_is_one_value() -> None:
+    """A gauge of 1 µm on a quiet process: most readings are the same, and quartiles say nothing of their scatter."""
+    quiet = [40.0] * 60 + [40.001] * 12 + [39.999] * 12
+    assert far_off(np.array([*quiet, 40.25])).nonzero()[0].tolist() == [84]
+    assert not far_off(np.array([*quiet, 40.003])).any()
+    assert not far_off(np.array([*([40.0] * 60), 40.25])).any(), "of two values nobody knows the step"
 
 
 class TestCautions:

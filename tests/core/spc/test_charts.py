@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import integrate
+from scipy.special import log_ndtr
 
 from app.core.compiled import plain
+from app.core.spc import constants, shewhart, spread
 from app.core.spc import cusum as sums
 from app.core.spc import ewma as averages
-from app.core.spc import shewhart, spread
 from app.core.spc.constants import c4, d2, d2_star, d3, factors
 from app.core.spc.cusum import cusum
 from app.core.spc.ewma import average_run_length, ewma, moving_average
@@ -75,6 +77,37 @@ def test_what_remembers_goes_on_where_it_stopped(values: list[float], cut: int) 
     together = cusum(baseline, values, headstart=2.5)
     assert [*first.above, *rest.above] == pytest.approx(together.above.tolist(), abs=1e-12)
     assert [*first.below, *rest.below] == pytest.approx(together.below.tolist(), abs=1e-12)
+
+
+@pytest.mark.parametrize(("n", "tabled"), [(50, 4.498), (100, 5.015), (200, 5.492), (500, 6.073), (1000, 6.483)])
+def test_large_subgroups_have_the_mean_range_that_tippett_tabled(n: int, tabled: float) -> None:
+    # L. H. C. Tippett (1925), On the extreme individuals and the range of samples, Biometrika 17, to three decimals.
+    assert d2(n) == pytest.approx(tabled, abs=0.0006)
+
+
+@pytest.mark.parametrize("n", [10_001, 1_000_000, 100_000_000])
+def test_of_very_large_subgroups_both_ends_of_the_range_are_independent(n: int) -> None:
+    largest = integrate.quad(lambda x: -np.expm1(n * log_ndtr(x)), 0, 12, epsabs=1e-12, limit=500)[0]
+    squared = integrate.quad(lambda x: -2 * x * np.expm1(n * log_ndtr(x)), 0, 12, epsabs=1e-12, limit=500)[0]
+    assert d2(n) == pytest.approx(2 * largest, rel=1e-9)
+    # Smallest and largest value know less and less of each other: the variance of the range is twice that of one end.
+    assert d3(n) ** 2 == pytest.approx(2 * (squared - largest**2), rel=0.5 / n**0.5 + 1e-7)
+
+
+def test_at_the_border_both_integrations_say_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = d2(constants.LARGE), d3(constants.LARGE)
+    monkeypatch.setattr(constants, "LARGE", 1)
+    constants._moments_of_range.cache_clear()
+    assert (d2(10_000), d3(10_000)) == pytest.approx(before, rel=1e-9)
+    constants._moments_of_range.cache_clear()
+
+
+def test_a_range_chart_takes_a_subgroup_of_any_size() -> None:
+    values = np.random.default_rng(3).normal(size=2 * 10_001 + 60)
+    groups = subgroups(values, [3] * 20 + [10_001, 10_001])
+    baseline = shewhart.subgroup_baseline(groups)
+    assert baseline.sigma.value == pytest.approx(1.0, abs=0.05)
+    assert not shewhart.ranges(baseline, groups).outside[-2:].any()  # the two large ones
 
 
 def test_the_limits_of_a_chart_are_where_rule_one_fires() -> None:

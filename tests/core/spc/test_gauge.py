@@ -1,6 +1,8 @@
 """Gauge studies: what is put in comes out, and half a study is refused."""
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -95,7 +97,9 @@ class TestCrossed:
     def test_a_missing_reading_and_equal_readings_are_refused(self) -> None:
         readings = study(5, 2)
         readings[0, 0, 0] = np.nan
-        for wrong in (readings, np.ones((5, 2, 2))):
+        tenth = np.repeat(np.arange(5.0)[:, None, None] * 0.3, 4, axis=1).reshape(5, 2, 2) + 0.1
+        noise = tenth + np.random.default_rng(1).normal(0, 1e-16, (5, 2, 2))
+        for wrong in (readings, np.ones((5, 2, 2)), tenth, noise):
             for evaluate in (by_anova, by_average_and_range):
                 with pytest.raises(Refused):
                     evaluate(wrong)
@@ -123,9 +127,20 @@ class TestSingle:
         assert not found.few
 
     def test_a_coarse_gauge_is_told(self) -> None:
-        found = single.type_one([1.0, 1.01] * 6, 1.0, 0.1, resolution=0.01)
-        assert found.resolved is False
-        assert found.few
+        for resolution in (0.01, None):  # as it is entered, or as the values show it
+            found = single.type_one([1.0, 1.01, 1.02] * 4, 1.01, 0.1, resolution=resolution)
+            assert not found.resolved
+            assert not found.capable(0.1)
+            assert found.few
+
+    @pytest.mark.parametrize(
+        "values",
+        [[39.9921] * 49 + [39.992101], [1.0, 1.01] * 15, [1.0] * 27 + [1.01, 1.02, 0.99], [0.1 + 0.2, 0.3] * 15],
+    )
+    def test_values_that_hide_their_scatter_have_no_cg(self, values: list[float]) -> None:
+        """The first had Cg 3771 and was called capable."""
+        with pytest.raises(Refused):
+            single.type_one(values, values[0], 0.016)
 
     def test_refusals(self) -> None:
         wrongs: list[Callable[[], object]] = [
@@ -149,13 +164,72 @@ class TestLinearity:
         assert low < 0.0 + value < high
         assert high - low < found.line_at(20.0)[2] - found.line_at(20.0)[1]
 
+    def test_a_bias_that_is_the_same_at_all_sizes_is_a_bias(self) -> None:
+        """1 mm at every size: no slope, and the zero line far outside the band (AIAG)."""
+        rng = np.random.default_rng(42)
+        found = linearity.linearity({size: size + 1 + rng.normal(0, 0.002, 10) for size in (10.0, 20, 30, 40, 50)})
+        assert not found.by_size
+        assert not found.holds_zero
+        assert found.biased_at == (10.0, 20.0, 30.0, 40.0, 50.0)
+        assert found.average_interval[0] > 0.99
+        assert not found.acceptable
+
+    def test_biases_beside_the_line_are_no_equal_bias(self) -> None:
+        """Up and down by 10 µm: slope and average are 0, yet the gauge errs by size."""
+        rng = np.random.default_rng(43)
+        steps = {10.0: 0.01, 20.0: -0.02, 30.0: 0.02, 40.0: -0.02, 50.0: 0.01}
+        found = linearity.linearity({size: size + step + rng.normal(0, 0.002, 10) for size, step in steps.items()})
+        assert found.slope.p_value > 0.3
+        assert found.bent
+        assert found.by_size
+        assert not found.acceptable
+
+    def test_the_zero_line_may_leave_the_band_between_the_sizes_alone(self) -> None:
+        found = linearity.linearity({0.0: [0.9, -0.9, 0.7, -0.1], 10.0: [10.9, 9.1, 10.7, 9.9]})
+        assert found.holds_zero
+        for shift in np.linspace(0, 1, 101):
+            found = linearity.linearity({x: [x + shift + e for e in (0.9, -0.9, 0.7, -0.7)] for x in (0.0, 10.0)})
+            line = [found.line_at(x) for x in np.linspace(0, 10, 201)]
+            assert found.holds_zero == all(low <= 0 <= high for _value, low, high in line)
+
+    def test_a_good_gauge_is_accepted_and_false_alarms_are_few(self) -> None:
+        rng = np.random.default_rng(44)
+        good = [
+            linearity.linearity({x: x + rng.normal(0, 0.001, 10) for x in (10.0, 20.0, 30.0, 40.0, 50.0)}).acceptable
+            for _study in range(200)
+        ]
+        assert np.mean(good) > 0.75  # five looks at 5 %, most of them at the same thing
+
+    def test_aiag_says_not_linear(self) -> None:
+        """AIAG MSA, 4th ed., table III-B 4: the band leaves zero out but at 6 mm; slope and intercept are significant."""
+        cases = json.loads((Path(__file__).parents[3] / "app/quality/proof/cases/gauge.json").read_text())
+        case = next(each for each in cases if each.get("kind") == "linearity" and 10 in each["given"]["references"])
+        found = linearity.linearity(dict(zip(case["given"]["references"], case["given"]["readings"], strict=True)))
+        assert (found.acceptable, found.by_size, found.holds_zero) == (False, True, False)
+        assert found.biased_at == (2.0, 4.0, 8.0, 10.0)
+
+    @pytest.mark.parametrize("slope", [0.0, 0.001])
+    def test_decimal_noise_is_no_significance(self, slope: float) -> None:
+        """A bias of exactly 0.1 at five sizes answered *errs by size, p < 0.001*."""
+        for repeats in (1, 10):
+            with pytest.raises(Refused) as refused:
+                linearity.linearity({x: [x + 0.1 + slope * x] * repeats for x in (10.0, 20.0, 30.0, 40.0, 50.0)})
+            assert refused.value.reason is Reason.NO_VARIATION
+
+    def test_repeats_that_are_the_same_count_once(self) -> None:
+        """Ten times the same value is no evidence ten times over."""
+        with pytest.raises(Refused):
+            linearity.linearity({x: [x + e] * 10 for x, e in ((10.0, 0.1), (20.0, 0.12), (30.0, 0.15), (40.0, 0.15))})
+
     def test_refusals(self) -> None:
         for wrong in ({1.0: [1.0, 1.1]}, {1.0: [1.0], 2.0: [2.1]}, {1.0: [1.0, 1.0], 2.0: [2.0, 2.0]}):
             with pytest.raises(Refused):
                 linearity.linearity(wrong)
 
 
-SIZES = st.lists(st.integers(-400, 400), min_size=12, max_size=40).filter(lambda values: len(set(values)) > 3)
+SIZES = st.lists(st.integers(-400, 400), min_size=12, max_size=40).filter(
+    lambda values: len(set(values)) > 3 and max(map(values.count, values)) <= 0.8 * len(values)
+)
 MOVES = {"shift": st.floats(-1e3, 1e3), "scale": st.sampled_from([-3.0, -1.0, 0.001, 25.4])}
 
 

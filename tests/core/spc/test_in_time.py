@@ -97,9 +97,9 @@ def test_values_that_take_turns_do_not_follow_each_other() -> None:
 
 
 def test_stability_counts_against_chance() -> None:
-    assert sum(not of_readings(white(seed)).stable for seed in range(100)) <= 2
+    assert sum(not of_readings(white(seed)).in_control for seed in range(100)) <= 2
     drifting = of_readings(white(1) + PLACE / 300)
-    assert not drifting.stable
+    assert not drifting.in_control
     assert {each.rule for each in drifting.beyond_chance} >= {RuleName.NELSON_2}
     beyond = stability([4.0] * 5 + [0.1, -0.1] * 200)
     (first, *_others) = beyond.fired
@@ -147,3 +147,14 @@ class TestWithoutCorrections:
             uncompensated(np.empty(0), np.empty(0, np.bool_), white(1, 30), Limits(-1, 1))
         with pytest.raises(Refused):
             uncompensated(np.zeros(30), np.arange(30) == 0, white(1, 30), Limits(-1, 1))
+
+
+def test_signals_are_sized_as_well_as_counted() -> None:
+    values = white(11, 200) * 0.002
+    assert of_readings(values).in_control
+    values[120] += 0.9
+    gross = of_readings(values)
+    assert not gross.in_control
+    assert gross.gross == 1
+    assert gross.farthest > 50
+    assert gross.beyond_chance == (), "one signal in 200 readings is no more than chance explains"

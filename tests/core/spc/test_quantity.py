@@ -1,4 +1,4 @@
-"""What is charted of a process that is corrected: differences, the wear line, and residuals about it."""
+"""Quantities to chart of a process that is corrected: differences, the wear line, and residuals about it."""
 
 import numpy as np
 import pytest

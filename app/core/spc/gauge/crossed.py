@@ -14,6 +14,7 @@ from scipy.special import fdtrc
 
 from app.core.spc.constants import d2, d2_star
 from app.core.spc.refusal import Floats, Reason, Refused
+from app.core.spc.variation import varies
 
 POOLED_ABOVE = 0.25
 """An interaction with a larger p-value is taken for repeatability (AIAG MSA: alpha for pooling 0.25)."""
@@ -22,14 +23,14 @@ CATEGORIES = 1.41
 
 
 class Method(StrEnum):
-    """How the study was evaluated."""
+    """Method of evaluation."""
 
     ANOVA = "anova"
     AVERAGE_RANGE = "average_range"
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class AnovaRow:
     """A line of the table of variance; f and p against what it is tested by, nan where it is not tested."""
 
     source: str
@@ -60,7 +61,7 @@ class Study:
     part: float
     total: float
     ndc: int
-    table: tuple[Line, ...]
+    table: tuple[AnovaRow, ...]
     pooled: bool
     zeroed: tuple[str, ...] = ()
 
@@ -83,9 +84,9 @@ def _block(readings: ArrayLike) -> Floats:
             raise Refused(Reason.INCOMPLETE_STUDY, have=have, needed=needed, what=what)
     if not np.isfinite(block).all():
         raise Refused(Reason.INCOMPLETE_STUDY, have=int(np.isfinite(block).sum()), needed=block.size, what="readings")
-    if not np.ptp(block, axis=2).any():
+    if not varies(float(np.ptp(block, axis=2).max()), block):
         # No cell knows what repeatability is: the gauge does not resolve it.
-        raise Refused(Reason.NO_VARIATION, what="repeats" if np.ptp(block) else "")
+        raise Refused(Reason.NO_VARIATION, what="repeats" if varies(float(np.ptp(block)), block) else "")
     return block - float(block.mean())
 
 
@@ -122,13 +123,13 @@ def by_anova(readings: ArrayLike, *, pooled_above: float = POOLED_ABOVE) -> Stud
     }
     sigmas = {name: sqrt(max(0.0, variance)) for name, variance in variances.items()}
 
-    table = [Line("part", p - 1, part, part / (p - 1), *_tested(part, p - 1, error, freedom_error))]
+    table = [AnovaRow("part", p - 1, part, part / (p - 1), *_tested(part, p - 1, error, freedom_error))]
     if o > 1:
         tested = _tested(operator, o - 1, error, freedom_error)
-        table.append(Line("operator", o - 1, operator, operator / (o - 1), *tested))
-        table.append(Line("interaction", freedom_both, both, both / freedom_both, *share))
-    table.append(Line("repeatability", freedom_repeats, repeats, repeats / freedom_repeats, nan, nan))
-    table.append(Line("total", p * o * t - 1, part + operator + both + repeats, nan, nan, nan))
+        table.append(AnovaRow("operator", o - 1, operator, operator / (o - 1), *tested))
+        table.append(AnovaRow("interaction", freedom_both, both, both / freedom_both, *share))
+    table.append(AnovaRow("repeatability", freedom_repeats, repeats, repeats / freedom_repeats, nan, nan))
+    table.append(AnovaRow("total", p * o * t - 1, part + operator + both + repeats, nan, nan, nan))
     return _study(
         Method.ANOVA,
         (p, o, t),
@@ -180,7 +181,7 @@ def _study(
     appraiser: float,
     interaction: float | None,
     part: float,
-    table: tuple[Line, ...],
+    table: tuple[AnovaRow, ...],
     zeroed: tuple[str, ...],
 ) -> Study:
     grr = sqrt(equipment**2 + appraiser**2 + (interaction or 0.0) ** 2)

@@ -7,11 +7,16 @@ from numpy.typing import ArrayLike
 from scipy.special import stdtr, stdtrit
 
 from app.core.spc.refusal import Reason, Refused, checked
+from app.core.spc.resolution import resolution_of
 from app.core.spc.spread import mean_of, overall
+from app.core.spc.variation import varies
 
 FEWEST_REPEATS = 10
 """Below it neither number is given; 25 are asked for at least, 50 are usual (VDA 5, section 5.2)."""
 ENOUGH_REPEATS = 25
+FEWEST_VALUES, MOST_EQUAL = 3, 0.8
+"""Fewer different values, or a larger share of equal ones, and the step of the gauge hides its scatter: with a resolution of 5 %
+of the tolerance and Cg = 1.33 a step is two sigma wide, so three values, the most frequent with 68 %, are to be expected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +35,7 @@ class Bias:
 
     @property
     def significant(self) -> bool:
-        """Whether the interval leaves 0 out."""
+        """True if the interval leaves 0 out."""
         return self.low > 0 or self.high < 0
 
 
@@ -43,7 +48,7 @@ def bias(values: ArrayLike, reference: float, *, confidence: float = 0.95, minim
     """
     x = checked(values, at_least=max(2, minimum))
     sigma = overall(x).value
-    if not sigma > 0:
+    if not varies(sigma, x, reference):
         raise Refused(Reason.NO_VARIATION)
     off = mean_of(x) - reference
     error = sigma / sqrt(len(x))
@@ -65,7 +70,7 @@ def bias(values: ArrayLike, reference: float, *, confidence: float = 0.95, minim
 class TypeOne:
     """Cg: the share of the tolerance that repeatability may take, in spreads; Cgk: less what bias takes of it.
 
-    resolved: the resolution is no coarser than 5 % of the tolerance; None where it was not given.
+    resolution: as it was given, else the step between the values. resolved: it is no coarser than 5 % of the tolerance.
     """
 
     bias: Bias
@@ -74,12 +79,13 @@ class TypeOne:
     cgk: float
     share: float
     spread: float
-    resolved: bool | None
+    resolution: float
+    resolved: bool
     few: bool
 
     def capable(self, least: float = 1.33) -> bool:
-        """Whether both are large enough; 1.33 is what is usually asked for."""
-        return self.cg >= least and self.cgk >= least
+        """True if both are large enough, and the resolution is; 1.33 is what is usually asked for."""
+        return self.cg >= least and self.cgk >= least and self.resolved
 
 
 def type_one(
@@ -94,7 +100,8 @@ def type_one(
 ) -> TypeOne:
     """Cg = share T / (spread s), Cgk = (share T/2 - |bias|) / (spread s/2).
 
-    T: width of the tolerance; share 20 % and 6 s as in VDA 5 and Minitab (4 s: ask for `spread=4`).
+    T: width of the tolerance; share 20 % and 6 s as in VDA 5 and Minitab (4 s: ask for `spread=4`). Raises `Refused` for
+    values that do not vary, or take too few different values to tell of a scatter.
 
     >>> found = type_one([10.00, 10.01, 9.99, 10.01, 10.00, 9.99, 10.00, 10.01, 10.00, 9.99], 10.0, 0.3)
     >>> round(found.cg, 3), round(found.cgk, 3)
@@ -102,14 +109,19 @@ def type_one(
     """
     if not tolerance > 0:
         raise Refused(Reason.LIMITS_CROSSED)
-    found = bias(values, reference, minimum=minimum)
+    result = bias(values, reference, minimum=minimum)
+    seen = resolution_of(values)
+    if seen.distinct < FEWEST_VALUES or seen.most > MOST_EQUAL * result.readings:
+        raise Refused(Reason.UNRESOLVED, have=seen.distinct, needed=FEWEST_VALUES)
+    step = seen.step if resolution is None else resolution
     return TypeOne(
-        bias=found,
+        bias=result,
         tolerance=tolerance,
-        cg=share * tolerance / (spread * found.repeatability),
-        cgk=(share * tolerance / 2 - abs(found.bias)) / (spread * found.repeatability / 2),
+        cg=share * tolerance / (spread * result.repeatability),
+        cgk=(share * tolerance / 2 - abs(result.bias)) / (spread * result.repeatability / 2),
         share=share,
         spread=spread,
-        resolved=None if resolution is None else resolution <= 0.05 * tolerance,
-        few=found.readings < ENOUGH_REPEATS,
+        resolution=step,
+        resolved=step <= 0.05 * tolerance,
+        few=result.readings < ENOUGH_REPEATS,
     )

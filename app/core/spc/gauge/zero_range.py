@@ -1,4 +1,4 @@
-"""What repeatability says about R33, the zero-compensation range: "the largest random deviation of this machine" (domain §2).
+"""Suggestion for R33, the zero range, from repeatability: "the largest random deviation of this machine" (domain §2).
 
 A deviation that chance explains must not be corrected: every such correction moves the next part off by as much. So R33
 should reach as far as chance does, and no further, because within R33 nothing is corrected. Chance has up to three parts,
@@ -21,7 +21,7 @@ from app.core.spc.refusal import Reason, Refused
 
 
 class Governs(StrEnum):
-    """Which part of chance made the suggestion as large as it is."""
+    """Part of chance that made the suggestion as large as it is."""
 
     REPEATABILITY = "repeatability"
     SIGNAL_PATH = "signal_path"

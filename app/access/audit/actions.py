@@ -1,0 +1,35 @@
+"""Writing the record of changes."""
+
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from app.access.audit.entry_actions import NOBODY, Acting, acting, write
+from app.db.engine import driver_connection
+
+__all__ = ["NOBODY", "Acting", "acts", "record"]
+
+
+def acts(person_id: int | None, key_id: int | None) -> None:
+    """Say who acts from now on in this request."""
+    acting.set(Acting(person_id, key_id))
+
+
+def record(
+    session: Session,
+    actor: str,
+    action: str,
+    subject: str,
+    before: dict[str, Any] | None = None,
+    after: dict[str, Any] | None = None,
+    why: str | None = None,
+    *,
+    by: Acting | None = None,
+) -> None:
+    """Note that somebody changed something, in the transaction that changes it.
+
+    ``action`` is a short verb phrase (`characteristic changed`), ``subject`` names what was changed as `kind/key`
+    (`characteristic/shaft-d40`, `tool/lathe-1/3`). Secrets and passwords are never part of before and after. ``by``: whose
+    name ``actor`` is; without it, whoever sent this request.
+    """
+    write(driver_connection(session), actor, action, subject, before, after, why, by=by)

@@ -1,0 +1,74 @@
+"""JSON route: the record of changes."""
+
+from datetime import datetime
+from typing import Annotated, Any
+
+from fastapi import Query
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.access.audit import queries
+from app.access.deps import require
+from app.web.api import api_router
+from app.web.deps import SessionDep
+from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Limit, Page, Text200, page_of
+
+router = api_router("audit")
+
+
+class AuditEntryOut(BaseModel):
+    """One change: who, what, from what, to what, and why."""
+
+    model_config = ConfigDict(
+        from_attributes=True,
+        json_schema_extra={
+            "example": {
+                "id": 318,
+                "at": "2026-11-21T08:15:02.120Z",
+                "actor": "Ana",
+                "person_id": 2,
+                "key_id": None,
+                "action": "parameters changed",
+                "subject": "characteristic/shaft-d40",
+                "before": {"zero_range": 0.001},
+                "after": {"zero_range": 0.0015},
+                "why": "scatter of the new probe is larger",
+            }
+        },
+    )
+
+    id: int
+    at: datetime
+    actor: str = Field(description="The name as it was then.")
+    person_id: int | None = Field(description="The person's number; null for keys, the system and the command line.")
+    key_id: int | None = Field(description="The key's number; null for people, the system and the command line.")
+    action: str
+    subject: str
+    before: dict[str, Any] | None
+    after: dict[str, Any] | None
+    why: str | None
+
+
+@router.get("/audit", dependencies=[require("engineer")])
+def list_audit_entries(
+    session: SessionDep,
+    subject: Annotated[
+        Text200 | None,
+        Query(description="Only what changed this, or what lies below it.", examples=["machine/lathe-1"]),
+    ] = None,
+    actor: Annotated[Text200 | None, Query(description="Only what this person or key changed.")] = None,
+    person: Annotated[
+        int | None, Query(ge=1, le=LARGEST_SERIAL, description="Only what the person with this number changed.")
+    ] = None,
+    key: Annotated[
+        int | None, Query(ge=1, le=LARGEST_SERIAL, description="Only what the key with this number changed.")
+    ] = None,
+    before: Annotated[
+        int | None, Query(ge=1, le=LARGEST_ID, description="Cursor: the `next` of the page before.")
+    ] = None,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[AuditEntryOut]:
+    """The record of changes, newest first. Nothing in it is ever altered."""
+    rows = queries.entries(
+        session, subject=subject, actor=actor, person=person, key=key, before=before, limit=limit + 1
+    )
+    return page_of([AuditEntryOut.model_validate(row) for row in rows], limit, lambda entry: entry.id)

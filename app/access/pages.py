@@ -1,0 +1,170 @@
+"""Pages: signing in and out, an invitation, one's own account."""
+
+import logging
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Request, Response
+from starlette.responses import RedirectResponse
+
+from app.access import actions, queries
+from app.access.deps import AnyCaller
+from app.access.passwords import SHORTEST
+from app.access.sign_in import SignedIn, begin_session, sign_in, sign_out
+from app.db.engine import Database
+from app.errors import InbandError
+from app.language.i18n import _
+from app.web.deps import SESSION_COOKIE, FormDep, SessionDep, SettingsDep, from_this_site
+from app.web.forms import by_field
+from app.web.problems import local_path
+from app.web.templates import page
+
+log = logging.getLogger(__name__)
+router = APIRouter(include_in_schema=False)
+FromThisSite = Depends(from_this_site)
+DEVICE_COOKIE = "inband_device"
+Next = Annotated[str, Query(alias="next", max_length=2000)]
+
+
+def _with_session(answer: Response, signed_in: SignedIn, settings: SettingsDep) -> Response:
+    answer.set_cookie(
+        SESSION_COOKIE,
+        signed_in.token,
+        max_age=settings.session_hours * 3600,
+        httponly=True,
+        samesite="lax",
+        secure=settings.secure_cookies,
+    )
+    return answer
+
+
+@router.get("/sign-in")
+def sign_in_page(request: Request, session: SessionDep, after: Next = "/", ended: str = "") -> Response:
+    token = request.cookies.get(SESSION_COOKIE)
+    if token and queries.signed_in(session, token, {}):
+        return RedirectResponse(local_path(after), 303)
+    return page(
+        request,
+        "access/sign_in.html",
+        after=local_path(after),
+        name="",
+        problem=actions.SessionEnded() if ended == "password" else None,
+        anybody=queries.anybody(session),
+    )
+
+
+@router.post("/sign-in", dependencies=[FromThisSite])
+def send_sign_in(request: Request, form: FormDep, settings: SettingsDep) -> Response:
+    database: Database = request.app.state.database
+    name, after = form.get("name", ""), local_path(form.get("next"))
+    address = request.client.host if request.client else "unknown"
+    device = request.cookies.get(DEVICE_COOKIE, "")
+    try:
+        signed_in = sign_in(database, name, form.get("password", ""), address, settings.session_hours, device)
+    except InbandError as error:
+        with database.begin() as session:  # what is no name may be a password, typed in the wrong place
+            known = queries.person_named(session, name.strip()) if name.isprintable() else None
+        log.warning("sign-in of %s from %s refused", known.name if known else "an unknown name", address)
+        return page(
+            request,
+            "access/sign_in.html",
+            status=error.status,
+            headers=error.headers,
+            after=after,
+            name=name,
+            problem=error,
+            anybody=True,
+        )
+    log.info("%s signed in from %s", name.strip(), address)
+    answer = _with_session(RedirectResponse(after, 303), signed_in, settings)
+    if signed_in.device:
+        answer.set_cookie(
+            DEVICE_COOKIE,
+            signed_in.device,
+            max_age=round(queries.PLACE_KEPT.total_seconds()),
+            path="/sign-in",
+            httponly=True,
+            samesite="lax",
+            secure=settings.secure_cookies,
+        )
+    return answer
+
+
+@router.post("/sign-out")
+def send_sign_out(request: Request, session: SessionDep, caller: AnyCaller) -> Response:
+    assert caller.kind == "person"
+    sign_out(session, request.cookies.get(SESSION_COOKIE, ""), caller.name)
+    answer = RedirectResponse("/sign-in", 303)
+    answer.delete_cookie(SESSION_COOKIE, httponly=True, samesite="lax")
+    return answer
+
+
+@router.get("/invitation/{token}")
+def invitation_page(request: Request, session: SessionDep, token: str) -> Response:
+    invitation = queries.open_invitation(session, token)
+    return page(
+        request,
+        "access/invitation.html",
+        status=200 if invitation else 404,
+        role=invitation.role if invitation else None,
+        name="",
+        errors={},
+        problem=None,
+        shortest=SHORTEST,
+    )
+
+
+@router.post("/invitation/{token}", dependencies=[FromThisSite])
+def send_invitation(
+    request: Request, session: SessionDep, form: FormDep, settings: SettingsDep, token: str
+) -> Response:
+    invitation = queries.open_invitation(session, token)
+    errors: dict[str, str] = {}
+    problem = None
+    if form.get("password", "") != form.get("again", ""):
+        errors = {"again": _("Is not the same as the password above")}
+    else:
+        try:
+            with session.begin_nested():  # a refused name must leave the invitation unused
+                person = actions.accept_invitation(session, token, form.get("name", ""), form.get("password", ""))
+        except InbandError as error:
+            errors, problem = by_field(error), error
+        else:
+            signed_in = begin_session(session, person.id, settings.session_hours)
+            return _with_session(RedirectResponse("/", 303), signed_in, settings)
+    return page(
+        request,
+        "access/invitation.html",
+        status=problem.status if problem else 422,
+        role=invitation.role if invitation else None,
+        name=form.get("name", ""),
+        errors=errors,
+        problem=problem,
+        shortest=SHORTEST,
+    )
+
+
+@router.get("/account")
+def account_page(request: Request, caller: AnyCaller, done: str = "") -> Response:
+    return page(request, "access/account.html", me=caller, errors={}, done=done, shortest=SHORTEST)
+
+
+@router.post("/account/password")
+def send_password(request: Request, session: SessionDep, caller: AnyCaller, form: FormDep) -> Response:
+    errors: dict[str, str] = {}
+    if form.get("new", "") != form.get("again", ""):
+        errors = {"again": _("Is not the same as the new password")}
+    else:
+        try:
+            token = request.cookies.get(SESSION_COOKIE)
+            actions.change_password(session, caller, form.get("old", ""), form.get("new", ""), token)
+        except actions.SessionEnded:  # answered here, so that what was counted stays
+            answer = RedirectResponse("/sign-in?ended=password", 303)
+            answer.delete_cookie(SESSION_COOKIE, httponly=True, samesite="lax")
+            return answer
+        except InbandError as error:
+            if not error.errors:
+                raise
+            errors = by_field(error)
+        else:
+            return RedirectResponse("/account?done=password", 303)
+    return page(request, "access/account.html", status=422, me=caller, errors=errors, done="", shortest=SHORTEST)

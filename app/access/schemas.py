@@ -1,0 +1,119 @@
+"""People and keys as JSON."""
+
+from datetime import datetime
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.access.callers import Role
+from app.access.tables import ApiKey
+from app.web.fields import Body, Text200
+
+
+class PersonOut(BaseModel):
+    """Somebody who signs in."""
+
+    model_config = ConfigDict(
+        from_attributes=True,
+        json_schema_extra={
+            "example": {
+                "id": 2,
+                "name": "Ana",
+                "role": "operator",
+                "created_at": "2026-11-21T07:00:00Z",
+                "disabled_at": None,
+            }
+        },
+    )
+
+    id: int
+    name: str
+    role: Role
+    created_at: datetime
+    disabled_at: datetime | None = Field(description="Since when they may not sign in any more; null if they may.")
+
+
+class PersonChange(Body):
+    """Changes of a person; what is left out stays."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"role": "engineer"}})
+
+    role: Role | None = None
+    disabled: bool | None = None
+
+
+class InvitationIn(Body):
+    """The role that the invited person gets."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"role": "operator"}})
+
+    role: Role
+
+
+class InvitationOut(BaseModel):
+    """A one-time link, told this once; it works for seven days."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"example": {"role": "operator", "url": "http://127.0.0.1:8000/invitation/Vb0…"}}
+    )
+
+    role: Role
+    url: str
+
+
+class RoleKeyIn(Body):
+    """A key for a program, with a person's role."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"name": "night report", "role": "viewer"}})
+
+    name: Text200
+    role: Role
+
+
+class MachineKeyIn(Body):
+    """A key for one machine."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"name": "cell PC"}})
+
+    name: Annotated[Text200, Field(description="What it is for, so that it can be told from others.")]
+
+
+class KeyOut(BaseModel):
+    """A key without its secret."""
+
+    model_config = ConfigDict(
+        from_attributes=True,
+        json_schema_extra={
+            "example": {
+                "id": 7,
+                "name": "cell PC",
+                "role": None,
+                "created_at": "2026-11-21T07:00:00Z",
+                "revoked_at": None,
+            }
+        },
+    )
+
+    id: int
+    name: str
+    role: Role | None = Field(description="null for the key of a machine.")
+    created_at: datetime
+    revoked_at: datetime | None
+
+
+class NewKeyOut(BaseModel):
+    """A key just made. The secret is told this once and stored nowhere."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"example": {"id": 7, "name": "cell PC", "secret": "inband_3vQ…", "role": None}}
+    )
+
+    id: int
+    name: str
+    secret: str
+    role: Role | None = None
+
+
+def key_out(key: ApiKey) -> KeyOut:
+    """Never with its hash."""
+    return KeyOut.model_validate(key)

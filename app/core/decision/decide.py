@@ -1,0 +1,160 @@
+"""The decision on one reading: the whole of domain §3, from deviation to tool offset.
+
+=================  =============  ==========================================  ====================
+zone               \\|D\\|          correction                                  running average M
+=================  =============  ==========================================  ====================
+zero               <= R33         none                                        updated, kept
+average            <= R34         by M_new if \\|M_new\\| > R33, else none      0 after a correction
+full               <= R35/2       by D in full                                0
+out of tolerance   < R37          by D in full, alarm                         0
+wear               < R36          computed in full, held, alarm               unchanged
+probe fault        >= R36         none, alarm, machine told to stop           unchanged
+=================  =============  ==========================================  ====================
+
+``M_new = M_old - M_old/k + D/k`` from 0: an exponentially weighted average with lambda = 1/k (R29).
+
+**No double correction.** Parts already cut when a correction is issued come out with the old
+offset. `decide` therefore judges the deviation that the part would have had with every correction
+issued so far (`outstanding`); the raw deviation is what is stored and charted. Two things are facts
+about the part itself and are told by the raw deviation whatever has been corrected since: that it is
+out of tolerance, and that the probe cannot be believed (R36).
+"""
+
+from collections.abc import Iterable
+from enum import StrEnum
+from typing import NamedTuple
+
+from app.core.decision.limits import FAULT, WEAR, ZONES, Zone, within_tolerance
+from app.core.decision.step import ACTIONS, CODES, CORRECT, HOLD, OFFSET_LIMIT, Action, Code, effect_of, step
+from app.core.parameters import Mode, Parameters
+
+
+class ReadingAlarm(StrEnum):
+    """The alarm that a reading gives rise to."""
+
+    OVERSIZE = "oversize"
+    UNDERSIZE = "undersize"
+    TOOL_WORN = "tool_worn"
+    PROBE_FAULT = "probe_fault"
+    ACCEPTANCE = "acceptance"
+    OFFSET_LIMIT = "offset_limit"
+    IMPLAUSIBLE = "implausible"
+
+
+class State(NamedTuple):
+    """State that the decision needs besides the reading.
+
+    average: M, the running average of this characteristic's memory location R11, mm.
+    total: sum of the corrections of the tool since it was changed, issued ones included, in offset units (mm).
+    paused: compensation is paused by an alarm that nobody has acknowledged yet: a probe fault, or an offset that differs.
+    """
+
+    average: float = 0.0
+    total: float = 0.0
+    paused: bool = False
+
+
+class Decision(NamedTuple):
+    """The verdict on one reading. Lengths in mm; `amount` is what the offset changes by.
+
+    deviation: raw D = measured - target - empirical value.
+    decided: D with the outstanding corrections taken into account; zone and action follow from it.
+    size_error: the error that `amount` removes (D or M), None without a correction.
+    clamped: `max_step` made the amount smaller.
+    good: the part itself lies within its tolerance.
+    """
+
+    deviation: float
+    decided: float
+    zone: Zone
+    action: Action
+    code: Code
+    average_before: float
+    average_after: float
+    size_error: float | None
+    amount: float | None
+    clamped: bool
+    good: bool
+    alarms: tuple[ReadingAlarm, ...]
+
+
+def outstanding_effect(amounts: Iterable[float], factor: float) -> float:
+    """Return how much the size (mm) will change once these offset corrections are in effect."""
+    return effect_of(sum(amounts), factor)
+
+
+def decide(
+    parameters: Parameters,
+    state: State,
+    deviation: float,
+    *,
+    outstanding: float = 0.0,
+    previous_tool: bool = False,
+    accepted: bool = True,
+    jump: bool = False,
+    first_move_triggered: bool = False,
+) -> Decision:
+    """Decide one reading (domain §3).
+
+    deviation: raw D, mm, as `deviation_of` makes it.
+    outstanding: size change still to come from corrections that this part was cut without, mm
+        (`outstanding_effect`).
+    previous_tool: the part was cut before the tool was changed or its offset edited by hand, so it
+        says nothing about the offset of today.
+    accepted: the n-of-m verdict over the part's sections (domain §6); a rejected part corrects
+        nothing unless the characteristic allows it.
+    jump: neither wear nor scatter explains it (`plausibility.is_jump`): what it asks for is computed in full and held, and
+        it says nothing to the average. In the wear zone the alarm *tool worn* asks the same already.
+    first_move_triggered: the probe triggered on its way to the surface (domain §5, *not a bore*): a probe fault, whatever D.
+
+    >>> p = Parameters(target=10.0, tolerance_width=0.04, zero_range=0.004, averaging_limit=0.0133,
+    ...                wear_limit=0.3, confidence_limit=1.0, weighting_factor=2, factor=-1, tool_memory=1, average_memory=1)
+    >>> decide(p, State(average=0.00325), 0.006).amount
+    -0.004625
+    """
+    made = step(
+        parameters.rules,
+        state.average,
+        state.total,
+        deviation,
+        outstanding,
+        state.paused,
+        previous_tool,
+        not accepted,
+        jump,
+        first_move_triggered,
+    )
+    good = within_tolerance(deviation, parameters.limits) and not first_move_triggered
+    alarms = []
+    if made.zone == FAULT:
+        alarms.append(ReadingAlarm.PROBE_FAULT)
+    elif made.zone == WEAR and not previous_tool:
+        alarms.append(ReadingAlarm.TOOL_WORN)
+    elif not good:
+        alarms.append(ReadingAlarm.OVERSIZE if deviation > 0 else ReadingAlarm.UNDERSIZE)
+    if not accepted:
+        alarms.append(ReadingAlarm.ACCEPTANCE)
+    if made.jumped:
+        alarms.append(ReadingAlarm.IMPLAUSIBLE)
+    if made.code == OFFSET_LIMIT:
+        alarms.append(ReadingAlarm.OFFSET_LIMIT)
+    corrects = made.action in (CORRECT, HOLD)
+    return Decision(
+        deviation,
+        made.decided,
+        ZONES[made.zone],
+        ACTIONS[made.action],
+        CODES[made.code],
+        state.average if parameters.average_memory else 0.0,
+        made.average,
+        made.size_error if corrects else None,
+        made.amount if corrects else None,
+        made.clamped,
+        good,
+        tuple(alarms),
+    )
+
+
+def needs_approval(parameters: Parameters) -> bool:
+    """True if a person releases each correction of this characteristic."""
+    return parameters.mode is Mode.APPROVAL

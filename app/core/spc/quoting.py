@@ -1,0 +1,124 @@
+"""Choice of the capability index that may be quoted. One function decides; pages, reports, API and cautions take it from here.
+
+=============  ==================================================================================================
+Cpk            a stable, normal process that is resolved finely enough, of 100 readings and more
+Ppk            any other process whose readings are normal
+percentiles    readings that are not normal (ISO 22514-2), of 100 and more
+none           no index was computed, a reading lies far from all others, or no distribution carries one
+=============  ==================================================================================================
+"""
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import NamedTuple, TypeVar
+
+from app.core.spc import in_time, stability
+from app.core.spc.capability import (
+    ENOUGH_READINGS,
+    Capability,
+    Caution,
+    Index,
+    Limits,
+    PercentileCapability,
+    capability,
+    percentile,
+)
+from app.core.spc.in_time import InTime
+from app.core.spc.refusal import Floats, Refused
+from app.core.spc.spread import far_off
+from app.core.spc.stability import Stability
+
+Result = TypeVar("Result")
+
+
+class Quote(StrEnum):
+    """The index that may be quoted."""
+
+    CPK = "cpk"
+    PPK = "ppk"
+    PERCENTILE = "percentile"
+    NONE = "none"
+
+
+class WhyNot(StrEnum):
+    """The reason why none may be, beside those of `Refused`."""
+
+    FAR_OFF = "far_off"
+    NO_SHAPE = "no_shape"
+
+
+class Quoting(NamedTuple):
+    """The index with its value and interval (None where it has none), or why there is none.
+
+    preliminary: of too few readings to stand without its interval (ISO 22514-2), or to know its outer percentiles.
+    """
+
+    quote: Quote
+    value: float | None = None
+    low: float | None = None
+    high: float | None = None
+    preliminary: bool = False
+    why: str | None = None
+
+
+FORBID_CPK = frozenset({Caution.NOT_IN_CONTROL, Caution.FEW_READINGS, Caution.COARSE})
+"""Cautions beside which Cpk is not quoted: each says that the scatter from part to part is not known well enough."""
+
+
+def quoting(
+    found: Capability | Refused,
+    by_percentile: PercentileCapability | Refused,
+    *,
+    stable: bool | None,
+    far: bool,
+) -> Quoting:
+    """Decide which index may be quoted.
+
+    stable: of the process in time, None where too little is known. far: a reading lies far from all others, so that the
+    readings are of two processes and no index describes both.
+    """
+    if isinstance(found, Refused):
+        return Quoting(Quote.NONE, why=found.reason.value)
+    if far:
+        return Quoting(Quote.NONE, why=WhyNot.FAR_OFF.value)
+    few = Caution.FEW_READINGS in found.cautions
+    if Caution.NOT_NORMAL in found.cautions:
+        if isinstance(by_percentile, Refused):
+            return Quoting(Quote.NONE, why=WhyNot.NO_SHAPE.value)
+        preliminary = few or Caution.FEW_FOR_PERCENTILES in by_percentile.cautions
+        return Quoting(Quote.PERCENTILE, by_percentile.ppk, preliminary=preliminary)
+    if stable is True and not FORBID_CPK & set(found.cautions):
+        return _of(Quote.CPK, found.cpk, few)
+    return _of(Quote.PPK, found.ppk, few)
+
+
+def stable(control: Stability | Refused, time: InTime | Refused) -> bool | None:
+    """In control by the run rules, and constant in time by ISO 22514; None where too little is known."""
+    if isinstance(control, Refused):
+        return None
+    return control.in_control and (isinstance(time, Refused) or time.model.steady)
+
+
+def quoting_of(values: Floats, limits: Limits) -> Quoting:
+    """Decide by the readings alone: statistical control is judged by limits of their own.
+
+    >>> import numpy as np
+    >>> quoting_of(np.repeat(0.001, 50), Limits(-1.0, 1.0, 0.0)).why
+    'no_variation'
+    """
+    result = or_refused(lambda: capability(values, limits))
+    control, time = or_refused(lambda: stability.of_readings(values)), or_refused(lambda: in_time.in_time(values))
+    by_percentile = or_refused(lambda: percentile(values, limits, minimum=ENOUGH_READINGS))
+    return quoting(result, by_percentile, stable=stable(control, time), far=bool(far_off(values).any()))
+
+
+def or_refused(compute: Callable[[], Result]) -> Result | Refused:
+    """The result, or the refusal as a value."""
+    try:
+        return compute()
+    except Refused as refused:
+        return refused
+
+
+def _of(quote: Quote, index: Index, preliminary: bool) -> Quoting:
+    return Quoting(quote, index.value, index.low, index.high, preliminary)

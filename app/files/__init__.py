@@ -1,0 +1,1 @@
+"""File formats in and out, and documents: PDF, XLSX, CSV, SVG."""

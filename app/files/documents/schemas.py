@@ -1,0 +1,163 @@
+"""A report as JSON. Numbers in the unit that stands beside them; lengths as people read them, in µm and mm."""
+
+from datetime import datetime
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.files.documents.content import Fact, Report, Section, Value
+
+
+class ValueOut(BaseModel):
+    """One value: the plain number or text, its unit, and the words of the page."""
+
+    value: float | int | str | None = Field(description="A number in `unit`; moments in RFC 3339; else the text.")
+    unit: str
+    text: str
+
+    @classmethod
+    def of(cls, value: Value, report: Report) -> "ValueOut":
+        """As the report words it."""
+        plain = value.value if value.number is None else value.number
+        return cls(value=plain, unit=value.unit, text=report.words(value))
+
+
+class FactOut(ValueOut):
+    """A value with its name and R number; `low` and `high` are the ends of its confidence interval."""
+
+    key: str
+    name: str
+    code: str
+    note: str
+    low: float | int | None = None
+    high: float | int | None = None
+
+    @classmethod
+    def of_fact(cls, fact: Fact, report: Report) -> "FactOut":
+        """With everything that stands beside it."""
+        return cls(
+            **ValueOut.of(fact.value, report).model_dump(),
+            key=fact.key,
+            name=fact.name,
+            code=fact.code,
+            note=fact.note,
+            low=fact.low.number if fact.low else None,
+            high=fact.high.number if fact.high else None,
+        )
+
+
+class ColumnOut(BaseModel):
+    """A column of a table."""
+
+    key: str
+    name: str
+
+
+class TableOut(BaseModel):
+    """Rows of values, one for each column; `more` rows are left out, the oldest."""
+
+    columns: list[ColumnOut]
+    rows: list[list[ValueOut]]
+    more: int
+
+
+class SectionOut(BaseModel):
+    """One part of the report."""
+
+    key: str
+    title: str
+    sentences: list[str]
+    warnings: list[str] = Field(description="What the numbers should not be read without.")
+    facts: list[FactOut]
+    table: TableOut | None
+    charts: list[str] = Field(description="Which charts stand here on the page and in the PDF.")
+
+    @classmethod
+    def of(cls, section: Section, report: Report) -> "SectionOut":
+        """All of it but the charts."""
+        table = section.table
+        return cls(
+            key=section.key,
+            title=section.title,
+            sentences=list(section.sentences),
+            warnings=list(section.warnings),
+            facts=[FactOut.of_fact(fact, report) for fact in section.facts],
+            table=None
+            if table is None
+            else TableOut(
+                columns=[ColumnOut(key=column.key, name=column.name) for column in table.columns],
+                rows=[[ValueOut.of(value, report) for value in row] for row in table.rows],
+                more=table.more,
+            ),
+            charts=[picture.key for picture in section.pictures],
+        )
+
+
+class ReportOut(BaseModel):
+    """Report on a characteristic and a period, with the same content as page, PDF, XLSX and CSV."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "characteristic": "shaft-d40",
+                "name": "Bearing seat Ø40 h6",
+                "machine": "Lathe 1",
+                "part": "shaft-0815",
+                "period": "2026-11-16 06:31:04 – 2026-11-21 16:04:14, readings 476 to 1475",
+                "timezone": "Europe/Belgrade",
+                "made_at": "2026-11-21T15:05:00+00:00",
+                "warnings": [],
+                "head": [],
+                "sections": [
+                    {
+                        "key": "numbers",
+                        "title": "Numbers",
+                        "sentences": [],
+                        "warnings": [],
+                        "facts": [
+                            {
+                                "key": "mean",
+                                "name": "Mean deviation",
+                                "code": "",
+                                "note": "",
+                                "value": 0.83,
+                                "unit": "µm",
+                                "text": "+0.83 µm",
+                                "low": None,
+                                "high": None,
+                            }
+                        ],
+                        "table": None,
+                        "charts": ["histogram"],
+                    }
+                ],
+            }
+        }
+    )
+
+    characteristic: str
+    name: str
+    machine: str
+    part: str
+    period: str
+    timezone: str
+    made_at: datetime
+    warnings: list[str] = Field(description="What stands above everything else.")
+    head: list[FactOut]
+    sections: list[SectionOut]
+
+    @classmethod
+    def of(cls, report: Report) -> "ReportOut":
+        """The whole report."""
+        assert report.made_at.moment is not None
+        return cls(
+            characteristic=report.key,
+            name=report.name,
+            machine=report.machine,
+            part=report.part,
+            period=report.period,
+            timezone=report.zone,
+            made_at=report.made_at.moment,
+            warnings=list(report.warnings),
+            head=[FactOut.of_fact(fact, report) for fact in report.head],
+            sections=[SectionOut.of(section, report) for section in report.sections],
+        )

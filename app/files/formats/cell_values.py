@@ -1,0 +1,152 @@
+"""Numbers and times as people's files hold them; what cannot be read is refused in words, never guessed."""
+
+import re
+import unicodedata
+from datetime import UTC, datetime, timedelta, timezone
+from functools import lru_cache
+from typing import Literal, cast
+from zoneinfo import ZoneInfo, available_timezones
+
+from app.core.number_text import NotANumber, NumberFault, plain, read_number
+from app.language.i18n import _
+
+_DAY_FIRST = re.compile(
+    r"(\d{1,2})\.\s*(\d{1,2})\.\s*(\d{4})\.?(?:[\s,T]+(\d{1,2}):(\d{2})(?::(\d{2})(?:[.,](\d{1,6})\d*)?)?)?"
+)
+_ISO = re.compile(
+    r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)?(?:\s?(?:[Zz]|[+-]\d{2}(?::?\d{2})?))?"
+)
+UNITS = {"mm": 1.0, "um": 0.001, "inch": 25.4}
+"""Millimetres in each unit that a file may hold."""
+
+
+class Unreadable(ValueError):
+    """A cell that is not what its column should hold; the message says why, and what to do."""
+
+
+def number(text: str, decimal: str) -> float:
+    """A finite number written with this decimal sign ("." or ",").
+
+    >>> number("39,998", ","), number(" -0.5e-3 ", ".")
+    (39.998, -0.0005)
+    """
+    try:
+        return read_number(text, decimal)
+    except NotANumber as error:
+        raise Unreadable(_no_number(error.fault, decimal)) from None
+
+
+def _no_number(fault: NumberFault, decimal: str) -> str:
+    """Explain why a cell is no number, and what to do."""
+    other = "." if decimal == "," else ","
+    return {
+        NumberFault.EMPTY: _("is empty; remove the line if the probe measured nothing"),
+        NumberFault.DECIMAL: _(
+            "has a {other}, but decimals are read with a {decimal}; say so if all are written with a {other}"
+        ).format(other=_sign(other), decimal=_sign(decimal)),
+        NumberFault.THOUSANDS: _(
+            "has separators of thousands, or a point and a comma; write it without a separator of thousands"
+        ),
+        NumberFault.BLANK: _("has a blank inside; write it without, nobody can tell what stood there"),
+        NumberFault.TOO_LARGE: _("is too large to be a number of this world"),
+        NumberFault.NOT_A_NUMBER: _("is not a number; write it like 39{decimal}9981, without a unit").format(
+            decimal=decimal
+        ),
+    }[fault]
+
+
+def _sign(character: str) -> str:
+    return _("comma") if character == "," else _("point")
+
+
+def moment(
+    text: str, zone: ZoneInfo | None, pattern: str | None = None, *, fold: Literal[0, 1] | None = None
+) -> datetime:
+    """A time with its offset: ISO 8601, day.month.year, or as `pattern` (strptime) says.
+
+    A time that names no offset is one of `zone`; without a zone it is refused, because an hour more or less would put
+    readings in another order. So is a time that is there twice because the clocks went back, unless `fold` says which is
+    meant: 0 the earlier, where a period begins; 1 the later, where it ends.
+
+    >>> moment("21.11.2026 08:15:02", ZoneInfo("Europe/Belgrade")).isoformat()
+    '2026-11-21T08:15:02+01:00'
+    """
+    stripped = plain(text)
+    if not stripped:
+        raise Unreadable(_("is empty; every line needs a time, or none does"))
+    read = _by_pattern(stripped, pattern) if pattern else _by_shape(stripped)
+    if read.tzinfo is not None:
+        return read
+    if zone is None:
+        raise Unreadable(_("does not say in which time zone; name the time zone, such as Europe/Belgrade"))
+    local = read.replace(tzinfo=zone, fold=fold or 0)
+    try:
+        there = local.astimezone(UTC).astimezone(zone).replace(tzinfo=None)
+    except OverflowError:  # the first and the last day that a calendar knows
+        raise Unreadable(_("lies outside the years 1 to 9999")) from None
+    if there != read:
+        raise Unreadable(_("does not exist in {zone}: the clocks went forward in that hour").format(zone=zone.key))
+    if fold is None and local.utcoffset() != local.replace(fold=1).utcoffset():
+        raise Unreadable(
+            _(
+                "is there twice in {zone}: the clocks went back in that hour; write it with its offset: {first} or {second}"
+            ).format(zone=zone.key, first=local.isoformat(), second=local.replace(fold=1).isoformat())
+        )
+    # With its offset, not with the zone: moments of one zone are compared by their wall clocks, whatever the offsets are.
+    return local.astimezone(timezone(cast("timedelta", local.utcoffset())))
+
+
+def _by_pattern(text: str, pattern: str) -> datetime:
+    try:
+        return datetime.strptime(text, pattern)  # noqa: DTZ007 - the zone is seen to by the caller
+    except ValueError:
+        raise Unreadable(_("does not have the form {pattern}").format(pattern=pattern)) from None
+
+
+def _by_shape(text: str) -> datetime:
+    try:
+        if _ISO.fullmatch(text):
+            return datetime.fromisoformat(text.replace(" +", "+").replace(" -", "-").replace(" Z", "Z"))
+        if match := _DAY_FIRST.fullmatch(text):
+            day, month, year, hour, minute, second = (int(part or 0) for part in match.groups()[:6])
+            return datetime(year, month, day, hour, minute, second, int((match[7] or "0").ljust(6, "0")))  # noqa: DTZ001
+    except ValueError as error:
+        raise Unreadable(_("is not a time: {error}").format(error=error)) from None
+    if re.fullmatch(r"[0-9.,]+", text):
+        raise Unreadable(
+            _("is a count of days or seconds and could mean several times; write it as 2026-11-21T08:15:02+01:00")
+        )
+    if "/" in text:
+        raise Unreadable(_("could be day/month or month/day; say which by a form of times such as %d/%m/%Y %H:%M:%S"))
+    raise Unreadable(_("is not a time; write it as 2026-11-21T08:15:02+01:00 or 21.11.2026 08:15:02"))
+
+
+@lru_cache
+def zone_named(name: str) -> ZoneInfo:
+    """The time zone. Raises `Unreadable`."""
+    if name not in available_timezones():
+        raise Unreadable(_("There is no time zone {name}; name it like Europe/Belgrade.").format(name=repr(name)))
+    return ZoneInfo(name)
+
+
+def folded(text: str) -> str:
+    """For comparing names: lower case, no accents, single blanks, no unit in brackets.
+
+    >>> folded("Izmerjena  vrednost [mm]"), folded("Čas_meritve")
+    ('izmerjena vrednost', 'cas meritve')
+    """
+    text = re.sub(r"[\[(<].*?[\])>]", " ", text.replace("_", " ").replace("-", " ").replace(".", " "))
+    decomposed = unicodedata.normalize("NFD", text.casefold().replace("đ", "d"))
+    return " ".join("".join(c for c in decomposed if unicodedata.category(c) != "Mn").split())
+
+
+def unit_in(name: str) -> str | None:
+    """The unit that a column's name carries.
+
+    >>> unit_in("Wert [µm]"), unit_in("размер (мкм)"), unit_in("measured")
+    ('um', 'um', None)
+    """
+    match = re.search(r"[\[(<]\s*([^\])>]*?)\s*[\])>]|[_ ](mm|um|µm|μm|inch)$", name)
+    word = (match[1] or match[2] or "").casefold() if match else ""
+    words = {"mm": "mm", "мм": "mm", "µm": "um", "μm": "um", "um": "um", "mkm": "um", "мкм": "um", "mikron": "um"}
+    return (words | {"in": "inch", "inch": "inch", '"': "inch", "zoll": "inch"}).get(word)

@@ -1,0 +1,161 @@
+"""CSV and its relatives: encodings, byte order marks, delimiters, decimal signs. Reads line by line, however long the file."""
+
+import codecs
+import csv
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple, TextIO
+
+from app.language.i18n import _
+
+DELIMITERS = (";", "\t", ",", "|")
+ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "cp1250", "cp1251", "cp1252", "iso-8859-2", "iso-8859-5")
+SAMPLE = 64 * 1024
+_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+# Full-width signs too, which some spreadsheets take for the plain ones. A sign behind another delimiter begins a cell where
+# the spreadsheet of another country parts the line there; a plain number does no harm there.
+_SIGNS = "=+@\N{FULLWIDTH EQUALS SIGN}\N{FULLWIDTH PLUS SIGN}\N{FULLWIDTH HYPHEN-MINUS}\N{FULLWIDTH COMMERCIAL AT}-"
+_NUMBER = r"[+-]\d+(\.\d+)?([eE][+-]?\d+)?([];,\t|\r\n]|$)"
+_DANGEROUS = re.compile(rf"^(?=\s*[{_SIGNS}]|[\t\r\n])|(?<=[;,\t|\r\n])(?=[{_SIGNS}])(?!{_NUMBER})")
+
+
+class Unusable(ValueError):
+    """A file, or the rest of it, that cannot be read as a table; `line` where it is known."""
+
+    def __init__(self, message: str, line: int | None = None) -> None:
+        super().__init__(message)
+        self.line = line
+
+
+class Row(NamedTuple):
+    """The cells of one row, and the line of the file where it begins."""
+
+    line: int
+    cells: list[str]
+
+
+def encoding_of(path: Path) -> str:
+    """Encoding by the byte order mark, else UTF-8."""
+    with path.open("rb") as file:
+        start = file.read(4)
+    return next((name for mark, name in _MARKS if start.startswith(mark)), "utf-8")
+
+
+def open_text(path: Path, encoding: str) -> TextIO:
+    """The file as text; line ends stay as they are, as the csv module wants it."""
+    return path.open(encoding=encoding, newline="")
+
+
+def delimiter_of(path: Path, encoding: str) -> str:
+    """The sign that parts the cells of the first lines most evenly; a comma when none does."""
+    with open_text(path, encoding) as file:
+        try:
+            sample = file.read(SAMPLE)
+        except UnicodeError:
+            raise Unusable(_not_text(encoding)) from None
+    if announced := re.match(r"sep=(.)\r?\n", sample):  # spreadsheets write this
+        return announced[1]
+    unquoted = re.sub(r'"(?:[^"]|"")*"', "", sample)
+    lines = [line for line in unquoted.splitlines() if line.strip()]
+    lines = ([line for line in lines if not line.lstrip().startswith("#")] or lines)[:30]
+    if len(sample) == SAMPLE and len(lines) > 1:
+        lines = lines[:-1]  # cut off in the middle, perhaps
+    evenness = {sign: min(line.count(sign) for line in lines) if lines else 0 for sign in DELIMITERS}
+    best = max(DELIMITERS, key=lambda sign: evenness[sign])
+    if not evenness[best] and lines:
+        best = max(DELIMITERS, key=lines[0].count)
+    return best if lines and best in lines[0] else ","
+
+
+def rows(path: Path, encoding: str, delimiter: str) -> Iterator[Row]:
+    """Every row that is not empty, the header first; comments (`#`) above it are passed over. Raises `Unusable` where it
+    cannot go on.
+    """
+    every = _rows(path, encoding, delimiter)
+    comment: Row | None = None
+    for row in every:
+        if comment is not None and _is_header(comment, row):
+            yield comment
+        comment = None
+        if row.cells[0].lstrip().startswith("#"):
+            comment = row
+            continue
+        yield row
+        break
+    if comment is not None:
+        yield comment
+    yield from every
+
+
+def _is_header(first: Row, below: Row) -> bool:
+    """Return whether a row that begins with # names the columns below it: as many cells as there, and numbers among those."""
+    return len(first.cells) == len(below.cells) > 1 and any(_is_number(cell) for cell in below.cells)
+
+
+def _is_number(cell: str) -> bool:
+    return re.fullmatch(r"\s*[+\-\N{MINUS SIGN}]?\d*[.,]?\d+\s*", cell) is not None
+
+
+def _rows(path: Path, encoding: str, delimiter: str) -> Iterator[Row]:
+    with open_text(path, encoding) as file:
+        reader = csv.reader(_decoded(file, encoding), delimiter=delimiter, strict=True)
+        while True:
+            line = reader.line_num + 1
+            try:
+                cells = next(reader)
+            except StopIteration:
+                return
+            except csv.Error as error:
+                raise Unusable(_why(str(error)), line) from None
+            if line == 1 and cells and cells[0].startswith("sep="):
+                continue
+            if any(cell.strip() for cell in cells):
+                yield Row(line, cells)
+
+
+def _decoded(file: TextIO, encoding: str) -> Iterator[str]:
+    line = 1
+    try:
+        for text in file:
+            yield text
+            line += 1
+    except UnicodeError:
+        raise Unusable(_not_text(encoding), line) from None
+
+
+def _not_text(encoding: str) -> str:
+    return _(
+        "This is not {encoding} text. Name the file's encoding: cp1250 for Serbian (Latin), Slovene and other Central "
+        "European Windows files, cp1251 for Cyrillic, cp1252 for Western European."
+    ).format(encoding=encoding.upper())
+
+
+def _why(error: str) -> str:
+    if "unexpected end" in error:
+        return _("A quotation mark is opened here and never closed.")
+    if "field larger" in error:
+        return _("A cell is longer than 128 kB; perhaps a quotation mark is opened here and never closed.")
+    if "expected after" in error:
+        return _("After a closing quotation mark the next cell must begin; double a quotation mark inside a cell.")
+    return _("This line cannot be taken apart: {error}.").format(error=error)
+
+
+def decimal_of(cells: Iterable[str]) -> str:
+    """The decimal sign of these cells; a point when they do not tell."""
+    commas = points = 0
+    for cell in cells:
+        commas += bool(re.fullmatch(r"\s*[+\-\N{MINUS SIGN}]?\d*,\d+\s*", cell))
+        points += bool(re.fullmatch(r"\s*[+\-\N{MINUS SIGN}]?\d*\.\d+\s*", cell))
+    return "," if commas > points else "."
+
+
+def defused(text: str) -> str:
+    """A text cell that no spreadsheet takes for a formula.
+
+    >>> defused("=HYPERLINK(1)"), defused("SN-812")
+    ("'=HYPERLINK(1)", 'SN-812')
+    >>> defused("chip;=1+1"), defused("40 h6; −3 µm, -2")
+    ("chip;'=1+1", '40 h6; −3 µm, -2')
+    """
+    return _DANGEROUS.sub("'", text)

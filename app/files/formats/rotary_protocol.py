@@ -1,0 +1,354 @@
+"""The protocol that a control writes after cycle 451 or 452 (TCHPRAUTO.html), read by its labels: German, English, Slovene.
+
+The labels are those of the cycle's manual; controls and versions word them differently, so what is not understood is
+handed back line by line. Lengths become mm, angles degrees. Nothing raises.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from app.core.number_text import has_broken_number, plain
+from app.core.rotary.axis import ERRORS, AxisName
+from app.core.rotary.results import SCALARS, STRINGS
+from app.files.formats.cell_values import folded
+from app.files.formats.markup import Row, rows_of
+from app.files.formats.rotary_stems import EARLIER, fits, meaning
+from app.files.formats.rotary_words import AXIS_KEYS, HEAD_KEYS, LABELS, OPTIMISED, WORTHLESS
+
+LARGEST = 1e6
+LONGEST_LABEL = 120
+FEW = 20  # lines that may be not understood whatever else there is
+_AXIS = re.compile(
+    r"\b(?:[a-z]{0,20}achse|[a-z]{0,20}tisch|axis(?: of rotation)?|rotary table|os|osi|miza)\s+([abc])\b"
+    r"|\b([abc])\s?(?:[a-z]{0,20}achse|axis|rotary axis|os|osi)\b"
+)
+# 1.212,3344 with a mark for the thousands and 1.2e-05 are no numbers here: half of one would be another one.
+_NUMBER = re.compile(
+    r"(?:(?<![\w.,+-])|(?<=,)(?=[+-]))([+-]?\d{1,12}(?:[.,]\d{1,12})?)(?![.,]?\d)\s*(mm|um|µm|μm|°|deg|grad|inch|in|\")?(?![\w])"
+)
+_COORDINATE = re.compile(r"\b([xyz])\s*[=:]?\s*([+-]?[\d.,]{1,26}(?<![.,]))\s*(mm|um|µm|μm)?", re.IGNORECASE)
+_DEVIATION = re.compile(r"\be([xyz])([abc])\b")
+_BLANKS = re.compile(r"\s*([^\d+\N{MINUS SIGN}]*[^\W\d]\)?)\s+([+\N{MINUS SIGN}-]?\d.*)")  # Startwinkel  -90,000 °
+_THOUSANDS = re.compile(r"\d[ '’]\d{3}(?!\d)")
+_CLOCK = re.compile(r"\d{1,2}:\d{2}")
+_ALONE = re.compile(r"(?:[a-z]{1,20} ){0,2}(?:[a-z]{0,20}achse|axis|os)(?: of rotation)?")  # Vermessene Rotationsachse
+_LETTER = re.compile(r"\s*([abc])(?:[\s-]*(?:achse|axis|os))?\s*", re.IGNORECASE)
+_ERROR = re.compile(
+    r"\b(E[XYZABC]0[ABC])\b\s*[=:]?\s*([+-]?\d{1,6}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm|°|deg|grad)?(?![\w.,]*\w)",
+    re.IGNORECASE,
+)
+_CYCLE = re.compile(r"\b45[0-3]\b")
+_WORD_BEFORE_TIME = re.compile(r"\s*[,;]?\s*\b(?:uhrzeit|um|time|at|čas|cas|ura|ob)\b\s*:?\s*(?=\d)", re.IGNORECASE)
+VECTORS = frozenset({"correction", "before", "after"})
+_PARAMETER = re.compile(r"\b(QS?1[0-9]{2})\b", re.IGNORECASE)
+SIGNS = {"+": 1, "-": -1, "positiv": 1, "negativ": -1, "positive": 1, "negative": -1, "pozitivna": 1, "negativna": -1}
+Point = tuple[float, float, float]
+
+
+class Unread(NamedTuple):
+    """A line of the protocol that was not understood."""
+
+    line: int
+    text: str
+
+
+class Deviation(NamedTuple):
+    """A row of the table behind a diagram, mm: deviations before and, where they are given, after; None: no such column."""
+
+    angle: float
+    approach: int
+    measured: tuple[float | None, float | None, float | None]
+    optimised: tuple[float | None, float | None, float | None]
+
+
+@dataclass
+class AxisProtocol:
+    """Values of one axis. numbers: by `AXIS_KEYS`; vectors: X Y Z of correction, before, after."""
+
+    numbers: dict[str, float] = field(default_factory=dict)
+    vectors: dict[str, Point] = field(default_factory=dict)
+    angles: tuple[float, ...] = ()
+    errors: dict[str, float] = field(default_factory=dict)
+    deviations: list[Deviation] = field(default_factory=list)
+
+
+@dataclass
+class Protocol:
+    """Content of a protocol: texts of the head, axes, result parameters as printed, and the lines not understood."""
+
+    head: dict[str, str] = field(default_factory=dict)
+    ball_radius: float | None = None
+    incidence: float | None = None
+    axes: dict[AxisName, AxisProtocol] = field(default_factory=dict)
+    parameters: list[str] = field(default_factory=list)
+    unread: list[Unread] = field(default_factory=list)
+    rows: int = 0  # how many there are, understood or not
+
+    @property
+    def is_foreign(self) -> bool:
+        """True of another text than a protocol: no head, and more lines not understood than understood."""
+        return not self.head and len(self.unread) > max(FEW, self.rows / 2)
+
+
+def read_protocol(text: str) -> Protocol:
+    """Read a protocol.
+
+    >>> protocol = read_protocol("<h2>C-Achse</h2><table><tr><td>Lose</td><td>0,0021 °</td></tr></table>")
+    >>> protocol.axes["C"].numbers
+    {'backlash': 0.0021}
+    """
+    protocol = Protocol()
+    rows, broken = rows_of(text.removeprefix("\ufeff"))
+    protocol.rows = len(rows)
+    protocol.unread += [Unread(line, "<") for line in broken]
+    axis: AxisName | None = None
+    columns: list[tuple[str, int]] = []
+    side_by_side: list[AxisName] = []
+    for row in rows:
+        label, values = _split(row)
+        words = folded(label[:LONGEST_LABEL])
+        named = _AXIS.search(words)
+        if named is not None:
+            axis = _axis_of(named)
+            protocol.axes.setdefault(axis, AxisProtocol())
+            words = " ".join(_AXIS.sub(" ", words).split())
+        elif letter := _LETTER.fullmatch(_heading(words, label, values)):
+            axis = _named(letter[1])
+            continue
+        if abreast := _abreast(row):
+            side_by_side, columns = abreast, []
+            continue
+        if columns_found := _columns(row):
+            axis, columns = columns_found
+            continue
+        if columns and axis is not None and _deviation(protocol, axis, columns, row):
+            continue
+        columns = []
+        if not values and (words in WORTHLESS or WORTHLESS.issuperset(words.split()) or _CYCLE.search(words)):
+            continue
+        if side_by_side and len(values) == len(side_by_side):
+            understood = [
+                _take(protocol, axis_of_value, words, label, [value])
+                for axis_of_value, value in zip(side_by_side, values, strict=True)
+            ]
+            if not all(understood):
+                protocol.unread.append(Unread(row.line, row.text[:200]))
+            continue
+        if not _take(protocol, axis, words, label, values):
+            protocol.unread.append(Unread(row.line, row.text[:200]))
+    protocol.axes = {
+        axis: columns_found for axis, columns_found in protocol.axes.items() if columns_found != AxisProtocol()
+    }
+    protocol.unread.sort(key=lambda axis_of_value: axis_of_value.line)
+    return protocol
+
+
+def _split(row: Row) -> tuple[str, list[str]]:
+    if len(row.cells) > 1:
+        return row.cells[0].rstrip(":= "), list(row.cells[1:])
+    text = row.cells[0]
+    clock = _CLOCK.search(text)
+    for mark in (":", "=", "\t"):
+        at = text.find(mark)
+        if at > 0 and not (mark == ":" and clock is not None and clock.start() < at < clock.end()):
+            return text[:at].strip(), [text[at + 1 :].strip()] if text[at + 1 :].strip() else []
+    if (blanks := _BLANKS.fullmatch(text)) and _key(folded(blanks[1][:LONGEST_LABEL]), "") is not None:
+        return blanks[1], [blanks[2]]
+    return text.strip(), []
+
+
+def _heading(words: str, label: str, values: Sequence[str]) -> str:
+    """Letter of an axis that stands alone: beside the word for it, or as the whole of a heading; else nothing."""
+    if not values:
+        return label
+    return values[0] if len(values) == 1 and _ALONE.fullmatch(words) else ""
+
+
+def _axis_of(match: re.Match[str]) -> AxisName:
+    return _named(match[1] or match[2])
+
+
+def _named(letter: str) -> AxisName:
+    return "A" if letter in "aA" else "B" if letter in "bB" else "C"
+
+
+def _abreast(row: Row) -> list[AxisName]:
+    """The axes, if this row is the head of a table with a column for each."""
+    letters = [_LETTER.fullmatch(cell) for cell in row.cells]
+    named = [letter for letter in letters if letter is not None]
+    if len(named) < 2 or len(named) < len(row.cells) - 1 or any(letter is None for letter in letters[1:]):
+        return []
+    return [_named(letter[1]) for letter in named]
+
+
+def _take(protocol: Protocol, axis: AxisName | None, words: str, label: str, values: Sequence[str]) -> bool:
+    """Keep what a row says; False when it is not understood."""
+    text = " ".join(values)
+    if (parameter := _PARAMETER.search(label)) is not None:
+        name = parameter[1].upper()
+        if name in {*SCALARS, *STRINGS} and text:
+            protocol.parameters.append(f"{name} = {text}")
+            return True
+    if not words:
+        return not values  # the heading of an axis
+    if errors := _ERROR.findall(f"{label} {text}".replace("\N{MINUS SIGN}", "-")):
+        owners = {name: owner for owner, names in ERRORS.items() for name in names}
+        if all(name.upper() in owners for name, _value, _unit in errors):
+            for name, value, unit in errors:
+                axis_values = protocol.axes.setdefault(owners[name.upper()], AxisProtocol())
+                axis_values.errors[name.upper()] = numbers_in(f"{value} {unit}")[0]
+            return True
+    key = _key(words, folded(label[:LONGEST_LABEL].replace("(", " ")))
+    if key is None:
+        return False
+    if key == "time":
+        if "created" not in protocol.head or _CLOCK.search(protocol.head["created"]) or not _CLOCK.search(text):
+            return False
+        protocol.head["created"] += f" {text[:20]}"
+        return True
+    if key in HEAD_KEYS:
+        if not text:
+            return False
+        protocol.head.setdefault(key, _WORD_BEFORE_TIME.sub(" ", text[:200]) if key == "created" else text[:200])
+        return True
+    return _number(protocol, axis, key, text, words)
+
+
+def _key(words: str, everything: str) -> str | None:
+    """Meaning of a label: a known one, one that goes on, or by its words. everything: with the text in brackets."""
+    key = next((key for key, words_of in LABELS if words in words_of), None)
+    if key is None:
+        key = next(
+            (key for key, words_of in LABELS if any(words.startswith(f"{beginning} ") for beginning in words_of)), None
+        )
+    if key is None:
+        key = meaning(words)
+    if key in {"scatter", "scatter_before"}:
+        optimised = (
+            any(word in everything for word in OPTIMISED) or fits(everything, "=nach") or fits(everything, "after")
+        )
+        return (
+            "scatter_after"
+            if optimised and not any(fits(everything, beginning) for beginning in EARLIER)
+            else "scatter_before"
+        )
+    return key
+
+
+def _number(protocol: Protocol, axis: AxisName | None, key: str, text: str, words: str) -> bool:
+    numbers = numbers_in(text)
+    if _THOUSANDS.search(text) and key != "angles" and not (key in VECTORS and len(numbers) == 3):
+        return False
+    if key == "ball_radius":
+        if not numbers:
+            return False
+        protocol.ball_radius = numbers[0]
+        return True
+    if axis is None:
+        if key == "incidence" and numbers:
+            protocol.incidence = numbers[0]
+            return True
+        return False
+    axis_values = protocol.axes.setdefault(axis, AxisProtocol())
+    if key == "angles":
+        if not numbers or re.search(r"\d", _NUMBER.sub("", text.replace("\N{MINUS SIGN}", "-"))):
+            return False  # a list of which only a part can be read is not read
+        axis_values.angles = tuple(numbers)
+        return True
+    if key in VECTORS:
+        letter = next((at for at, coordinate in enumerate("xyz") if fits(words, f"={coordinate}")), None)
+        vector = _vector(text)
+        if vector is None and letter is not None and len(numbers) == 1:  # a row for each direction
+            vector = axis_values.vectors.get(key, (0.0, 0.0, 0.0))
+            vector = (*vector[:letter], numbers[0], *vector[letter + 1 :])  # type: ignore[assignment] # three again
+        if vector is None:
+            return False
+        axis_values.vectors[key] = vector
+        return True
+    assert key in AXIS_KEYS
+    if not numbers:
+        return False
+    if key == "scatter_before" and len(numbers) == 2:  # measured and optimised in one row
+        axis_values.numbers.setdefault("scatter_after", numbers[1])
+    return (
+        axis_values.numbers.setdefault(key, numbers[0]) == numbers[0]
+    )  # a second value for the same is not understood
+
+
+def numbers_in(text: str) -> list[float]:
+    """The numbers of a text, µm as mm; inches are nothing that a control writes here.
+
+    >>> numbers_in("−90,000 ° 0 90.5°"), numbers_in("3,4 µm"), numbers_in("2 inch")
+    ([-90.0, 0.0, 90.5], [0.0034], [])
+    """
+    if has_broken_number(text):
+        return []  # one number would be read as two
+    numbers = []
+    for number, unit in _NUMBER.findall(plain(text)):
+        value = float(number.replace(",", "."))
+        if unit in {"inch", "in", '"'} or abs(value) > LARGEST:
+            continue
+        numbers.append(round(value / 1000, 12) if unit in {"um", "µm", "μm"} else value)
+    return numbers
+
+
+def _vector(text: str) -> Point | None:
+    plain = text.replace("\N{MINUS SIGN}", "-")
+    named = {letter.upper(): numbers_in(f"{number} {unit}")[:1] for letter, number, unit in _COORDINATE.findall(plain)}
+    if named:
+        x, y, z = ((named.get(letter) or [0.0])[0] for letter in "XYZ")
+        return (x, y, z) if all(named.values()) else None
+    numbers = numbers_in(plain)
+    return (numbers[0], numbers[1], numbers[2]) if len(numbers) == 3 else None
+
+
+def _columns(row: Row) -> tuple[AxisName, list[tuple[str, int]]] | None:
+    """The columns of the table behind a diagram, if this row is its head: (what, which of X Y Z)."""
+    if len(row.cells) < 2:
+        return None
+    columns: list[tuple[str, int]] = []
+    letters = set()
+    for cell in row.cells:
+        words = folded(cell[:LONGEST_LABEL].replace("(", " ").replace(")", " "))
+        if (match := _DEVIATION.search(words)) is not None:
+            letters.add(match[2].upper())
+            after = any(word in words for word in OPTIMISED)
+            columns.append(("optimised" if after else "measured", "xyz".index(match[1])))
+        elif any(word in words for word in ("richtung", "direction", "smer")):
+            columns.append(("approach", 0))
+        else:
+            columns.append(("angle" if not any(kind == "angle" for kind, _at in columns) else "other", 0))
+    if len(letters) != 1 or not any(kind == "angle" for kind, _at in columns):
+        return None
+    letter = letters.pop()
+    return ("A" if letter == "A" else "B" if letter == "B" else "C"), columns
+
+
+def _deviation(protocol: Protocol, axis: AxisName, columns: Sequence[tuple[str, int]], row: Row) -> bool:
+    if len(row.cells) != len(columns):
+        return False
+    by_kind: dict[str, list[float | None]] = {"measured": [None] * 3, "optimised": [None] * 3}
+    angle, approach = None, 0
+    for (kind, at), cell in zip(columns, row.cells, strict=True):
+        numbers = numbers_in(cell)
+        if kind == "approach":
+            approach = SIGNS.get(
+                folded(cell[:LONGEST_LABEL]) or cell.strip().replace("\N{MINUS SIGN}", "-"), 0
+            ) or SIGNS.get(cell.strip(), 0)
+        elif kind == "other":
+            continue
+        elif len(numbers) != 1:
+            return False
+        elif kind == "angle":
+            angle = numbers[0]
+        else:
+            by_kind[kind][at] = numbers[0]
+    if angle is None:
+        return False
+    x, y, z = by_kind["measured"]
+    xo, yo, zo = by_kind["optimised"]
+    axis_values = protocol.axes.setdefault(axis, AxisProtocol())
+    axis_values.deviations.append(Deviation(angle, approach, (x, y, z), (xo, yo, zo)))
+    return True

@@ -1,1 +1,0 @@
-"""Gauge studies: what of the scatter is the probe's own, entered, pasted or probed again and again."""

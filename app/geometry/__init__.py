@@ -1,0 +1,1 @@
+"""Geometry by probing: work zero, alignment, geometric form, rotary axes."""

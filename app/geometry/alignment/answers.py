@@ -1,0 +1,295 @@
+"""Alignments as they are answered. Lengths in mm, angles in degrees."""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Annotated, Any, Literal, cast
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from sqlalchemy.orm import Session
+
+from app.core.geometry.frames import frame, from_angles
+from app.core.geometry.in_plane import Table, Turned, by_table
+from app.core.programs.frames import FrameText, offset_of, write_frame, write_restored
+from app.geometry.alignment import queries, wording
+from app.geometry.alignment.evaluation import warnings_of
+from app.geometry.alignment.schemas import SIX, MethodName
+from app.geometry.alignment.tables import Alignment
+from app.loop.tables.machines import Machine
+from app.loop.warnings.queries import acknowledgement
+from app.loop.warnings.wording import sentence
+from app.web.warnings import Acknowledged, Warnings, acknowledged_out, warnings_out
+
+Kind = Literal["points", "two_points", "two_holes", "pallet"]
+TEXT = "; INBAND ALIGNMENT 7 FOR MILL-1\n; …\n$P_UIFR[1]=CTRANS(X,-306.06,Y,-154.16,Z,-299.84):CROT(X,0.01,Y,-0.01,Z,-0.118)\nM17\n"
+ANSWER: dict[str, JsonValue] = {
+    "id": 7,
+    "machine": "mill-1",
+    "kind": "points",
+    "method": "exact",
+    "name": "pallet 4",
+    "part": None,
+    "shift": {"a": -0.0506, "b": -0.1453, "c": 0.0097},
+    "angles": {"x": 0.0027, "y": -0.0114, "z": 0.118},
+    "turns": {"lambda": 0.0027, "beta": -0.0114, "gamma": 0.118},
+    "matrix": [[1.0, -0.0021, 0.0, -0.0506], [0.0021, 1.0, 0.0, -0.1453], [0.0, 0.0, 1.0, 0.0097], [0, 0, 0, 1]],
+    "uncertainty": {"a": 0.0061, "b": 0.0055, "c": 0.0047, "lambda": 0.0025, "beta": 0.0017, "gamma": 0.0022},
+    "touches": SIX,
+    "deviations": [0.012, 0.046, 0.021, 0.104, -0.205, 0.051],
+    "residuals": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    "leverage": [1.0, 1.0, 1.0, 1.0, 1.0, 1.0],
+    "condition": {"value": 1.97, "text": "The points locate the part well (condition 1.97)."},
+    "misfits": [],
+    "weakest": "Least certain: turn about X.",
+    "advice": {
+        "place": [0.0, 0.0, 0.0],
+        "normal": [0.0, 0.0, 1.0],
+        "gain": 1.07,
+        "text": "One more point near (0, 0, 0) on the face +Z makes this 1.1 times as certain.",
+    },
+    "difference": 0.000001,
+    "off": None,
+    "table": None,
+    "warnings": [],
+    "acknowledged": None,
+    "program": TEXT,
+    "readings": [],
+    "pallet": None,
+    "part_on_pallet": None,
+    "given": {"base": [-306.01, -154.25, -299.85], "work_offset": "G54"},
+    "aligned_at": "2026-11-21T06:02:11Z",
+    "received_at": "2026-11-21T06:02:11.131Z",
+    "by": "mill-1",
+    "key": "mill-1:align:812",
+    "recomputed_from": None,
+}
+
+
+class Shift(BaseModel):
+    """Shift of the part's origin, mm."""
+
+    a: float
+    b: float
+    c: float
+
+
+class Angles(BaseModel):
+    """As a frame takes them: about Z, then the new Y, then the new X; degrees."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Turns(BaseModel):
+    """The one turn about an axis in space, by its components about X, Y, Z; degrees."""
+
+    model_config = ConfigDict(serialize_by_alias=True, populate_by_name=True)
+
+    lambda_: Annotated[float, Field(alias="lambda")]
+    beta: float
+    gamma: float
+
+
+class Condition(BaseModel):
+    """Quality of the layout: how well the probed points hold the part."""
+
+    value: float
+    text: Annotated[str, Field(description="For people.")]
+
+
+class Advice(BaseModel):
+    """One touch more that would help most."""
+
+    place: list[float]
+    normal: list[float]
+    gain: Annotated[float | None, Field(description="How many times as certain the least certain motion becomes.")]
+    text: Annotated[str, Field(description="For people.")]
+
+
+class TableOut(BaseModel):
+    """Command for a rotary table."""
+
+    axis: str
+    turn: Annotated[float, Field(description="Of the part about Z, counter-clockwise positive.")]
+    position: Annotated[float, Field(description="To command.")]
+    shift: Annotated[Shift, Field(description="What is left for the frame after the table has turned.")]
+    angles: Angles
+
+
+class PushedOut(BaseModel):
+    """A result as a reading of a characteristic."""
+
+    result: str
+    characteristic: str
+    sequence: Annotated[int | None, Field(description="Null while it waits to be stored.")]
+    refused: Annotated[str | None, Field(description="Why it became no reading.")]
+
+
+class AlignmentOut(BaseModel):
+    """Position and rotation of a part, their uncertainty, the probed points, and the program that sets the frame."""
+
+    model_config = ConfigDict(json_schema_extra={"example": ANSWER})
+
+    id: int
+    machine: str
+    kind: Kind
+    method: MethodName
+    name: str | None
+    part: str | None
+    shift: Shift
+    angles: Angles
+    turns: Turns
+    matrix: Annotated[list[list[float]], Field(description="4 × 4: a nominal point r lies at matrix · (r, 1).")]
+    uncertainty: Annotated[dict[str, float], Field(description="By unknown, 95 %; needs `repeatability`.")]
+    touches: list[dict[str, Any]]
+    deviations: Annotated[list[float], Field(description="Actual less nominal along the normal.")]
+    residuals: Annotated[list[float], Field(description="What is left of each touch.")]
+    leverage: Annotated[list[float], Field(description="1: nothing checks this touch.")]
+    condition: Condition | None
+    misfits: Annotated[
+        list[list[int]],
+        Field(description="Touches that do not fit, from 1; several together where any of them may be the one."),
+    ]
+    weakest: str | None
+    advice: Advice | None
+    difference: Annotated[
+        float | None,
+        Field(description="How far small angles would have put a touch from where the exact solution does."),
+    ]
+    off: Annotated[float | None, Field(description="Of two holes: distance found less nominal distance.")]
+    table: TableOut | None
+    warnings: Warnings
+    acknowledged: Acknowledged
+    program: Annotated[
+        str,
+        Field(
+            description="For the machine's control; running it twice changes nothing. With warnings that nobody has "
+            "acknowledged it begins with a block that stops the control."
+        ),
+    ]
+    readings: list[PushedOut]
+    pallet: Annotated[int | None, Field(description="The alignment of the pallet that this is composed with.")]
+    part_on_pallet: int | None
+    given: Annotated[dict[str, Any], Field(description="All it was computed from.")]
+    aligned_at: datetime
+    received_at: datetime
+    by: str
+    key: str | None
+    recomputed_from: int | None
+
+
+def turned_table(alignment: Alignment) -> Turned | None:
+    """Command for the rotary table, if there is one."""
+    table = alignment.given.get("table")
+    if table is None:
+        return None
+    rotary_table = Table((table["centre"][0], table["centre"][1]), table["position"], table["clockwise"])
+    return by_table(np.array(alignment.result["matrix"]), rotary_table)
+
+
+def program_of(
+    alignment: Alignment,
+    machine: Machine,
+    control: str | None = None,
+    *,
+    stop: Sequence[str] = (),
+    restore: bool = False,
+) -> str | None:
+    """The text that puts the frame where the part lies; None for another control that has not its work offset.
+
+    stop: codes of warnings that nobody has acknowledged; the text does not run then. restore: the text that sets the work
+    offset back to what it was before; None where none is kept.
+    """
+    inputs = alignment.given
+    turned = turned_table(alignment)
+    offset = offset_of(control or machine.control, inputs["work_offset"]) if "work_offset" in inputs else None
+    if control is not None and offset is None and "work_offset" in inputs:
+        return None
+    base = None if offset is None else (offset, dict(zip("XYZ", inputs["base"], strict=True)))
+    # The angles as they are stored, so that a turn of nothing is written as none.
+    motion = frame(from_angles(*alignment.result["angles"]), alignment.result["shift"])
+    text = FrameText(
+        f"INBAND ALIGNMENT {alignment.id} FOR {machine.key.upper()}",
+        motion if turned is None else turned.motion,
+        base,
+        None if turned is None else (inputs["table"]["axis"], turned.position),
+        tuple(stop),
+        alignment.id,
+    )
+    return (write_restored if restore else write_frame)(control or machine.control, text)
+
+
+def stop_of(session: Session, alignment: Alignment, machine: Machine) -> list[str]:
+    """The codes of the warnings that stop its program text; none once somebody has acknowledged them."""
+    if acknowledgement(session, machine.id, queries.subject_of(alignment)) is not None:
+        return []
+    return [warning.code for warning in warnings_of(alignment, machine)]
+
+
+def _shift(values: Any) -> Shift:
+    a, b, c = (round(float(value), 9) + 0.0 for value in values)
+    return Shift(a=a, b=b, c=c)
+
+
+def alignment_out(session: Session, alignment: Alignment) -> AlignmentOut:
+    """An alignment as it is answered."""
+    machine = session.get_one(Machine, alignment.machine_id)
+    result, inputs = alignment.result, alignment.given
+    warnings = warnings_of(alignment, machine)
+    acknowledged = acknowledgement(session, machine.id, queries.subject_of(alignment)) if warnings else None
+    x, y, z = result["angles"]
+    turns = dict(zip(("lambda", "beta", "gamma"), result["turns"], strict=True))
+    advised = result.get("advice")
+    table = None
+    if (turned := turned_table(alignment)) is not None:
+        left = FrameText("", turned.motion).angles
+        table = TableOut(
+            axis=inputs["table"]["axis"],
+            turn=round(turned.turn, 10),
+            position=round(turned.position, 10),
+            shift=_shift(turned.motion[:3, 3]),
+            angles=Angles(x=left["X"], y=left["Y"], z=left["Z"]),
+        )
+    return AlignmentOut(
+        id=alignment.id,
+        machine=machine.key,
+        kind=cast("Kind", alignment.kind),
+        method=cast("MethodName", alignment.method),
+        name=alignment.name,
+        part=alignment.part,
+        shift=_shift(result["shift"]),
+        angles=Angles(x=x, y=y, z=z),
+        turns=Turns.model_validate(turns),
+        matrix=result["matrix"],
+        uncertainty=result["uncertainty"],
+        touches=inputs.get("touches") or inputs.get("side") or inputs.get("holes") or [],
+        deviations=result.get("deviations", []),
+        residuals=result.get("residuals", []),
+        leverage=result.get("leverage", []),
+        condition=Condition(value=result["condition"], text=wording.condition(result["condition"]))
+        if "condition" in result
+        else None,
+        misfits=result.get("misfits", []),
+        weakest=wording.weakest(result["weakest"]) if result.get("weakest") else None,
+        advice=None if advised is None else Advice(**advised, text=wording.advice(advised)),
+        difference=result.get("difference"),
+        off=result.get("off"),
+        table=table,
+        warnings=warnings_out(warnings, sentence),
+        acknowledged=acknowledged_out(acknowledged),
+        program=program_of(alignment, machine, stop=[] if acknowledged else [warning.code for warning in warnings])
+        or "",
+        readings=[
+            PushedOut(result=name, characteristic=key, sequence=sequence, refused=refused)
+            for name, key, sequence, refused in queries.pushed(session, alignment)
+        ],
+        pallet=alignment.pallet_id,
+        part_on_pallet=alignment.part_id,
+        given=inputs,
+        aligned_at=alignment.aligned_at,
+        received_at=alignment.received_at,
+        by=alignment.actor,
+        key=alignment.key,
+        recomputed_from=alignment.recomputed_from,
+    )

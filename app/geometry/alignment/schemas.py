@@ -1,0 +1,238 @@
+"""Alignments as JSON that comes in. Lengths in mm, angles in degrees."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, JsonValue, model_validator
+from pydantic_core import PydanticCustomError
+
+from app.core.parameters import LARGEST_LENGTH
+from app.language.i18n import _
+from app.web.fields import LARGEST_ID, Body, LatelyOrNow, Reason, Slug, Text200
+
+MOST_TOUCHES = 1000  # a hundred holes of a plate, ten touches each
+Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
+Angle = Annotated[float, Field(strict=True, ge=-360, le=360, allow_inf_nan=False)]
+Share = Annotated[float, Field(strict=True, ge=-1e3, le=1e3, allow_inf_nan=False)]
+Vector = Annotated[list[Length], Field(min_length=3, max_length=3)]
+Normal = Annotated[list[Share], Field(min_length=3, max_length=3)]
+Place = Annotated[list[Length], Field(min_length=2, max_length=2)]
+Repeatability = Annotated[
+    float,
+    Field(
+        strict=True,
+        gt=0,
+        le=1,
+        allow_inf_nan=False,
+        description="Standard deviation of one touch; with it uncertainties (95 %) and misfits are stated.",
+    ),
+]
+Key = Annotated[
+    Text200,
+    Field(
+        max_length=128,
+        description="Unique per machine: sent again, the answer is the first answer and nothing happens twice.",
+    ),
+]
+MethodName = Literal["exact", "small", "printed"]
+Motion = Literal["a", "b", "c", "lambda", "beta", "gamma"]
+DIRECTIONS = {
+    "+X": [1.0, 0.0, 0.0],
+    "-X": [-1.0, 0.0, 0.0],
+    "+Y": [0.0, 1.0, 0.0],
+    "-Y": [0.0, -1.0, 0.0],
+    "+Z": [0.0, 0.0, 1.0],
+    "-Z": [0.0, 0.0, -1.0],
+}
+
+SIX: list[JsonValue] = [
+    {"nominal": [10, 10, 0], "normal": "+Z", "deviation": 0.012},
+    {"nominal": [180, 15, 0], "normal": "+Z", "deviation": 0.046},
+    {"nominal": [90, 120, 0], "normal": "+Z", "deviation": 0.021},
+    {"nominal": [20, 0, -15], "normal": "-Y", "deviation": 0.104},
+    {"nominal": [170, 0, -15], "normal": "-Y", "deviation": -0.205},
+    {"nominal": [0, 60, -15], "normal": "-X", "deviation": 0.051},
+]
+ALIGNMENT: dict[str, JsonValue] = {
+    "machine": "mill-1",
+    "kind": "points",
+    "name": "pallet 4",
+    "touches": SIX,
+    "method": "exact",
+    "repeatability": 0.002,
+    "work_offset": "G54",
+    "base": [-306.01, -154.25, -299.85],
+    "key": "mill-1:align:812",
+}
+
+
+class TouchIn(Body):
+    """Nominal place of a face, its normal, and the probed point or its deviation along the normal."""
+
+    nominal: Annotated[Vector, Field(description="Nominal point in the part's coordinates.")]
+    normal: Annotated[
+        Normal, Field(description="Of the face there, pointing out of the part; or +X, -X, +Y, -Y, +Z, -Z.")
+    ]
+    deviation: Annotated[
+        Length | None, Field(description="Actual less nominal along the normal; or say `measured`.")
+    ] = None
+    measured: Annotated[
+        Vector | None, Field(description="The point that was touched; where the tip's centre stood if `tip` is said.")
+    ] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named_direction(cls, value: Any) -> Any:
+        if isinstance(value, dict) and isinstance(value.get("normal"), str):
+            direction = DIRECTIONS.get(value["normal"].strip().upper().replace("\N{MINUS SIGN}", "-"))
+            if direction is None:
+                raise PydanticCustomError(
+                    "normal",
+                    _("{text} is no direction: +X, -X, +Y, -Y, +Z, -Z").format(text=repr(value["normal"][:20])),
+                    {"at": "normal"},
+                )
+            return value | {"normal": direction}
+        return value
+
+    @model_validator(mode="after")
+    def _one_finding(self) -> "TouchIn":
+        if (self.deviation is None) == (self.measured is None):
+            raise PydanticCustomError("finding", _("say deviation or measured, one of them"))
+        return self
+
+
+class SidePointIn(Body):
+    """A touch on a side, in the plane."""
+
+    nominal: Annotated[Place, Field(description="X, Y where it was to be.")]
+    measured: Annotated[Place, Field(description="X, Y where it was found.")]
+
+
+class HoleIn(Body):
+    """A hole or spigot: its centre, or the touches that it follows from."""
+
+    nominal: Annotated[Place, Field(description="X, Y of its centre.")]
+    centre: Annotated[Place | None, Field(description="As the control has found it; or say `touches`.")] = None
+    touches: Annotated[
+        list[Place] | None, Field(max_length=MOST_TOUCHES, description="Three or more, where the tip's centre stood.")
+    ] = None
+    tip: Annotated[float, Field(strict=True, ge=0, le=1000, allow_inf_nan=False, description="Its diameter.")] = 0.0
+    inside: Annotated[bool, Field(strict=True, description="A hole; false for a spigot.")] = True
+
+    @model_validator(mode="after")
+    def _one_finding(self) -> "HoleIn":
+        if (self.centre is None) == (self.touches is None):
+            raise PydanticCustomError("finding", _("say centre or touches, one of them"))
+        return self
+
+
+class TableIn(Body):
+    """A rotary table that takes the turn about Z."""
+
+    axis: Annotated[Literal["A", "B", "C"], Field(description="As it is called on the control.")] = "C"
+    centre: Annotated[Place, Field(description="X, Y of its axis in the part's coordinates.")]
+    position: Annotated[
+        float,
+        Field(strict=True, ge=-1e6, le=1e6, allow_inf_nan=False, description="Where it stood while touching, degrees."),
+    ] = 0.0
+    clockwise: Annotated[
+        bool,
+        Field(strict=True, description="A positive command turns the part clockwise seen from +Z, as ISO 841 has it."),
+    ] = True
+
+
+class AlignmentIn(Body):
+    """Touches of a part whose place is to be found."""
+
+    model_config = ConfigDict(json_schema_extra={"example": ALIGNMENT})
+
+    machine: Annotated[Slug, Field(description="The key of the machine.")]
+    kind: Annotated[
+        Literal["points", "two_points", "two_holes"],
+        Field(description="points: six (3-2-1) or more; two_points: two on a side; two_holes."),
+    ] = "points"
+    name: Annotated[Text200 | None, Field(description="What was aligned: part, pallet, set-up.")] = None
+    part: Annotated[Text200 | None, Field(max_length=128, description="Serial number.")] = None
+    touches: Annotated[list[TouchIn] | None, Field(max_length=MOST_TOUCHES, description="Of the kind `points`.")] = None
+    tip: Annotated[
+        float,
+        Field(
+            strict=True,
+            ge=0,
+            le=1000,
+            allow_inf_nan=False,
+            description="Of the kind `points`: its diameter, where `measured` is where its centre stood; 0 for the surface itself.",
+        ),
+    ] = 0.0
+    side: Annotated[
+        list[SidePointIn] | None, Field(min_length=2, max_length=2, description="Of the kind `two_points`.")
+    ] = None
+    holes: Annotated[list[HoleIn] | None, Field(min_length=2, max_length=2, description="Of the kind `two_holes`.")] = (
+        None
+    )
+    method: Annotated[
+        MethodName,
+        Field(description="exact: finite rotations; small: rows [n, r×n]; printed: the short form for 3-2-1."),
+    ] = "exact"
+    solve_for: Annotated[
+        list[Motion] | None,
+        Field(min_length=1, max_length=6, description="The motions that are unknown; if left out, all six."),
+    ] = None
+    repeatability: Repeatability | None = None
+    work_offset: Annotated[
+        str | None,
+        Field(max_length=20, description="With `base`: the text sets this work offset anew; else the program's frame."),
+    ] = None
+    base: Annotated[Vector | None, Field(description="X, Y, Z of that work offset while touching.")] = None
+    table: Annotated[TableIn | None, Field(description="The turn about Z is taken by this table.")] = None
+    characteristics: Annotated[
+        dict[Literal["a", "b", "c"], Slug] | None,
+        Field(description="Characteristics of this machine whose readings a, b, c become."),
+    ] = None
+    aligned_at: Annotated[LatelyOrNow | None, Field(description="When; if left out, now.")] = None
+    key: Key | None = None
+
+
+class PoseIn(Body):
+    """Position of the pallet's own coordinates in those of the machine."""
+
+    shift: Annotated[Vector, Field(description="Of its origin.")]
+    rotation: Annotated[Angle, Field(description="About Z, degrees.")] = 0.0
+
+
+class PalletIn(Body):
+    """The error of a pallet and the error of a part on it, the one after the other."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "pallet": 7,
+                "part": 8,
+                "pose": {"shift": [500.0, 300.0, 100.0], "rotation": 90.0},
+                "name": "pallet 4 with part 812",
+            }
+        }
+    )
+
+    pallet: Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID, description="The alignment of the pallet.")]
+    part: Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID, description="The alignment of the part on it.")]
+    pose: Annotated[PoseIn | None, Field(description="If the part was measured in the pallet's own coordinates.")] = (
+        None
+    )
+    name: Annotated[Text200 | None, Field(description="What lies there.")] = None
+    key: Key | None = None
+
+
+class RecomputeIn(Body):
+    """The same touches once more: by another method, or without some of them. The first result stays on record."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"example": {"leave_out": [7], "reason": "touch 7 does not fit the others"}}
+    )
+
+    method: Annotated[MethodName | None, Field(description="If left out, as before.")] = None
+    repeatability: Repeatability | None = None
+    leave_out: Annotated[
+        list[Annotated[int, Field(strict=True, ge=1, le=MOST_TOUCHES)]],
+        Field(max_length=MOST_TOUCHES, description="Touches that do not count, from 1."),
+    ] = Field(default=[])
+    reason: Reason

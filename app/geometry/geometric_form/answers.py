@@ -1,0 +1,175 @@
+"""Form measurements as they are answered. Lengths in mm."""
+
+from datetime import datetime
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from app.geometry.geometric_form import wording
+from app.geometry.geometric_form.evaluation import warnings_of
+from app.geometry.geometric_form.queries import FormRow, ResultReading
+from app.geometry.geometric_form.schemas import FORM
+from app.loop.warnings.wording import sentence
+from app.web.warnings import Warnings, warnings_out
+
+FORM_OUT: dict[str, JsonValue] = {
+    "id": 17,
+    "machine": "lathe-1",
+    "feature": "bore-d50-axis",
+    "kind": "axis_straightness",
+    "method": "minimum_zone",
+    "value": 0.0113,
+    "uncertainty": 0.0012,
+    "tolerance": 0.005,
+    "verdict": {
+        "code": "bad",
+        "good": False,
+        "sure": True,
+        "text": "11.3 µm ± 1.2 µm is more than the tolerance 5.0 µm.",
+    },
+    "values": [
+        {"method": "minimum_zone", "value": 0.0113, "uncertainty": 0.0012},
+        {"method": "least_squares", "value": 0.0131, "uncertainty": 0.0014},
+        {"method": "printed", "value": 0.0078, "uncertainty": None},
+    ],
+    "suspects": [],
+    "warnings": [],
+    "tested": True,
+    "corrected": None,
+    "details": {"axis": {"point": [0.0, 0.0, 30.0], "direction": [0.0, 0.0, 1.0]}},
+    "given": {"sections": FORM["sections"], "tip_diameter": 6.0, "side": "inside"},
+    "repeatability": 0.0005,
+    "part": "SN-000812",
+    "measured_at": "2026-11-21T08:15:02Z",
+    "received_at": "2026-11-21T08:15:02.131Z",
+    "by": "lathe-1",
+    "key": "lathe-1:form:17",
+    "engine": 1,
+    "evaluation": 1,
+    "evaluated_at": "2026-11-21T08:15:02.131Z",
+    "reading": {"characteristic": "shaft-d40", "sequence": None, "refused": None},
+}
+
+
+class VerdictOut(BaseModel):
+    """Verdict on the tolerance. sure: the limit lies outside the uncertainty, which is known."""
+
+    code: Annotated[str, Field(description="good, good_unsure, bad_unsure or bad.")]
+    good: bool
+    sure: bool
+    text: Annotated[str, Field(description="For people.")]
+
+
+class ValueOut(BaseModel):
+    """A deviation by one method; uncertainty: expanded, k = 2, where it can be told."""
+
+    method: Annotated[
+        str, Field(description="minimum_zone, least_squares, printed, inscribed (MIC), circumscribed (MCC).")
+    ]
+    value: float
+    uncertainty: float | None
+
+
+class SuspectOut(BaseModel):
+    """A touch that does not belong to what the others agree on."""
+
+    of: Annotated[str, Field(description="feature or datum.")]
+    section: Annotated[int | None, Field(description="Counted from 1; none where there are no sections.")]
+    touch: Annotated[int, Field(description="Counted from 1.")]
+    off: Annotated[float, Field(description="How far off, positive outside or above.")]
+    t: Annotated[float, Field(description="Its studentized residual, which is beyond `limit`.")]
+    limit: float
+    given: list[float]
+    nearest: Annotated[list[float], Field(description="The next point that would fit.")]
+    alone: Annotated[
+        list[float | None],
+        Field(
+            description="Per coordinate what it would have to be if the others are right; none where that will not do."
+        ),
+    ]
+    text: Annotated[str, Field(description="For people.")]
+
+
+class FormReadingOut(BaseModel):
+    """The reading that the result becomes; without a number it is on its way."""
+
+    characteristic: str
+    sequence: int | None
+    refused: str | None
+
+
+class FormOut(BaseModel):
+    """A form measurement with what was found. Lengths in mm."""
+
+    model_config = ConfigDict(json_schema_extra={"example": FORM_OUT})
+
+    id: int
+    machine: str
+    feature: str
+    kind: str
+    method: Annotated[str, Field(description="By which the verdict goes.")]
+    value: Annotated[float, Field(description="The deviation by that method.")]
+    uncertainty: Annotated[float | None, Field(description="Expanded, k = 2; from the probe's repeatability.")]
+    tolerance: float | None
+    verdict: VerdictOut | None
+    values: list[ValueOut]
+    suspects: list[SuspectOut]
+    warnings: Warnings
+    tested: Annotated[bool, Field(description="There were touches enough to tell a bad one.")]
+    corrected: Annotated[
+        float | None, Field(description="The deviation if suspected touches were where they would have to be.")
+    ]
+    details: Annotated[dict[str, Any], Field(description="Centres, diameters, axes, residuals.")]
+    given: Annotated[dict[str, Any], Field(description="Touches and datum as they came.")]
+    repeatability: float | None
+    part: str | None
+    measured_at: datetime
+    received_at: datetime
+    by: str
+    key: str | None
+    engine: Annotated[int, Field(description="Version of the evaluation.")]
+    evaluation: Annotated[int, Field(description="How often it was evaluated; the newest counts.")]
+    evaluated_at: datetime
+    reading: FormReadingOut | None
+
+
+def form_out(row: FormRow, reading: ResultReading | None = None) -> FormOut:
+    """A measurement as it is answered."""
+    measurement, evaluation = row.measurement, row.evaluation
+    result = evaluation.result
+    verdict = None
+    if evaluation.verdict is not None:
+        verdict = VerdictOut(
+            code=evaluation.verdict,
+            good=evaluation.verdict.startswith("good"),
+            sure=evaluation.uncertainty is not None and not evaluation.verdict.endswith("unsure"),
+            text=wording.sentence(evaluation.value, measurement.tolerance, evaluation.uncertainty, evaluation.verdict),
+        )
+    return FormOut(
+        id=measurement.id,
+        machine=row.machine,
+        feature=measurement.feature,
+        kind=measurement.kind,
+        method=evaluation.method,
+        value=evaluation.value,
+        uncertainty=evaluation.uncertainty,
+        tolerance=measurement.tolerance,
+        verdict=verdict,
+        values=[ValueOut(**value) for value in result["values"]],
+        suspects=[SuspectOut(**suspect, text=wording.suspicion(suspect)) for suspect in result["suspects"]],
+        warnings=warnings_out(warnings_of(measurement.kind, measurement.given, result, row.plausible_shift), sentence),
+        tested=result["tested"],
+        corrected=result["corrected"],
+        details=result["details"],
+        given=measurement.given,
+        repeatability=measurement.repeatability,
+        part=measurement.part,
+        measured_at=measurement.measured_at,
+        received_at=measurement.received_at,
+        by=measurement.actor,
+        key=measurement.key,
+        engine=evaluation.engine,
+        evaluation=evaluation.number,
+        evaluated_at=evaluation.at,
+        reading=None if reading is None else FormReadingOut(**reading._asdict()),
+    )

@@ -1,0 +1,162 @@
+"""JSON routes: form measurements, their pictures, their trend."""
+
+from typing import Annotated, Any, Literal
+
+from fastapi import Path, Query, Request, Response
+
+from app.access.deps import AnyCaller, Caller
+from app.db.engine import Database
+from app.errors import NotFound
+from app.geometry.geometric_form import actions, figures, queries, wording
+from app.geometry.geometric_form.answers import FormOut, form_out
+from app.geometry.geometric_form.queries import FormRow
+from app.geometry.geometric_form.schemas import FormIn, RecomputeIn
+from app.language.i18n import _
+from app.loop.machines.queries import machine_keys_by_id, machine_named
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep
+from app.web.fields import Cursor, Limit, Page, Slug, page_of
+from app.web.theme import theme_from
+
+router = api_router("forms")
+Number = Annotated[int, Path(description="Number of the measurement.", examples=[17])]
+Theme = Annotated[str | None, Query(description="`light` or `dark`", max_length=20)]
+KindName = Literal[
+    "roundness",
+    "straightness",
+    "axis_straightness",
+    "flatness",
+    "coaxiality",
+    "position",
+    "parallelism",
+    "perpendicularity",
+]
+FIGURE: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}
+}
+AGAIN: dict[int | str, dict[str, Any]] = {
+    200: {"model": FormOut, "description": "It was sent before with the same key; nothing happened now."}
+}
+
+
+@router.post("/forms", status_code=201, responses=problems(404, 409) | AGAIN)
+def measure_form(request: Request, session: SessionDep, caller: AnyCaller, body: FormIn, response: Response) -> FormOut:
+    """Evaluate form or position of a feature from its touches.
+
+    Answers the deviation by every method that applies, the verdict, the uncertainty from the probe's repeatability, and
+    names touches that do not belong. Touches that carry no result (on one line, at one place, on too short an arc) are
+    refused with the reason. With `characteristic` the result becomes a reading of it, so that control charts, alarms and
+    reports work on it.
+    """
+    database: Database = request.app.state.database
+    with database.begin() as own:
+        machine = machine_named(own, body.machine)
+        caller.must_at(machine.id, "operator")
+    created = actions.measure_and_push(database, machine, body, caller)
+    response.status_code = 200 if created.again else 201
+    return _answer(session, created.row)
+
+
+@router.get("/forms", responses=problems(404))
+def list_forms(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: Annotated[Slug | None, Query(description="Only of this machine.")] = None,
+    feature: Annotated[Slug | None, Query(description="Only of this feature.")] = None,
+    kind: Annotated[KindName | None, Query(description="Only of this kind.")] = None,
+    after: Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")] = 0,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[FormOut]:
+    """Form measurements, oldest first, with what counts of each."""
+    machine_row = machine_named(session, machine) if machine is not None else None
+    if machine_row is None and caller.machine_id is not None:
+        machine_row = machine_named(session, machine_keys_by_id(session)[caller.machine_id])
+    if machine_row is not None:
+        caller.must_at(machine_row.id, "viewer")
+    else:
+        caller.must("viewer")
+    rows = queries.forms(session, machine=machine_row, feature=feature, kind=kind, after=after, limit=limit + 1)
+    readings = queries.became(session, rows)
+    return page_of([form_out(row, readings.get(row.measurement.id)) for row in rows], limit, lambda form: form.id)
+
+
+@router.get("/forms/{number}", responses=problems(404))
+def get_form_measurement(session: SessionDep, caller: AnyCaller, number: Number) -> FormOut:
+    """One measurement with its touches and everything that was found."""
+    return _answer(session, _seen(session, caller, number))
+
+
+@router.post("/forms/{number}/recompute", status_code=201, responses=problems(404))
+def recompute_form(session: SessionDep, caller: AnyCaller, number: Number, body: RecomputeIn) -> FormOut:
+    """Evaluate the stored touches anew by the present code; what was found before stays on record."""
+    caller.must_somewhere("operator")
+    row = queries.form(session, number)
+    caller.must_at(row.measurement.machine_id, "operator")
+    return _answer(session, actions.recompute(session, number, body.reason, caller))
+
+
+@router.get("/forms/{number}/figure", responses=problems(404) | FIGURE)
+def form_figure(
+    session: SessionDep,
+    caller: AnyCaller,
+    number: Number,
+    section: Annotated[int, Query(ge=1, le=1000, description="Which section, for the picture of one.")] = 1,
+    theme: Theme = None,
+) -> dict[str, Any]:
+    """The picture as a Plotly figure: section round, axis, map of a surface, or profile; deviations exaggerated."""
+    row = _seen(session, caller, number)
+    measurement, evaluation = row.measurement, row.evaluation
+    return figures.figure(
+        measurement.kind,
+        measurement.given,
+        evaluation.result,
+        measurement.tolerance,
+        section=section,
+        theme=theme_from(theme),
+    )
+
+
+@router.get("/machines/{machine}/forms/{feature}/figure", responses=problems(404) | FIGURE)
+def form_trend_figure(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])],
+    feature: Annotated[Slug, Path(description="The key of the feature.", examples=["bore-d50-axis"])],
+    kind: Annotated[KindName | None, Query(description="Only of this kind.")] = None,
+    theme: Theme = None,
+) -> dict[str, Any]:
+    """The deviations of a feature over time as a Plotly figure, with tolerance and uncertainty."""
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "viewer")
+    rows = queries.trend(session, machine_row, feature, kind)
+    if not rows:
+        raise NotFound(
+            _("There is no form measurement of the feature {feature} on this machine.").format(feature=repr(feature)),
+            _("GET /api/v1/forms lists what was measured."),
+        )
+    return figures.trend(
+        [
+            figures.Mark(
+                row.measurement.measured_at,
+                row.measurement.id,
+                row.evaluation.value,
+                row.evaluation.uncertainty,
+                row.measurement.tolerance,
+                row.evaluation.verdict,
+                wording.verdict_word(row.evaluation.verdict),
+                row.evaluation.suspects,
+            )
+            for row in rows
+        ],
+        theme=theme_from(theme),
+    )
+
+
+def _seen(session: SessionDep, caller: Caller, number: int) -> FormRow:
+    row = queries.form(session, number)
+    caller.must_at(row.measurement.machine_id, "viewer")
+    return row
+
+
+def _answer(session: SessionDep, row: FormRow) -> FormOut:
+    return form_out(row, queries.became(session, [row]).get(row.measurement.id))

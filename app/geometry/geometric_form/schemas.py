@@ -1,0 +1,223 @@
+"""Form measurements as they are sent. Lengths in mm."""
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import ConfigDict, Field, JsonValue, model_validator
+from pydantic_core import PydanticCustomError
+
+from app.core.geometry.form import Kind
+from app.core.parameters import LARGEST_LENGTH
+from app.language.i18n import _
+from app.web.fields import Body, LatelyOrNow, Reason, Slug, Text200
+
+MOST_TOUCHES = 2000
+MOST_SECTIONS = 200
+
+Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(strict=True, ge=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
+Flat = Annotated[list[Length], Field(min_length=2, max_length=2, examples=[[-6.096, 24.249]])]
+Point = Annotated[list[Length], Field(min_length=2, max_length=3)]
+
+OF_SECTIONS = {Kind.ROUNDNESS, Kind.AXIS_STRAIGHTNESS, Kind.COAXIALITY, Kind.POSITION}
+OF_POINTS = {Kind.STRAIGHTNESS, Kind.FLATNESS}
+WITH_DATUM = {Kind.COAXIALITY, Kind.PARALLELISM, Kind.PERPENDICULARITY}
+WITH_LENGTH = {Kind.PARALLELISM, Kind.PERPENDICULARITY}
+ONLY_OF = {"datum": WITH_DATUM, "nominal": {Kind.POSITION}, "length": WITH_LENGTH}
+
+FORM: dict[str, JsonValue] = {
+    "machine": "lathe-1",
+    "feature": "bore-d50-axis",
+    "kind": "axis_straightness",
+    "sections": [
+        {"height": 0, "touches": [[-6.096, 24.249], [22.578, 10.784], [12.465, -21.678]]},
+        {"height": 20, "touches": [[23.896, -7.346], [20.88, 13.749], [-23.388, 8.859]]},
+        {"height": 40, "touches": [[5.675, 24.341], [-24.71, -3.748], [23.78, -7.699]]},
+        {"height": 60, "touches": [[-12.55, 21.611], [-6.82, -24.059], [23.699, 7.911]]},
+    ],
+    "tolerance": 0.005,
+    "repeatability": 0.0005,
+    "tip_diameter": 6.0,
+    "side": "inside",
+    "part": "SN-000812",
+    "measured_at": "2026-11-21T08:15:02Z",
+    "characteristic": "shaft-d40",
+    "key": "lathe-1:form:17",
+}
+
+
+class SectionIn(Body):
+    """One section of a bore or shaft: its touches, or its centre as the control says it."""
+
+    height: Annotated[Length | None, Field(description="Z at which it was taken.")] = None
+    touches: Annotated[
+        list[Flat],
+        Field(
+            default_factory=list,
+            max_length=MOST_TOUCHES,
+            description="X and Y of each touch, of the tip's centre or of the surface.",
+        ),
+    ]
+    centre: Annotated[Flat | None, Field(description="In place of touches: X and Y of the centre.")] = None
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if bool(self.touches) == (self.centre is not None):
+            raise PydanticCustomError("section", _("say either touches or centre"))
+        return self
+
+
+class TouchedIn(Body):
+    """Probed points of a datum: a bore or shaft in sections, or a surface in points."""
+
+    sections: Annotated[list[SectionIn], Field(default_factory=list, max_length=MOST_SECTIONS)]
+    points: Annotated[list[Point], Field(default_factory=list, max_length=MOST_TOUCHES)]
+
+
+class FormIn(Body):
+    """A form measurement: what was touched, of what kind it is, and what it is held against."""
+
+    model_config = ConfigDict(json_schema_extra={"example": FORM})
+
+    machine: Annotated[Slug, Field(description="The key of the machine.")]
+    feature: Annotated[Slug, Field(description="A key of yours for what was touched: its measurements make a trend.")]
+    kind: Annotated[
+        Literal[
+            "roundness",
+            "straightness",
+            "axis_straightness",
+            "flatness",
+            "coaxiality",
+            "position",
+            "parallelism",
+            "perpendicularity",
+        ],
+        Field(description="What is looked at."),
+    ]
+    method: Annotated[
+        Literal["minimum_zone", "least_squares", "printed"] | None,
+        Field(
+            description="By which the verdict goes; every method is answered. Not said: minimum zone, as ISO 1101 has it, "
+            "where the kind has one. `printed` is the published method for axis straightness, which ignores heights."
+        ),
+    ] = None
+    sections: Annotated[
+        list[SectionIn], Field(default_factory=list, max_length=MOST_SECTIONS, description="Of a bore or shaft.")
+    ]
+    points: Annotated[
+        list[Point],
+        Field(
+            default_factory=list,
+            max_length=MOST_TOUCHES,
+            description="Of a surface: X, Y, Z. Of a profile: along and across it.",
+        ),
+    ]
+    datum: Annotated[
+        TouchedIn | None, Field(description="For coaxiality, parallelism, perpendicularity: what it is held against.")
+    ] = None
+    nominal: Annotated[Flat | None, Field(description="For position: X and Y where the centre should be.")] = None
+    length: Annotated[
+        Positive | None,
+        Field(
+            description="For parallelism and perpendicularity: over which a tilt counts; else over the whole feature."
+        ),
+    ] = None
+    tolerance: Annotated[NotNegative | None, Field(description="Greatest deviation that is good.")] = None
+    repeatability: Annotated[
+        NotNegative | None, Field(le=1, description="Standard deviation of a single touch; without it no uncertainty.")
+    ] = None
+    tip_diameter: Annotated[
+        NotNegative | None, Field(description="Of the probe's tip, if the touches are those of its centre.")
+    ] = None
+    side: Annotated[
+        Literal["inside", "outside"] | None, Field(description="Bore or shaft: the tip adds to it, or is taken off.")
+    ] = None
+    part: Annotated[Text200 | None, Field(max_length=128, description="Serial number of the part.")] = None
+    measured_at: Annotated[LatelyOrNow | None, Field(description="If left out, when it came in.")] = None
+    characteristic: Annotated[
+        Slug | None, Field(description="A characteristic of the machine whose reading the result becomes.")
+    ] = None
+    key: Annotated[
+        Text200 | None,
+        Field(max_length=128, description="Unique per machine: sent again, the answer is the first answer."),
+    ] = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        kind = Kind(self.kind)
+        count = _touches(self.sections) + len(self.points)
+        if self.datum is not None:
+            count += _touches(self.datum.sections) + len(self.datum.points)
+        if count > MOST_TOUCHES:
+            raise PydanticCustomError(
+                "touches",
+                _("{count} touches are more than the {most} that are taken at once").format(
+                    count=count, most=MOST_TOUCHES
+                ),
+            )
+        for name, kinds in ONLY_OF.items():  # a datum that is passed over would make a verdict of something else
+            if kind not in kinds and getattr(self, name) is not None:
+                raise PydanticCustomError(
+                    "not_of_kind", _("{name} means nothing for this kind").format(name=name), {"at": name}
+                )
+        if self.sections and self.points:
+            raise PydanticCustomError("both", _("say either sections or points of the feature"), {"at": "points"})
+        if kind in OF_SECTIONS and not self.sections:
+            raise PydanticCustomError("sections", _("this kind needs sections"), {"at": "sections"})
+        if kind in OF_POINTS and not self.points:
+            raise PydanticCustomError("points", _("this kind needs points"), {"at": "points"})
+        if kind in WITH_DATUM:
+            self._with_datum()
+        _depth(self.points, 2 if kind is Kind.STRAIGHTNESS else 3, "points")
+        if kind is Kind.POSITION and self.nominal is None:
+            raise PydanticCustomError(
+                "nominal", _("position needs nominal: where the centre should be"), {"at": "nominal"}
+            )
+        if bool(self.tip_diameter) and self.side is None:
+            raise PydanticCustomError(
+                "side", _("tip_diameter needs side: inside for a bore, outside for a shaft"), {"at": "side"}
+            )
+        return self
+
+    def _with_datum(self) -> None:
+        if self.datum is None or not (self.datum.sections or self.datum.points):
+            raise PydanticCustomError("datum", _("this kind needs a datum with sections or points"), {"at": "datum"})
+        if self.datum.sections and self.datum.points:
+            raise PydanticCustomError("both", _("say either sections or points of the datum"), {"at": "datum.points"})
+        if not (self.sections or self.points):
+            raise PydanticCustomError(
+                "touched", _("this kind needs sections or points of the feature"), {"at": "sections"}
+            )
+        if Kind(self.kind) is Kind.COAXIALITY and not self.datum.sections:
+            raise PydanticCustomError("datum", _("coaxiality needs a datum in sections"), {"at": "datum.sections"})
+        _depth(self.datum.points, 3, "datum.points")
+
+
+def _touches(sections: Sequence[SectionIn]) -> int:
+    return sum(len(section.touches) or 1 for section in sections)
+
+
+def _depth(points: Sequence[Sequence[float]], coordinates: int, name: str) -> None:
+    wrong = next((at for at, point in enumerate(points, start=1) if len(point) != coordinates), None)
+    if wrong is not None:
+        raise PydanticCustomError(
+            "coordinates",
+            _("point {at} of {name} has not {count} coordinates").format(at=wrong, name=name, count=coordinates),
+            {"at": name},
+        )
+
+
+class RecomputeIn(Body):
+    """Reason for computing again."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"reason": "new version"}})
+
+    reason: Reason
+
+
+def stored(body: FormIn) -> dict[str, Any]:
+    """Inputs of a result as they are stored."""
+    return body.model_dump(
+        include={"sections", "points", "datum", "nominal", "length", "tip_diameter", "side"}, exclude_none=True
+    )

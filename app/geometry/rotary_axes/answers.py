@@ -1,0 +1,297 @@
+"""Runs as they are answered. Lengths in mm, angles in degrees."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from app.core.rotary.axis import ERRORS, AxisName
+from app.core.rotary.results import MEASURED, OFFSETS, OPTIMISED, STRINGS, write_string
+from app.geometry.rotary_axes import wording
+from app.geometry.rotary_axes.queries import RunRow
+from app.geometry.rotary_axes.tables import KinematicsRun
+from app.web.warnings import Warnings, warnings_out
+
+Status = Literal["refused", "to_confirm", "confirmed", "measured", "entered"]
+
+AXIS: dict[str, JsonValue] = {
+    "axis": "C",
+    "carries": "table",
+    "errors": {
+        "EX0C": {"value": 0.0123, "deviation": 0.0008},
+        "EY0C": {"value": -0.0081, "deviation": 0.0008},
+        "EA0C": {"value": 0.0021, "deviation": 0.0004},
+        "EB0C": {"value": -0.0013, "deviation": 0.0004},
+    },
+    "backlash": {"value": 0.0021, "deviation": 0.0003},
+    "scatter_before": 0.0134,
+    "scatter_after": 0.0021,
+    "greatest_before": 0.0256,
+    "greatest_after": 0.0034,
+    "mean_error": 0.0019,
+    "angle_error": 0.0008,
+    "radius": 180.0125,
+    "start_angle": -90.0,
+    "end_angle": 180.0,
+    "points": 4,
+    "incidence": 0.0,
+    "angles": [-90.0, 0.0, 90.0, 180.0],
+    "ball": [180.0, 0.0, 40.0],
+    "shift": [
+        {"value": 0.0012, "deviation": 0.0009},
+        {"value": 0.0, "deviation": 0.0009},
+        {"value": 0.0003, "deviation": 0.0009},
+    ],
+    "correction": [0.0123, -0.0081, 0.0],
+    "position_before": [250.0, 0.0, -120.0],
+    "position_after": [250.0123, -0.0081, -120.0],
+    "positions": [
+        {"angle": 90.0, "approach": 1, "measured": [0.0204, -0.0042, 0.0101], "optimised": [0.0003, 0.0011, -0.0006]}
+    ],
+    "arc": 270.0,
+    "condition": 3.1,
+    "freedom": 5,
+    "noise": 0.0014,
+}
+RUN: dict[str, JsonValue] = {
+    "run": 118,
+    "machine": "lathe-1",
+    "form": "centres",
+    "head": None,
+    "program": "TNC:\\nc_prog\\preset_452.h",
+    "tool": "TOUCH_PROBE",
+    "kinematics": "MILL5_AC",
+    "mode": None,
+    "status": "measured",
+    "reason": {"code": "measured", "text": "C: scatter 13.4 µm → 2.1 µm."},
+    "measured_at": "2026-11-21T06:42:10Z",
+    "received_at": "2026-11-21T06:42:11.131Z",
+    "by": "lathe-1",
+    "key": "mill-5:452:118",
+    "axes": [AXIS],
+    "offsets": {"X": 0.0012, "Y": 0.0, "Z": 0.0003},
+    "parameters": {
+        "Q143": 0.0134,
+        "Q146": 0.0021,
+        "Q147": 0.0012,
+        "Q148": 0.0,
+        "Q149": 0.0003,
+        "QS146": "0.01230000 -0.0081000 0.00210000 -0.0013000",
+    },
+    "balls": [{"radius": 12.5003, "deviation": 0.0009, "form": 0.0021}],
+    "not_understood": [],
+    "warnings": [],
+    "limits": {
+        "ball_radius": 12.5,
+        "max_modification": 0.05,
+        "max_modification_angle": None,
+        "max_dev_cal_ball": 0.01,
+    },
+    "overtaken": False,
+    "undone": False,
+    "confirmed": None,
+    "entered": None,
+    "given": {"ball_radius": 12.5},
+}
+
+
+class EstimateOut(BaseModel):
+    """A value with its standard deviation; none where the run does not state it."""
+
+    value: float
+    deviation: float | None
+
+
+class PositionOut(BaseModel):
+    """One position: deviations X Y Z before (red in the diagram) and after (green)."""
+
+    angle: float
+    approach: Annotated[int, Field(description="1 from the negative side, −1 from the positive, 0 not said.")]
+    measured: list[float | None]
+    optimised: list[float | None]
+
+
+class AxisOut(BaseModel):
+    """One rotary axis, with everything that the control's protocol has."""
+
+    axis: AxisName
+    carries: Annotated[str | None, Field(description="table or head; none where the control has reckoned it.")] = None
+    errors: Annotated[
+        dict[str, EstimateOut],
+        Field(
+            description="EX0C EY0C EA0C EB0C of C; cyclic for A and B. From where the control believes the axis to where it "
+            "is: what has to be added to its kinematics."
+        ),
+    ]
+    backlash: EstimateOut | None
+    scatter_before: Annotated[float | None, Field(description="Q141 to Q143: rms of the deviations.")]
+    scatter_after: Annotated[float | None, Field(description="Q144 to Q146: rms of what the errors leave.")]
+    greatest_before: float | None
+    greatest_after: float | None
+    mean_error: Annotated[float | None, Field(description="Mean positioning error: mean length of what is left.")]
+    angle_error: Annotated[float | None, Field(description="The largest that is left, as an angle about the axis.")]
+    radius: Annotated[float | None, Field(description="Of the measuring circle.")]
+    start_angle: float | None
+    end_angle: float | None
+    points: int | None
+    incidence: float | None
+    angles: list[float]
+    ball: list[float] | None
+    shift: Annotated[list[EstimateOut] | None, Field(description="How far the ball lies from its nominal centre.")]
+    correction: Annotated[
+        list[float] | None, Field(description="Where the axis has to go, X Y Z; none where the run does not say it.")
+    ]
+    position_before: list[float] | None
+    position_after: list[float] | None
+    positions: list[PositionOut]
+    arc: float | None
+    condition: float | None
+    freedom: int | None
+    noise: Annotated[float | None, Field(description="Standard deviation of one coordinate of a centre.")]
+
+
+class ReasonOut(BaseModel):
+    """Reason for the outcome."""
+
+    code: Annotated[str, Field(description="measured, max_modification, max_dev_cal_ball.")]
+    text: str
+
+
+class DecidedOut(BaseModel):
+    """Decision: by whom, when and for which reason."""
+
+    at: datetime
+    by: str
+    reason: str
+
+
+class RunOut(BaseModel):
+    """A run of the preset compensation. Lengths in mm, angles in degrees."""
+
+    model_config = ConfigDict(json_schema_extra={"example": RUN})
+
+    run: int
+    machine: str
+    form: Annotated[str, Field(description="touches, centres, results or protocol.")]
+    head: str | None
+    program: Annotated[str | None, Field(description="NC program; sent, or read from the protocol.")] = None
+    tool: Annotated[str | None, Field(description="Name of the touch probe.")] = None
+    kinematics: Annotated[str | None, Field(description="Name of the active kinematics.")] = None
+    mode: Annotated[str | None, Field(description="How the cycle was run.")] = None
+    status: Annotated[
+        Status,
+        Field(
+            description="refused: the ball was wrong; to_confirm: its change is larger than permitted, or there are "
+            "warnings; confirmed; measured; entered on the control."
+        ),
+    ]
+    reason: ReasonOut
+    measured_at: datetime
+    received_at: datetime
+    by: str
+    key: str | None
+    axes: list[AxisOut]
+    offsets: Annotated[dict[str, float | None] | None, Field(description="Q147 to Q149: shift of the ball in X, Y, Z.")]
+    parameters: Annotated[
+        dict[str, float | str],
+        Field(
+            description="The same as the control's result parameters. While the run is `to_confirm` only the scatter, Q141 to "
+            "Q146: nothing that could be entered."
+        ),
+    ]
+    balls: Annotated[list[dict[str, float | None]], Field(description="Every ball that was found from touches.")]
+    not_understood: Annotated[list[str], Field(description="What of the protocol or the text was not understood.")]
+    warnings: Warnings
+    limits: dict[str, float | None]
+    overtaken: Annotated[bool, Field(description="The kinematics is not the one it was measured on.")]
+    undone: Annotated[bool, Field(description="It was entered, and the kinematics in effect is without it again.")]
+    confirmed: DecidedOut | None
+    entered: DecidedOut | None
+    given: Annotated[dict[str, Any], Field(description="As it was sent.")]
+
+
+def run_out(row: RunRow) -> RunOut:
+    """A run as it is answered."""
+    run, results = row.run, row.run.results
+    return RunOut(
+        run=run.id,
+        machine=row.machine.key,
+        form=run.form,
+        head=run.head or None,
+        **{name: said_of(run).get(name) for name in ("program", "tool", "kinematics", "mode")},
+        status=row.status,  # type: ignore[arg-type] # `RunRow.status` makes no others
+        reason=ReasonOut(code=run.reason["code"], text=wording.sentence(run)),
+        measured_at=run.measured_at,
+        received_at=run.received_at,
+        by=run.actor,
+        key=run.key,
+        axes=[axis_out(axis) for axis in results["axes"]],
+        offsets=results["offsets"],
+        parameters=parameters_of(row),
+        balls=results["balls"],
+        not_understood=results["notes"],
+        warnings=warnings_out(row.warnings, wording.warning),
+        limits=run.limits,
+        overtaken=row.overtaken,
+        undone=row.undone,
+        confirmed=_decided(row, "confirmed"),
+        entered=_decided(row, "entered"),
+        given=run.given,
+    )
+
+
+def said_of(run: KinematicsRun) -> dict[str, str]:
+    """Head of the run: the texts that were sent, or read in the control's protocol."""
+    return dict(run.results.get("head") or {}) | {name: v for name, v in run.given.items() if isinstance(v, str)}
+
+
+def axis_out(axis: Mapping[str, Any]) -> AxisOut:
+    """An axis as it is answered, with its errors in the order of the result string."""
+    errors = {name: axis["errors"][name] for name in ERRORS[axis["axis"]] if name in axis["errors"]}
+    return AxisOut.model_validate({**axis, "errors": errors})
+
+
+def _decided(row: RunRow, what: str) -> DecidedOut | None:
+    decision = row.decisions.get(what)
+    return None if decision is None else DecidedOut(at=decision.at, by=decision.actor, reason=decision.reason)
+
+
+def parameters_of(row: RunRow) -> dict[str, float | str]:
+    """The result parameters as the control leaves them: what is not known is not there.
+
+    While the run waits to be confirmed only the scatter is there, and nothing that could be entered on the control.
+    """
+    results = row.run.results
+    by_axis = {axis["axis"]: axis for axis in results["axes"]}
+    parameters: dict[str, float | str] = {}
+    for names, field in ((MEASURED, "scatter_before"), (OPTIMISED, "scatter_after")):
+        for name, letter in names.items():
+            value = by_axis.get(letter, {}).get(field)
+            if value is not None:
+                parameters[name] = value
+    if row.status == "to_confirm":
+        return parameters
+    offsets = results["offsets"] or {}
+    parameters |= {name: offsets[letter] for name, letter in OFFSETS.items() if offsets.get(letter) is not None}
+    for name, axis in STRINGS.items():
+        errors = by_axis.get(axis, {}).get("errors", {})
+        if len(errors) == len(ERRORS[axis]):
+            parameters[name] = write_string([errors[name_of_error]["value"] for name_of_error in ERRORS[axis]])
+    return parameters
+
+
+class RecomputedOut(BaseModel):
+    """A run evaluated anew from what was sent. What is on record stays as it is."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {"run": 118, "same": True, "outcome": "measured", "axes": [AXIS], "offsets": {"X": 0.0012}}
+        }
+    )
+
+    run: int
+    same: Annotated[bool, Field(description="It comes to what is on record.")]
+    outcome: str
+    axes: list[AxisOut]
+    offsets: dict[str, float | None] | None

@@ -1,0 +1,287 @@
+"""Work zeros and fixtures as they are answered. Lengths in mm, angles in degrees."""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from sqlalchemy.orm import Session
+
+from app.core.programs.frames import ZeroText, offset_of, write_restored, write_zero
+from app.geometry.work_zero import queries, wording
+from app.geometry.work_zero.evaluation import warnings_of
+from app.geometry.work_zero.queries import Compared, FixtureRow
+from app.geometry.work_zero.schemas import ApproachName, KindName
+from app.geometry.work_zero.tables import Fixture, WorkZero
+from app.loop.tables.machines import Machine
+from app.loop.warnings.queries import acknowledgement
+from app.loop.warnings.wording import sentence
+from app.web.warnings import Acknowledged, Warnings, acknowledged_out, warnings_out
+
+State = Literal["unknown", "steady", "warning", "alarm"]
+Basis = Literal["first", "median", "frozen"]
+TEXT = "; INBAND WORK ZERO 12 FOR MILL-1: G54\n…\n$P_UIFR[1]=CTRANS(X,-306.01,Y,-154.25,Z,-299.85)\nM17\n"
+SHIFT: dict[str, JsonValue] = {
+    "state": "warning",
+    "shifts": {"x": 0.012, "y": -0.004, "z": 0.0},
+    "total": 0.0126,
+    "reference": 3,
+    "text": "Shifted against work zero 3: X +12.0 µm, Y −4.0 µm, Z +0.0 µm.",
+}
+ANSWER: dict[str, JsonValue] = {
+    "id": 12,
+    "machine": "mill-1",
+    "kind": "pocket",
+    "work_offset": "G54",
+    "fixture": "vice-left",
+    "part": "SN-000812",
+    "x": -306.01,
+    "y": -154.25,
+    "z": -299.85,
+    "rotation": None,
+    "diameter": None,
+    "length": 100.004,
+    "width": 60.008,
+    "squareness": None,
+    "uncertainty": {"x": 0.0014, "y": 0.0014, "length": 0.0028, "width": 0.0028},
+    "touches": [{"x": -353.012, "approach": "-X"}, {"x": -259.008, "approach": "+X"}],
+    "residuals": [0.0, 0.0],
+    "tip": 6.0,
+    "notices": [],
+    "warnings": [],
+    "acknowledged": None,
+    "program": TEXT,
+    "shift": SHIFT,
+    "readings": [{"result": "length", "characteristic": "pocket-l", "sequence": 812, "refused": None}],
+    "touched_at": "2026-11-21T06:02:11Z",
+    "received_at": "2026-11-21T06:02:11.131Z",
+    "by": "mill-1",
+    "key": "mill-1:zero:812",
+    "recomputed_from": None,
+}
+
+
+class Notice(BaseModel):
+    """Reason to check a zero before it is used."""
+
+    code: str
+    text: Annotated[str, Field(description="For people.")]
+
+
+class ShiftOut(BaseModel):
+    """A zero against what its fixture is compared with."""
+
+    state: Annotated[State, Field(description="unknown: nothing to compare with, or no limit is set.")]
+    shifts: Annotated[dict[str, float], Field(description="By axis.")]
+    total: Annotated[float | None, Field(description="All axes together; this is what is held against the limits.")]
+    reference: Annotated[int | None, Field(description="The work zero compared with; null for a median.")]
+    text: Annotated[str, Field(description="For people.")]
+
+
+class PushedOut(BaseModel):
+    """A result as a reading of a characteristic."""
+
+    result: str
+    characteristic: str
+    sequence: Annotated[int | None, Field(description="Null while it waits to be stored.")]
+    refused: Annotated[str | None, Field(description="Why it became no reading.")]
+
+
+class TouchOut(BaseModel):
+    """A touch as it came in."""
+
+    x: float | None = None
+    y: float | None = None
+    approach: ApproachName | None = None
+
+
+class ZeroOut(BaseModel):
+    """A work zero with its size, its touches, and the text that sets it."""
+
+    model_config = ConfigDict(json_schema_extra={"example": ANSWER})
+
+    id: int
+    machine: str
+    kind: KindName
+    work_offset: str
+    fixture: str | None
+    part: str | None
+    x: float | None
+    y: float | None
+    z: float | None
+    rotation: Annotated[float | None, Field(description="Degrees, counter-clockwise seen from +Z.")]
+    diameter: float | None
+    length: Annotated[float | None, Field(description="Size along X.")]
+    width: Annotated[float | None, Field(description="Size along Y.")]
+    squareness: Annotated[float | None, Field(description="Degrees by which the angle of a corner differs from 90.")]
+    uncertainty: Annotated[dict[str, float], Field(description="By result, 95 %; needs `repeatability`.")]
+    touches: list[TouchOut]
+    records: list[float] | None = None
+    residuals: Annotated[list[float], Field(description="Per touch, positive into the material.")]
+    tip: float
+    notices: list[Notice]
+    warnings: Warnings
+    acknowledged: Acknowledged
+    program: Annotated[
+        str,
+        Field(
+            description="For the machine's control; running it twice changes nothing. With warnings that nobody has "
+            "acknowledged it begins with a block that stops the control."
+        ),
+    ]
+    shift: ShiftOut | None
+    readings: list[PushedOut]
+    touched_at: datetime
+    received_at: datetime
+    by: str
+    key: str | None
+    recomputed_from: Annotated[int | None, Field(description="The work zero whose touches were computed again.")]
+
+
+class FixtureOut(BaseModel):
+    """A fixture, what it is compared with, and how its last zero stands."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "machine": "mill-1",
+                "fixture": "vice-left",
+                "basis": "frozen",
+                "reference": 3,
+                "warning": 0.01,
+                "alarm": 0.03,
+                "characteristics": {"x": "vice-left-x"},
+                "zeros": 9,
+                "last": 12,
+                "shift": SHIFT,
+            }
+        }
+    )
+
+    machine: str
+    fixture: str
+    basis: Basis
+    reference: int | None
+    warning: float | None
+    alarm: float | None
+    characteristics: dict[str, str]
+    zeros: Annotated[int, Field(description="How many were found in it.")]
+    last: Annotated[int, Field(description="The last work zero.")]
+    shift: ShiftOut
+
+
+def program_of(
+    zero: WorkZero,
+    machine: Machine,
+    control: str | None = None,
+    *,
+    stop: Sequence[str] = (),
+    restore: bool = False,
+) -> str | None:
+    """The text that sets it on its machine, or on another control; None for a control without such a work offset.
+
+    stop: codes of warnings that nobody has acknowledged; the text does not run then. restore: the text that sets the offset
+    back to what it was before.
+    """
+    offset = offset_of(control or machine.control, zero.work_offset)
+    if offset is None and control is None:  # the machine had another control then
+        offset = offset_of("other", zero.work_offset)
+    if offset is None:
+        return None
+    title = f"INBAND WORK ZERO {zero.id} FOR {machine.key.upper()}"
+    # Turned about a place along the other axis that nobody touched, the part would lie elsewhere than it was found.
+    rotation = None if zero.x is None or zero.y is None else zero.rotation
+    text = ZeroText(title, offset, zero.x, zero.y, zero.z, rotation, tuple(stop), zero.id)
+    return (write_restored if restore else write_zero)(control or machine.control, text)
+
+
+def stop_of(session: Session, zero: WorkZero, machine: Machine) -> list[str]:
+    """The codes of the warnings that stop its program text; none once somebody has acknowledged them."""
+    if acknowledgement(session, machine.id, queries.subject_of(zero)) is not None:
+        return []
+    return [warning.code for warning in warnings_of(zero, machine)]
+
+
+def shift_out(compared: Compared, basis: str) -> ShiftOut:
+    """Comparison of a zero with its fixture's reference."""
+    against = wording.basis_word(basis, compared.reference)
+    return ShiftOut(
+        state=compared.state.value,
+        shifts=compared.shifts,
+        total=compared.total,
+        reference=compared.reference,
+        text=wording.shift(compared.shifts, against),
+    )
+
+
+def zeros_out(session: Session, zeros: Sequence[WorkZero]) -> list[ZeroOut]:
+    """Work zeros as they are answered."""
+    pushed = queries.pushed(session, zeros)
+    places = {(zero.machine_id, zero.fixture) for zero in zeros if zero.fixture is not None}
+    watched = {place: queries.settings_of(session, *place) for place in places}
+    return [
+        _zero_out(session, zero, pushed[zero.id], watched.get((zero.machine_id, zero.fixture or ""))) for zero in zeros
+    ]
+
+
+def zero_out(session: Session, zero: WorkZero) -> ZeroOut:
+    """A work zero as it is answered."""
+    return zeros_out(session, [zero])[0]
+
+
+def _zero_out(session: Session, zero: WorkZero, pushed: Sequence[queries.Pushed], settings: Fixture | None) -> ZeroOut:
+    machine = session.get_one(Machine, zero.machine_id)
+    compared = queries.compared(session, zero, settings)
+    basis = "first" if settings is None else settings.basis
+    inputs: dict[str, Any] = zero.given
+    warnings = warnings_of(zero, machine)
+    acknowledged = acknowledgement(session, machine.id, queries.subject_of(zero)) if warnings else None
+    return ZeroOut(
+        id=zero.id,
+        machine=machine.key,
+        kind=cast("KindName", zero.kind),
+        work_offset=zero.work_offset,
+        fixture=zero.fixture,
+        part=zero.part,
+        x=zero.x,
+        y=zero.y,
+        z=zero.z,
+        rotation=zero.rotation,
+        diameter=zero.diameter,
+        length=zero.length,
+        width=zero.width,
+        squareness=zero.result["squareness"],
+        uncertainty=zero.result["uncertainty"],
+        touches=[TouchOut(**touch) for touch in inputs.get("touches") or ()],
+        records=inputs.get("records"),
+        residuals=zero.result["residuals"],
+        tip=inputs["tip"],
+        notices=[Notice(code=code, text=wording.notice(code)) for code in zero.result["notices"]],
+        warnings=warnings_out(warnings, sentence),
+        acknowledged=acknowledged_out(acknowledged),
+        program=program_of(zero, machine, stop=[] if acknowledged else [warning.code for warning in warnings]) or "",
+        shift=None if compared is None else shift_out(compared, basis),
+        readings=[PushedOut(**warning._asdict()) for warning in pushed],
+        touched_at=zero.touched_at,
+        received_at=zero.received_at,
+        by=zero.actor,
+        key=zero.key,
+        recomputed_from=zero.recomputed_from,
+    )
+
+
+def fixture_out(row: FixtureRow) -> FixtureOut:
+    """A fixture as it is answered."""
+    settings = row.settings
+    return FixtureOut(
+        machine=row.machine.key,
+        fixture=row.key,
+        basis=cast("Basis", settings.basis),
+        reference=settings.reference,
+        warning=settings.warning,
+        alarm=settings.alarm,
+        characteristics=settings.characteristics,
+        zeros=row.zeros,
+        last=row.last.zero.id,
+        shift=shift_out(row.last, settings.basis),
+    )

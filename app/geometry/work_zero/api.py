@@ -1,0 +1,188 @@
+"""JSON routes: work zeros and the fixtures they are found in."""
+
+from typing import Annotated, Any
+
+from fastapi import Path, Query, Request, Response
+from fastapi.responses import PlainTextResponse
+
+from app.access.deps import AnyCaller, Engineer, Operator
+from app.db.engine import Database
+from app.geometry.work_zero import actions, figures, queries
+from app.geometry.work_zero.answers import (
+    TEXT,
+    FixtureOut,
+    ZeroOut,
+    fixture_out,
+    program_of,
+    stop_of,
+    zero_out,
+    zeros_out,
+)
+from app.geometry.work_zero.figures import Mark
+from app.geometry.work_zero.schemas import FixtureIn, RecomputeIn, ZeroIn
+from app.loop.machines.queries import machine_named, machine_of
+from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
+from app.loop.readings import actions as readings
+from app.web.api import api_router, plain, problems
+from app.web.deps import SessionDep
+from app.web.downloads import download
+from app.web.fields import Control, Cursor, Limit, Page, Slug, page_of
+from app.web.theme import theme_from
+from app.web.warnings import AcknowledgeIn
+
+router = api_router("work zeros")
+MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["mill-1"])]
+FixtureKey = Annotated[str, Path(description="The fixture, as work zeros name it.", examples=["vice-left"])]
+Number = Annotated[int, Path(description="Number of the work zero.", examples=[12])]
+MachineFilter = Annotated[Slug | None, Query(description="Only of this machine.", examples=["mill-1"])]
+FixtureFilter = Annotated[Slug | None, Query(description="Only of this fixture.", examples=["vice-left"])]
+Theme = Annotated[str | None, Query(description="`light` or `dark`", max_length=20)]
+FIGURE: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}
+}
+AGAIN: dict[int | str, dict[str, Any]] = {
+    200: {"model": ZeroOut, "description": "It was sent before with the same key; nothing happened now."}
+}
+
+
+@router.post("/work-zeros", status_code=201, responses=problems(404, 409) | AGAIN)
+def find_work_zero(
+    request: Request, session: SessionDep, caller: AnyCaller, body: ZeroIn, response: Response
+) -> ZeroOut:
+    """Find work zero and size from the touches of an edge finder or probe.
+
+    The answer holds the text that sets it on the machine's control, and how far the fixture has shifted. Touches that make
+    no zero are refused with the reason, by their numbers. `characteristics` names what its results become readings of.
+    `warnings` names what is hardly plausible: until somebody acknowledges them the text stops the control.
+    """
+    caller.must_somewhere("operator")
+    database: Database = request.app.state.database
+    with database.begin() as own:
+        machine = machine_named(own, body.machine)
+        caller.must_at(machine.id, "operator")
+        created = actions.find(own, machine, body, caller)
+    readings.push_results(database)
+    response.status_code = 200 if created.again else 201
+    return zero_out(session, queries.work_zero(session, created.zero.id))
+
+
+@router.get("/work-zeros", responses=problems(404))
+def list_work_zeros(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineFilter = None,
+    fixture: FixtureFilter = None,
+    after: Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")] = 0,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[ZeroOut]:
+    """Work zeros in the order in which they came."""
+    only = caller.only_machine
+    if machine is not None:
+        machine_row = machine_named(session, machine)
+        caller.must_at(machine_row.id, "viewer")
+        only = machine_row.id
+    rows = queries.work_zeros(session, only, fixture, after=after, limit=limit + 1)
+    return page_of(zeros_out(session, rows), limit, lambda row: row.id)
+
+
+@router.get("/work-zeros/fixtures")
+def list_fixtures(session: SessionDep, caller: AnyCaller) -> Page[FixtureOut]:
+    """Every fixture with its last zero and how far it has shifted."""
+    return Page(items=[fixture_out(row) for row in queries.fixtures(session, caller.only_machine)])
+
+
+@router.get("/work-zeros/fixtures/{machine}/{fixture}", responses=problems(404))
+def get_fixture(session: SessionDep, caller: AnyCaller, machine: MachineKey, fixture: FixtureKey) -> FixtureOut:
+    """One fixture; its zeros: `GET /work-zeros?machine=…&fixture=…`."""
+    caller.must_at(machine_named(session, machine).id, "viewer")
+    return fixture_out(queries.fixture_of(session, machine, fixture))
+
+
+@router.put("/work-zeros/fixtures/{machine}/{fixture}", responses=problems(404))
+def watch_fixture(
+    session: SessionDep, caller: Engineer, machine: MachineKey, fixture: FixtureKey, body: FixtureIn
+) -> FixtureOut:
+    """Set a fixture's reference, the shift that warns, and the shift that raises the alarm *fixture shifted*."""
+    row = queries.fixture_of(session, machine, fixture)
+    actions.set_fixture(session, row, body, caller)
+    return fixture_out(queries.fixture_of(session, machine, fixture))
+
+
+@router.get("/work-zeros/fixtures/{machine}/{fixture}/figure", responses=problems(404) | FIGURE)
+def fixture_figure(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineKey,
+    fixture: FixtureKey,
+    theme: Theme = None,
+    limit: Annotated[Limit, Query()] = 200,
+) -> dict[str, Any]:
+    """The shift of a fixture over its last zeros as a Plotly figure."""
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "viewer")
+    row = queries.fixture_of(session, machine, fixture)
+    marks = [
+        Mark(
+            comparison.zero.id,
+            comparison.zero.touched_at,
+            comparison.shifts,
+            comparison.state.value,
+            comparison.zero.work_offset,
+        )
+        for comparison in queries.history(session, machine_row, row.key, limit=limit)
+    ]
+    return figures.shift_figure(marks, row.settings.warning, row.settings.alarm, theme=theme_from(theme))
+
+
+@router.get("/work-zeros/{number}", responses=problems(404))
+def get_work_zero(session: SessionDep, caller: AnyCaller, number: Number) -> ZeroOut:
+    """One work zero with its touches."""
+    return zero_out(session, queries.work_zero(session, number, caller.only_machine))
+
+
+@router.get("/work-zeros/{number}/program", responses=problems(404) | plain(TEXT), response_class=PlainTextResponse)
+def write_work_zero(
+    session: SessionDep,
+    caller: AnyCaller,
+    number: Number,
+    control: Annotated[
+        Control | None, Query(description="For which control; if left out, that of the machine.")
+    ] = None,
+    restore: Annotated[
+        bool, Query(description="The text that sets the offset back to what it was before; Sinumerik and Fanuc.")
+    ] = False,
+) -> Response:
+    """The text that sets the work zero, for the machine's control or for another one. It may run twice: the result is the same.
+
+    It keeps the old offset on the control first (R90 to R96, #800 to #803), and `restore=true` is the text that sets it back.
+
+    With warnings that nobody has acknowledged it begins with a block that stops the control.
+    """
+    zero = queries.work_zero(session, number, caller.only_machine)
+    machine = machine_of(session, zero.machine_id)
+    text = program_of(zero, machine, control, stop=stop_of(session, zero, machine), restore=restore)
+    if text is None:
+        raise no_old_offset() if restore else no_such_offset(zero.work_offset)
+    name = f"{machine.key}-zero-{zero.id}" + ("-before" if restore else "")
+    return download(text, file_name(control or machine.control, name))
+
+
+@router.post("/work-zeros/{number}/acknowledge", responses=problems(404, 409))
+def acknowledge_work_zero(session: SessionDep, caller: Operator, number: Number, body: AcknowledgeIn) -> ZeroOut:
+    """Take it as it is, although there are warnings: from now on its program text runs. Who, when and why is kept.
+
+    409 where there is no warning, or somebody was first.
+    """
+    zero = queries.work_zero(session, number)
+    actions.acknowledge(session, zero, body, caller)
+    return zero_out(session, zero)
+
+
+@router.post("/work-zeros/{number}/recompute", status_code=201, responses=problems(404, 409))
+def recompute_work_zero(session: SessionDep, caller: Operator, number: Number, body: RecomputeIn) -> ZeroOut:
+    """Compute the same touches once more, with another tip or without some of them; the result is another work zero.
+
+    It stands in place of this one in the history of its fixture; readings that were made of this one stay as they are.
+    """
+    zero = queries.work_zero(session, number)
+    return zero_out(session, actions.recompute(session, zero, body, caller))

@@ -1,0 +1,194 @@
+"""Touches as people type or paste them, and the form as the API takes it.
+
+A pasted line is a touch: ``-X -353.012``, ``X -353.012 Y -181.25 -X``, or two numbers, X and Y. Or the text is what the
+printed macros keep: ``R1=-353.012`` to ``R4``, ``#501`` to ``#505``, with ``#508`` and ``#2`` for Z.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from app.core.number_text import has_broken_number
+from app.errors import FieldError, InbandError, Invalid
+from app.geometry.work_zero.schemas import MOST_TOUCHES, OTHER_NAMES, RECORDS
+from app.language.i18n import _
+from app.web.forms import by_field, length
+
+ROWS = 6
+SHOWN_ROWS = 4  # the others are opened where they are needed
+MOST_LETTERS = 20_000
+RESULTS = ("x", "y", "z", "diameter", "length", "width")
+WORDS = ("machine", "kind", "work_offset", "fixture", "part", "key")
+NUMBERS = ("tip", "z_touched", "feeler", "tool_length")
+SIGN = {"\N{MINUS SIGN}": "-", "\N{EN DASH}": "-"}
+
+# In which direction the tip goes, touch by touch, where nobody says otherwise.
+APPROACHES: dict[str, tuple[str, ...]] = {
+    "bore": ("-X", "+X", "-Y", "+Y", "", ""),
+    "boss": ("+X", "-X", "+Y", "-Y", "", ""),
+    "pocket": ("-X", "+X", "-Y", "+Y", "", ""),
+    "web": ("+X", "-X", "+Y", "-Y", "", ""),
+    "corner": ("+X", "+Y", "", "", "", ""),
+}
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)"
+_RECORD = re.compile(rf"(?<![\w.#])(R[1-4]|#50[1245]|#508|#2)\s*[=:\s]\s*({_NUMBER})(?![\w.])", re.IGNORECASE)
+_APPROACH = re.compile(r"(?<!\S)([+-])\s?([XY])(?![\w.])", re.IGNORECASE)
+_WORD = re.compile(rf"(?<![\w.])([XY])\s*[=:]?\s*({_NUMBER})(?![\w.])", re.IGNORECASE)
+_BARE = re.compile(rf"(?<![\w.])({_NUMBER})(?![\w.])")
+
+
+def blank(kind: str) -> dict[str, str]:
+    """The form as it is offered for this kind."""
+    directions = APPROACHES.get(kind, APPROACHES["pocket"])
+    return {f"approach{at}": direction for at, direction in enumerate(directions, 1)} | {"work_offset": "G54"}
+
+
+def like(inputs: Mapping[str, Any], kind: str, /, **more: str | None) -> dict[str, str]:
+    """The form as another zero was typed, its touches left out: the same thing is measured again."""
+    form = blank(kind) | {name: value or "" for name, value in more.items()}
+    for name in ("tip", "feeler", "tool_length"):
+        if inputs.get(name):
+            form[name] = f"{inputs[name]:.9g}"
+    if inputs.get("repeatability"):
+        form["repeatability"] = f"{inputs['repeatability'] * 1000:.6g}"
+    for at, touch in enumerate((inputs.get("touches") or [])[:ROWS], 1):
+        form[f"approach{at}"] = touch.get("approach") or ""
+    return form
+
+
+def fields(form: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
+    """The form as the API takes it, and by touch the field in which it was typed. Raises `Invalid` for a line that is none."""
+    values: dict[str, Any] = {name: form.get(name, "").strip() for name in WORDS}
+    values |= {name: length(form.get(name)) for name in NUMBERS}
+    micrometres = length(form.get("repeatability"))
+    values["repeatability"] = round(micrometres / 1000, 9) if isinstance(micrometres, float) else micrometres
+    if named := {name: key for name in RESULTS if (key := form.get(f"as_{name}", "").strip())}:
+        values["characteristics"] = named
+    touches: list[dict[str, Any]] = []
+    typed_in: list[str] = []
+    for at in range(1, ROWS + 1):
+        x, y = length(form.get(f"x{at}")), length(form.get(f"y{at}"))
+        if x is None and y is None:
+            continue
+        touches.append(_touch(x, y, form.get(f"approach{at}", "").strip()))
+        typed_in.append(f"touch{at}")
+    text = form.get("lines", "")
+    records = _records(text)
+    if records and not touches:
+        return values | records, ["lines"] * 4
+    pasted = _lines(text)
+    touches += pasted
+    typed_in += ["lines"] * len(pasted)
+    return values | {"touches": touches}, typed_in
+
+
+def _touch(x: Any, y: Any, approach: str) -> dict[str, Any]:
+    values = {"x": x, "y": y, "approach": approach.replace("\N{MINUS SIGN}", "-") or None}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _plain(text: str) -> str:
+    """Signs as signs, and commas as points where they are decimal commas."""
+    for sign, plain in SIGN.items():
+        text = text.replace(sign, plain)
+    rows = []
+    for row in text.splitlines():
+        if "." not in row:
+            row = re.sub(r"(?<=\d),(?=\d)", ".", row)  # noqa: PLW2901 - the row, cleaned
+        rows.append(re.sub(r"[,;\t|]", " ", row))
+    return "\n".join(rows)
+
+
+def _records(text: str) -> dict[str, Any]:
+    """Values that the printed macros keep, by their name there; nothing where the text has none."""
+    records: dict[str, Any] = {}
+    for name, number in _RECORD.findall(_plain(text)):
+        records[OTHER_NAMES.get(name.upper(), name.upper())] = float(number)
+    return records if any(name in RECORDS for name in records) else {}
+
+
+def _lines(text: str) -> list[dict[str, Any]]:
+    if len(text) > MOST_LETTERS:
+        wrong = _("the text is too long for {most} points").format(most=MOST_TOUCHES)
+        raise Invalid(f"lines: {wrong}.", errors=[FieldError("lines", wrong)])
+    return [_line(row, number) for number, row in enumerate(_plain(text).splitlines(), 1) if row.strip()]
+
+
+def _line(row: str, number: int) -> dict[str, Any]:
+    """A touch of one line. Raises `Invalid` naming it.
+
+    >>> _line("-X -353.012", 1), _line("X 12.5 Y -3 +Y", 2)
+    ({'x': -353.012, 'approach': '-X'}, {'x': 12.5, 'y': -3.0, 'approach': '+Y'})
+    >>> _line("1.5 2", 3)
+    {'x': 1.5, 'y': 2.0}
+    """
+    directions = [sign + axis.upper() for sign, axis in _APPROACH.findall(row)]
+    rest = "?" if has_broken_number(row) else _APPROACH.sub(" ", row)
+    named = {axis.lower(): float(value) for axis, value in _WORD.findall(rest)}
+    bare = [float(value) for value in _BARE.findall(_WORD.sub(" ", rest))]
+    left_over = _BARE.sub(" ", _WORD.sub(" ", rest)).strip()
+    if not left_over and len(directions) < 2:
+        approach = directions[0] if directions else ""
+        if named and not bare:
+            return _touch(named.get("x"), named.get("y"), approach)
+        if not named and len(bare) == 2:
+            return _touch(bare[0], bare[1], approach)
+        if not named and len(bare) == 1 and approach:
+            along_x = approach.endswith("X")
+            return _touch(bare[0] if along_x else None, None if along_x else bare[0], approach)
+    wrong = _("line {number} is not a valid point: {row}").format(number=number, row=repr(row.strip()[:60]))
+    raise Invalid(
+        f"lines: {wrong}.",
+        _("Write one point per line: -X -353.012, or X and Y. Or paste R1 to R4."),
+        errors=[FieldError("lines", wrong)],
+    )
+
+
+def watch(form: Mapping[str, str]) -> dict[str, Any]:
+    """The settings of a fixture as the API takes them; limits are typed in µm."""
+    values: dict[str, Any] = {"basis": form.get("basis", "").strip(), "reason": form.get("reason", "").strip()}
+    number = form.get("reference", "").strip()
+    values["reference"] = int(number) if number.isascii() and number.isdigit() and len(number) < 19 else number
+    if values["basis"] != "frozen":
+        values["reference"] = None
+    for name in ("warning", "alarm"):
+        micrometres = length(form.get(name))
+        values[name] = round(micrometres / 1000, 9) if isinstance(micrometres, float) else micrometres
+    values["characteristics"] = {name: key for name in RESULTS if (key := form.get(f"as_{name}", "").strip())}
+    return values
+
+
+def again(form: Mapping[str, str]) -> dict[str, Any]:
+    """Computing once more, as the API takes it."""
+    values: dict[str, Any] = {"tip": length(form.get("tip")), "reason": form.get("reason", "").strip()}
+    numbers = form.get("leave_out", "").replace(",", " ").replace(";", " ").split()
+    values["leave_out"] = [
+        int(number_text) if number_text.isascii() and number_text.isdigit() and len(number_text) < 6 else number_text
+        for number_text in numbers
+    ]
+    return values
+
+
+def at_fields(error: InbandError, typed_in: Sequence[str] = ()) -> dict[str, str]:
+    """Messages by the field of the form."""
+    moved = []
+    for field, message in error.errors:
+        folder, _dot, rest = field.partition(".")
+        at = re.fullmatch(r"touches\[(\d+)\]", folder)
+        if at is not None:
+            number = int(at[1])
+            name = typed_in[number] if number < len(typed_in) else "lines"
+            message = f"{rest.upper()}: {message}" if rest and name != "lines" else message  # noqa: PLW2901 - moved
+        elif folder == "characteristics":
+            name = f"as_{rest}"
+        elif folder in {"records", *RECORDS}:
+            name = "lines"
+        elif folder.startswith("leave_out"):
+            name = "leave_out"
+        else:
+            name = folder
+        error_at_field = FieldError(name, message)
+        if error_at_field not in moved:
+            moved.append(error_at_field)
+    error.errors = moved
+    return by_field(error)

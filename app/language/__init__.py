@@ -1,0 +1,1 @@
+"""Translation, and the writing of numbers and units."""

@@ -1,0 +1,103 @@
+"""Lengths and times as people read them. The minus sign is a minus sign (U+2212); a sign of a deviation is always shown.
+
+Lengths come in mm. Deviations, limits and corrections are read in µm, sizes in the drawing's mm.
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+from babel.dates import format_datetime
+from markupsafe import Markup, escape
+
+from app.language.i18n import _, current_locale
+from app.language.times import is_twice, local, offset, plant_zone
+
+MINUS = "\N{MINUS SIGN}"
+PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
+NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
+NOTHING = "\N{EN DASH}"
+
+
+def signed(value: float | None, decimals: int = 1) -> str:
+    """A number with its sign, zero too: `+0.0`.
+
+    >>> signed(-6.14), signed(-0.01), signed(None)
+    ('−6.1', '+0.0', '–')
+    """
+    if value is None:
+        return NOTHING
+    rounded = round(value, decimals)
+    return f"{MINUS if rounded < 0 else '+'}{abs(rounded):.{decimals}f}"
+
+
+def um(deviation_mm: float | None, decimals: int = 1) -> str:
+    r"""A deviation in µm with its sign.
+
+    >>> um(0.0061), um(-0.3, 0), um(None)
+    ('+6.1\xa0µm', '−300\xa0µm', '–')
+    """
+    if deviation_mm is None:
+        return NOTHING
+    return f"{signed(deviation_mm * 1000, decimals)}{NO_BREAK_SPACE}µm"
+
+
+def um_limit(limit_mm: float) -> str:
+    r"""A limit in µm, both sides at once and no more decimals than it needs, in mm from 1 mm on.
+
+    >>> um_limit(0.0053), um_limit(0.3), um_limit(1.0)
+    ('±5.3\xa0µm', '±300\xa0µm', '±1\xa0mm')
+    """
+    if limit_mm >= 1:
+        return f"{PLUS_MINUS}{limit_mm:.6g}{NO_BREAK_SPACE}mm"
+    return f"{PLUS_MINUS}{limit_mm * 1000:.6g}{NO_BREAK_SPACE}µm"
+
+
+def mm(size_mm: float | None, decimals: int = 4) -> str:
+    r"""A size in mm.
+
+    >>> mm(39.9981)
+    '39.9981\xa0mm'
+    """
+    if size_mm is None:
+        return NOTHING
+    return f"{MINUS if round(size_mm, decimals) < 0 else ''}{abs(size_mm):.{decimals}f}{NO_BREAK_SPACE}mm"
+
+
+def when(moment: datetime | None, style: str = "seconds") -> Markup:
+    """A moment in the time zone of the plant, which the foot of the page names. Style: `seconds`, `minutes` or `date`."""
+    if moment is None:
+        return Markup("–")
+    there = local(moment)
+    pattern = {"seconds": "d MMM y HH:mm:ss", "minutes": "d MMM y HH:mm", "date": "d MMM y"}[style]
+    text = format_datetime(there, pattern, tzinfo=plant_zone(), locale=current_locale())
+    if style != "date" and is_twice(there):
+        text += f" {offset(there)}"
+    title = f"{plant_zone().key}, {offset(there)}"
+    return Markup('<time datetime="{}" title="{}">{}</time>').format(there.isoformat(), title, text)
+
+
+def age(seconds: float) -> str:
+    """An age as one reads it from two metres away: one unit, no more; times.js says it with the same symbols.
+
+    >>> age(12), age(200), age(90_000)
+    ('12 s', '3 min', '25 h')
+    """
+    whole = max(0, int(seconds))
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min"
+    if whole < 2 * 86400:
+        return f"{whole // 3600} h"
+    return f"{whole // 86400} d"
+
+
+def ago(moment: datetime | None, now: datetime | None = None) -> Markup:
+    """Time since a moment; the browser keeps it up to date (times.js)."""
+    if moment is None:
+        return Markup("–")
+    seconds = ((now or datetime.now(UTC)) - moment).total_seconds()
+    return Markup('<time-ago datetime="{}">{}</time-ago>').format(
+        moment.astimezone(UTC).isoformat(), escape(_("{age} ago").format(age=age(seconds)))
+    )

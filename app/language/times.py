@@ -1,0 +1,90 @@
+"""Moments as people read them: in the time zone of the plant, and no other.
+
+The setting `timezone` names the zone (INBAND_TIMEZONE; without it that of the computer). Pages, charts, reports, files and
+sentences take it from here, so that all times on a screen are of one zone. A wall-clock time that is there twice, because the
+clocks went back, is written with its offset. JSON keeps RFC 3339 with an offset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from datetime import datetime
+from functools import cache
+from typing import TYPE_CHECKING
+from zoneinfo import ZoneInfo
+
+if TYPE_CHECKING:  # a fifth of a second to read, which most commands need not spend
+    from app.settings import Settings
+
+SECONDS, MINUTES = "%Y-%m-%d %H:%M:%S", "%Y-%m-%d %H:%M"
+_chosen: ContextVar[ZoneInfo | None] = ContextVar("zone", default=None)
+_of_process: list[ZoneInfo] = []
+
+
+def use_zone(settings: Settings) -> None:
+    """Take the plant's time zone of these settings for the whole process."""
+    _of_process[:] = [ZoneInfo(settings.timezone)]
+
+
+@cache
+def _usual() -> ZoneInfo:
+    from app.settings import computer_timezone
+
+    return ZoneInfo(computer_timezone())
+
+
+def plant_zone() -> ZoneInfo:
+    """The time zone in which people read and type times."""
+    return _chosen.get() or (_of_process[0] if _of_process else _usual())
+
+
+@contextmanager
+def in_zone(zone: ZoneInfo) -> Iterator[None]:
+    """Everything inside is written in this time zone: a report may be asked for in another one than the plant's."""
+    token = _chosen.set(zone)
+    try:
+        yield
+    finally:
+        _chosen.reset(token)
+
+
+def local(at: datetime) -> datetime:
+    """The moment in the zone of the plant."""
+    return at.astimezone(plant_zone())
+
+
+def is_twice(at: datetime) -> bool:
+    """True if the wall clock shows this local time twice, an hour (or less) apart, because it is put back."""
+    return at.replace(fold=0).utcoffset() != at.replace(fold=1).utcoffset()
+
+
+def offset(at: datetime) -> str:
+    """The offset of a moment with a zone: `UTC+05:45`."""
+    return f"UTC{at.isoformat()[-6:]}" if at.utcoffset() is not None else "UTC"
+
+
+def written(at: datetime, pattern: str = SECONDS, zone: ZoneInfo | None = None) -> str:
+    """The wall-clock time (`strftime`), with the offset only where it would be ambiguous.
+
+    >>> from datetime import UTC
+    >>> berlin = ZoneInfo("Europe/Berlin")
+    >>> written(datetime(2026, 11, 22, 15, 50, 28, tzinfo=UTC), zone=berlin)
+    '2026-11-22 16:50:28'
+    >>> written(datetime(2026, 10, 25, 1, 30, tzinfo=UTC), MINUTES, berlin)
+    '2026-10-25 02:30 UTC+01:00'
+    """
+    there = at.astimezone(zone or plant_zone())
+    text = there.strftime(pattern)
+    return f"{text} {offset(there)}" if is_twice(there) else text
+
+
+def in_sentence(at: datetime | None) -> str:
+    """A moment inside a sentence that programs may read as well: RFC 3339, to the second, in the zone of the plant."""
+    return local(at).isoformat(timespec="seconds") if at else "?"
+
+
+def on_axis(at: datetime) -> str:
+    """A moment as a chart takes it: RFC 3339 in the zone of the plant. What is drawn is the wall-clock time in it."""
+    return local(at).isoformat()

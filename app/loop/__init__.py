@@ -1,0 +1,1 @@
+"""The compensation loop: machines, characteristics, readings, tools, alarms, calibration, programs, summaries."""

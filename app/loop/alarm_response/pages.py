@@ -1,0 +1,169 @@
+"""Pages: the operator's board, one alarm, the history. Everything works as plain links and posts; scripts only save a page load."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request, Response
+from starlette.responses import RedirectResponse
+
+from app.access.deps import Caller, Operator, Viewer, require
+from app.errors import Conflict, Invalid
+from app.loop.alarm_response import acknowledging, queries, wording
+from app.loop.alarm_response.by_hand import ByHand
+from app.loop.alarm_response.outcomes import outcomes
+from app.loop.alarm_response.queries import AlarmRow
+from app.loop.alarm_response.schemas import AcknowledgeIn
+from app.loop.machines import queries as machines
+from app.web.deps import FormDep, SessionDep
+from app.web.fields import LARGEST_ID
+from app.web.forms import by_field, length, parsed, words
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+MOST_ON_BOARD = 100
+ON_HISTORY_PAGE = 50
+MachineFilter = Annotated[str | None, Query(max_length=64)]
+Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
+
+
+def address(path: str, **query: Any) -> str:
+    """A path with those of the query that are given."""
+    parameters = {name: value for name, value in query.items() if value not in {None, ""}}
+    return f"{path}?{urlencode(parameters)}" if parameters else path
+
+
+@router.get("/alarms", dependencies=[require("viewer")])
+def board(
+    request: Request,
+    session: SessionDep,
+    machine: MachineFilter = None,
+    done: Number = None,
+    late: Number = None,
+) -> Response:
+    """Active alarms, oldest first; below them the alarms acknowledged last, with the consequences."""
+    machine_row = machines.machine_named(session, machine) if machine else None
+    machine_id = machine_row.id if machine_row else None
+    rows = queries.alarms(session, state="active", machine_id=machine_id, limit=MOST_ON_BOARD)
+    by_machine = queries.active_by_machine(session)
+    return page(
+        request,
+        "alarms/board.html",
+        rows=rows,
+        active=queries.active_count(session, machine_id),
+        last=queries.acknowledged_last(session, machine_id=machine_id),
+        machines=[(row.key, row.name, by_machine.get(row.key, 0)) for row in machines.machines(session)],
+        machine=machine_row,
+        done=queries.alarm(session, done) if done else None,
+        late=queries.alarm(session, late) if late else None,
+        wording=wording,
+        outcomes=outcomes,
+        address=address,
+    )
+
+
+@router.get("/alarms/count", dependencies=[require("viewer")])
+def count(request: Request, session: SessionDep) -> Response:
+    """The number beside *Alarms* in the navigation."""
+    return page(request, "alarm_count.html", active_alarms=queries.active_count(session))
+
+
+@router.get("/alarms/history", dependencies=[require("viewer")])
+def history(request: Request, session: SessionDep, machine: MachineFilter = None, before: Number = None) -> Response:
+    """All alarms, newest first."""
+    machine_row = machines.machine_named(session, machine) if machine else None
+    rows = queries.history(
+        session, machine_id=machine_row.id if machine_row else None, before=before, limit=ON_HISTORY_PAGE + 1
+    )
+    more = len(rows) > ON_HISTORY_PAGE
+    rows = rows[:ON_HISTORY_PAGE]
+    here = {"machine": machine}
+    return page(
+        request,
+        "alarms/history.html",
+        rows=rows,
+        machines=[(row.key, row.name) for row in machines.machines(session)],
+        machine=machine_row,
+        older=address("/alarms/history", **here, before=rows[-1].alarm.id) if more else None,
+        newest=address("/alarms/history", **here) if before else None,
+        wording=wording,
+        outcomes=outcomes,
+        address=address,
+    )
+
+
+@router.get("/alarms/{number}")
+def alarm_page(
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    number: int,
+    action: Annotated[str | None, Query(max_length=40)] = None,
+    machine: MachineFilter = None,
+) -> Response:
+    """One alarm; with ``action`` it asks for the second touch."""
+    return _alarm(request, queries.alarm(session, number), caller, action, machine)
+
+
+def _alarm(
+    request: Request,
+    row: AlarmRow,
+    caller: Caller,
+    action: str | None,
+    machine: str | None,
+    form: Mapping[str, str] | None = None,
+    error: Invalid | None = None,
+) -> Response:
+    active = row.alarm.acknowledged_at is None
+    confirmed_action = action if active and action in wording.offered(row) and caller.may("operator") else None
+    return page(
+        request,
+        "alarms/alarm.html",
+        status=error.status if error else 200,
+        row=row,
+        action=confirmed_action,
+        machine=machine,
+        form=form or {},
+        errors=by_field(error) if error else {},
+        wording=wording,
+        outcomes=outcomes,
+        address=address,
+    )
+
+
+@router.post("/alarms/{number}/acknowledge")
+def acknowledge(request: Request, session: SessionDep, caller: Operator, number: int, form: FormDep) -> Response:
+    """The second touch. Sent twice, or after somebody else, it changes nothing and says so."""
+    machine = form.get("machine") or None
+    try:
+        offset = length(form.get("offset"))
+        if form.get("true") in {"reported", "expected"}:
+            offset = queries.alarm(session, number).alarm.data.get(form["true"])
+        acknowledgement = parsed(
+            AcknowledgeIn,
+            {
+                "action": form.get("action"),
+                "comment": words(form, "comment"),
+                "offset": offset,
+                "changed_by": form.get("changed_by"),
+                "hand_measured": length(form.get("hand_measured")),
+                "hand_verdict": form.get("hand_verdict"),
+            },
+        )
+        acknowledging.acknowledge(
+            session,
+            number,
+            acknowledgement.action,
+            acknowledgement.comment,
+            caller,
+            offset=acknowledgement.offset,
+            changed_by=acknowledgement.changed_by,
+            hand=ByHand(acknowledgement.hand_measured, acknowledgement.hand_verdict),
+        )
+    except Conflict:
+        alarm = queries.alarm(session, number).alarm
+        again = alarm.acknowledged_by == caller.name and alarm.action == form.get("action")
+        return RedirectResponse(address("/alarms", machine=machine, **{"done" if again else "late": number}), 303)
+    except Invalid as error:
+        return _alarm(request, queries.alarm(session, number), caller, form.get("action"), machine, form, error)
+    return RedirectResponse(address("/alarms", machine=machine, done=number), 303)

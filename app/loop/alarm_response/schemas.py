@@ -1,0 +1,170 @@
+"""Alarms as JSON. Lengths in mm."""
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from app.core.parameters import LARGEST_LENGTH
+from app.loop.alarm_response import outcomes, wording
+from app.loop.alarm_response.queries import AlarmRow
+from app.loop.alarms.kinds import Action
+from app.web.fields import LARGEST_ID, Body, Reason, Text200
+
+ALARM: dict[str, JsonValue] = {
+    "id": 41,
+    "kind": "tool_worn",
+    "state": "active",
+    "machine": "lathe-1",
+    "characteristic": "shaft-d40",
+    "tool_memory": 3,
+    "text": "Deviation +312.0 µm has reached the wear limit ±300 µm: tool 3 is worn or broken.",
+    "what_to_do": "Look at the cutting edge.",
+    "raised_at": "2026-11-21T07:15:02.131Z",
+    "last_at": "2026-11-21T07:19:44.002Z",
+    "count": 2,
+    "sequence": 812,
+    "last_sequence": 813,
+    "held_correction": {"number": 19, "amount": -0.312},
+    "data": {"characteristic": "shaft-d40", "deviation": 0.312, "decided": 0.312, "limit": 0.3},
+    "acknowledged_at": None,
+    "acknowledged_by": None,
+    "action": None,
+    "comment": None,
+    "outcome": None,
+}
+ACKNOWLEDGED = ALARM | {
+    "state": "acknowledged",
+    "held_correction": None,
+    "acknowledged_at": "2026-11-21T07:21:10.500Z",
+    "acknowledged_by": "ana",
+    "action": "tool_replaced",
+    "comment": "New insert",
+    "outcome": [
+        {
+            "code": "tool_restarted",
+            "tool": 3,
+            "offset": 0.0,
+            "parts": 211,
+            "text": "Tool 3 starts a new life with offset 0.0000 mm; the old one cut 211 parts.",
+        },
+        {"code": "corrections_superseded", "numbers": [19], "text": "Correction 19 was dropped."},
+        {"code": "averages_restarted", "locations": [5], "text": "The running average R11 = 5 begins at 0."},
+    ],
+}
+
+
+class AcknowledgeIn(Body):
+    """Acknowledgement of an alarm: the action taken and a comment."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"example": {"action": "tool_replaced", "comment": "New insert", "offset": 0.0}}
+    )
+
+    action: Action
+    comment: Reason
+    offset: Annotated[
+        float | None,
+        Field(
+            strict=True,
+            ge=-LARGEST_LENGTH,
+            le=LARGEST_LENGTH,
+            description="With `tool_replaced`: the offset that the new tool starts with; 0 if left out. With `offset_set`: "
+            "the one that is true, mm.",
+        ),
+    ] = None
+    changed_by: Annotated[
+        Text200 | None, Field(description="With `offset_set`: who has changed the offset at the control.")
+    ] = None
+    hand_measured: Annotated[
+        float | None,
+        Field(
+            strict=True,
+            ge=-LARGEST_LENGTH,
+            le=LARGEST_LENGTH,
+            description="What was measured by hand, mm; kept beside the machine's value, the reading is not excluded.",
+        ),
+    ] = None
+    hand_verdict: Annotated[
+        Literal["good", "bad"] | None, Field(description="Whether the part is good, by the person's own judgement.")
+    ] = None
+    hand_sequence: Annotated[
+        int | None,
+        Field(
+            strict=True,
+            ge=1,
+            le=LARGEST_ID,
+            description="Of which reading; of the last one behind the alarm if left out.",
+        ),
+    ] = None
+
+
+class HeldCorrection(BaseModel):
+    """The correction that waits for this alarm to be acknowledged."""
+
+    number: int
+    amount: float
+
+
+class Followed(BaseModel):
+    """One thing that followed, as a code with its values and as a sentence."""
+
+    model_config = ConfigDict(extra="allow")
+
+    code: str
+    text: str
+
+
+class AlarmOut(BaseModel):
+    """Something that needs a person, what that person did about it, and what followed."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [ALARM, ACKNOWLEDGED]})
+
+    id: int
+    kind: Annotated[str, Field(description="oversize, undersize, tool_worn, probe_fault, acceptance, offset_limit …")]
+    state: Literal["active", "acknowledged"]
+    machine: str
+    characteristic: str | None
+    tool_memory: Annotated[int | None, Field(description="R10; none if the characteristic only measures.")]
+    text: Annotated[str, Field(description="What is wrong.")]
+    what_to_do: str
+    raised_at: datetime
+    last_at: datetime
+    count: Annotated[int, Field(description="How often it has happened while the alarm is active.")]
+    sequence: Annotated[int | None, Field(description="The reading that raised it.")]
+    last_sequence: Annotated[int | None, Field(description="The latest reading that repeated it.")]
+    held_correction: HeldCorrection | None
+    data: dict[str, Any]
+    acknowledged_at: datetime | None
+    acknowledged_by: str | None
+    action: Action | None
+    comment: str | None
+    outcome: Annotated[list[Followed] | None, Field(description="What followed; none while it is active.")]
+
+
+def alarm_out(row: AlarmRow) -> AlarmOut:
+    """An alarm as it is answered."""
+    alarm, held = row.alarm, row.held
+    done = alarm.acknowledged_at is not None
+    return AlarmOut(
+        id=alarm.id,
+        kind=alarm.kind,
+        state="acknowledged" if done else "active",
+        machine=row.machine.key,
+        characteristic=row.characteristic.key if row.characteristic else None,
+        tool_memory=alarm.tool_memory,
+        text=wording.sentence(alarm),
+        what_to_do=wording.what_to_do(alarm.kind),
+        raised_at=alarm.raised_at,
+        last_at=alarm.last_at,
+        count=alarm.count,
+        sequence=alarm.sequence,
+        last_sequence=alarm.last_sequence,
+        held_correction=None if held is None else HeldCorrection(number=held.number, amount=held.amount),
+        data=alarm.data,
+        acknowledged_at=alarm.acknowledged_at,
+        acknowledged_by=alarm.acknowledged_by,
+        action=alarm.action,  # type: ignore[arg-type] # only `acknowledge` writes it
+        comment=alarm.comment,
+        outcome=[Followed(**item) for item in outcomes.outcomes(alarm.outcome)] if done else None,
+    )

@@ -1,0 +1,120 @@
+"""Raising alarms that do not come from a reading. Readings raise theirs in `app.loop.readings`; people acknowledge in `acknowledging`."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.loop.alarms.kinds import AlarmKind
+from app.loop.tables.alarms import Alarm
+
+
+def raise_for_tool(session: Session, machine_id: int, tool_memory: int, kind: AlarmKind, data: dict[str, Any]) -> Alarm:
+    """Raise an alarm about a tool, or count one more if it is active already; the machine is locked.
+
+    The values of the last time are what its sentence says.
+    """
+    active = session.scalars(
+        select(Alarm)
+        .where(
+            Alarm.machine_id == machine_id,
+            Alarm.tool_memory == tool_memory,
+            Alarm.kind == kind.name,
+            Alarm.characteristic_id.is_(None),
+            Alarm.acknowledged_at.is_(None),
+        )
+        .execution_options(populate_existing=True)
+    ).one_or_none()
+    return _raised(session, active or Alarm(machine_id=machine_id, tool_memory=tool_memory, kind=kind.name), data)
+
+
+def _raised(session: Session, alarm: Alarm, data: dict[str, Any]) -> Alarm:
+    """A new alarm is kept; on one that is active already, one more is counted."""
+    if alarm in session:
+        alarm.count += 1
+        alarm.last_at = func.clock_timestamp()
+    alarm.data = data
+    session.add(alarm)
+    session.flush()
+    return alarm
+
+
+def raise_for_characteristic(
+    session: Session,
+    machine_id: int,
+    characteristic_id: int,
+    tool_memory: int | None,
+    kind: AlarmKind,
+    data: dict[str, Any],
+) -> Alarm:
+    """Raise an alarm about a characteristic that no reading raises, or count one more if it is active already."""
+    active = session.scalars(
+        select(Alarm)
+        .where(
+            Alarm.machine_id == machine_id,
+            Alarm.characteristic_id == characteristic_id,
+            Alarm.kind == kind.name,
+            Alarm.acknowledged_at.is_(None),
+        )
+        .execution_options(populate_existing=True)
+    ).one_or_none()
+    return _raised(
+        session,
+        active
+        or Alarm(
+            machine_id=machine_id, characteristic_id=characteristic_id, tool_memory=tool_memory or None, kind=kind.name
+        ),
+        data,
+    )
+
+
+def raise_for_place(session: Session, machine_id: int, kind: AlarmKind, data: dict[str, Any]) -> Alarm:
+    """Raise an alarm about a location of a memory (`memory` and `location` in its data); the machine is locked.
+
+    While it is active, one more counts on it.
+    """
+    active = active_of_place(session, machine_id, kind, data)
+    return _raised(session, active or Alarm(machine_id=machine_id, kind=kind.name), data)
+
+
+def settle_for_place(
+    session: Session,
+    machine_id: int,
+    kind: AlarmKind,
+    data: dict[str, Any],
+    by: str,
+    comment: str,
+    outcome: dict[str, Any],
+) -> Alarm | None:
+    """End an alarm about this location, because what it asked for has been done; None if there is none."""
+    active = active_of_place(session, machine_id, kind, data)
+    if active is None:
+        return None
+    active.acknowledged_at, active.acknowledged_by = datetime.now(UTC), by
+    active.action, active.comment, active.outcome = "noted", comment, [outcome]
+    session.flush()
+    return active
+
+
+def news(machine: str, alarm: Alarm) -> dict[str, Any]:
+    """The event of an alarm that does not come from a reading, for live pages and event listeners."""
+    event = {"kind": "alarm", "machine": machine, "characteristic": None, "tool": alarm.tool_memory, "id": alarm.id}
+    if alarm.acknowledged_at is None:
+        return event | {"alarm": alarm.kind, "state": "active"}
+    return event | {"alarm": alarm.kind, "state": "acknowledged", "action": alarm.action}
+
+
+def active_of_place(session: Session, machine_id: int, kind: AlarmKind, data: dict[str, Any]) -> Alarm | None:
+    """The alarm about this location that nobody has ended."""
+    return session.scalars(
+        select(Alarm)
+        .where(
+            Alarm.machine_id == machine_id,
+            Alarm.kind == kind.name,
+            Alarm.data["memory"].astext == data["memory"],
+            Alarm.data["location"].astext == str(data["location"]),
+            Alarm.acknowledged_at.is_(None),
+        )
+        .execution_options(populate_existing=True)
+    ).one_or_none()

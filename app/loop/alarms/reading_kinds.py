@@ -1,0 +1,152 @@
+"""Alarm kinds that a reading raises: the signals of the decision (`app.core.decision.decide.ReadingAlarm`)."""
+
+from app.language.i18n import _
+from app.language.numbers import um, um_limit
+from app.loop.alarms.kinds import AlarmKind, register
+from app.loop.tables.alarms import Alarm
+
+
+def _deviation(alarm: Alarm, text: str) -> str:
+    values = {"deviation": um(alarm.data.get("deviation")), "limit": um_limit(alarm.data.get("limit") or 0.0)}
+    return text.format(tool=alarm.tool_memory, **values)
+
+
+def _tool_worn(alarm: Alarm) -> str:
+    text = _("Deviation {deviation} has reached the wear limit {limit}: tool {tool} is worn or broken.")
+    if alarm.tool_memory is None:
+        text = _("Deviation {deviation} has reached the wear limit {limit}: the tool is worn or broken.")
+    return _deviation(alarm, text)
+
+
+def _not_accepted(alarm: Alarm) -> str:
+    if "m" not in alarm.data:  # raised before sections were told
+        return _("Too many sections of the part are out of tolerance: it is not accepted.")
+    return _("At least {least} of {m} sections lie outside the tolerance: the part is not accepted.").format(
+        least=alarm.data.get("least"), m=alarm.data["m"]
+    )
+
+
+def _set_aside() -> str:
+    return _("Set the part aside and look at tool and clamping.")
+
+
+OVERSIZE = register(
+    AlarmKind(
+        "oversize",
+        word=lambda: _("Oversize"),
+        sentence=lambda alarm: _deviation(alarm, _("The part is too large: deviation {deviation}, tolerance {limit}.")),
+        what_to_do=_set_aside,
+        icon="oversize",
+        actions=("noted", "measured_by_hand", "tool_replaced", "false_reading"),
+    )
+)
+UNDERSIZE = register(
+    AlarmKind(
+        "undersize",
+        word=lambda: _("Undersize"),
+        sentence=lambda alarm: _deviation(alarm, _("The part is too small: deviation {deviation}, tolerance {limit}.")),
+        what_to_do=_set_aside,
+        icon="undersize",
+        actions=("noted", "measured_by_hand", "tool_replaced", "false_reading"),
+    )
+)
+TOOL_WORN = register(
+    AlarmKind(
+        "tool_worn",
+        word=lambda: _("Tool worn"),
+        sentence=_tool_worn,
+        what_to_do=lambda: _("Look at the cutting edge."),
+        tone="wear",
+        icon="wear",
+        actions=("tool_replaced", "keep_cutting", "sister_tool", "false_reading", "noted"),
+        holds_corrections=True,
+    )
+)
+
+
+def _probe_fault(alarm: Alarm) -> str:
+    if alarm.data.get("first_move_triggered"):
+        return _(
+            "The first move of the probe triggered: there is no bore, or a chip, or the wrong part. Compensation is paused."
+        )
+    return _deviation(
+        alarm,
+        _(
+            "Deviation {deviation} cannot be: it has reached the confidence limit {limit}. The probe or the program "
+            "is wrong; compensation is paused."
+        ),
+    )
+
+
+PROBE_FAULT = register(
+    AlarmKind(
+        "probe_fault",
+        word=lambda: _("Probe fault"),
+        sentence=_probe_fault,
+        what_to_do=lambda: _("Clean the stylus, look at chips, coolant and the program. Then say what it was."),
+        tone="stop",
+        icon="probe_fault",
+        actions=("false_reading", "noted", "tool_replaced"),
+        comments={"noted": lambda: [_("Stylus replaced"), _("Program corrected"), _("Probe calibrated")]},
+    )
+)
+ACCEPTANCE = register(
+    AlarmKind(
+        "acceptance",
+        word=lambda: _("Not accepted"),
+        sentence=_not_accepted,
+        what_to_do=lambda: _("Measure it by hand and confirm."),
+        actions=("measured_by_hand", "noted", "tool_replaced", "false_reading"),
+    )
+)
+OFFSET_LIMIT = register(
+    AlarmKind(
+        "offset_limit",
+        word=lambda: _("Offset limit"),
+        sentence=lambda alarm: _deviation(
+            alarm,
+            _(
+                "The corrections of tool {tool} have come to their limit {limit} in all: nothing more is corrected that would "
+                "exceed it."
+            ),
+        ),
+        what_to_do=lambda: _(
+            "Change the tool, or look for what drifts. If the limit is too narrow, an engineer raises the largest sum in Set-up."
+        ),
+        actions=("tool_replaced", "sister_tool", "noted"),
+        comments={"noted": lambda: [_("Limit is looked at")]},
+    )
+)
+IMPLAUSIBLE = register(
+    AlarmKind(
+        "implausible",
+        word=lambda: _("Implausible jump"),
+        sentence=lambda alarm: _deviation(
+            alarm,
+            _(
+                "Deviation {deviation} lies more than {limit} from the level of the readings before: neither wear nor scatter "
+                "explains it. Wrong part, wrong tool, or a chip on the stylus?"
+            ),
+        ),
+        what_to_do=lambda: _(
+            "Look at the part and the stylus, and whether the right tool has cut it. Then say what it was."
+        ),
+        icon="jump",
+        actions=("false_reading", "keep_cutting", "tool_replaced", "sister_tool", "noted"),
+        comments={
+            "false_reading": lambda: [
+                _("Chip on the stylus"),
+                _("Wrong part"),
+                _("Part not clamped right"),
+                _("Coolant on the part"),
+            ],
+            "keep_cutting": lambda: [
+                _("Part measured, agrees"),
+                _("Edge looked at, still good"),
+                _("New material"),
+            ],
+        },
+        holds_corrections=True,
+    )
+)
+HOLDING = (TOOL_WORN.name, IMPLAUSIBLE.name)  # a correction is held until they are answered

@@ -1,0 +1,370 @@
+"""Calibrations, pairs and plans as they are answered. Lengths in mm."""
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from app.loop.calibration import wording
+from app.loop.calibration.figures import Mark
+from app.loop.calibration.places import PlaceRow
+from app.loop.calibration.queries import CalibrationRow, Pair, Suggestion
+from app.loop.calibration.schemas import GAUGE
+from app.loop.warnings.wording import sentence
+from app.web.warnings import Warnings, warnings_out
+
+Status = Literal["refused", "unchanged", "proposed", "accepted", "overtaken"]
+State = Literal["overdue", "refused", "proposed", "due_soon", "calibrated", "never"]
+ACTIONS = {"refused": "stop", "proposed": "accept"}
+
+CALIBRATION: dict[str, JsonValue] = {
+    "machine": "lathe-1",
+    "number": 17,
+    "kind": "gauge",
+    "average_memory": 5,
+    "tool_memory": 30,
+    "status": "proposed",
+    "action": "accept",
+    "reason": {
+        "code": "averaged_difference",
+        "text": "Measuring error +3.0 µm; +0.0 µm is already compensated, +3.0 µm remains; the average +1.5 µm "
+        "is beyond the zero range ±1 µm: the empirical value becomes +1.5 µm.",
+    },
+    "gauge_size": 199.852,
+    "measured": 199.855,
+    "difference": 0.003,
+    "average": 0.0015,
+    "value_before": 0.0,
+    "proposed": 0.0015,
+    "results": {"R42": 199.852, "R43": 199.855, "R44": 0.003, "R46": 5, "R47": 30, "R49": 0.0015},
+    "touches": GAUGE["touches"],
+    "settings": {"zero_range": 0.001, "averaging_limit": 0.01, "confidence_limit": 1.0, "repeats": 3, "spread": 0.0004},
+    "calibrated_at": "2026-11-21T06:02:11Z",
+    "received_at": "2026-11-21T06:02:11.131Z",
+    "by": "lathe-1",
+    "key": "lathe-1:cal:17",
+    "accepted": None,
+    "warnings": [],
+}
+PAIR: dict[str, JsonValue] = {
+    "id": 31,
+    "machine_value": 39.9981,
+    "external_value": 39.9955,
+    "difference": 0.0026,
+    "instrument": "CMM, hall C",
+    "characteristic": "shaft-d40",
+    "sequence": 812,
+    "at": "2026-11-21T09:12:40Z",
+    "by": "ana",
+    "counts": True,
+    "excluded": None,
+    "warnings": [],
+}
+
+
+class OutcomeReason(BaseModel):
+    """The outcome of a calibration."""
+
+    code: Annotated[
+        str,
+        Field(
+            description="within_zero_range, average_kept, averaged_difference, full_difference, centred, paired; refused: "
+            "window, probe_fault, not_a_bore, wrong_gauge."
+        ),
+    ]
+    text: Annotated[str, Field(description="For people.")]
+
+
+class Accepted(BaseModel):
+    """Person, time and reason of the acceptance; automatic: applied without a person, as planned."""
+
+    at: datetime
+    by: str
+    reason: str
+    automatic: bool
+
+
+class CalibrationOut(BaseModel):
+    """A calibration as it came out. Lengths in mm."""
+
+    model_config = ConfigDict(json_schema_extra={"example": CALIBRATION})
+
+    machine: str
+    number: Annotated[int, Field(description="Counts per machine.")]
+    kind: Annotated[
+        Literal["gauge", "ring", "pairs"], Field(description="Gauge (L92), ring on the spindle, or external gauge.")
+    ]
+    average_memory: Annotated[int | None, Field(description="R11 (R46): whose empirical value it is about.")]
+    tool_memory: Annotated[int | None, Field(description="R47: the location that holds the probe's offset.")]
+    status: Annotated[
+        Status,
+        Field(
+            description="refused: it counts for nothing; unchanged: it confirms what is in effect; proposed: somebody may "
+            "accept it; accepted; overtaken by a newer one."
+        ),
+    ]
+    action: Annotated[str, Field(description="stop: refused, stop the machine; accept: a person decides; else none.")]
+    reason: OutcomeReason
+    gauge_size: Annotated[float | None, Field(description="R42; of a ring its nominal.")]
+    measured: Annotated[float | None, Field(description="R43; of a ring the mean of its diameters.")]
+    difference: Annotated[
+        float | None, Field(description="R44; of a ring, distance of the probe from the spindle axis.")
+    ]
+    average: Annotated[float | None, Field(description="R49: the running average of the difference.")]
+    value_before: Annotated[float, Field(description="Empirical value, or offset of the probe, that was in effect.")]
+    proposed: Annotated[float | None, Field(description="What it is to become; none: it stays.")]
+    results: Annotated[dict[str, float | None], Field(description="The same under the numbers in which L92 leaves it.")]
+    touches: Annotated[list[Any], Field(description="As they came; of pairs, machine and external value.")]
+    settings: Annotated[dict[str, Any], Field(description="Settings of the calibration, and further computed values.")]
+    calibrated_at: datetime
+    received_at: datetime
+    by: str
+    key: str | None
+    accepted: Accepted | None
+    warnings: Annotated[
+        list[str],
+        Field(
+            description="What may be wrong: inches sent as mm, values outside the ranges of the control's own cycle. With "
+            "inches, or a value that no probe has, nothing is applied automatically."
+        ),
+    ]
+
+
+def calibration_out(row: CalibrationRow, machine: str) -> CalibrationOut:
+    """A calibration as it is answered."""
+    record, acceptance = row.record, row.acceptance
+    average = record.memory == "average"
+    tool = record.settings.get("tool_memory") if average else record.location
+    results = {
+        "R42": record.size,
+        "R43": record.measured,
+        "R44": record.difference,
+        "R46": record.location if average else None,
+        "R47": tool,
+        "R49": record.average,
+    }
+    return CalibrationOut(
+        machine=machine,
+        number=record.number,
+        kind=record.kind,  # type: ignore[arg-type] # the table's CHECK holds it
+        average_memory=record.location if average else None,
+        tool_memory=tool,
+        status=row.status,  # type: ignore[arg-type] # one of those that the query gives
+        action=ACTIONS.get(row.status, "none"),
+        reason=OutcomeReason(code=record.outcome, text=wording.sentence(record)),
+        gauge_size=record.size,
+        measured=record.measured,
+        difference=record.difference,
+        average=record.average,
+        value_before=record.value_before,
+        proposed=record.proposed,
+        results=results,
+        touches=record.touches,
+        settings={name: value for name, value in record.settings.items() if name != "warnings"},
+        calibrated_at=record.calibrated_at,
+        received_at=record.received_at,
+        by=record.actor,
+        key=record.key,
+        accepted=None
+        if acceptance is None
+        else Accepted(at=acceptance.at, by=acceptance.actor, reason=acceptance.reason, automatic=acceptance.automatic),
+        warnings=wording.warnings(record),
+    )
+
+
+def mark_of(row: CalibrationRow) -> Mark:
+    """A calibration as it is drawn."""
+    record, settings = row.record, row.record.settings
+    nominal = record.size or 0.0
+    ring = record.kind == "ring"
+    return Mark(
+        record.calibrated_at,
+        record.number,
+        row.status,
+        wording.status_word(row.status),
+        record.difference,
+        record.value_before,
+        zero=settings.get("zero_range"),
+        averaging=settings.get("averaging_limit"),
+        low=settings.get("low"),
+        high=settings.get("high"),
+        diameters=[diameter - nominal for diameter in settings.get("diameters", ())],
+        smallest=settings["smallest"] - nominal if ring else None,
+        largest=settings["largest"] - nominal if ring else None,
+        text=wording.sentence(record),
+    )
+
+
+class ExcludedPair(BaseModel):
+    """Person, time and reason of the exclusion of a pair."""
+
+    at: datetime
+    by: str
+    reason: str
+
+
+class PairOut(BaseModel):
+    """The same part on the machine and on an external gauge."""
+
+    model_config = ConfigDict(json_schema_extra={"example": PAIR})
+
+    id: int
+    machine_value: float
+    external_value: float
+    difference: Annotated[float, Field(description="Machine minus external: measuring error of the machine.")]
+    instrument: str
+    characteristic: str | None
+    sequence: int | None
+    at: datetime
+    by: str
+    counts: Annotated[bool, Field(description="It belongs to the series of now; a series begins with each new value.")]
+    excluded: ExcludedPair | None
+    warnings: Warnings
+
+
+def pair_out(pair: Pair) -> PairOut:
+    """A pair as it is answered."""
+    row = pair.row
+    excluded = None
+    if row.excluded_at is not None:
+        excluded = ExcludedPair(at=row.excluded_at, by=row.excluded_by or "", reason=row.excluded_why or "")
+    return PairOut(
+        id=row.id,
+        machine_value=row.machine_value,
+        external_value=row.true_value,
+        difference=pair.difference,
+        instrument=row.instrument,
+        characteristic=pair.characteristic,
+        sequence=row.sequence,
+        at=row.at,
+        by=row.actor,
+        counts=pair.counts,
+        excluded=excluded,
+        warnings=warnings_out(pair.warnings, sentence),
+    )
+
+
+class SuggestionOut(BaseModel):
+    """The comparison of the pairs of a location."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "machine": "lathe-1",
+                "average_memory": 5,
+                "empirical_value": 0.0,
+                "suggested": 0.0026,
+                "pairs": 6,
+                "missing": 0,
+                "mean": 0.0026,
+                "deviation": 0.0006,
+                "low": 0.0020,
+                "high": 0.0032,
+                "confidence": 0.95,
+                "equal": False,
+                "step": None,
+                "outlier": None,
+                "since": "2026-11-20T05:02:11Z",
+                "text": "The machine reads +2.6 µm too much, with 95 % confidence between +2.0 µm and +3.2 µm. The empirical "
+                "value +0.0 µm lies outside: +2.6 µm is suggested.",
+            }
+        }
+    )
+
+    machine: str
+    average_memory: int
+    empirical_value: Annotated[float, Field(description="The one in effect.")]
+    suggested: Annotated[
+        float | None,
+        Field(description="None while pairs are missing, when they agree with the one in effect, or are all the same."),
+    ]
+    pairs: Annotated[int, Field(description="Pairs that count.")]
+    missing: Annotated[int, Field(description="How many more a suggestion needs.")]
+    mean: Annotated[float | None, Field(description="Mean difference.")]
+    deviation: Annotated[float | None, Field(description="Standard deviation of the differences.")]
+    low: Annotated[float | None, Field(description="Lower end of the mean's confidence interval (Student t).")]
+    high: Annotated[float | None, Field(description="Upper end.")]
+    confidence: float
+    equal: Annotated[bool, Field(description="All differences are the same: there is no interval, and no suggestion.")]
+    step: Annotated[
+        float | None,
+        Field(
+            description="Smallest distance of two differences, where the interval is half of it to each side; else null."
+        ),
+    ]
+    outlier: Annotated[int | None, Field(description="The pair that stands out by Grubbs' test; only a hint.")]
+    since: Annotated[datetime | None, Field(description="When the value in effect was set; the series began then.")]
+    text: Annotated[str, Field(description="For people.")]
+
+
+def suggestion_out(found: Suggestion, machine: str, location: int) -> SuggestionOut:
+    """A suggestion as it is answered."""
+    compared = found.comparison
+    return SuggestionOut(
+        machine=machine,
+        average_memory=location,
+        empirical_value=found.empirical_value,
+        outlier=found.outlier,
+        since=found.since,
+        text=wording.what_pairs_say(compared, found.empirical_value),
+        **{name: getattr(compared, name) for name in ("suggested", "pairs", "missing", "mean", "deviation")},
+        **{name: getattr(compared, name) for name in ("low", "high", "confidence", "equal", "step")},
+    )
+
+
+class PlaceOut(BaseModel):
+    """A place that is calibrated, and when that is due."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "machine": "lathe-1",
+                "average_memory": 5,
+                "tool_memory": None,
+                "state": "due_soon",
+                "characteristics": ["shaft-d40"],
+                "value": 0.0026,
+                "acceptance": "accept",
+                "due_parts": 500,
+                "due_days": 7.0,
+                "parts": 461,
+                "since": "2026-11-19T06:02:11Z",
+                "due_at": "2026-11-26T06:02:11Z",
+                "last": 17,
+            }
+        }
+    )
+
+    machine: str
+    average_memory: Annotated[int | None, Field(description="R11, whose empirical value is calibrated.")]
+    tool_memory: Annotated[int | None, Field(description="R10, the probe whose offset is calibrated in the ring.")]
+    state: State
+    characteristics: Annotated[list[str], Field(description="Which characteristics use it.")]
+    value: Annotated[float, Field(description="Empirical value or offset in effect.")]
+    acceptance: Annotated[str, Field(description="accept or automatic.")]
+    due_parts: int | None
+    due_days: float | None
+    parts: Annotated[int, Field(description="Parts since the last calibration, or since the plan was made.")]
+    since: datetime | None
+    due_at: Annotated[datetime | None, Field(description="When it is due by days.")]
+    last: Annotated[int | None, Field(description="Number of the last calibration.")]
+
+
+def place_out(row: PlaceRow) -> PlaceOut:
+    """A place as it is answered."""
+    plan, average = row.plan, row.place.memory == "average"
+    return PlaceOut(
+        machine=row.machine.key,
+        average_memory=row.place.location if average else None,
+        tool_memory=None if average else row.place.location,
+        state=row.state,  # type: ignore[arg-type] # one of those that the row gives
+        characteristics=row.characteristics,
+        value=row.value,
+        acceptance="accept" if plan is None else plan.acceptance,
+        due_parts=None if plan is None else plan.due_parts,
+        due_days=None if plan is None else plan.due_days,
+        parts=row.parts,
+        since=None if plan is None else plan.since,
+        due_at=row.due_at,
+        last=None if row.last is None else row.last.record.number,
+    )

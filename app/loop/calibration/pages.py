@@ -1,0 +1,260 @@
+"""Pages: every place that is calibrated, one place with its history and forms, and the second touch before a value is set."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.access.deps import Caller, Operator, Viewer, require
+from app.core.parameters import MOST_LOCATIONS
+from app.errors import Conflict, FieldError, Invalid, NotFound
+from app.loop.calibration import actions, confirmation, form_reader, pairs, places, queries, wording
+from app.loop.calibration.queries import Place
+from app.loop.calibration.schemas import GaugeIn, PairIn, PlanIn, RingIn
+from app.loop.characteristics import queries as characteristics
+from app.loop.machines import queries as machines
+from app.loop.machines.queries import machine_named
+from app.loop.warnings.wording import sentence
+from app.web.deps import FormDep, SessionDep
+from app.web.fields import LARGEST_ID
+from app.web.forms import by_field, parsed, words
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+ON_PAGE = 25
+MEMORIES = {"averages": "average", "probes": "tool"}
+Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
+Word = Annotated[str | None, Query(max_length=40)]
+
+
+def address(machine: str, place: Place, **query: Any) -> str:
+    """The page of a place."""
+    folder = "averages" if place.memory == "average" else "probes"
+    parameters = {name: value for name, value in query.items() if value is not None}
+    return f"/calibration/{machine}/{folder}/{place.location}" + (f"?{urlencode(parameters)}" if parameters else "")
+
+
+ON_PAGE = 25  # machines
+
+
+@router.get("/calibration", dependencies=[require("viewer")])
+def overview(
+    request: Request,
+    session: SessionDep,
+    machine: Annotated[str | None, Query(max_length=64)] = None,
+    after: Annotated[int, Query(ge=0, le=1_000_000)] = 0,
+) -> Response:
+    """Machines and places: what was found last, and when the next calibration is places."""
+    every = machines.machines(session)
+    on_page = [machine_named(session, machine)] if machine else every[after : after + ON_PAGE]
+    rows = places.places(session, on_page)
+    groups = [(machine, [row for row in rows if row.machine.id == machine.id]) for machine in on_page]
+    return page(
+        request,
+        "calibration/overview.html",
+        groups=groups,
+        machines=every,
+        machine=machine,
+        after=after,
+        on_page=ON_PAGE,
+        most_locations=MOST_LOCATIONS,
+        wording=wording,
+        address=address,
+    )
+
+
+@router.get("/calibration/probes", dependencies=[require("viewer")])
+def choose_probe(
+    session: SessionDep,
+    machine: Annotated[str, Query(max_length=64)],
+    tool: Annotated[int, Query(ge=1, le=MOST_LOCATIONS)],
+) -> Response:
+    """The page of the probe in this location of the tool memory."""
+    return RedirectResponse(address(machine_named(session, machine).key, Place("tool", tool)), 303)
+
+
+@router.get("/calibration/{machine}/{memory}/{location}")
+def place_page(
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    machine: str,
+    memory: str,
+    location: int,
+    before: Number = None,
+    done: Word = None,
+    n: Number = None,
+) -> Response:
+    """One place: how it stands, its history, the pairs, and the form_reader."""
+    message = confirmation.done(done, n) if done else None
+    return _place(request, session, caller, machine, _of(memory, location), before=before, said=message)
+
+
+def _of(memory: str, location: int) -> Place:
+    if memory not in MEMORIES:
+        raise NotFound(wording.no_such_page(), wording.go_to_overview())
+    return Place(MEMORIES[memory], location)
+
+
+def _place(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    machine: str,
+    place: Place,
+    *,
+    before: int | None = None,
+    said: str | None = None,
+    late: bool = False,
+    form: Mapping[str, str] | None = None,
+    error: Invalid | None = None,
+) -> Response:
+    machine_row = machine_named(session, machine)
+    value = queries.value_of(session, machine_row, place)
+    row = places.place_row(session, machine_row, place, value)
+    average = place.memory == "average"
+    history = queries.calibrations(session, machine_row, place, before=before, newest_first=True, limit=ON_PAGE + 1)
+    older = address(machine, place, before=history[ON_PAGE - 1].record.number) if len(history) > ON_PAGE else None
+    return page(
+        request,
+        "calibration/place.html" if average else "calibration/probe.html",
+        status=error.status if error else 409 if late else 200,
+        machine=machine_row,
+        place=place,
+        row=row,
+        history=history[:ON_PAGE],
+        older=older,
+        newest=address(machine, place) if before else None,
+        origin=queries.origin(session, machine_row, place.location) if average else None,
+        suggestion=queries.suggestion(session, machine_row, place.location) if average else None,
+        form=form_reader.filled_in(row, _limits(session, row)) | dict(form or {}),
+        errors=form_reader.at_fields(error) if error else {},
+        in_sections=form_reader.IN_SECTIONS,
+        said=said,
+        late=late,
+        wording=wording,
+        warned=sentence,
+        address=address,
+        may_plan=caller.may("engineer"),
+    )
+
+
+def _limits(session: Session, row: places.PlaceRow) -> dict[str, float]:
+    """R33, R34, R36 and R28 of a characteristic that uses the location."""
+    if not row.characteristics:
+        return {}
+    parameters = characteristics.characteristic_named(session, row.characteristics[0]).parameters
+    return {name: getattr(parameters, name) for name in form_reader.LENGTHS}
+
+
+@router.post("/calibration/{machine}/{memory}/{location}")
+def enter(
+    request: Request,
+    session: SessionDep,
+    caller: Operator,
+    machine: str,
+    memory: str,
+    location: int,
+    form: FormDep,
+) -> Response:
+    """A calibration typed in, pairs pasted, or a plan: `do` says which. All of it is taken, or nothing."""
+    machine_row, place = machine_named(session, machine), _of(memory, location)
+    queries.value_of(session, machine_row, place)
+    verb, number = form.get("do", ""), None
+    try:
+        with session.begin_nested():
+            if verb == "plan":
+                caller.must("engineer")
+                actions.set_plan(session, machine_row, place, parsed(PlanIn, form_reader.plan(form)), caller)
+            elif verb == "pairs" and place.memory == "average":
+                new_pairs = [parsed(PairIn, pair) for pair in form_reader.pairs(form)]
+                number = _add_pairs(session, machine_row, location, new_pairs, caller)
+            elif place.memory == "average":
+                number = actions.calibrate_gauge(
+                    session, machine_row, parsed(GaugeIn, form_reader.gauge(form, location)), caller
+                ).row.record.number
+            else:
+                ringed = parsed(RingIn, form_reader.ring(form, location))
+                number = actions.calibrate_ring(session, machine_row, ringed, caller).row.record.number
+    except Invalid as error:
+        return _place(request, session, caller, machine, place, form=form, error=error)
+    done = verb if verb in {"plan", "pairs"} else "calibrated"  # whatever else the form said
+    return RedirectResponse(address(machine, place, done=done, n=number), 303)
+
+
+def _add_pairs(session: Session, machine: Any, location: int, given: list[PairIn], caller: Caller) -> int:
+    try:
+        return len(pairs.add_pairs(session, machine, location, given, caller))
+    except NotFound as missing:  # a reading that is not there is a slip in a line, not a page that is not there
+        raise Invalid(missing.detail, errors=[FieldError("lines", missing.detail)]) from None
+
+
+@router.get("/calibration/{machine}/{memory}/{location}/{what}/{number}", dependencies=[require("operator")])
+def ask(
+    request: Request, session: SessionDep, machine: str, memory: str, location: int, what: str, number: int
+) -> Response:
+    """The second touch: `accept` a calibration, accept the `suggestion` of the pairs, `exclude` a pair."""
+    return _ask(request, session, machine, _of(memory, location), what, number)
+
+
+def _ask(
+    request: Request,
+    session: Session,
+    machine: str,
+    place: Place,
+    what: str,
+    number: int,
+    form: Mapping[str, str] | None = None,
+    error: Invalid | None = None,
+) -> Response:
+    machine_row = machine_named(session, machine)
+    return page(
+        request,
+        "calibration/ask.html",
+        status=error.status if error else 200,
+        machine=machine_row,
+        place=place,
+        question=confirmation.question(session, machine_row, place, what, number),
+        form=form or {},
+        errors=by_field(error) if error else {},
+        wording=wording,
+        address=address,
+        here=f"{address(machine, place)}/{what}/{number}",
+    )
+
+
+@router.post("/calibration/{machine}/{memory}/{location}/{what}/{number}")
+def confirm(
+    request: Request,
+    session: SessionDep,
+    caller: Operator,
+    machine: str,
+    memory: str,
+    location: int,
+    what: str,
+    number: int,
+    form: FormDep,
+) -> Response:
+    """It is done, or who comes too late is told how it stands."""
+    machine_row, place = machine_named(session, machine), _of(memory, location)
+    try:
+        reason = confirmation.reason(words(form, "reason"))
+        if what == "accept":
+            actions.accept(session, machine_row, number, reason, caller)
+        elif what == "suggestion" and place.memory == "average":
+            seen = confirmation.seen(form.get("seen"))
+            number = pairs.accept_suggestion(session, machine_row, location, reason, caller, seen=seen).record.number
+        elif what == "exclude" and place.memory == "average":
+            pairs.exclude_pair(session, machine_row, location, number, reason, caller)
+        else:
+            raise NotFound(wording.no_such_page(), wording.go_to_overview())
+    except Conflict as late:
+        return _place(
+            request, session, caller, machine, place, said=f"{late.detail} {late.what_to_do or ''}", late=True
+        )
+    except Invalid as error:
+        return _ask(request, session, machine, place, what, number, form, error)
+    return RedirectResponse(address(machine, place, done=what, n=number), 303)

@@ -1,0 +1,247 @@
+"""Calibrations, pairs and plans as JSON. Lengths in mm."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, JsonValue, model_validator
+from pydantic_core import PydanticCustomError
+
+from app.core.calibration import SECTIONS
+from app.core.parameters import LARGEST_LENGTH, MOST_LOCATIONS
+from app.language.i18n import _
+from app.web.fields import LARGEST_ID, Body, LatelyOrNow, Reason, Slug, Text200
+
+Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, ge=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
+Key = Annotated[
+    Text200,
+    Field(
+        max_length=128,
+        description="Unique per machine: sent again, the answer is the first answer and nothing happens twice.",
+    ),
+]
+MOST_TOUCHES = 100
+
+R_NAMES = {
+    "R11": "average_memory",
+    "R22": "probe_type",
+    "R27": "repeats",
+    "R28": "path_factor",
+    "R29": "weighting_factor",
+    "R30": "axis",
+    "R31": "direction",
+    "R32": "gauge_size",
+    "R33": "zero_range",
+    "R34": "averaging_limit",
+    "R36": "confidence_limit",
+    "R47": "tool_memory",
+}
+R_CODES: dict[str, dict[int, str]] = {
+    "R22": {1: "axial", 2: "radial"},
+    "R30": {1: "X", 2: "Z"},
+    "R31": {0: "positive", 1: "negative"},
+}
+MACRO_NAMES = {"#502": "radius_term", "#505": "nominal", "#506": "upper_deviation", "#507": "lower_deviation"}
+GAUGE: dict[str, JsonValue] = {
+    "average_memory": 5,
+    "gauge_size": 199.852,
+    "touches": [199.8552, 199.8548, 199.855],
+    "surface": "free",
+    "probe_type": "axial",
+    "axis": "X",
+    "direction": "negative",
+    "zero_range": 0.001,
+    "averaging_limit": 0.01,
+    "confidence_limit": 1.0,
+    "weighting_factor": 2,
+    "path_factor": 1,
+    "tool_memory": 30,
+    "calibrated_at": "2026-11-21T06:02:11Z",
+    "key": "lathe-1:cal:17",
+}
+RING: dict[str, JsonValue] = {
+    "tool_memory": 32,
+    "nominal": 30.0,
+    "upper_deviation": 0.01,
+    "lower_deviation": -0.01,
+    "radius_term": 6.0,
+    "sections": [
+        {"plus": 24.013, "minus": -23.991},
+        {"plus": 24.014, "minus": -23.99},
+        {"plus": 24.015, "minus": -23.989},
+    ],
+    "first_move_triggered": False,
+    "calibrated_at": "2026-11-21T06:02:11Z",
+    "key": "lathe-2:ring:4",
+}
+
+
+def _by_number(value: Any, names: dict[str, str]) -> Any:
+    """R numbers and macro variables in place of names. What is said twice is refused."""
+    if not isinstance(value, dict):
+        return value
+    fields = dict(value)
+    for number, name in names.items():
+        if number not in fields:
+            continue
+        if name in fields:
+            raise PydanticCustomError(
+                "twice", _("{number} and {name} mean the same: say one").format(number=number, name=name), {"at": name}
+            )
+        entry = fields.pop(number)
+        codes = R_CODES.get(number, {})
+        fields[name] = codes.get(entry, entry) if isinstance(entry, int) and not isinstance(entry, bool) else entry
+    return fields
+
+
+class GaugeIn(Body):
+    """A calibration against a gauge of known size, as L92 makes it. R numbers may stand in place of names (`"R33": 0.001`)."""
+
+    model_config = ConfigDict(json_schema_extra={"example": GAUGE})
+
+    average_memory: Annotated[
+        int, Field(strict=True, ge=1, le=MOST_LOCATIONS, description="R11: whose empirical value is found (R46).")
+    ]
+    gauge_size: Annotated[Length, Field(description="R32: size of the gauge, or where the surface or flank lies.")]
+    touches: Annotated[
+        list[Length], Field(min_length=1, max_length=MOST_TOUCHES, description="One per repeat; their mean is R43.")
+    ]
+    repeats: Annotated[
+        int | None, Field(strict=True, ge=1, le=MOST_TOUCHES, description="R27; if said, so many touches must come.")
+    ] = None
+    surface: Annotated[
+        Literal["free", "groove"], Field(description="On a free surface (R21 = 1, R23 = 0) or in a reference groove.")
+    ] = "free"
+    probe_type: Annotated[Literal["axial", "radial"] | None, Field(description="R22: 1 axial, 2 radial.")] = None
+    axis: Annotated[Literal["X", "Z"], Field(description="R30: 1 X, 2 Z.")] = "X"
+    direction: Annotated[Literal["positive", "negative"] | None, Field(description="R31: 0 positive, 1 negative.")] = (
+        None
+    )
+    zero_range: Annotated[Positive, Field(description="R33: up to here nothing is to be changed.")]
+    averaging_limit: Annotated[Positive, Field(description="R34: up to here the average decides.")]
+    confidence_limit: Annotated[Positive, Field(description="R36: from here on the probe or the program is wrong.")]
+    weighting_factor: Annotated[float, Field(strict=True, ge=1, le=1000, description="R29: k of the average.")] = 1.0
+    path_factor: Annotated[
+        float, Field(strict=True, gt=0, le=1000, description="R28: touches are expected within ±1 mm × R28.")
+    ] = 1.0
+    tool_memory: Annotated[
+        int | None, Field(strict=True, ge=1, le=MOST_LOCATIONS, description="R47: the offset that the probe has.")
+    ] = None
+    calibrated_at: Annotated[LatelyOrNow | None, Field(description="When; if left out, now.")] = None
+    key: Key | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _r_numbers(cls, value: Any) -> Any:
+        fields = _by_number(value, R_NAMES)
+        if isinstance(fields, dict) and ("R21" in fields or "R23" in fields):
+            r21, r23 = fields.pop("R21", None), fields.pop("R23", None)
+            groove = r23 not in {0, None} or r21 == 0
+            if (r21 == 1 and groove) or "surface" in fields:
+                raise PydanticCustomError(
+                    "r21", _("R21 = 1 with R23 = 0 is a free surface, R21 = 0 a groove: say one"), {"at": "surface"}
+                )
+            fields["surface"] = "groove" if groove else "free"
+        return fields
+
+
+class SectionIn(Body):
+    """Position of X (#5041) at the trigger, on both sides of one section of the ring."""
+
+    plus: Annotated[Length, Field(description="Touched in +X.")]
+    minus: Annotated[Length, Field(description="Touched in −X.")]
+
+
+class RingIn(Body):
+    """A calibration in a ring on the spindle, as the macro of the lathe line makes it.
+
+    The macro's variables may stand in place of names (`"#502": 6.0`).
+    """
+
+    model_config = ConfigDict(json_schema_extra={"example": RING})
+
+    tool_memory: Annotated[
+        int, Field(strict=True, ge=1, le=MOST_LOCATIONS, description="The location that holds the probe's offset.")
+    ]
+    nominal: Annotated[Positive, Field(description="#505: nominal diameter of the ring.")]
+    upper_deviation: Annotated[Length, Field(description="#506: ES of the ring.")]
+    lower_deviation: Annotated[Length, Field(description="#507: EI of the ring.")]
+    radius_term: Annotated[
+        Length,
+        Field(description="#502: what the tip adds to a position in X; its diameter where X counts in diameters."),
+    ]
+    sections: Annotated[
+        list[SectionIn],
+        Field(max_length=SECTIONS, description="Three along Z; fewer only if the last one lies outside the limits."),
+    ] = Field(default=[])
+    first_move_triggered: Annotated[
+        bool, Field(strict=True, description="The first move along Z triggered: it is not a bore.")
+    ] = False
+    calibrated_at: Annotated[LatelyOrNow | None, Field(description="When; if left out, now.")] = None
+    key: Key | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _macro_variables(cls, value: Any) -> Any:
+        return _by_number(value, MACRO_NAMES)
+
+
+class PairIn(Body):
+    """The same part on the machine and on an external gauge.
+
+    The machine's reading is named by characteristic and sequence, or typed as `machine_value`.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "characteristic": "shaft-d40",
+                "sequence": 812,
+                "external_value": 39.9955,
+                "instrument": "CMM, hall C",
+                "key": "cmm:4711",
+            }
+        }
+    )
+
+    characteristic: Annotated[Slug | None, Field(description="Whose reading it is.")] = None
+    sequence: Annotated[int | None, Field(strict=True, ge=1, le=LARGEST_ID, description="Which reading.")] = None
+    machine_value: Annotated[
+        Length | None, Field(description="What the machine measured, empirical value not taken off.")
+    ] = None
+    external_value: Annotated[Length, Field(description="What the external gauge says, taken for true.")]
+    instrument: Annotated[Text200, Field(description="Which gauge: micrometer, measuring machine.")]
+    key: Key | None = None
+
+
+class SuggestionAcceptIn(Body):
+    """Acceptance of the suggested empirical value, with a reason."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"example": {"empirical_value": 0.0026, "reason": "compared with the CMM, parts 812 to 820"}}
+    )
+
+    empirical_value: Annotated[
+        Length | None,
+        Field(description="The suggestion as you have seen it; if it is another by now, nothing happens."),
+    ] = None
+    reason: Reason
+
+
+class PlanIn(Body):
+    """Interval of calibration, and automatic or approved application of its results."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"due_parts": 500, "due_days": 7, "acceptance": "accept"}})
+
+    due_parts: Annotated[
+        int | None, Field(strict=True, ge=1, le=100_000_000, description="Due after so many parts; none: not by parts.")
+    ] = None
+    due_days: Annotated[
+        float | None, Field(strict=True, gt=0, le=36_500, allow_inf_nan=False, description="Due after so many days.")
+    ] = None
+    acceptance: Annotated[
+        Literal["accept", "automatic"],
+        Field(
+            description="accept: somebody accepts what was found; automatic: it comes into effect at once, as on L92, "
+            "unless it looks like inches or is a value that no probe has."
+        ),
+    ] = "accept"

@@ -1,0 +1,86 @@
+"""JSON routes: characteristics and the versions of their parameters."""
+
+from typing import Annotated
+
+from fastapi import Path, Query, Response
+
+from app.access.deps import AnyCaller, Engineer
+from app.loop.characteristics import actions, queries
+from app.loop.characteristics.schemas import (
+    CharacteristicChange,
+    CharacteristicIn,
+    CharacteristicOut,
+    VersionOut,
+    characteristic_out,
+    version_out,
+)
+from app.loop.machines import queries as machines
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep
+from app.web.fields import LARGEST_SERIAL, KeyCursor, Limit, Page, page_of
+
+router = api_router("characteristics")
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+
+
+@router.post("/characteristics", status_code=201, responses=problems(409))
+def add_characteristic(
+    session: SessionDep, caller: Engineer, characteristic: CharacteristicIn, response: Response
+) -> CharacteristicOut:
+    """Set up a characteristic. Parameters outside the control's ranges are accepted with a warning."""
+    created = actions.add_characteristic(session, characteristic, caller.name)
+    response.headers["Location"] = f"/api/v1/characteristics/{characteristic.key}"
+    return characteristic_out(created)
+
+
+@router.get("/characteristics", responses=problems(404))
+def list_characteristics(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: Annotated[str | None, Query(description="Only those of this machine.", examples=["lathe-1"])] = None,
+    after: Annotated[KeyCursor, Query(description="Cursor: the `next` of the page before.")] = "",
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[CharacteristicOut]:
+    """Characteristics by key; for the key of a machine, those of that machine."""
+    machine_id = caller.only_machine
+    if machine is not None:
+        machine_id = machines.machine_named(session, machine).id
+        caller.must_at(machine_id, "viewer")
+    elif machine_id is None:
+        caller.must("viewer")
+    rows = queries.characteristics(session, machine_id=machine_id, after=after, limit=limit + 1)
+    return page_of([characteristic_out(row) for row in rows], limit, lambda row: row.key)
+
+
+@router.get("/characteristics/{characteristic}", responses=problems(404))
+def get_characteristic(session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey) -> CharacteristicOut:
+    """One characteristic with its parameters in force."""
+    standing = queries.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    return characteristic_out(standing)
+
+
+@router.patch("/characteristics/{characteristic}", responses=problems(404, 409))
+def change_characteristic(
+    session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, change: CharacteristicChange
+) -> CharacteristicOut:
+    """Change it. `parameters` make a new version and need a `reason`; old readings keep the version they were judged by."""
+    standing = actions.change_characteristic(session, characteristic, change, caller.name)
+    return characteristic_out(standing, queries.target_before(session, standing))
+
+
+@router.get("/characteristics/{characteristic}/parameters", responses=problems(404))
+def list_parameter_versions(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    before: Annotated[
+        int | None, Query(ge=1, le=LARGEST_SERIAL, description="Cursor: the `next` of the page before.")
+    ] = None,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[VersionOut]:
+    """Every version of the parameters, newest first: who, when, why."""
+    standing = queries.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    rows = queries.versions(session, standing.characteristic, before=before, limit=limit + 1)
+    return page_of([version_out(row) for row in rows], limit, lambda row: row.version)

@@ -1,0 +1,115 @@
+"""Characteristics and the versions of their parameters. Never writes."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.core.parameters import Parameters
+from app.errors import NotFound
+from app.language.i18n import _
+from app.loop.tables.characteristics import Characteristic, ParametersVersion
+from app.loop.tables.machines import Machine
+from app.loop.tables.readings import Stream
+from app.loop.tables.tools import Tool
+from app.web.fields import is_slug
+
+
+class Standing(NamedTuple):
+    """A characteristic as it stands now."""
+
+    characteristic: Characteristic
+    machine: Machine
+    version: ParametersVersion
+
+    @property
+    def parameters(self) -> Parameters:
+        return Parameters.from_dict(self.version.parameters)
+
+
+_STANDING = (
+    select(Characteristic, Machine, ParametersVersion)
+    .join(Machine, Machine.id == Characteristic.machine_id)
+    .join(Stream, (Stream.machine_id == Characteristic.machine_id) & (Stream.characteristic_id == Characteristic.id))
+    .join(
+        ParametersVersion,
+        (ParametersVersion.machine_id == Stream.machine_id)
+        & (ParametersVersion.characteristic_id == Stream.characteristic_id)
+        & (ParametersVersion.version == Stream.parameters_version),
+    )
+)
+
+
+def characteristic_named(session: Session, key: str) -> Standing:
+    """The characteristic with this key. Raises `NotFound`."""
+    row = session.execute(_STANDING.where(Characteristic.key == key)).one_or_none() if is_slug(key) else None
+    if row is None:
+        raise NotFound(
+            _("There is no characteristic {key}.").format(key=repr(key[:64])),
+            _("Check the key; GET /api/v1/characteristics lists them."),
+        )
+    return Standing(*row)
+
+
+def key_is_taken(session: Session, key: str) -> bool:
+    return session.scalar(select(Characteristic.id).where(Characteristic.key == key)) is not None
+
+
+def characteristics(
+    session: Session, *, machine_id: int | None = None, after: str = "", limit: int = 1000
+) -> list[Standing]:
+    """Characteristics by key, of one machine or of all."""
+    query = _STANDING.where(Characteristic.key > after).order_by(Characteristic.key).limit(limit)
+    if machine_id is not None:
+        query = query.where(Characteristic.machine_id == machine_id)
+    return [Standing(*row) for row in session.execute(query)]
+
+
+def versions(
+    session: Session, characteristic: Characteristic, *, before: int | None = None, limit: int = 1000
+) -> Sequence[ParametersVersion]:
+    """The versions of its parameters, newest first."""
+    query = (
+        select(ParametersVersion)
+        .where(
+            ParametersVersion.machine_id == characteristic.machine_id,
+            ParametersVersion.characteristic_id == characteristic.id,
+        )
+        .order_by(ParametersVersion.version.desc())
+        .limit(limit)
+    )
+    return session.scalars(query if before is None else query.where(ParametersVersion.version < before)).all()
+
+
+def target_before(session: Session, standing: Standing) -> float | None:
+    """Return the target of the version before the one in force, mm; None of the first."""
+    number = standing.version.version - 1
+    before = session.get(ParametersVersion, (standing.machine.id, standing.characteristic.id, number))
+    return None if before is None else Parameters.from_dict(before.parameters).target
+
+
+def parameters_of(session: Session, machine_id: int, characteristic_id: int, version: int) -> Parameters:
+    """The parameters that a reading was judged by. Asked for once per session, for they never change."""
+    book: dict[tuple[int, int, int], Parameters] = session.info.setdefault("parameters", {})
+    key = (machine_id, characteristic_id, version)
+    if key not in book:
+        book[key] = Parameters.from_dict(
+            session.scalars(
+                select(ParametersVersion.parameters).where(
+                    ParametersVersion.machine_id == machine_id,
+                    ParametersVersion.characteristic_id == characteristic_id,
+                    ParametersVersion.version == version,
+                )
+            ).one()
+        )
+    return book[key]
+
+
+def parts_cut(session: Session, machine_id: int, number: int) -> int:
+    """Return the parts cut with the tool in this location since it was changed."""
+    counted = select(func.max(Stream.sequence - Stream.sequence_at_tool_change)).where(
+        Stream.machine_id == machine_id, Stream.tool_memory == number
+    )
+    earlier = select(Tool.parts_kept).where(Tool.machine_id == machine_id, Tool.number == number)
+    return (session.scalar(counted) or 0) + (session.scalar(earlier) or 0)

@@ -1,0 +1,215 @@
+"""Characteristics as JSON. The parameters' schema is made from the core's table of them."""
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from app.core.decision.limits import nanometres
+from app.core.parameters import FIELDS, Kind, MachineType, ParameterError, Problem, read, unusual_on
+from app.core.plausibility import inch_warnings
+from app.loop.characteristics import queries, wording
+from app.loop.tables.characteristics import ParametersVersion
+from app.loop.warnings.wording import sentence
+from app.web.fields import Body, Reason, Slug, Text200
+from app.web.warnings import WarningOut, Warnings, warnings_out
+
+PARAMETERS: dict[str, JsonValue] = {
+    "tool_memory": 3,
+    "average_memory": 5,
+    "variant": "single",
+    "points": 1,
+    "repeats": 1,
+    "axis": "X",
+    "direction": "positive",
+    "nominal": 40.0,
+    "upper_deviation": 0.0,
+    "lower_deviation": -0.016,
+    "zero_range": 0.001,
+    "averaging_limit": 0.0053,
+    "wear_limit": 0.3,
+    "confidence_limit": 1.0,
+    "weighting_factor": 2,
+    "path_factor": 1,
+    "factor": -1,
+    "accept": {"n": 1, "m": 1},
+    "mode": "automatic",
+    "wear_policy": "hold",
+    "max_step": None,
+    "max_total": None,
+    "plausible_jump": None,
+}
+CHARACTERISTIC: dict[str, JsonValue] = {
+    "key": "shaft-d40",
+    "name": "Bearing seat Ø40 h6",
+    "machine": "lathe-1",
+    "part": "shaft-0815",
+    "unit": "mm",
+    "parameters": PARAMETERS,
+}
+
+
+def parameters_schema() -> dict[str, Any]:
+    """The JSON schema of `parameters`, with R numbers."""
+    types = {
+        Kind.LENGTH: "number",
+        Kind.NUMBER: "number",
+        Kind.WHOLE: "integer",
+        Kind.CHOICE: "string",
+        Kind.YES_NO: "boolean",
+    }
+    properties: dict[str, Any] = {}
+    for field in FIELDS:
+        words = [f"{field.r}." if field.r else "", f"{wording.label(field.name)}."]
+        words += [wording.explanation(field.name) or "", "In mm." if field.kind is Kind.LENGTH else ""]
+        properties[field.name] = {
+            "type": [types[field.kind], "null"],
+            "description": " ".join(word for word in words if word),
+            **({"minimum": field.lowest} if field.lowest is not None else {}),
+            **({"maximum": field.highest} if field.highest is not None else {}),
+            **({"enum": [*field.choices, None]} if field.choices else {}),
+            **({"default": field.default} if field.default is not None else {}),
+        }
+    properties["accept"] = {
+        "type": ["object", "null"],
+        "description": "Acceptance: n of m sections must be inside the tolerance.",
+        "properties": {"n": {"type": "integer", "minimum": 1}, "m": {"type": "integer", "maximum": 100}},
+        "default": {"n": 1, "m": 1},
+    }
+    return {
+        "type": "object",
+        "properties": properties,
+        "patternProperties": {r"^[Rr]\d{2}$": {"description": "Any of them under its R number."}},
+        "additionalProperties": False,
+    }
+
+
+GivenParameters = Annotated[
+    dict[str, Any],
+    Field(
+        description="The R parameters, by name or R number. R33 < R34 ≤ R35/2 ≤ R37 ≤ R36 must hold. "
+        "`target` with `tolerance_width` may stand in place of nominal and deviations.",
+        json_schema_extra=parameters_schema(),
+    ),
+]
+Part = Annotated[Text200, Field(description="The part it belongs to: drawing or article number.")]
+
+
+class CharacteristicIn(Body):
+    """A characteristic to set up."""
+
+    model_config = ConfigDict(json_schema_extra={"example": CHARACTERISTIC})
+
+    key: Annotated[Slug, Field(description="Its name in addresses and readings; it stays for good.")]
+    name: Annotated[Text200, Field(description="What people call it, as on the drawing.")]
+    machine: Annotated[str, Field(description="The key of the machine that cuts and measures it; it stays for good.")]
+    part: Part | None = None
+    unit: Literal["mm"] = "mm"
+    parameters: GivenParameters
+
+
+class CharacteristicChange(Body):
+    """Change of a characteristic. Omitted fields and parameters stay; null resets a parameter to its default."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {"parameters": {"zero_range": 0.0015}, "reason": "scatter of the new probe is larger"}
+        }
+    )
+
+    key: Annotated[Slug | None, Field(description="May be sent along, unchanged.")] = None
+    name: Text200 | None = None
+    machine: Annotated[str | None, Field(description="May be sent along, unchanged.")] = None
+    part: Part | None = None
+    unit: Literal["mm"] | None = None
+    parameters: GivenParameters | None = None
+    parameters_version: Annotated[
+        int | None, Field(strict=True, ge=1, description="The version you looked at; 409 if there is a newer one.")
+    ] = None
+    reason: Annotated[Reason | None, Field(description="Why; required when parameters change.")] = None
+
+
+class CharacteristicOut(BaseModel):
+    """A characteristic as it stands."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": CHARACTERISTIC | {"parameters_version": 4, "created_at": "2026-11-21T07:00:00Z", "warnings": []}
+        }
+    )
+
+    key: str
+    name: str
+    machine: str
+    part: str | None
+    unit: str
+    parameters: Annotated[dict[str, Any], Field(json_schema_extra=parameters_schema())]
+    parameters_version: int
+    created_at: datetime
+    warnings: Warnings
+
+
+class VersionOut(BaseModel):
+    """One version of the parameters; readings keep the version they were judged by."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "version": 4,
+                "at": "2026-11-21T07:00:00Z",
+                "by": "Ana",
+                "reason": "scatter of the new probe is larger",
+                "parameters": PARAMETERS,
+            }
+        }
+    )
+
+    version: int
+    at: datetime
+    by: str
+    reason: str | None
+    parameters: Annotated[dict[str, Any], Field(json_schema_extra=parameters_schema())]
+
+
+def warnings_of(standing: queries.Standing, before: float | None = None) -> list[WarningOut]:
+    """Warn of what is outside the ranges of the sources, does not fit the machine, or is finer than its probe tells.
+
+    before: the target of the version before, mm; one that is the same in inches is named.
+    """
+    parameters, machine = standing.parameters, standing.machine
+    try:
+        unusual = read(parameters.as_dict())[1]
+    except ParameterError:  # made when rules were others
+        unusual = []
+    unusual += unusual_on(parameters.as_dict(), MachineType(machine.type))
+    if nanometres(parameters.zero_range) < nanometres(machine.zero_range_floor):
+        values = {"value": parameters.zero_range, "floor": machine.zero_range_floor}
+        unusual.append(Problem("zero_range", "signal_path", values, warning=True))
+    inches = [] if before is None else inch_warnings([("parameters.target", parameters.target, before)])
+    return [*warnings_out(inches, sentence), *wording.warnings(unusual)]
+
+
+def characteristic_out(standing: queries.Standing, before: float | None = None) -> CharacteristicOut:
+    """Return a characteristic as it is answered. before: the target of the version before, mm."""
+    characteristic, machine, version = standing
+    return CharacteristicOut(
+        key=characteristic.key,
+        name=characteristic.name,
+        machine=machine.key,
+        part=characteristic.part,
+        unit=characteristic.unit,
+        parameters=wording.in_order(version.parameters),
+        parameters_version=version.version,
+        created_at=characteristic.created_at,
+        warnings=warnings_of(standing, before),
+    )
+
+
+def version_out(version: ParametersVersion) -> VersionOut:
+    return VersionOut(
+        version=version.version,
+        at=version.created_at,
+        by=version.created_by,
+        reason=version.reason,
+        parameters=wording.in_order(version.parameters),
+    )

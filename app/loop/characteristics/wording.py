@@ -1,0 +1,346 @@
+"""Parameters in words: what each is called, what it does, and what is wrong with one, in the words of the shop floor."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+from app.core.parameters import BY_NAME, Field, Kind, Problem, Variant
+from app.errors import FieldError
+from app.language.i18n import _
+from app.web.warnings import WarningOut
+
+
+def label(name: str) -> str:
+    """Name of a parameter."""
+    return {
+        "tool_memory": _("Tool memory"),
+        "average_memory": _("Average memory"),
+        "variant": _("Measuring variant"),
+        "points": _("Measuring points"),
+        "repeats": _("Repeats"),
+        "index": _("Index or spacing"),
+        "wait": _("Wait"),
+        "axis": _("Measuring axis"),
+        "direction": _("Probing direction"),
+        "feature": _("What is touched"),
+        "nominal": _("Nominal"),
+        "upper_deviation": _("Upper deviation"),
+        "lower_deviation": _("Lower deviation"),
+        "target": _("Target"),
+        "tolerance_width": _("Tolerance width"),
+        "zero_range": _("Zero range"),
+        "averaging_limit": _("Averaging limit"),
+        "wear_limit": _("Wear limit"),
+        "confidence_limit": _("Confidence limit"),
+        "weighting_factor": _("Weighting factor k"),
+        "path_factor": _("Path factor"),
+        "factor": _("Factor from size error to offset"),
+        "accept": _("Acceptance"),
+        "rejected_may_correct": _("A rejected part may correct"),
+        "mode": _("Mode"),
+        "wear_policy": _("Beyond the wear limit"),
+        "max_step": _("Largest step"),
+        "max_total": _("Largest sum"),
+        "plausible_jump": _("Largest plausible jump"),
+    }.get(name, name)
+
+
+def explanation(name: str) -> str | None:
+    """Effect of a parameter, in one or two short sentences; None where the name says it."""
+    return {
+        "tool_memory": _("Whose offset is corrected; usual: 1 to 32. 0 measures only."),
+        "average_memory": _("Where the running average is kept; usual: 1 to 20; may be shared. 0 keeps none."),
+        "points": _("For the variants with several points."),
+        "repeats": _("At the same point; the mean counts. Usual: 1 to 10."),
+        "index": _("Degrees between points, or mm along Z."),
+        "wait": _("Seconds before measuring goes on after indexing."),
+        "feature": _(
+            "The part from outside or inside (with the direction it says where the probe starts), or the tool itself: its length "
+            "or radius tells its wear."
+        ),
+        "target": _("Aimed at: the middle of the tolerance."),
+        "tolerance_width": _("Upper minus lower limit."),
+        "zero_range": _("Up to here a deviation is scatter: nothing is corrected."),
+        "averaging_limit": _("Up to here the running average decides. Empty: a third of the tolerance."),
+        "wear_limit": _("From here on the tool is worn: an operator decides."),
+        "confidence_limit": _("From here on probe or program is wrong: the machine stops."),
+        "weighting_factor": _(
+            "1 takes the last reading whole; larger follows slower and scatters less. Usual: 1 to 4."
+        ),
+        "path_factor": _("The touch is expected within ± this many mm of the target. Usual: 1 to 5."),
+        "mode": _("Automatic: the machine fetches each correction. Approval: a person releases it first."),
+        "wear_policy": _("What becomes of a correction computed for a worn tool."),
+        "max_step": _("A larger correction is cut to this. Empty: no limit."),
+        "max_total": _(
+            "Sum of corrections per tool: beyond it nothing is corrected and an alarm is raised. Empty: no limit."
+        ),
+        "plausible_jump": _(
+            "A reading further than this from the level of those before is marked, and its correction held. Empty: off."
+        ),
+        "rejected_may_correct": _("A part outside n of m also corrects the tool."),
+    }.get(name)
+
+
+def result_label(name: str) -> str:
+    """Name of a variant's result."""
+    return {
+        "run_out": _("Run-out"),
+        "out_of_roundness": _("Out-of-roundness"),
+        "taper": _("Taper over the length"),
+        "slope": _("Taper per mm"),
+        "repeat_range": _("Range of the repeats"),
+        "repeat_deviation": _("Standard deviation of the repeats"),
+        "sections_outside": _("Sections outside"),
+        "rejected": _("Rejected"),
+    }.get(name, name)
+
+
+def choice(name: str, value: str) -> str:
+    """One of the choices of a parameter."""
+    return {
+        "variant": {
+            "single": _("One point"),
+            "indexed": _("One point, part indexed"),
+            "round": _("Several points round the part"),
+            "along": _("Several points along the part"),
+            "two_point": _("Two points (width, bore)"),
+        },
+        "axis": {"X": "X", "Y": "Y", "Z": "Z"},
+        "direction": {"positive": _("Positive (+)"), "negative": _("Negative (−)")},
+        "feature": {
+            "outside": _("Outside (shaft, web)"),
+            "inside": _("Inside (bore, pocket)"),
+            "tool": _("The tool itself (length, radius)"),
+        },
+        "mode": {
+            "automatic": _("Automatic"),
+            "approval": _("Approval by a person"),
+            "measure_only": _("Measure only"),
+        },
+        "wear_policy": {
+            "hold": _("Held for the operator"),
+            "release": _("Released at once"),
+        },
+    }.get(name, {}).get(value, value)
+
+
+def millimetres(value: float) -> str:
+    """A limit as it is written in sentences: at least four decimals, none hidden.
+
+    >>> millimetres(0.009), millimetres(0.0053333)
+    ('0.0090 mm', '0.0053333 mm')
+    """
+    whole, _point, decimals = f"{value:.9f}".partition(".")
+    return f"{whole}.{decimals.rstrip('0').ljust(4, '0')} mm"
+
+
+def named(name: str) -> str:
+    """A parameter as sentences name it: `R34 averaging limit`."""
+    field = BY_NAME.get(name)
+    words = label(name)
+    words = words[:1].lower() + words[1:]
+    return f"{field.r} {words}" if field is not None and field.r else words
+
+
+def in_order(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """The set in the order of the table, which PostgreSQL does not keep."""
+    return {name: parameters[name] for name in (*BY_NAME, "accept") if name in parameters}
+
+
+def field_errors(problems: Iterable[Problem]) -> list[FieldError]:
+    """Everything that is wrong, each at the field where one can change it."""
+    return [FieldError(f"parameters.{_where(problem)}", sentence(problem)) for problem in problems]
+
+
+def warnings(problems: Iterable[Problem]) -> list[WarningOut]:
+    """Warnings of values that were accepted but may be wrong, each at its field."""
+    return [
+        WarningOut(code=problem.code, text=sentence(problem), field=f"parameters.{problem.field}")
+        for problem in problems
+    ]
+
+
+def _where(problem: Problem) -> str:
+    # The tolerance is given by the drawing: if R34 does not fit into it, R34 is what gives way.
+    return "averaging_limit" if (problem.field, problem.code) == ("tolerance_width", "order") else problem.field
+
+
+def sentence(problem: Problem) -> str:
+    """The sentence of a problem: the error and what to do."""
+    data, name = problem.data, named(problem.field)
+    if problem.code == "order":
+        return order_sentence(data["inner"], data["outer"], millimetres(data["smaller"]), millimetres(data["larger"]))
+    if problem.code in {"range", "source_range"}:
+        return _range(problem, name)
+    return {
+        "required": _("{name} is missing; say it").format(name=name),
+        "unknown": _("There is no parameter {name}; check the spelling or the R number").format(
+            name=problem.field[:64]
+        ),
+        "twice": _("{name} is said twice, also as {other}; say it once").format(
+            name=problem.field[:64], other=data.get("other")
+        ),
+        "not_a_number": _("{name} must be a finite number, in mm with a decimal point where it is a length").format(
+            name=name
+        ),
+        "not_whole": _("{name} must be a whole number").format(name=name),
+        "not_a_choice": _("{name} must be one of {choices}").format(
+            name=name, choices=", ".join(data.get("choices", ()))
+        ),
+        "not_yes_no": _("{name} must be true or false").format(name=name),
+        "target_missing": _(
+            "The size is missing: say R42 nominal with R40 and R41 deviations, or R32 target with R35 tolerance width"
+        ),
+        "target_twice": _target_twice(problem, name),
+        "tolerance_sign": _(
+            "R40 upper deviation must be greater than R41 lower deviation; check the signs (h6 is 0 and −0.016)"
+        ),
+        "signal_path": _signal_path(problem, name),
+        "no_location": _(
+            "{name} {value} is not on this machine: it has {last}; the number is set with the machine"
+        ).format(name=name, value=data.get("value"), last=data.get("last")),
+        "variant_axis": _("{name} is {axis}, but “{variant}” is measured in X only; check R25 and R30").format(
+            name=name, axis=data.get("axis"), variant=choice("variant", data.get("variant", ""))
+        ),
+        "points_missing": _("“{variant}” needs several points, but R23 does not say how many").format(
+            variant=choice("variant", data.get("variant", ""))
+        ),
+        "not_on_lathe": _(
+            "Two-point measurement (R24) is not for lathes: the cycles know it on machining centres only"
+        ),
+        "factor_on_lathe": _(
+            "The factor {value} is positive, but this machine is a lathe: −1 in diameter, −0.5 in radius, −1 in length. "
+            "With the wrong sign every correction makes the part worse"
+        ).format(value=f"{data.get('value', 0):+.10g}"),
+        "sign_missing": _(
+            "The factor is missing: it says which way the offset acts. Lathe diameter −1, radius −0.5, length −1; "
+            "milling radius −0.5 outside, +0.5 inside"
+        ),
+        "tool_measured": _(
+            "A tool that is measured itself (feature: tool) needs its location R10 and the mode measure_only: its size tells "
+            "its wear, and no correction changes it"
+        ),
+        "factor_zero": _("The factor must not be 0: nothing would ever be corrected. To only measure, set R10 to 0"),
+        "sections": _(
+            "{name} {points} do not fit acceptance by {sections} sections; say {sections}, or leave it out"
+        ).format(name=name, points=data.get("points"), sections=data.get("sections")),
+        "accept": _('Acceptance must be {"n": n, "m": m} with whole numbers, 1 ≤ n ≤ m ≤ 100, for example 2 of 3'),
+    }.get(problem.code, problem.code)
+
+
+def order_sentence(inner: str, outer: str, smaller: str, larger: str) -> str:
+    """Refusal of a pair in the wrong order: ``smaller`` is the value of R number ``inner``, ``larger`` that of ``outer``."""
+    names = {
+        "R33": _("R33 zero range"),
+        "R34": _("R34 averaging limit"),
+        "R35/2": "R35/2",
+        "R37": _("R37 wear limit"),
+        "R36": _("R36 confidence limit"),
+    }
+    if outer == "R35/2":
+        sentence = _(
+            "{inner} {smaller} must not be larger than R35/2 = {larger}; lower it, or leave it empty for a third of the "
+            "tolerance"
+        )
+    elif inner == "R35/2":
+        sentence = _("{outer} {larger} must not be smaller than R35/2 = {smaller}; raise it")
+    elif inner == "R33":
+        sentence = _("{inner} {smaller} must be smaller than {outer} {larger}; lower the one or raise the other")
+    else:
+        sentence = _("{inner} {smaller} must not be larger than {outer} {larger}; lower the one or raise the other")
+    return sentence.format(inner=names[inner], outer=names[outer], smaller=smaller, larger=larger)
+
+
+def _range(problem: Problem, name: str) -> str:
+    field = BY_NAME[problem.field]
+    value, lowest, highest = (problem.data[key] for key in ("value", "lowest", "highest"))
+    unit = " mm" if field.kind is Kind.LENGTH else ""
+    values = {
+        "name": name,
+        "value": f"{value:.10g}{unit}" if isfinite(value) else str(value),
+        "lowest": f"{lowest:.10g}",
+        "highest": f"{highest:.10g}{unit}",
+    }
+    if problem.warning:
+        if problem.field == "index":
+            values["value"], values["highest"] = f"{value:.10g}°", f"{highest:.10g}°"
+        unusual = _("{name} {value} is unusual: the control's range is {lowest} to {highest}").format(**values)
+        return unusual + (_("; check that it is in mm") if unit else "")
+    return _("{name} must lie between {lowest} and {highest}, not {value}").format(**values)
+
+
+def _target_twice(problem: Problem, name: str) -> str:
+    if problem.code != "target_twice":
+        return ""
+    return _(
+        "{name} {value} does not agree with nominal and deviations, which give {computed}; say only one of the two"
+    ).format(name=name, value=millimetres(problem.data["value"]), computed=millimetres(problem.data["computed"]))
+
+
+def _signal_path(problem: Problem, name: str) -> str:
+    if problem.code != "signal_path":
+        return ""
+    return _(
+        "{name} {value} is finer than the probe tells: through the PLC a touch is uncertain by {floor}, the probing feed "
+        "times the delay of the signal"
+    ).format(name=name, value=millimetres(problem.data["value"]), floor=millimetres(problem.data["floor"]))
+
+
+class HasParameters(Protocol):
+    """A stored version of the parameters."""
+
+    @property
+    def parameters(self) -> Mapping[str, Any]: ...
+
+
+Version = TypeVar("Version", bound=HasParameters)
+
+
+class Difference(NamedTuple):
+    """Change of one parameter between two versions."""
+
+    name: str
+    r: str | None
+    before: str
+    after: str
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterable[Difference]:
+    """Changes between two versions, worded."""
+    for name in (*BY_NAME, "accept"):
+        if old.get(name) != new.get(name):
+            field = BY_NAME.get(name)
+            yield Difference(label(name), field.r if field else None, worded(name, old), worded(name, new))
+
+
+def worded(name: str, parameters: Mapping[str, Any]) -> str:
+    """One parameter as people read it."""
+    value = parameters.get(name)
+    field = BY_NAME.get(name)
+    if value is None:
+        return "–"
+    if name == "accept":
+        return _("{n} of {m}").format(n=value["n"], m=value["m"])
+    if isinstance(value, bool):
+        return _("yes") if value else _("no")
+    if field is not None and field.choices:
+        return choice(name, str(value))
+    text = f"{value:.10g}" if isinstance(value, float) else str(value)
+    return text.replace("-", "\N{MINUS SIGN}") + _unit(name, field, parameters)
+
+
+def _unit(name: str, field: Field | None, parameters: Mapping[str, Any]) -> str:
+    if name == "index":  # R26 is an angle, or along the part a distance
+        return " mm" if parameters.get("variant") == Variant.ALONG else "°"
+    if name == "wait":
+        return " s"
+    return " mm" if field is not None and field.kind is Kind.LENGTH else ""
+
+
+def history(versions: Sequence[Version]) -> list[tuple[Version, list[Difference]]]:
+    """Each version, newest first, with what it changed; the oldest of them changed nothing."""
+    older = [*versions[1:], None]
+    return [
+        (version, list(differences(before.parameters, version.parameters)) if before else [])
+        for version, before in zip(versions, older, strict=True)
+    ]

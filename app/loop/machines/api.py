@@ -1,0 +1,53 @@
+"""JSON routes: machines and their keys."""
+
+from typing import Annotated
+
+from fastapi import Path, Query, Response
+
+from app.access.deps import AnyCaller, Engineer
+from app.loop.machines import actions, queries
+from app.loop.machines.schemas import MachineChange, MachineIn, MachineOut
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep
+from app.web.fields import KeyCursor, Limit, Page, page_of
+
+router = api_router("machines")
+MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
+
+
+@router.post("/machines", status_code=201, responses=problems(409))
+def add_machine(session: SessionDep, caller: Engineer, machine: MachineIn, response: Response) -> MachineOut:
+    """Set up a machine, with its empty tool memory (R10) and average memory (R11)."""
+    created = actions.add_machine(session, machine, caller.name)
+    response.headers["Location"] = f"/api/v1/machines/{created.key}"
+    return MachineOut.model_validate(created)
+
+
+@router.get("/machines")
+def list_machines(
+    session: SessionDep,
+    caller: AnyCaller,
+    after: Annotated[KeyCursor, Query(description="Cursor: the `next` of the page before.")] = "",
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[MachineOut]:
+    """All machines by key; for the key of a machine, that machine."""
+    if caller.only_machine is None:
+        caller.must("viewer")
+    rows = queries.machines(session, after, limit + 1, caller.only_machine)
+    return page_of([MachineOut.model_validate(row) for row in rows], limit, lambda machine: machine.key)
+
+
+@router.get("/machines/{machine}", responses=problems(404))
+def get_machine(session: SessionDep, caller: AnyCaller, machine: MachineKey) -> MachineOut:
+    """One machine."""
+    machine_row = queries.machine_named(session, machine)
+    caller.must_at(machine_row.id, "viewer")
+    return MachineOut.model_validate(machine_row)
+
+
+@router.patch("/machines/{machine}", responses=problems(404))
+def change_machine(session: SessionDep, caller: Engineer, machine: MachineKey, change: MachineChange) -> MachineOut:
+    """Give it another name or control, another path of the probe's signal, another expiry of corrections, or other limits of
+    what is plausible on it.
+    """
+    return MachineOut.model_validate(actions.change_machine(session, machine, change, caller.name))

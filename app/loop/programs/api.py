@@ -1,0 +1,66 @@
+"""JSON and text routes: program text read and written."""
+
+from typing import Annotated, Literal
+
+from fastapi import Path, Query, Response
+from fastapi.responses import PlainTextResponse
+
+from app.access.deps import AnyCaller, require
+from app.core.parameters import LARGEST_LENGTH
+from app.loop.characteristics import queries as characteristics
+from app.loop.machines.queries import machine_named
+from app.loop.programs import queries
+from app.loop.programs.schemas import ProgramIn, ProgramRead, program_read
+from app.web.api import api_router, plain, problems
+from app.web.deps import SessionDep
+from app.web.downloads import download
+
+router = api_router("programs")
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+MEASURING = (
+    "L15 (MEASURING SUBPROGRAM)\n(INBAND CHARACTERISTIC=shaft-d40)\n(INBAND FACTOR=-1)\nN5 R10=3 R11=5 R24=0 R25=0 …\n"
+)
+
+
+@router.post("/programs/read", dependencies=[require("viewer")], responses=problems(404))
+def read_program(session: SessionDep, program: ProgramIn) -> ProgramRead:
+    """Read a program text: the parameters in it, and every line with a verdict. Nothing is stored.
+
+    Understood are the subprograms `L05` and `L15`, R assignments (`R33=0.001`, and run together `R240` for R24 = 0), the
+    later names (`_TZL`), and the macro variables of the lathe line (`#505=40.`). What was passed over on purpose and what
+    was not understood is named, line by line. Send `parameters` on to `POST /characteristics`.
+    """
+    machine = machine_named(session, program.machine) if program.machine is not None else None
+    return program_read(queries.check(program.text, program.control, machine))
+
+
+@router.get(
+    "/characteristics/{characteristic}/program",
+    responses=problems(404) | plain(MEASURING),
+    response_class=PlainTextResponse,
+)
+def write_program(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    control: Annotated[
+        Literal["sinumerik", "fanuc"] | None, Query(description="For which control; if left out, the machine's.")
+    ] = None,
+    kind: Annotated[queries.Kind, Query(description="Which of the two subprograms.")] = "measuring",
+    gauge: Annotated[
+        float | None,
+        Query(description="Calibration: size of the gauge (R32), mm.", gt=0, le=LARGEST_LENGTH, allow_inf_nan=False),
+    ] = None,
+    surface: Annotated[Literal["free", "groove"], Query(description="Calibration: where (R21, R23).")] = "free",
+    probe: Annotated[Literal["axial", "radial"], Query(description="Calibration: type of the probe (R22).")] = "axial",
+) -> Response:
+    """The measuring or the calibration subprogram of a characteristic. Read back it gives the same parameters.
+
+    What R numbers cannot say (factor, mode, acceptance …) stands in comments such as `(INBAND FACTOR=-1)`.
+    """
+    standing = characteristics.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    chosen = queries.control_of(standing, control)
+    text = queries.program_of(standing, chosen, kind, gauge=gauge, surface=surface, probe=probe)
+    name = queries.file_name(standing, chosen, kind)
+    return download(text, name)

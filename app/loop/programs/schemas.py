@@ -1,0 +1,185 @@
+"""Program text as JSON: what was read of it. Lengths in mm."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from app.core.programs import fanuc
+from app.core.programs.lines import MOST_CHARACTERS, WARNINGS, Note, Program
+from app.errors import FieldError
+from app.loop.programs import wording
+from app.loop.programs.queries import CheckedProgram, ReadableControl
+from app.web.fields import Body, Slug
+from app.web.warnings import Warnings
+
+Verdict = Literal["understood", "ignored", "not_understood"]
+KindOf = Literal["calibration", "measuring", "assignments", "results", "kinematics", "work_zero"]
+
+TEXT = (
+    "L15\nN5 R103 R115 R240 R250\nN10 R33=0.001 R36=1 R37=0.3\nN15 R40=0 R41=-0.016 R42=40\nN20 L75\nN25 L93\nN30 M17\n"
+)
+LINE: dict[str, JsonValue] = {
+    "line": 3,
+    "text": "N10 R33=0.001 R36=1 R37=0.3",
+    "verdict": "understood",
+    "notes": [{"code": "assigned", "text": "R33 = 0.001 mm zero range", "warning": False}],
+}
+PARAMETERS: dict[str, JsonValue] = {
+    "tool_memory": 3,
+    "average_memory": 5,
+    "variant": "single",
+    "nominal": 40.0,
+    "upper_deviation": 0.0,
+    "lower_deviation": -0.016,
+    "zero_range": 0.001,
+    "wear_limit": 0.3,
+    "confidence_limit": 1.0,
+}
+PROGRAM: dict[str, JsonValue] = {
+    "kind": "measuring",
+    "first_line": 1,
+    "last_line": 7,
+    "parameters": PARAMETERS,
+    "about": {},
+    "values": {},
+    "results": {},
+    "touches": None,
+    "notes": [],
+}
+
+
+class ProgramIn(Body):
+    """A program text to be read."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"control": "sinumerik", "text": TEXT}})
+
+    control: Annotated[
+        ReadableControl | None, Field(description="Whose text it is; if left out, taken from the text.")
+    ] = None
+    machine: Annotated[
+        Slug | None, Field(description="The machine it is for: what does not fit its type or its locations is said.")
+    ] = None
+    text: Annotated[str, Field(strict=True, max_length=MOST_CHARACTERS, description="The text, line by line.")]
+
+
+class Remark(BaseModel):
+    """An error, with the parameter that it concerns."""
+
+    field: str
+    message: str
+
+
+class NoteOut(BaseModel):
+    """Something said about a line or a program."""
+
+    code: str
+    text: str
+    warning: Annotated[bool, Field(description="Whether somebody should look at it.")]
+
+
+class LineOut(BaseModel):
+    """A line and what was made of it."""
+
+    model_config = ConfigDict(json_schema_extra={"example": LINE})
+
+    line: int
+    text: str
+    verdict: Verdict
+    notes: list[NoteOut]
+
+
+class ProgramOut(BaseModel):
+    """One of the programs in the text."""
+
+    model_config = ConfigDict(json_schema_extra={"example": PROGRAM})
+
+    kind: KindOf
+    first_line: int
+    last_line: int
+    parameters: Annotated[
+        dict[str, Any],
+        Field(
+            description="As POST /characteristics takes them; of a calibration, with `gauge` (R32), `surface` and `probe`; of a "
+            "kinematics cycle, `cycle` and its Q parameters."
+        ),
+    ]
+    about: Annotated[dict[str, str], Field(description="Key, name and part, where the text says them.")]
+    values: Annotated[dict[str, float], Field(description="What only the control knows, such as `#504`.")]
+    results: Annotated[dict[str, float], Field(description="What the cycle has found, such as `R43` or `#510`.")]
+    touches: Annotated[
+        list[list[float]] | None, Field(description="The results as `touches` of a reading, where they are such.")
+    ]
+    notes: list[NoteOut]
+
+
+class ProgramRead(BaseModel):
+    """The content of a program text. Nothing was stored."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "control": "sinumerik",
+                "program": PROGRAM,
+                "problems": [
+                    {
+                        "field": "parameters.factor",
+                        "message": "The factor is missing: it says which way the offset acts.",
+                    }
+                ],
+                "warnings": [],
+                "not_understood": 0,
+                "lines": [LINE],
+                "programs": [PROGRAM],
+            }
+        }
+    )
+
+    control: ReadableControl
+    program: Annotated[
+        ProgramOut | None,
+        Field(description="The one that makes a characteristic, if there is any; else what there is."),
+    ]
+    problems: Annotated[list[Remark], Field(description="Why its parameters cannot be used as they are.")]
+    warnings: Warnings
+    not_understood: Annotated[int, Field(description="How many lines hold something that was not understood.")]
+    lines: list[LineOut]
+    programs: list[ProgramOut]
+
+
+def note_out(note: Note) -> NoteOut:
+    return NoteOut(code=note.code, text=wording.note(note), warning=note.code in WARNINGS)
+
+
+def program_out(program: Program) -> ProgramOut:
+    return ProgramOut(
+        kind=program.kind.value,
+        first_line=program.first_line,
+        last_line=program.last_line,
+        parameters=program.parameters,
+        about=program.about,
+        values=program.values,
+        results=program.results,
+        touches=fanuc.touches(program.results),
+        notes=[note_out(note) for note in program.notes],
+    )
+
+
+def program_read(looked: CheckedProgram) -> ProgramRead:
+    """A text as it is answered."""
+    lines = [
+        LineOut(line=line.number, text=line.text, verdict=line.verdict.value, notes=[note_out(n) for n in line.notes])
+        for line in looked.text.lines
+    ]
+    return ProgramRead(
+        control=looked.control,
+        program=None if looked.program is None else program_out(looked.program),
+        problems=_remarks(looked.problems),
+        warnings=looked.warnings,
+        not_understood=sum(line.verdict == "not_understood" for line in lines),
+        lines=lines,
+        programs=[program_out(program) for program in looked.text.programs],
+    )
+
+
+def _remarks(errors: list[FieldError]) -> list[Remark]:
+    return [Remark(field=field, message=message) for field, message in errors]

@@ -1,0 +1,168 @@
+"""Actions of people on stored readings. The readings themselves are written by the writer alone."""
+
+from collections.abc import Sequence
+
+from sqlalchemy import select, update
+from sqlalchemy.dialects.postgresql import insert
+from sqlalchemy.orm import Session
+
+from app.access.audit import actions as audit
+from app.db.events import publish
+from app.errors import Conflict
+from app.language.i18n import _
+from app.language.times import in_sentence
+from app.loop.machines.queries import lock_machines
+from app.loop.readings import queries
+from app.loop.readings.by_hand.actions import HandResult
+from app.loop.readings.by_hand.actions import measure as measure_by_hand
+from app.loop.readings.by_hand.actions import measure_typed as measure_typed_by_hand
+from app.loop.readings.records import Entry
+from app.loop.readings.results import Source, ask_for, push_results
+from app.loop.tables.readings import Exclusion, Reading, Stream
+
+__all__ = [
+    "HandResult",
+    "Source",
+    "ask_for",
+    "exclude",
+    "exclude_all",
+    "measure_by_hand",
+    "measure_typed_by_hand",
+    "push_results",
+]
+
+
+def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: str) -> Exclusion:
+    """Take a reading out of the statistics, never out of the record.
+
+    Raises `NotFound`, and `Conflict` when it has been excluded already, saying by whom.
+    """
+    queries.record_of(session, entry, sequence)
+    lock_machines(session, [entry.machine_id])  # before the first row, as whoever acknowledges an alarm does
+    exclusion: Exclusion | None = session.scalar(
+        insert(Exclusion)
+        .values(
+            machine_id=entry.machine_id,
+            characteristic_id=entry.characteristic_id,
+            sequence=sequence,
+            actor=actor,
+            reason=reason,
+        )
+        .on_conflict_do_nothing()
+        .returning(Exclusion)
+    )
+    if exclusion is None:
+        first = session.scalars(
+            select(Exclusion).where(
+                Exclusion.machine_id == entry.machine_id,
+                Exclusion.characteristic_id == entry.characteristic_id,
+                Exclusion.sequence == sequence,
+            )
+        ).one()
+        raise Conflict(
+            _("Reading %(sequence)s of %(characteristic)s was excluded by %(actor)s already, on %(at)s: %(reason)s")
+            % {
+                "sequence": sequence,
+                "characteristic": entry.characteristic,
+                "actor": first.actor,
+                "at": in_sentence(first.at),
+                "reason": first.reason,
+            },
+            _("There is nothing left to do."),
+        )
+    _forget_level(session, entry, [sequence])
+    audit.record(
+        session,
+        actor,
+        "reading excluded",
+        f"reading/{entry.characteristic}/{sequence}",
+        before={"excluded": False},
+        after={"excluded": True},
+        why=reason,
+    )
+    publish(
+        session,
+        {
+            "kind": "reading",
+            "machine": entry.machine,
+            "characteristic": entry.characteristic,
+            "sequence": sequence,
+            "excluded": True,
+        },
+    )
+    return exclusion
+
+
+def exclude_all(session: Session, entry: Entry, sequences: Sequence[int], actor: str, reason: str) -> list[int]:
+    """Take several readings of one characteristic out of the statistics at once; those excluded already are left alone.
+
+    Returns the ones that were excluded now.
+    """
+    lock_machines(session, [entry.machine_id])
+    at = {"machine_id": entry.machine_id, "characteristic_id": entry.characteristic_id}
+    excluded = sorted(
+        session.scalars(
+            insert(Exclusion)
+            .values([{**at, "sequence": sequence, "actor": actor, "reason": reason} for sequence in sequences])
+            .on_conflict_do_nothing()
+            .returning(Exclusion.sequence)
+        )
+        if sequences
+        else ()
+    )
+    if excluded:
+        _forget_level(session, entry, excluded)
+        audit.record(
+            session,
+            actor,
+            "readings excluded",
+            f"reading/{entry.characteristic}",
+            before={"excluded": False},
+            after={"excluded": True, "sequences": excluded},
+            why=reason,
+        )
+        publish(
+            session,
+            {
+                "kind": "reading",
+                "machine": entry.machine,
+                "characteristic": entry.characteristic,
+                "sequence": excluded[-1],
+                "excluded": True,
+            },
+        )
+    return excluded
+
+
+REMEMBERED = 8  # readings after which what one of them was makes no difference to the level (1/2 to the 8th of it)
+NOT_OF_LEVEL = ("implausible", "tool_worn_held", "probe_fault", "before_tool_change")
+
+
+def _forget_level(session: Session, entry: Entry, sequences: Sequence[int]) -> None:
+    """A level that readings taken out have made is not believed any more: the next reading begins it anew.
+
+    The machine is locked.
+    """
+    at = (Stream.machine_id == entry.machine_id, Stream.characteristic_id == entry.characteristic_id)
+    newest = session.scalar(select(Stream.level_sequence).where(*at))
+    if newest is None or not any(newest - REMEMBERED < sequence <= newest for sequence in sequences):
+        return
+    made_it = session.scalar(
+        select(Reading.sequence)
+        .where(
+            Reading.machine_id == entry.machine_id,
+            Reading.characteristic_id == entry.characteristic_id,
+            Reading.sequence.in_(sequences),
+            Reading.sequence > newest - REMEMBERED,
+            Reading.sequence <= newest,
+            Reading.code.not_in(NOT_OF_LEVEL),
+        )
+        .limit(1)
+    )
+    if made_it is not None:
+        session.execute(
+            update(Stream)
+            .where(*at)
+            .values(level=None, level_sequence=None)
+            .execution_options(synchronize_session=False)
+        )

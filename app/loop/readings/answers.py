@@ -1,0 +1,211 @@
+"""A decided reading as the contract words it: the same for the first answer, a repeated one, and a look into the record."""
+
+from collections.abc import Iterable
+from datetime import datetime
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from app.core.decision.decide import needs_approval
+from app.core.decision.step import DECIMALS, Action
+from app.core.parameters import Parameters
+from app.core.variants import Results
+from app.loop.readings.by_hand.schemas import BY_HAND, HandMeasurementOut
+from app.loop.readings.records import Record
+from app.loop.readings.wording import reason
+
+
+def answer(
+    characteristic: str,
+    record: Record,
+    parameters: Parameters,
+    *,
+    correction: tuple[int, float] | None,
+    alarms: Iterable[tuple[int, str]],
+    results: Results | None = None,
+) -> dict[str, Any]:
+    """The answer to the machine. `correction` is (R10, amount in mm) of the one this reading led to.
+
+    The status is the one the correction had when it was issued, so that a repeated answer is the first one.
+    """
+    issued = None
+    if correction is not None:
+        if record.action == Action.HOLD:
+            status = "held"
+        else:
+            status = "awaiting_approval" if needs_approval(parameters) else "pending"
+        issued = {
+            "number": record.correction,
+            "tool_memory": correction[0],
+            "amount": correction[1],
+            "status": status,
+        }
+    return {
+        "characteristic": characteristic,
+        "sequence": record.sequence,
+        "key": record.key,
+        "part": record.part,
+        "measured": record.measured,
+        "measured_at": record.measured_at,
+        "received_at": record.received_at,
+        "late": record.late,
+        "deviation": record.deviation,
+        "size": round(parameters.target + record.deviation, DECIMALS),
+        "decided_deviation": record.decided,
+        "outstanding": list(record.outstanding or ()),
+        "zone": record.zone,
+        "results": None if results is None else results._asdict(),
+        "average_before": record.average_before,
+        "average_after": record.average_after,
+        "action": record.action,
+        "correction": issued,
+        "alarms": [{"id": number, "kind": kind} for number, kind in alarms],
+        "reason": reason(record, parameters, correction[1] if correction else None),
+        "parameters_version": record.parameters_version,
+    }
+
+
+ANSWER: dict[str, JsonValue] = {
+    "characteristic": "shaft-d40",
+    "sequence": 812,
+    "key": "lathe-1:000812:d40",
+    "part": "SN-000812",
+    "measured": 39.9981,
+    "measured_at": "2026-11-21T07:15:02.120Z",
+    "received_at": "2026-11-21T07:15:02.131Z",
+    "late": False,
+    "deviation": 0.0061,
+    "size": 39.9981,
+    "decided_deviation": 0.0061,
+    "outstanding": [],
+    "zone": "full",
+    "results": None,
+    "average_before": 0.0012,
+    "average_after": 0.0,
+    "action": "correct",
+    "correction": {"number": 18, "tool_memory": 3, "amount": -0.0061, "status": "pending"},
+    "alarms": [],
+    "reason": {
+        "code": "full_deviation",
+        "text": "Deviation 6.1 µm is beyond the averaging limit 5.3 µm: corrected in full.",
+        "notes": [],
+    },
+    "parameters_version": 4,
+}
+ROW = ANSWER | {"excluded": None}
+DETAIL = ROW | {"by_hand": [BY_HAND], "touches": None, "machined_at": None, "correction_in_effect": 17}
+
+
+class IssuedCorrection(BaseModel):
+    """The correction that a reading led to, as it was issued."""
+
+    number: Annotated[int, Field(description="Counts per machine, without gaps; confirm it by this number.")]
+    tool_memory: Annotated[int, Field(description="R10: the tool memory location whose offset is to be changed.")]
+    amount: Annotated[float, Field(description="Add this to the offset, mm.")]
+    status: Annotated[
+        str, Field(description="pending: apply it; held or awaiting_approval: a person decides first, so do not.")
+    ]
+
+
+class RaisedAlarm(BaseModel):
+    """An alarm that a reading raised, or repeated while it was active."""
+
+    id: int
+    kind: str
+
+
+class WhySo(BaseModel):
+    """The reason of a decision."""
+
+    code: Annotated[str, Field(description="For programs.")]
+    text: Annotated[str, Field(description="For people.")]
+    notes: Annotated[
+        list[str],
+        Field(
+            description="What else was considered: outstanding, part_out_of_tolerance, clamped, empirical_value, late, inches."
+        ),
+    ]
+
+
+class VariantResults(BaseModel):
+    """Results of the measuring variant beside the value; null where it has no such thing. Lengths in mm."""
+
+    run_out: Annotated[float | None, Field(description="Part indexed (R25 = 1): half-difference of the sides.")]
+    out_of_roundness: Annotated[float | None, Field(description="Points round (R25 = 2): their range.")]
+    taper: Annotated[
+        float | None, Field(description="Points along (R25 = 3): rise of the least-squares line over the length.")
+    ]
+    slope: Annotated[float | None, Field(description="The same per mm; null where the spacing R26 is not said.")]
+    repeat_range: Annotated[float | None, Field(description="Largest range of the repeats (R27) at one point.")]
+    repeat_deviation: Annotated[float | None, Field(description="Pooled standard deviation of the repeats.")]
+    sections_outside: Annotated[int | None, Field(description="With acceptance n of m: sections out of tolerance.")]
+    rejected: Annotated[bool | None, Field(description="With acceptance n of m: too many sections are outside.")]
+
+
+class ReadingAnswer(BaseModel):
+    """The answer to one reading. Lengths in mm; `deviation` is raw, `decided_deviation` counts outstanding corrections."""
+
+    model_config = ConfigDict(json_schema_extra={"example": ANSWER})
+
+    characteristic: str
+    sequence: Annotated[int, Field(description="Counts 1, 2, 3 … per characteristic, without gaps.")]
+    key: str | None
+    part: str | None
+    measured: Annotated[float, Field(description="As the machine sent it, mm; of touches, what they amount to.")]
+    measured_at: datetime
+    received_at: datetime
+    late: Annotated[bool, Field(description="Measured before a reading that had come in already.")]
+    deviation: Annotated[float, Field(description="Measured - target - empirical value, as the part came out.")]
+    size: Annotated[
+        float, Field(description="Target + deviation, mm: the size that the drawing's limits are compared with.")
+    ]
+    decided_deviation: Annotated[
+        float, Field(description="What it would have been with the outstanding corrections; decided by this.")
+    ]
+    outstanding: Annotated[
+        list[int],
+        Field(
+            description="Numbers of the corrections that were not in effect yet when the part was cut; of more than a "
+            "hundred the first. All of them count."
+        ),
+    ]
+    zone: Annotated[str, Field(description="zero, average, full, oversize, undersize, wear or probe_fault.")]
+    results: Annotated[
+        VariantResults | None, Field(description="Of touches, what the variant yields beside the value.")
+    ]
+    average_before: Annotated[float, Field(description="Running average M before this reading.")]
+    average_after: Annotated[float, Field(description="M after it; 0 after a correction.")]
+    action: Annotated[
+        str, Field(description="none; correct: apply the correction; hold: a person decides; stop: stop the machine.")
+    ]
+    correction: Annotated[IssuedCorrection | None, Field(description="What this reading led to, if anything.")]
+    alarms: list[RaisedAlarm]
+    reason: WhySo
+    parameters_version: Annotated[int, Field(description="Which version of the parameters it was judged by.")]
+
+
+class Excluded(BaseModel):
+    """The exclusion of a reading from the statistics."""
+
+    at: datetime
+    by: str
+    reason: str
+
+
+class ReadingRow(ReadingAnswer):
+    """A stored reading."""
+
+    model_config = ConfigDict(json_schema_extra={"example": ROW})
+
+    excluded: Annotated[Excluded | None, Field(description="If it was taken out of the statistics.")]
+
+
+class ReadingDetail(ReadingRow):
+    """A stored reading with everything about it."""
+
+    model_config = ConfigDict(json_schema_extra={"example": DETAIL})
+
+    by_hand: Annotated[list[HandMeasurementOut], Field(description="What people measured on this part.")]
+    touches: Annotated[list[list[float]] | None, Field(description="One list per point, each with its repeats.")]
+    machined_at: datetime | None
+    correction_in_effect: int | None

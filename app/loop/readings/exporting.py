@@ -1,0 +1,151 @@
+"""Readings into files, row by row out of a server-side cursor: however many there are, few are in memory."""
+
+import csv
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Any, TextIO
+
+import msgspec
+from sqlalchemy import select, text
+from sqlalchemy.orm import Session
+
+from app.core.decision.step import DECIMALS
+from app.core.variants import Results
+from app.files.formats.delimited import defused
+from app.language.times import local
+from app.loop.characteristics.queries import parameters_of
+from app.loop.readings.by_hand import queries as by_hand
+from app.loop.readings.by_hand.wording import verdict_of
+from app.loop.readings.records import Entry
+from app.loop.tables.readings import Exclusion, Reading, ReadingResults, ReadingTouches
+
+COLUMNS = (
+    "sequence",
+    "measured_at",
+    "machined_at",
+    "received_at",
+    "part",
+    "key",
+    "measured",
+    "deviation",
+    "corrected_size",
+    "decided_deviation",
+    "zone",
+    "action",
+    "code",
+    "average_before",
+    "average_after",
+    "correction",
+    "correction_in_effect",
+    "parameters_version",
+    "late",
+    "excluded",
+    *Results._fields,
+    "hand_measured",
+    "hand_verdict",
+)
+OF_READING = COLUMNS[: COLUMNS.index("excluded")]
+MADE_OF = {"decided_deviation": "decided", "corrected_size": "deviation"}
+AT_ONCE = 2_000  # readings that are fetched at once
+
+
+def rows(
+    session: Session,
+    entry: Entry,
+    *,
+    since: datetime | None = None,
+    until: datetime | None = None,
+    last: int | None = None,
+) -> Iterator[dict[str, Any]]:
+    """Readings in the order of their arrival: measured from `since` on and before `until`, of the last `last`."""
+    hand = by_hand.latest_of_each()
+    here = (Reading.machine_id == entry.machine_id, Reading.characteristic_id == entry.characteristic_id)
+    query = (
+        # Columns, not entities: a session keeps hold of those, and cannot let go of them between two fetches.
+        select(
+            *(getattr(Reading, MADE_OF.get(name, name)) for name in OF_READING),
+            Exclusion.reason,
+            *(getattr(ReadingResults, name) for name in Results._fields),
+            hand.measured,
+            hand.good,
+            ReadingTouches.touches,
+        )
+        .outerjoin(
+            ReadingTouches,
+            (ReadingTouches.machine_id == Reading.machine_id)
+            & (ReadingTouches.characteristic_id == Reading.characteristic_id)
+            & (ReadingTouches.sequence == Reading.sequence),
+        )
+        .outerjoin(
+            Exclusion,
+            (Exclusion.machine_id == Reading.machine_id)
+            & (Exclusion.characteristic_id == Reading.characteristic_id)
+            & (Exclusion.sequence == Reading.sequence),
+        )
+        .outerjoin(
+            ReadingResults,
+            (ReadingResults.machine_id == Reading.machine_id)
+            & (ReadingResults.characteristic_id == Reading.characteristic_id)
+            & (ReadingResults.sequence == Reading.sequence),
+        )
+        .outerjoin(
+            hand,
+            (hand.machine_id == Reading.machine_id)
+            & (hand.characteristic_id == Reading.characteristic_id)
+            & (hand.sequence == Reading.sequence),
+        )
+        .where(*here)
+        .order_by(Reading.sequence)
+    )
+    if since is not None:
+        query = query.where(Reading.measured_at >= since)
+    if until is not None:
+        query = query.where(Reading.measured_at < until)
+    if last is not None:
+        newest = select(Reading.sequence).where(*here).order_by(Reading.sequence.desc()).offset(last).limit(1)
+        before = session.scalar(newest)
+        if before is not None:
+            query = query.where(Reading.sequence > before)
+    # Whoever reads the file may be slow.
+    session.execute(text("SET LOCAL idle_in_transaction_session_timeout = 0"))
+    targets: dict[int, float] = {}
+    fetched = session.execute(query.execution_options(yield_per=AT_ONCE))
+    for *values, good, touches in fetched:
+        row = dict(zip(COLUMNS, (*values, verdict_of(good)), strict=True)) | {"touches": touches}
+        version = row["parameters_version"]
+        if version not in targets:
+            targets[version] = parameters_of(session, entry.machine_id, entry.characteristic_id, version).target
+        # Target + deviation, mm: the size as the drawing counts it.
+        yield row | {"corrected_size": round(targets[version] + row["deviation"], DECIMALS)}
+
+
+def write_csv(found: Iterator[dict[str, Any]], file: TextIO) -> int:
+    """As CSV with a header; texts that a spreadsheet would take for a formula are defused. The number of rows."""
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    count = 0
+    for row in found:
+        writer.writerow([_cell(row[name]) for name in COLUMNS])
+        count += 1
+    return count
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, str):
+        return defused(value)
+    if isinstance(value, datetime):
+        return local(value).isoformat()
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return "" if value is None else value
+
+
+def write_ndjson(found: Iterator[dict[str, Any]], file: TextIO) -> int:
+    """One JSON object per line, with the touches of those that have them. The number of rows."""
+    count = 0
+    for row in found:
+        if row["touches"] is None:
+            del row["touches"]
+        file.write(msgspec.json.encode(row).decode() + "\n")
+        count += 1
+    return count

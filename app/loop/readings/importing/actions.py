@@ -1,0 +1,115 @@
+"""The two ways in: as history, which is the rule, and live."""
+
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from pathlib import Path
+
+from app.db.engine import Database
+from app.errors import Conflict, Invalid, NotFound
+from app.language.i18n import _
+from app.loop.readings import queries
+from app.loop.readings.importing.history import MOST_FLAWS, Flawed, Progress, Summary, store_history
+from app.loop.readings.importing.layout import Layout
+from app.loop.readings.importing.lines import Flaw, Line, lines
+from app.loop.readings.records import Entry
+from app.loop.readings.schemas import ReadingIn
+from app.loop.readings.writer.batch import store_batch
+from app.loop.readings.writer.transaction import new_verdicts
+
+MOST_LIVE = 10_000
+
+
+def import_readings(
+    database: Database,
+    characteristic: str,
+    path: Path,
+    layout: Layout,
+    *,
+    actor: str,
+    source: str | None = None,
+    live: bool = False,
+    dry_run: bool = False,
+    progress: Progress = lambda: None,
+) -> Summary:
+    """Import a file, all of it or nothing.
+
+    live: decide as if the readings came in now, with corrections and alarms. dry_run: say what would happen.
+    source: what the file is called in the record of changes. Raises `NotFound`, `Flawed` and `Invalid`.
+    """
+    with database.sessions() as session:
+        entry = queries.entry_of(session, characteristic)
+        if entry is None:
+            raise NotFound(
+                _("There is no characteristic {key}.").format(key=repr(characteristic)),
+                _("Check its key under Set-up, or set it up first."),
+            )
+        found = lines(path, layout, characteristic)
+        if not live:
+            summary = store_history(session, entry, found, actor=actor, source=source or path.name, progress=progress)
+            if dry_run:
+                session.rollback()
+            else:
+                session.commit()
+            return summary
+    return _store_live(database, entry, found, dry_run=dry_run, progress=progress)
+
+
+def _store_live(
+    database: Database, entry: Entry, found: Iterable[Line | Flaw], *, dry_run: bool, progress: Progress
+) -> Summary:
+    wanted, numbers = _all_good(found, progress)
+    summary = Summary(lines=len(wanted))
+    times = [reading.measured_at or datetime.now(UTC) for reading in wanted]
+    summary.first_at, summary.last_at = min(times), max(times)
+    if dry_run:
+        return summary
+    try:
+        outcomes = store_batch(database, {}, [(entry, reading) for reading in wanted])
+    except (Invalid, Conflict) as refusal:
+        if not refusal.errors:
+            raise
+        raise Flawed(
+            [_named(error.field, error.message, numbers) for error in refusal.errors], len(refusal.errors)
+        ) from None
+    new = new_verdicts(outcomes)
+    summary.stored, summary.repeated = len(new), len(outcomes) - len(new)
+    for verdict in new:
+        zone = verdict.decision.zone.value
+        summary.zones[zone] = summary.zones.get(zone, 0) + 1
+    summary.corrections = sum(verdict.correction is not None for verdict in new)
+    summary.alarms = len({id(alarm) for verdict in new for alarm in verdict.alarms if alarm.new})
+    if new:
+        summary.first_sequence, summary.last_sequence = new[0].sequence, new[-1].sequence
+    return summary
+
+
+def _all_good(found: Iterable[Line | Flaw], progress: Progress) -> tuple[list[ReadingIn], list[int]]:
+    wanted: list[ReadingIn] = []
+    numbers: list[int] = []
+    flaws: list[Flaw] = []
+    wrong = 0
+    for line in found:
+        progress()
+        if isinstance(line, Flaw):
+            wrong += 1
+            flaws += [line] if wrong <= MOST_FLAWS else []
+            continue
+        wanted.append(line.reading)
+        numbers.append(line.number)
+        if len(wanted) > MOST_LIVE:
+            raise Invalid(
+                _("Live, at most {most} lines are imported at once.").format(most=MOST_LIVE),
+                _("Nothing was imported. So many readings at once are history: import them without --live."),
+            )
+    if wrong:
+        raise Flawed(flaws, wrong)
+    if not wanted:
+        raise Invalid(_("The file holds no readings: there is nothing after its header."), _("Nothing was imported."))
+    return wanted, numbers
+
+
+def _named(where: str, message: str, numbers: list[int]) -> Flaw:
+    """Return the error of a batch's item `[17].measured` as one of the line that it came from."""
+    item, _dot, column = where.partition(".")
+    at = item.strip("[]")
+    return Flaw(numbers[int(at)] if at.isdigit() and int(at) < len(numbers) else 0, column, "", message)

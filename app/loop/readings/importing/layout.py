@@ -1,0 +1,266 @@
+"""Meanings of the columns of a file: by the names that people give them in English, German, Serbian, Slovene and Russian."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from zoneinfo import ZoneInfo
+
+from app.errors import FieldError, Invalid
+from app.files.formats import cell_values, delimited
+from app.files.formats.delimited import Unusable
+from app.language.i18n import _
+
+# Folded: lower case, no accents, no unit. The first of a line is the field's own name.
+NAMES: dict[str, tuple[str, ...]] = {
+    "measured": (
+        "measured", "measured value", "measurement", "value", "actual", "actual value", "size", "diameter",
+        "messwert", "wert", "istwert", "ist", "istmass", "mass", "gemessen", "durchmesser",
+        "izmereno", "izmerena vrednost", "vrednost", "mera", "izmerjeno", "izmerjena vrednost", "meritev", "mere",
+        "precnik", "premer", "пречник", "диаметр",
+        "измерено", "измерена вредност", "вредност", "мера", "значение", "измеренное значение", "размер", "результат",
+    ),
+    "measured_at": (
+        "measured at", "time", "timestamp", "date time", "datetime", "date", "date and time", "measured on",
+        "zeit", "zeitpunkt", "zeitstempel", "messzeit", "messzeitpunkt", "datum", "datum uhrzeit", "datum zeit",
+        "vreme", "vreme merenja", "datum i vreme", "cas", "cas meritve", "datum in cas",
+        "време", "време мерења", "датум", "датум и време", "время", "время измерения", "дата", "дата и время",
+    ),
+    "machined_at": (
+        "machined at", "cut at", "bearbeitet", "gefertigt", "gefertigt am", "obradeno", "vreme obrade", "izdelano",
+        "cas izdelave", "обрађено", "време обраде", "обработано", "время обработки",
+    ),
+    "part": (
+        "part", "part number", "part id", "serial", "serial number", "sn", "teil", "teilenummer", "teile nr", "seriennummer",
+        "werkstuck", "deo", "komad", "serijski broj", "kos", "obdelovanec", "serijska stevilka",
+        "део", "комад", "серијски број", "деталь", "номер детали", "серийный номер",
+    ),
+    "key": ("key", "schlussel", "kljuc", "ключ", "кључ"),
+    "correction_in_effect": ("correction in effect",),
+    "touches": ("touches",),
+}  # fmt: skip
+MOST_COLUMNS = 500
+DATES = {"date", "datum", "дата", "датум"}
+TIMES = {"time", "zeit", "uhrzeit", "vreme", "cas", "время", "време"}
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """Choices of a person about a file. What is None (or not mapped) is recognised from the file."""
+
+    mapping: Mapping[str, str] = field(default_factory=dict)  # field -> column, by name or number
+    delimiter: str | None = None
+    decimal: str | None = None
+    unit: str | None = None
+    timezone: str | None = None
+    time_format: str | None = None
+    encoding: str | None = None
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The layout by which a file is read."""
+
+    kind: str  # csv, lines (one JSON object per line) or list (one JSON list)
+    header: tuple[str, ...]
+    columns: Mapping[str, tuple[int, ...]]  # field -> places in the header; a date and a time may be two
+    encoding: str = "utf-8"
+    delimiter: str = ","
+    decimal: str = "."
+    unit: str = "mm"
+    zone: ZoneInfo | None = None
+    time_format: str | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Tell if the column of the measured values is known."""
+        return "measured" in self.columns or "touches" in self.columns
+
+    @property
+    def ignored_places(self) -> list[int]:
+        """Return the places of columns that mean nothing here."""
+        used = {place for places in self.columns.values() for place in places}
+        return [place for place in range(len(self.header)) if place not in used]
+
+    @property
+    def ignored(self) -> list[str]:
+        """Their names."""
+        return [self.header[place] for place in self.ignored_places]
+
+    def named(self, field_name: str) -> str:
+        """The column that a field is read from."""
+        return "+".join(self.header[place] for place in self.columns.get(field_name, ()))
+
+
+def look(path: Path, wishes: Wishes, name: str | None = None, *, complete: bool = True) -> Layout:
+    """Find out how a file is to be read. Raises `Invalid`, naming what must be said.
+
+    name: what the file is called where `path` is only a copy of it; its ending says what kind it is.
+    complete: refuse a file in which no column is known to hold what was measured.
+    """
+    try:
+        zone = cell_values.zone_named(wishes.timezone) if wishes.timezone else None
+    except cell_values.Unreadable as error:
+        raise wrong("timezone", str(error)) from None
+    if wishes.unit not in {None, *cell_values.UNITS}:
+        raise wrong("unit", _("Choose one of {units}.").format(units=", ".join(cell_values.UNITS)))
+    if wishes.decimal not in {None, ".", ","}:
+        raise wrong("decimal", _("Decimals are written with a point or a comma."))
+    if wishes.encoding not in {None, *delimited.ENCODINGS}:
+        raise wrong("encoding", _("Choose one of {names}.").format(names=", ".join(delimited.ENCODINGS)))
+    if wishes.delimiter is not None and (len(wishes.delimiter) != 1 or wishes.delimiter in '"\r\n'):
+        raise wrong("delimiter", _("Cells are parted by one sign, such as ; or a tabulator."))
+    ending = Path(name or path.name).suffix.lower()
+    try:
+        if ending in {".ndjson", ".jsonl", ".json"}:
+            layout = _json_layout(path, wishes, zone, is_list=ending == ".json")
+        else:
+            layout = _csv_layout(path, wishes, zone)
+    except Unusable as error:
+        where = _("line {line}").format(line=error.line) if error.line else "file"
+        raise wrong(where, str(error)) from None
+    if complete and not layout.complete:
+        raise wrong(
+            "measured",
+            _(
+                "No column is recognised as the measured value. Say which it is: measured=COLUMN. The columns are: {header}."
+            ).format(header=", ".join(layout.header)),
+        )
+    return layout
+
+
+def wrong(where: str, message: str) -> Invalid:
+    """One thing that is wrong with the file or with what was said about it."""
+    return Invalid(f"{where}: {message}", _("Nothing was imported."), errors=[FieldError(where, message)])
+
+
+def _refuse_wide(columns: int) -> None:
+    """Refuse what is no table of readings, before each column is looked at and offered for choice."""
+    if columns > MOST_COLUMNS:
+        raise wrong(
+            "file",
+            _("The file has {columns} columns; at most {most} are taken. Is its first line the header?").format(
+                columns=columns, most=MOST_COLUMNS
+            ),
+        )
+
+
+def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None) -> Layout:
+    encoding = wishes.encoding or delimited.encoding_of(path)
+    delimiter = wishes.delimiter or delimited.delimiter_of(path, encoding)
+    rows = delimited.rows(path, encoding, delimiter)
+    first = next(rows, None)
+    if first is None:
+        raise wrong("file", _("The file is empty."))
+    _refuse_wide(len(first.cells))
+    header = tuple(cell.strip().removeprefix("\ufeff") for cell in first.cells)
+    columns = _columns(header, wishes.mapping)
+    place = columns.get("measured", (0,))[0]
+    sample = [row.cells[place] for row, _count in zip(rows, range(200), strict=False) if len(row.cells) > place]
+    return Layout(
+        kind="csv",
+        header=header,
+        columns=columns,
+        encoding=encoding,
+        delimiter=delimiter,
+        decimal=wishes.decimal or delimited.decimal_of(sample),
+        unit=wishes.unit or ("measured" in columns and cell_values.unit_in(header[place])) or "mm",
+        zone=zone,
+        time_format=wishes.time_format,
+    )
+
+
+def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: bool) -> Layout:
+    names: dict[str, None] = {}
+    for value in _first_values(path, is_list=is_list):
+        if isinstance(value, dict):
+            names.update(dict.fromkeys(map(str, value)))
+            _refuse_wide(len(names))
+    header = tuple(names)
+    if not header:
+        raise wrong("file", _("The file holds no JSON objects."))
+    columns = _columns(header, wishes.mapping)
+    unit = wishes.unit or (cell_values.unit_in(header[columns["measured"][0]]) if "measured" in columns else None)
+    return Layout(
+        "list" if is_list else "lines", header, columns, unit=unit or "mm", zone=zone, time_format=wishes.time_format
+    )
+
+
+def _first_values(path: Path, *, is_list: bool, most: int = 200) -> list[Any]:
+    try:
+        if is_list:
+            whole = json.loads(path.read_text("utf-8-sig"))
+            return whole[:most] if isinstance(whole, list) else []
+        with path.open(encoding="utf-8-sig") as file:
+            return [_object(line) for line, _count in zip(file, range(most), strict=False) if line.strip()]
+    except UnicodeDecodeError:
+        raise Unusable(_("JSON files are UTF-8 text; this is not.")) from None
+    except ValueError as error:
+        raise Unusable(_("This is not JSON: {error}.").format(error=error)) from None
+    except RecursionError:
+        raise Unusable(_("This is nested too deeply to be readings.")) from None
+
+
+def _object(line: str) -> Any:
+    try:
+        return json.loads(line)
+    except ValueError:
+        return None  # the line is named when it is read
+
+
+def _columns(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str, tuple[int, ...]]:
+    problems: list[FieldError] = []
+    columns: dict[str, tuple[int, ...]] = {}
+    for name, column in mapping.items():
+        if name not in NAMES:
+            message = _("There is no field {name}; there are {names}.").format(name=repr(name), names=", ".join(NAMES))
+            problems.append(FieldError("map", message))
+        elif column:  # an empty one says: not in this file
+            places = _places(header, column)
+            if places is None:
+                message = _("There is no column {column}; the file has: {header}.").format(
+                    column=repr(column), header=", ".join(header)
+                )
+                problems.append(FieldError(f"map {name}", message))
+            else:
+                columns[name] = places
+    if problems:
+        raise Invalid(problems[0].message, _("Nothing was imported."), errors=problems)
+    taken = {place for places in columns.values() for place in places}
+    guesses = _guesses(header).items()
+    columns |= {name: guess for name, guess in guesses if name not in mapping and not taken & set(guess)}
+    return columns
+
+
+def _places(header: tuple[str, ...], column: str) -> tuple[int, ...] | None:
+    """Return the place of a column: by its name or number, or two that belong together as Date+Time or 2+3."""
+    place = _place(header, column)
+    if place is not None:
+        return (place,)
+    places = [_place(header, part.strip()) for part in column.split("+")]
+    found = tuple(place for place in places if place is not None)
+    return found if len(found) == len(places) else None
+
+
+def _place(header: tuple[str, ...], column: str) -> int | None:
+    if column in header:
+        return header.index(column)
+    if column.isascii() and column.isdigit() and len(column) < 6 and 1 <= int(column) <= len(header):
+        return int(column) - 1
+    return None
+
+
+def _guesses(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
+    names = [cell_values.folded(name) for name in header]
+    found: dict[str, tuple[int, ...]] = {}
+    for name, words in NAMES.items():
+        folded = [cell_values.folded(word) for word in words]
+        ranked = sorted((folded.index(each), place) for place, each in enumerate(names) if each in folded)
+        if ranked:
+            found[name] = (ranked[0][1],)
+    date = next((place for place, each in enumerate(names) if each in DATES), None)
+    time = next((place for place, each in enumerate(names) if each in TIMES), None)
+    if date is not None and time is not None:
+        found["measured_at"] = (date, time)
+    return found

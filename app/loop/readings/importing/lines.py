@@ -1,0 +1,198 @@
+"""The lines of a file as readings, or what is wrong with each: line, column, reason."""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from app.errors import Invalid
+from app.files.formats import cell_values, delimited
+from app.files.formats.cell_values import UNITS, Unreadable
+from app.files.formats.delimited import Unusable
+from app.language.i18n import _
+from app.loop.readings.importing.layout import Layout
+from app.loop.readings.schemas import ReadingIn, reading_of
+
+SHOWN = 60  # characters of a wrong value
+
+
+class Flaw(NamedTuple):
+    """The error of a line."""
+
+    line: int
+    column: str
+    value: str
+    reason: str
+
+    def __str__(self) -> str:
+        where = _("line {line}").format(line=self.line) + (f", {self.column}" if self.column else "")
+        return f"{where}: {f'{self.value!r} ' if self.value else ''}{self.reason}"
+
+
+class Line(NamedTuple):
+    """A line that can be a reading."""
+
+    number: int
+    reading: ReadingIn
+
+
+def fingerprint(path: Path) -> str:
+    """Names the content of a file: the same content has the same, whatever the file is called."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:20]
+
+
+def lines(path: Path, layout: Layout, characteristic: str, *, now: datetime | None = None) -> Iterator[Line | Flaw]:
+    """Every line that is not empty. A reading without a key of its own gets one made of the file's content and the line,
+    so that importing the same file again stores nothing twice.
+    """
+    now = now or datetime.now(UTC)
+    mark = fingerprint(path)
+    source = _csv(path, layout) if layout.kind == "csv" else _json(path, layout)
+    for number, found in source:
+        if isinstance(found, Flaw):
+            yield found
+            continue
+        found["characteristic"] = characteristic
+        if found.get("touches") is not None:
+            found.pop("measured", None)  # it is made of them
+        if found.get("key") is None:
+            found["key"] = f"file:{mark}:{number}"
+        try:
+            yield Line(number, reading_of(found, now))
+        except Invalid as refusal:
+            for error in refusal.errors:
+                column = layout.named(error.field.partition(".")[0]) or error.field
+                yield Flaw(number, column, _shown(found.get(error.field)), error.message)
+
+
+def _shown(value: Any) -> str:
+    text = "" if value is None else value if isinstance(value, str) else str(value)
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
+
+
+Found = Iterator[tuple[int, "dict[str, Any] | Flaw"]]
+
+
+def _csv(path: Path, layout: Layout) -> Found:
+    readers = _readers(layout)
+    width = len(layout.header)
+    rows = delimited.rows(path, layout.encoding, layout.delimiter)
+    try:
+        next(rows)
+        for row in rows:
+            if len(row.cells) < width or any(cell.strip() for cell in row.cells[width:]):
+                yield row.line, Flaw(row.line, "", "", _width(len(row.cells), width, layout.delimiter))
+                continue
+            found: dict[str, Any] = {}
+            flaws: list[Flaw] = []
+            for name, places, read in readers:
+                text = " ".join(row.cells[place] for place in places).strip()
+                try:
+                    found[name] = read(text)
+                except Unreadable as error:
+                    flaws.append(Flaw(row.line, layout.named(name), _shown(text), str(error)))
+            if flaws:
+                yield from ((row.line, flaw) for flaw in flaws)
+            else:
+                yield row.line, found
+    except Unusable as error:
+        yield error.line or 0, Flaw(error.line or 0, "", "", str(error))
+
+
+def _width(cells: int, width: int, delimiter: str) -> str:
+    sign = {"\t": _("tabulator"), ",": _("comma"), ";": _("semicolon")}.get(delimiter, delimiter)
+    text = _("has {cells} columns, the header has {width}; cells are parted by {sign}.").format(
+        cells=cells, width=width, sign=sign
+    )
+    if delimiter == "," and cells > width:
+        text += " " + _(
+            "A decimal comma parts a cell too: put such numbers in quotation marks, or name another delimiter."
+        )
+    return text
+
+
+def _readers(layout: Layout) -> list[tuple[str, tuple[int, ...], Callable[[str], Any]]]:
+    scale, decimal, zone, pattern = UNITS[layout.unit], layout.decimal, layout.zone, layout.time_format
+
+    def length(text: str) -> float:
+        value = cell_values.number(text, decimal)
+        return value if scale == 1.0 else round(value * scale, 9)
+
+    def time(text: str) -> datetime:
+        return cell_values.moment(text, zone, pattern)
+
+    def whole(text: str) -> int | None:
+        if text and not (text.isascii() and text.isdigit()):
+            raise Unreadable(_("is not the number of a correction"))
+        return int(text) if text else None
+
+    kinds: dict[str, Callable[[str], Any]] = {
+        "measured": length,
+        "measured_at": time,
+        "machined_at": lambda text: time(text) if text else None,
+        "correction_in_effect": whole,
+        "touches": _touches,
+    }
+    return [(name, places, kinds.get(name, lambda text: text or None)) for name, places in layout.columns.items()]
+
+
+def _touches(text: str) -> Any:
+    try:
+        return json.loads(text) if text else None
+    except (ValueError, RecursionError):
+        raise Unreadable(_("is not a list of touches such as [[39.998, 39.9982]]")) from None
+
+
+def _json(path: Path, layout: Layout) -> Found:
+    for number, value in objects(path, layout.kind):
+        if isinstance(value, Flaw):
+            yield number, value
+            continue
+        if not isinstance(value, dict):
+            yield number, Flaw(number, "", _shown(value), _("is not a JSON object with the fields of a reading"))
+            continue
+        found = {
+            name: value.get(layout.header[places[0]])
+            for name, places in layout.columns.items()
+            if value.get(layout.header[places[0]]) is not None
+        }
+        flaws = list(_converted(found, layout, number))
+        if flaws:
+            yield from ((number, flaw) for flaw in flaws)
+        else:
+            yield number, found
+
+
+def objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:
+    """Yield the content of each line of a file of JSON objects, or in each place of a JSON list."""
+    if kind == "list":
+        yield from enumerate(json.loads(path.read_text("utf-8-sig")), start=1)
+        return
+    number = 0
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            for number, line in enumerate(file, start=1):
+                if not line.strip():
+                    continue
+                try:
+                    yield number, json.loads(line)
+                except (ValueError, RecursionError) as error:
+                    yield number, Flaw(number, "", _shown(line.strip()), _("is not JSON: {error}").format(error=error))
+    except UnicodeDecodeError:
+        yield number + 1, Flaw(number + 1, "", "", _("JSON files are UTF-8 text; this is not."))
+
+
+def _converted(found: dict[str, Any], layout: Layout, number: int) -> Iterator[Flaw]:
+    """Bring lengths to mm and times to their zone; what is of the wrong kind is told with the other fields."""
+    scale = UNITS[layout.unit]
+    if scale != 1.0 and isinstance(found.get("measured"), int | float) and abs(found["measured"]) < 1e300:
+        found["measured"] = round(found["measured"] * scale, 9)
+    for name in ("measured_at", "machined_at"):
+        if isinstance(found.get(name), str):
+            try:
+                found[name] = cell_values.moment(found[name], layout.zone, layout.time_format)
+            except Unreadable as error:
+                yield Flaw(number, layout.named(name), _shown(found[name]), str(error))

@@ -1,0 +1,204 @@
+"""HTML routes: send a file, look at what it means and at what is wrong with it, import it. How it is read lies in the URL."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Path, Query, Request, Response
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import UploadFile
+from starlette.responses import RedirectResponse
+
+from app.access.deps import Caller, Engineer, require
+from app.db.engine import Database
+from app.errors import InbandError
+from app.files.formats.delimited import ENCODINGS
+from app.language.i18n import _
+from app.language.times import plant_zone
+from app.loop.characteristics import queries as characteristics
+from app.loop.readings.importing import uploads
+from app.loop.readings.importing.actions import import_readings
+from app.loop.readings.importing.history import Flawed
+from app.loop.readings.importing.layout import NAMES, Layout, Wishes, look
+from app.loop.readings.importing.preview import Preview, preview
+from app.web.deps import FormDep, SessionDep, SettingsDep
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+Token = Annotated[str, Path(max_length=64)]
+Number = Annotated[int | None, Query(ge=0)]
+HOW = ("timezone", "unit", "decimal", "delimiter", "encoding", "time_format")
+SIGNS = {"tab": "\t", "comma": ",", "semicolon": ";", "bar": "|"}
+
+
+@router.get("/import", dependencies=[require("engineer")])
+def start(
+    request: Request,
+    session: SessionDep,
+    characteristic: str = "",
+    stored: Number = None,
+    repeated: Number = None,
+    first: Number = None,
+) -> Response:
+    """Choose a characteristic and a file."""
+    return _start(request, session, characteristic, done=_done(session, characteristic, stored, repeated, first))
+
+
+def _done(
+    session: Any, characteristic: str, stored: int | None, repeated: int | None, first: int | None
+) -> dict[str, Any] | None:
+    if stored is None:
+        return None
+    standing = characteristics.characteristic_named(session, characteristic)
+    last = first + stored - 1 if first and stored else None
+    return {"to": standing.characteristic, "stored": stored, "repeated": repeated or 0, "first": first, "last": last}
+
+
+def _start(
+    request: Request,
+    session: Any,
+    characteristic: str,
+    *,
+    error: str | None = None,
+    done: dict[str, Any] | None = None,
+    status: int = 200,
+) -> Response:
+    return page(
+        request,
+        "imports/start.html",
+        status=status,
+        choices=[
+            (standing.characteristic.key, f"{standing.characteristic.name} · {standing.machine.name}")
+            for standing in characteristics.characteristics(session, limit=100_000)
+        ],
+        chosen=characteristic,
+        error=error,
+        done=done,
+    )
+
+
+@router.post("/import")
+async def send(request: Request, session: SessionDep, caller: Engineer, settings: SettingsDep) -> Response:
+    """Keep the file and go on to the preview."""
+    form = await request.form()
+    file, characteristic = form.get("file"), str(form.get("characteristic") or "")
+    if not isinstance(file, UploadFile) or not file.filename:
+        return await run_in_threadpool(
+            _start, request, session, characteristic, error=_("Choose the file to import."), status=422
+        )
+    await run_in_threadpool(characteristics.characteristic_named, session, characteristic)
+    kept = await run_in_threadpool(uploads.keep, settings, caller.name, file.filename, file.file)
+    return RedirectResponse(f"/import/{kept.token}?{urlencode({'characteristic': characteristic})}", 303)
+
+
+@router.get("/import/{token}")
+def look_at_it(
+    request: Request,
+    session: SessionDep,
+    caller: Engineer,
+    settings: SettingsDep,
+    token: Token,
+    characteristic: str = "",
+) -> Response:
+    """Show how the file is understood, what it would come to, what is wrong with it."""
+    return _preview(request, session, caller, settings, token, characteristic, request.query_params)
+
+
+def _preview(
+    request: Request,
+    session: Any,
+    caller: Caller,
+    settings: Any,
+    token: str,
+    characteristic: str,
+    said: Mapping[str, str],
+    *,
+    status: int = 200,
+) -> Response:
+    upload = uploads.find(settings, caller.name, token)
+    standing = characteristics.characteristic_named(session, characteristic)
+    session.commit()  # nothing is kept open while the file is read
+    layout: Layout | None = None
+    found: Preview | None = None
+    trouble: InbandError | None = None
+    try:
+        layout = look(upload.path, _wishes(said), upload.name, complete=False)
+        found = preview(_database(request), characteristic, upload.path, layout)
+        trouble = found.trouble
+    except InbandError as error:
+        trouble = error
+    ready = found is not None and layout is not None and layout.complete and not found.flaw_count and trouble is None
+    return page(
+        request,
+        "imports/preview.html",
+        status=status,
+        upload=upload,
+        size=upload.path.stat().st_size,
+        to=standing,
+        layout=layout,
+        found=found,
+        trouble=trouble,
+        ready=ready,
+        said={name: said.get(name, "") for name in HOW},
+        fields=_fields(layout) if layout else [],
+        encodings=[("", _("automatic")), *((name, name) for name in ENCODINGS)],
+        back=f"/import?{urlencode({'characteristic': characteristic})}",
+    )
+
+
+def _wishes(said: Mapping[str, str]) -> Wishes:
+    return Wishes(
+        mapping={name: said[f"column_{name}"] for name in NAMES if f"column_{name}" in said},
+        delimiter=SIGNS.get(said.get("delimiter", "")),
+        decimal={"comma": ",", "point": "."}.get(said.get("decimal", "")),
+        unit=said.get("unit") or None,
+        timezone=said.get("timezone", "").strip() or plant_zone().key,
+        time_format=said.get("time_format", "").strip() or None,
+        encoding=said.get("encoding") or None,
+    )
+
+
+def _fields(layout: Layout) -> list[dict[str, Any]]:
+    """Each field that a column can be, with the columns to choose from and the one that it is."""
+    labels = {
+        "measured": _("Measured value"),
+        "measured_at": _("Time of measuring"),
+        "machined_at": _("Time of cutting"),
+        "part": _("Part"),
+        "key": _("Key"),
+    }
+    columns = [(str(at), name or _("Column {n}").format(n=at)) for at, name in enumerate(layout.header, start=1)]
+    made: list[dict[str, Any]] = []
+    for name, label in labels.items():
+        places = layout.columns.get(name, ())
+        value = "+".join(str(place + 1) for place in places)
+        pair = [(value, layout.named(name))] if len(places) > 1 else []
+        made.append({"name": f"column_{name}", "label": label, "value": value, "options": [("", "–"), *pair, *columns]})
+    return made
+
+
+def _database(request: Request) -> Database:
+    database: Database = request.app.state.database
+    return database
+
+
+@router.post("/import/{token}")
+def import_it(
+    request: Request, session: SessionDep, caller: Engineer, settings: SettingsDep, token: Token, form: FormDep
+) -> Response:
+    """All of it or nothing; what is wrong is shown where it was to be seen before."""
+    characteristic = form.get("characteristic", "")
+    upload = uploads.find(settings, caller.name, token)
+    session.commit()  # the import has a transaction of its own, and takes a while
+    try:
+        layout = look(upload.path, _wishes(form), upload.name)
+        summary = import_readings(
+            _database(request), characteristic, upload.path, layout, actor=caller.name, source=upload.name
+        )
+    except Flawed:
+        return _preview(request, session, caller, settings, token, characteristic, form, status=422)
+    uploads.forget(upload)
+    told = {"characteristic": characteristic, "stored": summary.stored, "repeated": summary.repeated}
+    if summary.first_sequence is not None:
+        told["first"] = summary.first_sequence
+    return RedirectResponse(f"/import?{urlencode(told)}", 303)

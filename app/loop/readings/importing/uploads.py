@@ -1,0 +1,70 @@
+"""Files that came by browser, kept between the look at them and the import: readable by nobody else, gone after a day."""
+
+import json
+import os
+import re
+import secrets
+import shutil
+import time
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+from app.errors import NotFound
+from app.language.i18n import _
+from app.settings import Settings
+
+LASTS = 24 * 3600.0  # s
+_TOKEN = re.compile(r"[A-Za-z0-9_-]{22}")
+
+
+class Upload(NamedTuple):
+    """A file that waits to be imported; `name` is what its owner calls it."""
+
+    token: str
+    name: str
+    path: Path
+
+
+def keep(settings: Settings, owner: str, name: str, content: BinaryIO) -> Upload:
+    """Keep what was sent; files of yesterday go."""
+    folder = _folder(settings)
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    for old in folder.iterdir():
+        if old.stat().st_mtime < time.time() - LASTS:
+            old.unlink(missing_ok=True)
+    token = secrets.token_urlsafe(16)
+    path = folder / f"{token}.data"
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        shutil.copyfileobj(content, file)
+    name = "".join(character for character in Path(name).name if character.isprintable())[:100] or "file.csv"
+    about = json.dumps({"name": name, "owner": owner})
+    with os.fdopen(os.open(folder / f"{token}.about", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+        file.write(about)
+    return Upload(token, name, path)
+
+
+def find(settings: Settings, owner: str, token: str) -> Upload:
+    """The file that this person has sent. Raises `NotFound`."""
+    folder = _folder(settings)
+    if _TOKEN.fullmatch(token):
+        try:
+            about = json.loads((folder / f"{token}.about").read_text())
+        except FileNotFoundError:
+            about = {}
+        path = folder / f"{token}.data"
+        if about.get("owner") == owner and path.exists():
+            return Upload(token, about["name"], path)
+    raise NotFound(
+        _("This file is not here any more: it was imported, or you sent it more than a day ago."),
+        _("Send it again under Set-up, Import."),
+    )
+
+
+def forget(upload: Upload) -> None:
+    """It was imported, or is not wanted."""
+    upload.path.unlink(missing_ok=True)
+    upload.path.with_suffix(".about").unlink(missing_ok=True)
+
+
+def _folder(settings: Settings) -> Path:
+    return settings.data_dir / "imports"

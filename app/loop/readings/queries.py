@@ -1,0 +1,308 @@
+"""Everything that is read of readings."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from sqlalchemy import ColumnElement, func, select, tuple_
+from sqlalchemy.orm import Session
+
+from app.core.decision.limits import Zone
+from app.core.decision.step import Code
+from app.core.plausibility import uncorrected
+from app.core.variants import Results
+from app.errors import FieldError, Invalid, NotFound
+from app.language.i18n import _
+from app.loop.characteristics import queries as characteristics
+from app.loop.readings.answers import answer
+from app.loop.readings.by_hand import queries as by_hand
+from app.loop.readings.by_hand.wording import as_json as in_json
+from app.loop.readings.records import Entry, Record
+from app.loop.readings.wording import reason
+from app.loop.tables.alarms import Alarm
+from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.machines import Machine
+from app.loop.tables.readings import (
+    Exclusion,
+    HandMeasurement,
+    Reading,
+    ReadingResults,
+    ReadingTouches,
+    ResultReading,
+    Stream,
+)
+from app.loop.tables.tools import Correction
+from app.web.fields import is_slug
+
+COLUMNS = [getattr(Reading, name) for name in Record._fields]
+_RESULTS = [getattr(ReadingResults, name) for name in Results._fields]
+
+
+def entry_of(session: Session, characteristic: str) -> Entry | None:
+    """Return the place of a characteristic, by its key."""
+    if not is_slug(characteristic):
+        return None
+    row = session.execute(
+        select(Characteristic.machine_id, Machine.key, Characteristic.id, Characteristic.key)
+        .join(Machine, Machine.id == Characteristic.machine_id)
+        .where(Characteristic.key == characteristic)
+    ).one_or_none()
+    return Entry(*row) if row else None
+
+
+def entry_by_id(session: Session, machine_id: int, characteristic_id: int) -> Entry:
+    """Return the place of a characteristic that is known to be there."""
+    row = session.execute(
+        select(Characteristic.machine_id, Machine.key, Characteristic.id, Characteristic.key)
+        .join(Machine, Machine.id == Characteristic.machine_id)
+        .where(Characteristic.machine_id == machine_id, Characteristic.id == characteristic_id)
+    ).one()
+    return Entry(*row)
+
+
+def entries_for_results(
+    session: Session, machine_id: int, named: Mapping[str, str], field: str = "characteristics.{result}"
+) -> dict[str, Entry]:
+    """The characteristics that results are to become, by result. Raises `Invalid` for one that this machine has not.
+
+    field: where a result's characteristic stands in what was sent.
+    """
+    found: dict[str, Entry] = {}
+    errors = []
+    for result, characteristic in named.items():
+        entry = entry_of(session, characteristic)
+        if entry is None or entry.machine_id != machine_id:
+            wrong = _("there is no characteristic {key} on this machine").format(key=repr(characteristic[:64]))
+            errors.append(FieldError(field.format(result=result), wrong))
+        else:
+            found[result] = entry
+    if errors:
+        raise Invalid(f"{errors[0].field}: {errors[0].message}.", _("Set the characteristic up first."), errors=errors)
+    return found
+
+
+def readings_of_results(session: Session, keys: Iterable[str]) -> dict[str, tuple[str, ResultReading]]:
+    """Return the readings of results, by key: the key of their characteristic, and the row."""
+    rows = session.scalars(select(ResultReading).where(ResultReading.key.in_(list(keys)))).all()
+    return {row.key: (entry_by_id(session, row.machine_id, row.characteristic_id).characteristic, row) for row in rows}
+
+
+def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[str, Any]]:
+    """The stored readings as they were answered, with what has been said about them since (excluded)."""
+    if not records:
+        return []
+    numbers = [record.correction for record in records if record.correction is not None]
+    corrections: dict[int, tuple[int, float]] = {}
+    if numbers:
+        rows = session.execute(
+            select(Correction.number, Correction.tool_memory, Correction.amount).where(
+                Correction.machine_id == entry.machine_id, Correction.number.in_(numbers)
+            )
+        )
+        corrections = {number: (tool, amount) for number, tool, amount in rows}
+    alarm_ids = {number for record in records for number in record.alarms or ()}
+    kinds: dict[int, str] = {}
+    if alarm_ids:
+        found = session.execute(
+            select(Alarm.id, Alarm.kind).where(Alarm.machine_id == entry.machine_id, Alarm.id.in_(alarm_ids))
+        )
+        kinds = {row.id: row.kind for row in found}
+    excluded = {
+        sequence: {"at": at, "by": actor, "reason": reason}
+        for sequence, at, actor, reason in session.execute(
+            select(Exclusion.sequence, Exclusion.at, Exclusion.actor, Exclusion.reason).where(
+                Exclusion.machine_id == entry.machine_id,
+                Exclusion.characteristic_id == entry.characteristic_id,
+                Exclusion.sequence.in_([record.sequence for record in records]),
+            )
+        )
+    }
+    results = _results(session, entry, [record.sequence for record in records])
+    return [
+        answer(
+            entry.characteristic,
+            record,
+            characteristics.parameters_of(
+                session, entry.machine_id, entry.characteristic_id, record.parameters_version
+            ),
+            correction=corrections.get(record.correction) if record.correction is not None else None,
+            alarms=[(number, kinds[number]) for number in record.alarms or () if number in kinds],
+            results=results.get(record.sequence),
+        )
+        | {"excluded": excluded.get(record.sequence)}
+        for record in records
+    ]
+
+
+def _results(session: Session, entry: Entry, sequences: list[int]) -> dict[int, Results]:
+    """Return the results of the variants of these readings beside the value, of those that have anything."""
+    rows = session.execute(
+        select(ReadingResults.sequence, *_RESULTS).where(
+            ReadingResults.machine_id == entry.machine_id,
+            ReadingResults.characteristic_id == entry.characteristic_id,
+            ReadingResults.sequence.in_(sequences),
+        )
+    )
+    return {sequence: Results(*found) for sequence, *found in rows}
+
+
+def record_of(session: Session, entry: Entry, sequence: int) -> Record:
+    """One stored reading. Raises `NotFound`."""
+    row = session.execute(
+        select(*COLUMNS).where(
+            Reading.machine_id == entry.machine_id,
+            Reading.characteristic_id == entry.characteristic_id,
+            Reading.sequence == sequence,
+        )
+    ).one_or_none()
+    if row is None:
+        raise NotFound(
+            _("Characteristic %(key)s has no reading %(sequence)s.")
+            % {"key": entry.characteristic, "sequence": sequence},
+            _("Readings are numbered 1, 2, 3 … without gaps; look at the list for the last one."),
+        )
+    return Record(*row)
+
+
+def uncorrected_of(session: Session, machine_id: int, characteristic_id: int, sequence: int) -> float | None:
+    """Return the deviation of a reading without the corrections its part was cut with, mm; None if nobody knows."""
+    row = session.execute(
+        select(Reading.deviation, Reading.compensated, Reading.parameters_version).where(
+            Reading.machine_id == machine_id,
+            Reading.characteristic_id == characteristic_id,
+            Reading.sequence == sequence,
+        )
+    ).one_or_none()
+    if row is None or row.compensated is None:
+        return None
+    parameters = characteristics.parameters_of(session, machine_id, characteristic_id, row.parameters_version)
+    return uncorrected(row.deviation, row.compensated, parameters.factor)
+
+
+def within_wear_since(session: Session, machine_id: int, characteristic_id: int, sequence: int) -> bool:
+    """Tell if a reading after this one, of a part cut with the same tool, lies within the wear limit R37."""
+    found = session.scalar(
+        select(Reading.sequence)
+        .where(
+            Reading.machine_id == machine_id,
+            Reading.characteristic_id == characteristic_id,
+            Reading.sequence > sequence,
+            Reading.late.is_(False),
+            Reading.zone.not_in((Zone.WEAR, Zone.PROBE_FAULT)),
+            Reading.code.not_in((Code.BEFORE_TOOL_CHANGE, Code.IMPORTED)),
+        )
+        .limit(1)
+    )
+    return found is not None
+
+
+def course_of(session: Session, machine_id: int, characteristic_id: int, factor: float, limit: int) -> list[float]:
+    """The last deviations on this tool as they would be without corrections, oldest first, mm; excluded ones left out."""
+    rows = session.execute(
+        select(Reading.deviation, Reading.compensated)
+        .join(
+            Stream,
+            (Stream.machine_id == Reading.machine_id) & (Stream.characteristic_id == Reading.characteristic_id),
+        )
+        .outerjoin(
+            Exclusion,
+            (Exclusion.machine_id == Reading.machine_id)
+            & (Exclusion.characteristic_id == Reading.characteristic_id)
+            & (Exclusion.sequence == Reading.sequence),
+        )
+        .where(
+            Reading.machine_id == machine_id,
+            Reading.characteristic_id == characteristic_id,
+            Reading.sequence > func.greatest(Stream.sequence_at_tool_change, Stream.sequence - limit),
+            Reading.compensated.is_not(None),
+            Reading.code != Code.IMPLAUSIBLE,
+            Exclusion.sequence.is_(None),
+        )
+        .order_by(Reading.sequence)
+    )
+    return [uncorrected(deviation, compensated or 0.0, factor) for deviation, compensated in rows]
+
+
+def first_answers(session: Session, entry: Entry, sequences: Iterable[int]) -> dict[int, dict[str, Any]]:
+    """The answers that these readings were given when they came, by sequence."""
+    rows = session.execute(
+        select(*COLUMNS).where(
+            Reading.machine_id == entry.machine_id,
+            Reading.characteristic_id == entry.characteristic_id,
+            Reading.sequence.in_(sequences),
+        )
+    )
+    made = {each["sequence"]: each for each in answers(session, entry, [Record(*row) for row in rows])}
+    for each in made.values():
+        del each["excluded"]  # the first answer could not know it
+    return made
+
+
+def detail(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
+    """One reading with its touches and the full reason."""
+    record = record_of(session, entry, sequence)
+    touches = session.scalar(
+        select(ReadingTouches.touches).where(
+            ReadingTouches.machine_id == entry.machine_id,
+            ReadingTouches.characteristic_id == entry.characteristic_id,
+            ReadingTouches.sequence == sequence,
+        )
+    )
+    found = by_hand.of_readings(session, entry.machine_id, entry.characteristic_id, [sequence])
+    return answers(session, entry, [record])[0] | {
+        "by_hand": [in_json(each) for each in found.get(sequence, ())],
+        "touches": touches,
+        "machined_at": record.machined_at,
+        "correction_in_effect": record.correction_in_effect,
+    }
+
+
+def hand_measurements(
+    session: Session, machine_id: int, characteristic_id: int, first: int, last: int, limit: int
+) -> list[HandMeasurement]:
+    """Return what was measured by hand on the parts of these readings; of more than `limit` the newest."""
+    return by_hand.between(session, machine_id, characteristic_id, first, last, limit)
+
+
+def page(session: Session, entry: Entry, after: int, limit: int) -> list[Record]:
+    """Readings after a sequence number, oldest first."""
+    rows = session.execute(
+        select(*COLUMNS)
+        .where(
+            Reading.machine_id == entry.machine_id,
+            Reading.characteristic_id == entry.characteristic_id,
+            Reading.sequence > after,
+        )
+        .order_by(Reading.sequence)
+        .limit(limit)
+    )
+    return [Record(*row) for row in rows]
+
+
+def latest(
+    session: Session, entry: Entry, before: int | None, limit: int, *of_those: ColumnElement[bool]
+) -> list[Record]:
+    """Readings before a sequence number (or the last ones), of those for which all of this holds; newest first."""
+    query = select(*COLUMNS).where(
+        Reading.machine_id == entry.machine_id, Reading.characteristic_id == entry.characteristic_id, *of_those
+    )
+    if before is not None:
+        query = query.where(Reading.sequence < before)
+    return [Record(*row) for row in session.execute(query.order_by(Reading.sequence.desc()).limit(limit))]
+
+
+def reasons(
+    session: Session, machine_id: int, asked: Iterable[tuple[int, int, float]]
+) -> dict[tuple[int, int], dict[str, Any]]:
+    """Return the reasons of corrections: those of the readings (characteristic id, sequence, amount in mm) behind them."""
+    amounts = {(characteristic_id, sequence): amount for characteristic_id, sequence, amount in asked}
+    rows = session.execute(
+        select(*COLUMNS).where(
+            Reading.machine_id == machine_id, tuple_(Reading.characteristic_id, Reading.sequence).in_(amounts)
+        )
+    )
+    found = {}
+    for record in (Record(*row) for row in rows):
+        at = (record.characteristic_id, record.sequence)
+        parameters = characteristics.parameters_of(session, machine_id, at[0], record.parameters_version)
+        found[at] = reason(record, parameters, amounts[at])
+    return found

@@ -1,0 +1,402 @@
+"""Readings as a machine sends them, and the errors when one cannot be used.
+
+The fast way is msgspec; what it refuses is looked at once more, field by field, so that the answer names
+everything that is wrong in words that a machinist understands.
+"""
+
+import json
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
+from math import isfinite
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta, Struct
+
+from app.core.parameters import LARGEST_LENGTH
+from app.errors import FieldError, Invalid
+from app.language.i18n import _
+
+Length = Annotated[float, Meta(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
+Moment = Annotated[datetime, Meta(tz=True)]
+EARLIEST = datetime(2000, 1, 1, tzinfo=UTC)
+AHEAD = timedelta(hours=24)  # of this server's clock; more is a wrong clock or a wrong unit
+MOST_POINTS, MOST_REPEATS = 100, 100
+
+
+class ReadingIn(Struct, forbid_unknown_fields=True, gc=False):
+    """One reading as it is sent. Lengths in mm, times RFC 3339 with an offset."""
+
+    characteristic: Annotated[str, Meta(min_length=1, max_length=64, description="The key of the characteristic.")]
+    measured: Annotated[Length | None, Meta(description="The size, mm.")] = None
+    touches: Annotated[
+        Annotated[
+            list[Annotated[list[Length | None], Meta(max_length=MOST_REPEATS)] | None], Meta(max_length=MOST_POINTS)
+        ]
+        | None,
+        Meta(
+            description="In place of measured: one list per point (R23), each with its repeats (R27). null stands for a "
+            "touch that is missing; it is refused by the number of its point and repeat."
+        ),
+    ] = None
+    measured_at: Annotated[Moment | None, Meta(description="When it was measured; if left out, when it came in.")] = (
+        None
+    )
+    machined_at: Annotated[
+        Moment | None,
+        Meta(
+            description="When the part was cut: in place of correction_in_effect, if the machine knows only the time."
+        ),
+    ] = None
+    part: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=128)] | None, Meta(description="Serial number of the part.")
+    ] = None
+    key: Annotated[
+        Annotated[str, Meta(min_length=1, max_length=128)] | None,
+        Meta(
+            description="Yours, unique per characteristic: sent again, you get the first answer and nothing happens twice."
+        ),
+    ] = None
+    correction_in_effect: Annotated[
+        Annotated[int, Meta(ge=0, le=2_147_483_647)] | None,
+        Meta(
+            description="Number of the last correction the machine had applied when it cut this part; 0 for none. "
+            "It also confirms the pending ones up to it."
+        ),
+    ] = None
+    first_move_triggered: Annotated[
+        bool,
+        Meta(
+            description="true: the probe triggered on its first move, where there should have been air (no bore, a chip, a "
+            "wrong part). measured is then the position where it did; it is judged a probe fault whatever its value."
+        ),
+    ] = False
+
+
+FIELDS = ReadingIn.__struct_fields__
+_one = msgspec.json.Decoder(ReadingIn)
+_many = msgspec.json.Decoder(list[ReadingIn])
+_raw = msgspec.json.Decoder(list[msgspec.Raw])
+
+
+def decode_one(body: bytes, now: datetime) -> ReadingIn:
+    """The reading in a body. Raises `Invalid`."""
+    try:
+        reading = _one.decode(body)
+    except (msgspec.MsgspecError, UnicodeDecodeError):
+        reading = _retry(_loads(body), "")
+    else:
+        if body.count(b'"') != _quotes(reading):
+            _loads(body)
+    if not _plain(reading, now + AHEAD) and (errors := list(_sense(reading, now, ""))):
+        raise _invalid(errors)
+    return reading
+
+
+def reading_of(fields: dict[str, Any], now: datetime) -> ReadingIn:
+    """The reading that these fields make, out of a file for example; times may be datetimes. Raises `Invalid`."""
+    try:
+        reading = msgspec.convert(fields, ReadingIn)
+    except msgspec.ValidationError:
+        written = {n: v.isoformat() if isinstance(v, datetime) else v for n, v in fields.items()}
+        reading = _retry(written, "")
+    if not _plain(reading, now + AHEAD) and (errors := list(_sense(reading, now, ""))):
+        raise _invalid(errors)
+    return reading
+
+
+def decode_many(body: bytes, now: datetime, *, lines: bool) -> list[ReadingIn]:
+    """The readings in a JSON list, or one per line of NDJSON. Raises `Invalid` with what is wrong, by position."""
+    try:
+        readings = _one.decode_lines(body) if lines else _many.decode(body)
+    except (msgspec.MsgspecError, UnicodeDecodeError):
+        readings = _retry_many(body, lines=lines)
+    else:
+        if body.count(b'"') != sum(map(_quotes, readings)):
+            _load_many(body, lines=lines)
+    latest = now + AHEAD
+    if _all_plain(readings, latest):
+        return readings
+    errors = [
+        error
+        for at, reading in enumerate(readings)
+        if not _plain(reading, latest)
+        for error in _sense(reading, now, f"[{at}].")
+    ]
+    if errors:
+        raise _invalid(errors)
+    return readings
+
+
+def _quotes(reading: ReadingIn) -> int:
+    """Return the number of quotation marks that a reading is written with, if each field is there once and no text holds any.
+
+    msgspec takes the last of two fields of one name. A second one brings quotation marks of its own, so a body with
+    another number of them is looked at by the reader that refuses it; one with as many has none.
+    """
+    return 4 + 2 * (
+        (reading.measured is not None)
+        + (reading.touches is not None)
+        + (reading.correction_in_effect is not None)
+        + reading.first_move_triggered
+        + 2
+        * (
+            (reading.key is not None)
+            + (reading.part is not None)
+            + (reading.measured_at is not None)
+            + (reading.machined_at is not None)
+        )
+    )
+
+
+def _retry(value: Any, prefix: str) -> ReadingIn:
+    errors = list(_field_errors(value, prefix))
+    if errors:
+        raise _invalid(errors)
+    try:
+        return msgspec.convert(value, ReadingIn)
+    except msgspec.ValidationError as error:
+        raise _invalid([FieldError(prefix.rstrip("."), str(error))]) from None
+
+
+def _load_many(body: bytes, *, lines: bool) -> list[Any]:
+    if lines:
+        filled = (line for line in body.splitlines() if line.strip())
+        return [_loads(line, f"[{at}]") for at, line in enumerate(filled)]
+    try:
+        return [_loads(bytes(value), f"[{at}]") for at, value in enumerate(_raw.decode(body))]
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        values = _loads(body)  # takes NaN, so that its field can be named
+    if not isinstance(values, list):
+        raise _invalid([FieldError("", _("A batch is a JSON list of readings, or NDJSON with one reading per line."))])
+    return values
+
+
+def _retry_many(body: bytes, *, lines: bool) -> list[ReadingIn]:
+    values = _load_many(body, lines=lines)
+    errors: list[FieldError] = []
+    for at, value in enumerate(values):
+        errors.extend(_field_errors(value, f"[{at}]."))
+        if len(errors) >= MOST_ERRORS:
+            break
+    if errors:
+        raise _invalid(errors)
+    return [_retry(value, f"[{at}].") for at, value in enumerate(values)]
+
+
+MOST_ERRORS = 100
+
+
+def _invalid(errors: list[FieldError]) -> Invalid:
+    shown = errors[:MOST_ERRORS]
+    return Invalid(
+        shown[0].message if len(errors) == 1 else _("%(count)s things are wrong with it.") % {"count": len(errors)},
+        _("Correct what is named under errors and send it again. Nothing of this request was stored."),
+        errors=shown,
+    )
+
+
+def _loads(body: bytes, where: str = "") -> Any:
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        made: dict[str, Any] = {}
+        for name, value in pairs:
+            if name in made:
+                raise _invalid(
+                    [FieldError(f"{where}.{name}".lstrip("."), _("This field is there twice; send it once."))]
+                )
+            made[name] = value
+        return made
+
+    try:
+        return json.loads(body, object_pairs_hook=once)
+    except UnicodeDecodeError:
+        message = _("This is not UTF-8 text. Send JSON encoded as UTF-8.")
+    except RecursionError:
+        message = _("This is nested too deeply to be a reading.")
+    except json.JSONDecodeError as error:
+        message = (
+            _("This is not JSON: %(error)s.") % {"error": error}
+            if body.strip()
+            else _("Nothing was sent. Send the reading as JSON.")
+        )
+    except ValueError:  # Python reads no whole number of thousands of digits
+        message = _("This holds a number of thousands of digits.")
+    raise _invalid([FieldError(where, message)])
+
+
+def clean_text(value: str) -> bool:
+    """Tell if a text can be stored: no control characters, no half surrogates."""
+    return value.isprintable() or not any(c < " " or c == "\x7f" or "\ud800" <= c <= "\udfff" for c in value)
+
+
+def _plain(reading: ReadingIn, latest: datetime) -> bool:
+    """Tell if it is plain at a glance that `_sense` has nothing to say, as of nearly all readings."""
+    measured_at, key, part = reading.measured_at, reading.key, reading.part
+    return (
+        reading.measured is not None
+        and reading.touches is None
+        and reading.machined_at is None
+        and (measured_at is None or EARLIEST <= measured_at <= latest)
+        and reading.characteristic.isprintable()
+        and (key is None or key.isprintable())
+        and (part is None or part.isprintable())
+    )
+
+
+def _all_plain(readings: list[ReadingIn], latest: datetime) -> bool:
+    """Tell if `_plain` holds for all of them, in a third of the time."""
+    texts = [text for r in readings for text in (r.key, r.part) if text is not None]
+    times = [reading.measured_at for reading in readings if reading.measured_at is not None]
+    return (
+        "".join(texts).isprintable()
+        and "".join({reading.characteristic for reading in readings}).isprintable()
+        and (not times or (min(times) >= EARLIEST and max(times) <= latest))
+        and all(r.measured is not None and r.touches is None and r.machined_at is None for r in readings)
+    )
+
+
+def _sense(reading: ReadingIn, now: datetime, prefix: str) -> Iterator[FieldError]:
+    """Check what the types alone cannot say."""
+    if (reading.measured is None) == (reading.touches is None):
+        message = (
+            _("A reading needs measured (mm), or touches in its place.")
+            if reading.measured is None
+            else _("Send measured or touches, not both: the value is made of the touches.")
+        )
+        yield FieldError(f"{prefix}measured", message)
+    if reading.first_move_triggered and reading.touches is not None:
+        yield FieldError(
+            f"{prefix}touches",
+            _(
+                "With first_move_triggered nothing was touched as planned: send measured, the position where it triggered."
+            ),
+        )
+    for name in ("characteristic", "part", "key"):
+        value = getattr(reading, name)
+        if value is not None and not value.isprintable() and not clean_text(value):
+            yield FieldError(
+                f"{prefix}{name}", _("This text holds control characters; send letters, digits and signs only.")
+            )
+    for name in ("measured_at", "machined_at"):
+        moment = getattr(reading, name)
+        if moment is None:
+            continue
+        if moment > now + AHEAD:
+            yield FieldError(
+                f"{prefix}{name}",
+                _(
+                    "%(time)s is more than a day ahead of the server's clock. Check the machine's clock and the unit of the time."
+                )
+                % {"time": moment.isoformat()},
+            )
+        elif moment < EARLIEST:
+            yield FieldError(
+                f"{prefix}{name}",
+                _("%(time)s lies before the year 2000. Check the machine's clock and the unit of the time.")
+                % {"time": moment.isoformat()},
+            )
+    if reading.measured_at and reading.machined_at and reading.machined_at > reading.measured_at:
+        yield FieldError(
+            f"{prefix}machined_at",
+            _("A part cannot be measured before it is machined: machined_at lies after measured_at."),
+        )
+
+
+def _number(value: Any) -> str | None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return _("This must be a number in mm, such as 39.9981 (a decimal point, no unit, no quotes).")
+    if isinstance(value, float) and not isfinite(value):
+        return _("This is not a finite number. A probe that did not trigger has no reading: do not send one.")
+    if abs(value) > LARGEST_LENGTH:
+        return _("%(value)g mm is longer than any machine. Lengths are in mm, not in µm or nm.") % {
+            "value": float(value) if abs(value) < 1e300 else float("inf")
+        }
+    return None
+
+
+def _time(value: Any) -> str | None:
+    if isinstance(value, bool) or not isinstance(value, str):
+        return _(
+            "A time is RFC 3339 text with an offset, such as 2026-11-21T08:15:02.120+01:00, not a count of (milli)seconds."
+        )
+    try:
+        msgspec.convert(value, Moment)
+    except (msgspec.ValidationError, UnicodeEncodeError):
+        return _("This is not a time with an offset; write it as 2026-11-21T08:15:02.120+01:00 or …Z.")
+    return None
+
+
+def _text(limit: int) -> Callable[[Any], str | None]:
+    def check(value: Any) -> str | None:
+        if not isinstance(value, str):
+            return _("This must be text in quotes.")
+        if not 1 <= len(value) <= limit:
+            return _("This text must have 1 to %(limit)s characters; it has %(got)s.") % {
+                "limit": limit,
+                "got": len(value),
+            }
+        if not clean_text(value):
+            return _("This text holds control characters; send letters, digits and signs only.")
+        return None
+
+    return check
+
+
+def _touches(value: Any) -> str | None:
+    if not isinstance(value, list) or not all(point is None or isinstance(point, list) for point in value):
+        return _("Touches are one list per point, each with its repeats: [[39.998, 39.9982], [39.9979, 39.9981]].")
+    if len(value) > MOST_POINTS or any(len(point or ()) > MOST_REPEATS for point in value):
+        return _("No more than %(points)s points with %(repeats)s repeats each.") % {
+            "points": MOST_POINTS,
+            "repeats": MOST_REPEATS,
+        }
+    for at, point in enumerate(value, start=1):
+        for repeat, touch in enumerate(point or (), start=1):
+            if touch is not None and (problem := _number(touch)):
+                return _("Point %(point)s, repeat %(repeat)s: %(problem)s") % {
+                    "point": at,
+                    "repeat": repeat,
+                    "problem": problem,
+                }
+    return None
+
+
+def _correction_number(value: Any) -> str | None:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 2_147_483_647:
+        return _("This is the number of the last correction the machine had applied: a whole number, 0 for none yet.")
+    return None
+
+
+def _yes_or_no(value: Any) -> str | None:
+    return None if isinstance(value, bool) else _("This must be true or false, without quotes.")
+
+
+_CHECKS: dict[str, Callable[[Any], str | None]] = {
+    "characteristic": _text(64),
+    "measured": _number,
+    "touches": _touches,
+    "measured_at": _time,
+    "machined_at": _time,
+    "part": _text(128),
+    "key": _text(128),
+    "correction_in_effect": _correction_number,
+    "first_move_triggered": _yes_or_no,
+}
+
+
+def _field_errors(value: Any, prefix: str) -> Iterator[FieldError]:
+    """Everything that is wrong with the fields of one reading that msgspec refused."""
+    if not isinstance(value, dict):
+        yield FieldError(prefix.rstrip("."), _("A reading is a JSON object with characteristic and measured."))
+        return
+    for name in value:
+        if name not in _CHECKS:
+            yield FieldError(
+                f"{prefix}{name}",
+                _("There is no such field in a reading; there are: %(fields)s.") % {"fields": ", ".join(FIELDS)},
+            )
+    if "characteristic" not in value or value["characteristic"] is None:
+        yield FieldError(f"{prefix}characteristic", _("Name the characteristic that was measured."))
+    for name, check in _CHECKS.items():
+        if value.get(name) is not None and (problem := check(value[name])):
+            yield FieldError(f"{prefix}{name}", problem)

@@ -1,0 +1,240 @@
+"""The sentences about readings: why it was decided so, and what is wrong with touches."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from app.core.decision.limits import Zone, nanometres, within_tolerance
+from app.core.decision.step import Code, average_of
+from app.core.parameters import Parameters
+from app.core.plausibility import looks_like_inches
+from app.core.probing import TouchError
+from app.language.i18n import _
+from app.loop.readings.records import MOST_OUTSTANDING, Record
+
+NAMED_AT_MOST = 3
+
+
+def um(length: float) -> str:
+    """A length in µm as it is read in a sentence, e.g. ``6.1 µm``; never finer than 1 nm."""
+    value = round(length * 1000, 3) + 0.0
+    text = f"{value:.1f}" if value == round(value, 1) else f"{value:.3f}".rstrip("0")
+    return f"{text} µm".replace("-", "\N{MINUS SIGN}")
+
+
+def reason(record: Record, parameters: Parameters, amount: float | None = None) -> dict[str, Any]:
+    """Code, sentence and notes on one decision; `amount` (mm) is that of the correction it led to, if any."""
+    notes = [code for code, applies in _notes(record, parameters, amount) if applies]
+    sentences = [_sentence(record, parameters), *(_note(code, record, parameters) for code in notes)]
+    return {"code": record.code, "text": " ".join(sentences), "notes": notes}
+
+
+def _notes(record: Record, parameters: Parameters, amount: float | None) -> tuple[tuple[str, bool], ...]:
+    in_full = record.zone != Zone.AVERAGE or record.code == Code.IMPLAUSIBLE
+    size_error = record.decided if in_full else _averaged(record, parameters)
+    return (
+        ("outstanding", record.outstanding is not None),
+        (
+            "part_out_of_tolerance",
+            record.zone in (Zone.ZERO, Zone.AVERAGE, Zone.FULL)
+            and not within_tolerance(record.deviation, parameters.limits),
+        ),
+        ("clamped", amount is not None and nanometres(abs(amount)) < nanometres(abs(parameters.factor * size_error))),
+        ("empirical_value", nanometres(empirical_value(record, parameters)) != 0),
+        ("late", record.late),
+        ("inches", record.code == Code.PROBE_FAULT and looks_like_inches(record.measured, parameters.target)),
+        (
+            "target_in_inches",
+            record.code == Code.PROBE_FAULT and looks_like_inches(parameters.target, record.measured),
+        ),
+    )
+
+
+def empirical_value(record: Record, parameters: Parameters) -> float:
+    """Return what was taken off the measurement, mm; it can be told from what is stored: D = measured - target - EV."""
+    return record.measured - parameters.target - record.deviation
+
+
+def _averaged(record: Record, parameters: Parameters) -> float:
+    return average_of(record.average_before, record.decided, parameters.weighting_factor)
+
+
+class _Values(dict[str, str]):
+    """Values that a sentence may name, worded when it does: every reading is answered with one, and most name two values."""
+
+    def __init__(self, record: Record, parameters: Parameters) -> None:
+        super().__init__()
+        self.record, self.parameters = record, parameters
+
+    def __missing__(self, name: str) -> str:
+        made = _WORDED[name](self.record, self.parameters)
+        return um(made) if isinstance(made, float) else str(made)
+
+
+def _of_reading(name: str) -> Callable[[Record, Parameters], Any]:
+    return lambda record, _parameters: getattr(record, name)
+
+
+def _of_parameters(name: str) -> Callable[[Record, Parameters], Any]:
+    return lambda _record, parameters: getattr(parameters, name)
+
+
+_WORDED: dict[str, Callable[[Record, Parameters], float | int | None]] = {
+    "deviation": _of_reading("decided"),
+    "raw": _of_reading("deviation"),
+    "average": _of_reading("average_after"),
+    "averaged": _averaged,
+    "number": _of_reading("correction"),
+    "alarm": _of_reading("paused_by"),
+    "zero": _of_parameters("zero_range"),
+    "averaging": _of_parameters("averaging_limit"),
+    "tolerance": lambda _record, parameters: parameters.tolerance_width / 2,
+    "wear": _of_parameters("wear_limit"),
+    "confidence": _of_parameters("confidence_limit"),
+    "total": _of_parameters("max_total"),
+    "jump": _of_parameters("plausible_jump"),
+    "n": _of_parameters("accept_n"),
+    "m": _of_parameters("accept_m"),
+}
+
+
+def _sentence(record: Record, parameters: Parameters) -> str:
+    values = _Values(record, parameters)
+    match record.code:
+        case Code.WITHIN_ZERO_RANGE:
+            text = _("Deviation %(deviation)s is within the zero range %(zero)s: no correction, the average is kept.")
+        case Code.AVERAGE_KEPT:
+            text = _(
+                "Deviation %(deviation)s is within the averaging limit %(averaging)s and the running average %(average)s "
+                "within the zero range %(zero)s: no correction, the average is kept."
+            )
+        case Code.AVERAGED_DEVIATION:
+            text = _("The running average %(averaged)s is beyond the zero range %(zero)s: corrected by the average.")
+        case Code.FULL_DEVIATION:
+            text = _("Deviation %(deviation)s is beyond the averaging limit %(averaging)s: corrected in full.")
+        case Code.OUT_OF_TOLERANCE:
+            text = _("Deviation %(deviation)s is beyond the tolerance ±%(tolerance)s: corrected in full.")
+        case Code.TOOL_WORN_HELD:
+            text = _(
+                "Deviation %(deviation)s has reached the wear limit %(wear)s: the tool is worn. "
+                "Correction %(number)s is held until somebody decides."
+            )
+        case Code.TOOL_WORN_RELEASED:
+            text = _(
+                "Deviation %(deviation)s has reached the wear limit %(wear)s: the tool is worn. "
+                "Corrected in full, as this characteristic is set to release."
+            )
+        case Code.PROBE_FAULT:
+            text = _(
+                "Deviation %(raw)s has reached the confidence limit %(confidence)s: the probe or the program is wrong. "
+                "The machine is told to stop, and compensation pauses until the alarm is acknowledged."
+            )
+        case Code.FIRST_MOVE_TRIGGERED:
+            text = _(
+                "The first move of the probe triggered: there is no bore here, or a chip, or the wrong part. "
+                "The machine is told to stop, and compensation pauses until the alarm is acknowledged."
+            )
+        case Code.PAUSED:
+            text = _(
+                "Deviation %(deviation)s: compensation is paused by alarm %(alarm)s. Stored and judged, nothing is corrected."
+            )
+        case Code.MEASURE_ONLY:
+            text = _("Deviation %(deviation)s: this characteristic is only measured, nothing is corrected.")
+        case Code.IMPORTED:
+            text = _("Deviation %(deviation)s: imported from a file. Judged like any other, it corrects nothing.")
+        case Code.BEFORE_TOOL_CHANGE:
+            text = _(
+                "Deviation %(deviation)s: the part was cut before the tool was changed or its offset edited by hand, "
+                "so it says nothing about the offset of now. Nothing is corrected."
+            )
+        case Code.OFFSET_LIMIT:
+            text = _(
+                "Deviation %(deviation)s asks for a correction, but the corrections of this tool would exceed %(total)s in all. "
+                "Nothing is corrected until the tool is changed, or the largest sum is raised."
+            )
+        case Code.IMPLAUSIBLE if record.correction is None:
+            text = _(
+                "Deviation %(deviation)s lies more than the plausible %(jump)s from the level of the readings before: neither "
+                "wear nor scatter explains it. It is marked, and the average is left as it was."
+            )
+        case Code.IMPLAUSIBLE:
+            text = _(
+                "Deviation %(deviation)s lies more than the plausible %(jump)s from the level of the readings before: neither "
+                "wear nor scatter explains it. Correction %(number)s is held until somebody decides."
+            )
+        case Code.REJECTED:
+            text = _(
+                "Fewer than %(n)s of %(m)s sections are within the tolerance: the part is rejected and corrects nothing."
+            )
+        case _:
+            text = record.code
+    return text % values
+
+
+def _note(code: str, record: Record, parameters: Parameters) -> str:
+    match code:
+        case "outstanding":
+            numbers = _listed(record.outstanding or ())
+            return _(
+                "The part was cut before correction %(numbers)s took effect: its deviation of %(raw)s counts as %(decided)s."
+            ) % {"numbers": numbers, "raw": um(record.deviation), "decided": um(record.decided)}
+        case "part_out_of_tolerance":
+            return _("The part itself is out of tolerance by its deviation of %(raw)s.") % {"raw": um(record.deviation)}
+        case "clamped":
+            return _("The correction is limited to the largest step %(step)s.") % {
+                "step": um(parameters.max_step or 0.0)
+            }
+        case "inches":
+            return _("As inches the value would fit: readings are sent in mm.")
+        case "target_in_inches":
+            return _("The target would fit as inches: parameters are in mm.")
+        case "empirical_value":
+            return _("The empirical value %(value)s (R11 = %(location)s) is taken off.") % {
+                "value": um(empirical_value(record, parameters)),
+                "location": parameters.average_memory,
+            }
+        case _:
+            return _("It came late: a later measurement had arrived before it.")
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    """The numbers as a sentence lists them; of many only the first, for the reading itself lists more of them."""
+    named = ", ".join(map(str, numbers[:NAMED_AT_MOST]))
+    more = len(numbers) - NAMED_AT_MOST
+    if len(numbers) >= MOST_OUTSTANDING:
+        return _("%(numbers)s and at least %(n)s more") % {"numbers": named, "n": more}
+    return _("%(numbers)s and %(n)s more") % {"numbers": named, "n": more} if more > 0 else named
+
+
+def touch_problem(error: TouchError) -> str:
+    """Return the sentence on points that cannot be used, naming point and repeat."""
+    values = {"point": error.point, "repeat": error.repeat, "expected": error.expected, "got": error.got}
+    few = (error.got or 0) < error.expected
+    match error.code:
+        case "points" if few:
+            text = _(
+                "%(got)s points came, %(expected)s are expected: point %(point)s is missing. "
+                "Send one list of touches per point."
+            )
+        case "points":
+            text = _("%(got)s points came, %(expected)s are expected: point %(point)s is one too many.")
+        case "repeats" if few:
+            text = _(
+                "Point %(point)s has %(got)s touches, %(expected)s are expected (R27): repeat %(repeat)s is missing."
+            )
+        case "repeats":
+            text = _(
+                "Point %(point)s has %(got)s touches, %(expected)s are expected (R27): repeat %(repeat)s is one too many."
+            )
+        case "missing":
+            text = _("Point %(point)s, repeat %(repeat)s: the touch is missing, the probe did not trigger.")
+        case "distance":
+            text = _(
+                "Point %(point)s, repeat %(repeat)s: its distance of %(got)s mm from the point before lies more than "
+                "%(expected)s mm (R28) from the programmed dimension."
+            )
+        case _:
+            text = _(
+                "Point %(point)s, repeat %(repeat)s: the touch at %(got)s mm lies more than %(expected)s mm (R28) "
+                "from the programmed dimension."
+            )
+    return text % values

@@ -1,0 +1,1 @@
+"""The writer: the way of readings into the database."""

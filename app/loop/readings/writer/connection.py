@@ -1,0 +1,104 @@
+"""The connection of a writer: opened when it is needed, and how long the database has been away."""
+
+import asyncio
+from contextlib import suppress
+from time import monotonic
+
+import psycopg
+
+from app.db.connections import LIMITS
+from app.db.engine import Database
+from app.db.pipeline import Pipeline
+from app.loop.readings.writer.transaction import ROLLBACK
+
+LONGEST = 60.0  # s that a batch may take, as long as the database is heard; a single reading has only the patience
+LAST_ATTEMPT = 0.2  # of the patience, for the one attempt of whoever comes when it has run out
+
+# Every statement of the writer finds its rows by an index, however small the tables are when it is first planned; planned
+# each time, the planning would cost more than the work.
+PLANNER = "-c plan_cache_mode=force_generic_plan -c enable_seqscan=off -c enable_sort=off -c enable_hashjoin=off"
+
+
+async def connect(database: Database) -> Pipeline:
+    """Open a connection for readings: statements prepared at their first use, transactions by our own word."""
+    connections = database.connections
+    return Pipeline(await connections.connect_async(options=f"{LIMITS} {PLANNER}", application_name="inband-readings"))
+
+
+class WriterConnection:
+    """One connection at a time, and since when there has been none that works."""
+
+    def __init__(self, database: Database) -> None:
+        self.database = database
+        self.patience = database.connections.patience
+        self.pipeline: Pipeline | None = None
+        self._away_since: float | None = None
+
+    @property
+    def lost(self) -> bool:
+        """Tell if a connection has to be opened: the server may be another one than before."""
+        return self.pipeline is None or self.pipeline.closed
+
+    async def open(self) -> Pipeline:
+        """Open a connection in the place of the one before. Raises psycopg's `OperationalError`."""
+        self.pipeline = await connect(self.database)
+        return self.pipeline
+
+    async def close(self) -> None:
+        """Give the connection back."""
+        if self.pipeline is not None:
+            await self.pipeline.connection.close()
+
+    async def roll_back(self) -> None:
+        """End the transaction that is open, or the connection that cannot."""
+        if self.pipeline is not None and not self.pipeline.closed and self.pipeline.begun:
+            try:
+                await self.pipeline.run(ROLLBACK)
+            except psycopg.Error:
+                await self.pipeline.connection.close()
+
+    async def send(self, statement: str) -> None:
+        """Run one statement that nobody waits for; a database that is away has nobody to read it."""
+        if self.pipeline is not None:
+            self.answer_by(monotonic(), at_least=self.patience * LAST_ATTEMPT)
+            with suppress(psycopg.Error):
+                await self.pipeline.run(((statement,),))
+
+    def answer_by(self, deadline: float, *, at_least: float) -> None:
+        """Limit the wait for the next answer: until the deadline (`monotonic`), and at least so many seconds."""
+        assert self.pipeline is not None
+        self.pipeline.until = asyncio.get_running_loop().time() + max(deadline - monotonic(), at_least)
+
+    def deadline(self) -> float:
+        """Return when patience ends, by `monotonic`. It began when the database was first found away."""
+        return (monotonic() if self._away_since is None else self._away_since) + self.patience
+
+    def is_away(self) -> None:
+        """Note that the database does not answer."""
+        self._away_since = self._away_since or monotonic()
+
+    def is_back(self) -> None:
+        """Note that the database answers."""
+        self._away_since = None
+
+    @property
+    def away_for(self) -> float:
+        """Seconds since the database began to be away; 0 while it is there."""
+        return 0.0 if self._away_since is None else monotonic() - self._away_since
+
+
+class Attempts:
+    """Pauses between attempts, each twice as long as the one before, until the deadline or until the database is silent."""
+
+    def __init__(self, connection: WriterConnection, deadline: float) -> None:
+        self.deadline = deadline
+        self._silent = connection.database.connections
+        self._pause = 0.02
+
+    async def another(self) -> bool:
+        """Wait for the next attempt; False, at once, if there is no time for one."""
+        if monotonic() + self._pause > self.deadline or self._silent.silent:
+            return False
+        await asyncio.sleep(self._pause)
+        self._pause = min(2 * self._pause, 0.5)
+        return True

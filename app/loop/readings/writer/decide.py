@@ -1,0 +1,278 @@
+"""Decide readings one after the other against the snapshot, in memory, and note what to write.
+
+`decide_reading` decides one reading with `app.core` on what the readings before it have left in `PendingWrites`, moves that
+along for the next one, and collects the rows to write. It does no I/O, so that single readings, batches and `inband replay`
+are decided by the same lines. A reading that is refused moves nothing.
+"""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+from app.core.decision.decide import Decision, ReadingAlarm, State, decide, needs_approval, outstanding_effect
+from app.core.decision.step import DECIMALS, Action, Code, deviation_of
+from app.core.parameters import Parameters
+from app.core.plausibility import is_jump, moved, uncorrected
+from app.core.probing import TouchError, measured_value
+from app.core.variants import Results, results_of
+from app.errors import Conflict, FieldError, InbandError, Invalid
+from app.language.i18n import _
+from app.loop.readings.records import Entry
+from app.loop.readings.schemas import ReadingIn
+from app.loop.readings.wording import touch_problem
+from app.loop.readings.writer.corrections_in_effect import confirm, corrections_in_effect, issued_total
+from app.loop.readings.writer.pending import (
+    PendingAlarm,
+    PendingCorrection,
+    PendingStream,
+    PendingTool,
+    PendingWrites,
+    Stored,
+    Verdict,
+)
+
+
+def decide_one_by_one(
+    pending: PendingWrites, readings: Sequence[tuple[Entry, ReadingIn]], now: datetime
+) -> list[Verdict | Stored | InbandError]:
+    """Decide readings in their order; a refusal stands in the place of its reading."""
+    outcomes: list[Verdict | Stored | InbandError] = []
+    for entry, reading in readings:
+        try:
+            outcomes.append(decide_reading(pending, entry, reading, now))
+        except InbandError as refusal:
+            outcomes.append(refusal)
+    return outcomes
+
+
+def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now: datetime) -> Verdict | Stored:
+    """Decide one reading and move the pending state along.
+
+    Raises `Invalid` or `Conflict` when the reading cannot be taken; nothing has changed then.
+    """
+    stream = pending.stream(entry.characteristic_id)
+    parameters = stream.parameters
+    if reading.key is not None and (first := _first_with_key(pending, entry, reading.key, reading)):
+        return first
+    measured, points = _measured(parameters, reading)
+    tool = stream.tool
+    in_effect = reading.correction_in_effect
+    if in_effect is not None and in_effect > pending.last_number(entry.machine_id):
+        raise Invalid(
+            _("Machine %(machine)s has no correction %(number)s; its last one is %(last)s.")
+            % {"machine": entry.machine, "number": in_effect, "last": pending.last_number(entry.machine_id)},
+            _("Send the number of the last correction that the machine had applied when it cut this part."),
+            errors=[FieldError("correction_in_effect", _("There is no such correction yet."))],
+        )
+
+    sequence = stream.sequence + 1
+    measured_at = now if reading.measured_at is None else reading.measured_at.astimezone(UTC)
+    if tool is not None and tool.corrections and in_effect is not None:
+        confirm(pending, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
+    previous_tool, outstanding, amounts, compensated = corrections_in_effect(pending, tool, reading, parameters)
+    average = stream.average
+    empirical_value = average.empirical_value if average else 0.0
+    results = results_of(parameters, reading.touches or (), points, empirical_value) if points else None
+    deviation = deviation_of(measured, parameters.target, empirical_value)
+    course = None
+    if parameters.plausible_jump is not None and compensated is not None:
+        course = uncorrected(deviation, compensated, parameters.factor)
+    jump = course is not None and is_jump(course, stream.level, parameters.plausible_jump or 0.0)
+    paused_by = stream.paused_by if tool is None or stream.paused_by is not None else tool.paused_by
+    decision = decide(
+        parameters,
+        State(
+            average.average if average else 0.0,
+            issued_total(pending, tool) if parameters.max_total is not None else 0.0,
+            paused_by is not None,
+        ),
+        deviation,
+        outstanding=outstanding_effect(amounts, parameters.factor) if outstanding else 0.0,
+        previous_tool=previous_tool,
+        accepted=results is None or not results.rejected,
+        jump=jump,
+        first_move_triggered=reading.first_move_triggered,
+    )
+    alarms = [_signal(pending, stream, signal, sequence, decision, results) for signal in decision.alarms]
+    correction = None
+    if decision.amount is not None and tool is not None:
+        correction = _issue(pending, stream, tool, sequence, decision)
+
+    stream.sequence = sequence
+    if average is not None and average.average != decision.average_after:
+        average.average = decision.average_after
+        average.changed = True
+    if decision.action is Action.STOP and stream.paused_by is None:
+        stream.paused_by = next(alarm for alarm in alarms if alarm.kind == ReadingAlarm.PROBE_FAULT.value)
+    last = stream.last_measured_at
+    late = last is not None and measured_at < last
+    if not late:
+        stream.last_measured_at = measured_at
+        if course is not None and not jump and decision.action is not Action.STOP:
+            stream.level, stream.level_sequence, stream.level_moved = moved(stream.level, course), sequence, True
+    verdict = Verdict(
+        stream,
+        reading,
+        sequence,
+        stream.version,
+        parameters,
+        measured,
+        measured_at,
+        now,
+        late,
+        decision,
+        outstanding,
+        correction,
+        paused_by,
+        alarms,
+        compensated,
+        results=results,
+    )
+    stream.last = verdict
+    pending.touched[entry.characteristic_id] = stream
+    pending.verdicts.append(verdict)
+    if reading.key is not None:
+        pending.by_key[entry.characteristic_id, reading.key] = verdict
+    return verdict
+
+
+def _measured(parameters: Parameters, reading: ReadingIn) -> tuple[float, tuple[float, ...]]:
+    """Return the value, and the mean at each probed point if it came as points."""
+    if reading.touches is None:
+        if parameters.accept_m > 1:
+            raise Invalid(
+                _("This characteristic is accepted by %(n)s of %(m)s sections, so it needs touches.")
+                % {"n": parameters.accept_n, "m": parameters.accept_m},
+                _("Send touches with one list per section in place of measured."),
+                errors=[FieldError("touches", _("Send one list of touches per section."))],
+            )
+        return float(reading.measured or 0.0), ()
+    try:
+        value = measured_value(parameters, reading.touches)
+    except TouchError as error:
+        message = touch_problem(error)
+        raise Invalid(
+            message,
+            _("Nothing was stored. Measure again, or correct points, repeats or path factor of the characteristic."),
+            errors=[FieldError("touches", message)],
+        ) from None
+    return value.value, value.points
+
+
+def _first_with_key(pending: PendingWrites, entry: Entry, key: str, reading: ReadingIn) -> Verdict | Stored | None:
+    """Return the first reading with this key, here or in the record; the same key with another value is refused.
+
+    Points are made into a value as they were then, whatever the characteristic expects by now.
+    """
+    at = (entry.characteristic_id, key)
+    here = pending.by_key.get(at)
+    first = here or pending.snapshot.stored_keys.get(at)
+    if first is None:
+        return None
+    sequence, value = first.sequence, first.measured
+    measured, _sections = _measured(first.parameters, reading)
+    if round(value - measured, DECIMALS) != 0:
+        raise Conflict(
+            _(
+                "Key %(key)s belongs to reading %(sequence)s of %(characteristic)s, which measured %(first)s mm, not %(now)s mm."
+            )
+            % {
+                "key": key,
+                "sequence": sequence,
+                "characteristic": entry.characteristic,
+                "first": value,
+                "now": measured,
+            },
+            _("A key names one reading for ever. Give the new reading a key of its own."),
+            errors=[FieldError("key", _("This key is taken by another value."))],
+        )
+    return here or Stored(entry, sequence)
+
+
+def _issue(
+    pending: PendingWrites, stream: PendingStream, tool: PendingTool, sequence: int, decision: Decision
+) -> PendingCorrection:
+    """Number the correction; whatever is held for this tool is superseded by it, so that they never add up."""
+    number = pending.last_number(tool.machine_id) + 1
+    pending.last_correction[tool.machine_id] = number
+    pending.touched_machines.add(tool.machine_id)
+    for place in range(tool.none_held, len(tool.corrections)):
+        if tool.corrections[place].status == "held":
+            earlier = tool.changing(place)
+            earlier.status, earlier.superseded_by = "superseded", number
+    tool.none_held = len(tool.corrections)
+    if decision.action is Action.HOLD:
+        status = "held"
+    elif needs_approval(stream.parameters):
+        status = "awaiting_approval"
+    else:
+        status = "pending"
+    correction = PendingCorrection(
+        tool.machine_id,
+        number,
+        tool.number,
+        decision.amount or 0.0,
+        status,
+        stream.entry.characteristic_id,
+        sequence,
+        decision.size_error or 0.0,
+        new=True,
+    )
+    tool.corrections.append(correction)
+    pending.issued.append(correction)
+    return correction
+
+
+LIMIT_OF = {
+    ReadingAlarm.TOOL_WORN: "wear_limit",
+    ReadingAlarm.PROBE_FAULT: "confidence_limit",
+    ReadingAlarm.IMPLAUSIBLE: "plausible_jump",
+}
+
+
+def _signal(
+    pending: PendingWrites,
+    stream: PendingStream,
+    signal: ReadingAlarm,
+    sequence: int,
+    decision: Decision,
+    results: Results | None,
+) -> PendingAlarm:
+    """Raise the alarm, or add to the one that is active for the same trouble."""
+    entry, parameters = stream.entry, stream.parameters
+    of_tool = signal is ReadingAlarm.OFFSET_LIMIT and stream.tool is not None
+    if of_tool:
+        active = pending.tool_alarms.get((entry.machine_id, parameters.tool_memory, signal.value))
+    else:
+        active = stream.alarms.get(signal.value)
+    if active is None:
+        active = PendingAlarm(
+            entry.machine_id,
+            None if of_tool else entry.characteristic_id,
+            parameters.tool_memory or None,
+            signal.value,
+            sequence=sequence,
+        )
+        pending.raised.append(active)
+        if of_tool:
+            pending.tool_alarms[entry.machine_id, parameters.tool_memory, signal.value] = active
+        else:
+            stream.alarms[signal.value] = active
+    limit = parameters.max_total if of_tool else getattr(parameters, LIMIT_OF.get(signal, ""), None)
+    active.data = {
+        "characteristic": entry.characteristic,
+        "deviation": decision.deviation,
+        "decided": decision.decided,
+        "limit": parameters.tolerance_width / 2 if limit is None else limit,
+    }
+    if decision.code is Code.FIRST_MOVE_TRIGGERED:
+        active.data["first_move_triggered"] = True
+    if signal is ReadingAlarm.ACCEPTANCE and results is not None:
+        active.data |= {
+            "m": parameters.accept_m,
+            "least": parameters.accept_m - parameters.accept_n + 1,  # so many outside, and it is rejected
+            "outside": results.sections_outside,
+            "target": parameters.target,
+        }
+    active.count += 1
+    active.last_sequence = sequence
+    return active

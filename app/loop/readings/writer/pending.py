@@ -1,0 +1,376 @@
+"""Writes of the readings of one transaction: decided readings, and the rows that move with them.
+
+`PendingWrites` begins on a `Snapshot`, which it never changes. A reading takes what it moves out of the snapshot into an
+object of its own here, the next readings find it moved, and only the end of a committed transaction makes it the next
+snapshot (`settle`).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any, NamedTuple
+
+from app.core.decision.decide import Decision
+from app.core.parameters import Parameters
+from app.core.variants import Results
+from app.loop.readings.records import Entry, Record
+from app.loop.readings.schemas import ReadingIn
+from app.loop.readings.writer.snapshot import (
+    MOST_NAMED,
+    LoadedAverage,
+    LoadedCorrection,
+    LoadedStream,
+    LoadedTool,
+    NamedCorrection,
+    Snapshot,
+)
+
+
+@dataclass(slots=True)
+class PendingAlarm:
+    """An alarm that these readings raise. `save` learns if it is active already, or draws a number for it."""
+
+    machine_id: int
+    characteristic_id: int | None
+    tool_memory: int | None
+    kind: str
+    id: int | None = None
+    sequence: int | None = None
+    last_sequence: int | None = None
+    count: int = 0  # readings that raised it now
+    new: bool = True
+    data: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class PendingCorrection:
+    """A correction that these readings issue (`new`), or change. mm."""
+
+    machine_id: int
+    number: int
+    tool_memory: int
+    amount: float
+    status: str
+    characteristic_id: int = 0
+    sequence: int = 0
+    size_error: float = 0.0
+    applied_at: datetime | None = None
+    decided_at: datetime | None = None
+    fetched_at: datetime | None = None
+    applied_by: str | None = None
+    offset_after: float | None = None
+    superseded_by: int | None = None
+    new: bool = False
+
+    def loaded(self) -> LoadedCorrection:
+        """Return it as the database holds it after the commit."""
+        return LoadedCorrection(
+            self.number,
+            self.amount,
+            self.status,
+            self.applied_at,
+            self.decided_at,
+            self.fetched_at,
+            self.characteristic_id,
+        )
+
+
+@dataclass(slots=True)
+class EffectTally:
+    """Corrections of a tool, summed up for parts that name the same correction as the last in effect, or none.
+
+    Made by `corrections_in_effect`. seen: the number of the tool's corrections that are counted. previous_tool: the parts
+    were cut before the tool was changed. confirms: a pending correction is among those they were cut with. has_applied: an
+    applied one is among those seen. issued: amounts of the open ones. numbers, amounts: of those they were cut without;
+    applied_since: amounts of those that are applied by now. Amounts in mm of offset.
+    """
+
+    in_effect: int | None
+    last: NamedCorrection | None
+    seen: int = 0
+    previous_tool: bool = False
+    confirms: bool = False
+    has_applied: bool = False
+    issued: list[float] = field(default_factory=list)
+    numbers: list[int] = field(default_factory=list)
+    amounts: list[float] = field(default_factory=list)
+    applied_since: list[float] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class PendingTool:
+    """A location of the tool memory as these readings move it. mm."""
+
+    machine_id: int
+    number: int
+    offset: float
+    total: float
+    reset_at: datetime | None
+    paused_by: int | None = None
+    corrections: list[LoadedCorrection | PendingCorrection] = field(default_factory=list)
+    changed: bool = False
+    # Worked out of `corrections`, and how many of the first ones are known not to be held.
+    tallies: dict[int | None, EffectTally] = field(default_factory=dict)
+    none_held: int = 0
+
+    def forget(self) -> None:
+        """Drop what was worked out of the corrections: there are others, or one has another status."""
+        self.tallies, self.none_held = {}, 0
+
+    def changing(self, at: int) -> PendingCorrection:
+        """Return the correction at an index, as one that will be written."""
+        correction = self.corrections[at]
+        if isinstance(correction, LoadedCorrection):
+            correction = self.corrections[at] = PendingCorrection(
+                self.machine_id,
+                correction.number,
+                self.number,
+                correction.amount,
+                correction.status,
+                correction.characteristic_id,
+                applied_at=correction.applied_at,
+                decided_at=correction.decided_at,
+                fetched_at=correction.fetched_at,
+            )
+        return correction
+
+    def written(self) -> list[PendingCorrection]:
+        """Return the corrections that were issued or changed."""
+        return [c for c in self.corrections if isinstance(c, PendingCorrection)]
+
+
+@dataclass(slots=True)
+class PendingAverage:
+    """A location of the average memory as these readings move it. mm."""
+
+    machine_id: int
+    location: int
+    average: float
+    empirical_value: float
+    changed: bool = False
+
+
+@dataclass(slots=True)
+class PendingStream:
+    """The running state of one characteristic as these readings move it."""
+
+    entry: Entry
+    sequence: int
+    version: int
+    parameters: Parameters
+    average: PendingAverage | None
+    tool: PendingTool | None
+    paused_by: int | PendingAlarm | None
+    last_measured_at: datetime | None
+    level: float | None = None
+    level_sequence: int | None = None
+    level_moved: bool = False
+    alarms: dict[str, PendingAlarm] = field(default_factory=dict)
+    before: int = 0  # sequence in the snapshot
+    last: "Verdict | None" = None
+
+    def loaded(self) -> LoadedStream:
+        """Return it as the database holds it after the commit."""
+        return LoadedStream(
+            self.entry,
+            self.sequence,
+            self.version,
+            self.parameters,
+            None if self.average is None else self.average.location,
+            None if self.tool is None else self.tool.number,
+            self.paused_by.id if isinstance(self.paused_by, PendingAlarm) else self.paused_by,
+            self.last_measured_at,
+            self.level,
+            self.level_sequence,
+        )
+
+
+@dataclass(slots=True)
+class OffsetChange:
+    """A change of a tool offset to be written into its history. mm."""
+
+    machine_id: int
+    number: int
+    at: datetime
+    offset_before: float
+    offset_after: float
+    correction: int
+    actor: str
+
+
+@dataclass(slots=True)
+class PendingWrites:
+    """Everything that the readings of one transaction come to.
+
+    streams, tools, averages: taken out of the snapshot so far; `touched` are the streams with new readings. last_correction,
+    named: where they differ from the snapshot. column_rows: rows of the table `reading` for binary COPY that were laid out
+    of columns, beside the verdicts.
+    """
+
+    snapshot: Snapshot
+    streams: dict[int, PendingStream] = field(default_factory=dict)
+    tools: dict[tuple[int, int], PendingTool] = field(default_factory=dict)
+    averages: dict[tuple[int, int], PendingAverage] = field(default_factory=dict)
+    last_correction: dict[int, int] = field(default_factory=dict)
+    named: dict[tuple[int, int], NamedCorrection] = field(default_factory=dict)
+    touched: dict[int, PendingStream] = field(default_factory=dict)
+    verdicts: "list[Verdict]" = field(default_factory=list)
+    by_key: "dict[tuple[int, str], Verdict]" = field(default_factory=dict)
+    issued: list[PendingCorrection] = field(default_factory=list)
+    raised: list[PendingAlarm] = field(default_factory=list)
+    tool_alarms: dict[tuple[int, int, str], PendingAlarm] = field(default_factory=dict)
+    offset_changes: list[OffsetChange] = field(default_factory=list)
+    touched_machines: set[int] = field(default_factory=set)
+    column_rows: Callable[[], memoryview] | None = None
+
+    def stream(self, characteristic_id: int) -> PendingStream:
+        """Return the state of a characteristic as the readings before have left it."""
+        stream = self.streams.get(characteristic_id)
+        if stream is None:
+            loaded = self.snapshot.streams[characteristic_id]
+            machine_id = loaded.entry.machine_id
+            stream = self.streams[characteristic_id] = PendingStream(
+                loaded.entry,
+                loaded.sequence,
+                loaded.version,
+                loaded.parameters,
+                None if loaded.average is None else self._average((machine_id, loaded.average)),
+                None if loaded.tool is None else self._tool((machine_id, loaded.tool)),
+                loaded.paused_by,
+                loaded.last_measured_at,
+                loaded.level,
+                loaded.level_sequence,
+                before=loaded.sequence,
+            )
+        return stream
+
+    def _average(self, at: tuple[int, int]) -> PendingAverage:
+        average = self.averages.get(at)
+        if average is None:
+            average = self.averages[at] = PendingAverage(*self.snapshot.averages[at])
+        return average
+
+    def _tool(self, at: tuple[int, int]) -> PendingTool:
+        tool = self.tools.get(at)
+        if tool is None:
+            loaded = self.snapshot.tools[at]
+            tool = self.tools[at] = PendingTool(
+                loaded.machine_id,
+                loaded.number,
+                loaded.offset,
+                loaded.total,
+                loaded.reset_at,
+                loaded.paused_by,
+                list(loaded.corrections),
+            )
+        return tool
+
+    def last_number(self, machine_id: int) -> int:
+        """Return the number of the machine's last correction; 0 before the first."""
+        number = self.last_correction.get(machine_id)
+        return self.snapshot.last_correction[machine_id] if number is None else number
+
+    def named_correction(self, machine_id: int, number: int) -> NamedCorrection | None:
+        """Return what is known of a correction that readings name as the last in effect."""
+        at = (machine_id, number)
+        return self.named.get(at) or self.snapshot.named.get(at)
+
+    def settle(self) -> None:
+        """Make the snapshot what the commit has made of it. These writes are done."""
+        snapshot = self.snapshot
+        snapshot.stored_keys = {}
+        if self.column_rows is not None:
+            snapshot.forget()  # the columns hold more than the objects here
+            return
+        for characteristic_id, stream in self.touched.items():
+            snapshot.streams[characteristic_id] = stream.loaded()
+            average, tool = stream.average, stream.tool
+            if average is not None and average.changed:
+                at = (average.machine_id, average.location)
+                snapshot.averages[at] = LoadedAverage(*at, average.average, average.empirical_value)
+            if tool is not None and (tool.changed or tool.written()):
+                snapshot.tools[tool.machine_id, tool.number] = self._settled(tool)
+        for machine_id in {stream.entry.machine_id for stream in self.touched.values()}:
+            snapshot.versions[machine_id] += 1
+        snapshot.last_correction |= self.last_correction
+        snapshot.named |= self.named
+        if len(snapshot.named) > MOST_NAMED:
+            snapshot.named = {}
+        snapshot.named |= {(c.machine_id, c.number): NamedCorrection(None, None) for c in self.issued}
+
+    def _settled(self, tool: PendingTool) -> LoadedTool:
+        return self.snapshot.tools[tool.machine_id, tool.number]._replace(
+            offset=tool.offset,
+            total=tool.total,
+            corrections=[
+                c.loaded() if isinstance(c, PendingCorrection) else c
+                for c in tool.corrections
+                if c.status not in {"rejected", "superseded"}
+            ],
+        )
+
+
+@dataclass(slots=True)
+class Verdict:
+    """A decided reading, before its alarms have numbers."""
+
+    stream: PendingStream
+    reading: ReadingIn
+    sequence: int
+    version: int
+    parameters: Parameters
+    measured: float
+    measured_at: datetime
+    received_at: datetime
+    late: bool
+    decision: Decision
+    outstanding: Sequence[int]
+    correction: PendingCorrection | None
+    paused_by: int | PendingAlarm | None
+    alarms: list[PendingAlarm]
+    compensated: float | None
+    results: Results | None = None
+    _record: Record | None = None
+
+    def record(self) -> Record:
+        """Return the row to store, and to answer from; every alarm has its number by now."""
+        if self._record is None:
+            self._record = self._row()
+        return self._record
+
+    def _row(self) -> Record:
+        d, r, entry = self.decision, self.reading, self.stream.entry
+        paused_by = self.paused_by.id if isinstance(self.paused_by, PendingAlarm) else self.paused_by
+        return Record(
+            entry.machine_id,
+            entry.characteristic_id,
+            self.sequence,
+            self.measured,
+            d.deviation,
+            d.decided,
+            d.average_before,
+            d.average_after,
+            self.measured_at,
+            self.received_at,
+            r.machined_at,
+            self.version,
+            r.correction_in_effect,
+            self.correction.number if self.correction else None,
+            paused_by,
+            self.late,
+            d.zone.value,
+            d.action.value,
+            d.code.value,
+            r.key,
+            r.part,
+            self.outstanding or None,
+            [alarm.id or 0 for alarm in self.alarms] or None,
+            self.compensated,
+        )
+
+
+class Stored(NamedTuple):
+    """The reading is in the record already: the same key with the same value was sent before."""
+
+    entry: Entry
+    sequence: int

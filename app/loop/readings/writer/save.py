@@ -1,0 +1,279 @@
+"""Write what was decided, and commit: one round trip. Large batches send their readings by binary COPY.
+
+This is the one place that writes the tables of offsets and alarms from here: a set-based statement for all readings of
+a transaction cannot be had through the actions that serve one person at a time.
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+from app.db.pipeline import Pipeline, Step
+from app.loop.readings.records import Entry, Record
+from app.loop.readings.writer.binary_copy import array_of_int4
+from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
+from app.loop.readings.writer.statements import (
+    ACTIVE_ALARMS,
+    ALARM_NUMBERS,
+    BASE_LEVEL,
+    CHANGE_CORRECTIONS,
+    COPY,
+    COPY_TYPES,
+    COUNTERS,
+    FAN,
+    GUARD,
+    ISSUE,
+    LOCK,
+    MOVE_LEVELS,
+    MOVE_TOOLS,
+    RAISE,
+    REPEAT,
+    RESULTS,
+    SAVE,
+    STEPS,
+    SUMMARISE_READINGS,
+    SUMMARISE_SUMMARIES,
+    TOP_LEVEL,
+    TOUCHES,
+    array,
+    as_json,
+)
+
+COPY_FROM = 500  # readings in one transaction from which COPY is faster than one JSON document
+
+
+async def save(pipeline: Pipeline, pending: PendingWrites, *, begun: bool, notify: bool = True) -> None:
+    """Write everything that is pending and commit it.
+
+    begun: the machines are locked already; otherwise all of it happens in one round trip. notify: wake who listens to the
+    journal of events. Raises psycopg's errors; `DivisionByZero` when somebody has changed a machine since the snapshot was
+    loaded.
+    """
+    touched = list(pending.touched.values())
+    machines = {stream.entry.machine_id for stream in touched}
+    versions = as_json(
+        [{"machine_id": machine_id, "version": pending.snapshot.versions[machine_id]} for machine_id in machines]
+    )
+    copying = len(pending.verdicts) >= COPY_FROM
+    locking: list[Step] = [(LOCK, array(machines))] if len(machines) > 1 and not begun else []
+    if copying or pending.column_rows or pending.raised:  # something must be done before the last round trip
+        opening: list[Step] = [*([] if begun else [("BEGIN",)]), *locking, (GUARD, versions)]
+        await (_number_alarms(pipeline, pending, opening) if pending.raised else pipeline.run(opening))
+        begun, locking, versions = True, [], "[]"
+    records = [verdict.record() for verdict in pending.verdicts]
+    if pending.column_rows:
+        await _copy_columns(pipeline, pending.column_rows())
+    if copying:
+        await _copy(pipeline, records)
+    averages = {id(stream.average): stream.average for stream in touched}.values()
+    await pipeline.run(
+        (
+            *locking,
+            (
+                SAVE,
+                versions,
+                as_json([_stream_row(stream) for stream in touched]),
+                as_json(
+                    [
+                        {"machine_id": a.machine_id, "location": a.location, "average": a.average}
+                        for a in averages
+                        if a is not None and a.changed
+                    ]
+                ),
+                as_json([] if copying else [record._asdict() for record in records]),
+                as_json(_changes(pending, touched)),
+                str(notify),
+            ),
+            *((statement, as_json(rows)) for statement, rows in _rarer(pending) if rows),
+            *(
+                (statement, as_json(blocks))
+                for statement, blocks in full_blocks([(s.entry, s.before, s.sequence) for s in touched])
+            ),
+            *([("COMMIT",)] if begun else []),
+        )
+    )
+
+
+async def _number_alarms(pipeline: Pipeline, pending: PendingWrites, opening: list[Step]) -> None:
+    """Find the alarms that are active for the same trouble already, and draw numbers for the others."""
+    machines = {alarm.machine_id for alarm in pending.raised}
+    *_opened, rows = await pipeline.run([*opening, (ACTIVE_ALARMS, array(machines))])
+    active = {
+        (int(machine or 0), _number(characteristic), _number(tool), (kind or b"").decode()): _number(alarm)
+        for machine, characteristic, tool, kind, alarm in rows
+    }
+    for alarm in pending.raised:
+        tool = alarm.tool_memory if alarm.characteristic_id is None else None
+        alarm.id = active.get((alarm.machine_id, alarm.characteristic_id, tool, alarm.kind))
+        alarm.new = alarm.id is None
+    new = [alarm for alarm in pending.raised if alarm.new]
+    if new:
+        (numbers,) = await pipeline.run(((ALARM_NUMBERS, str(len(new))),))
+        for alarm, (number,) in zip(new, numbers, strict=True):
+            alarm.id = _number(number)
+
+
+def _number(text: bytes | None) -> int | None:
+    return None if text is None else int(text)
+
+
+async def _copy_columns(pipeline: Pipeline, rows: memoryview) -> None:
+    async with pipeline.connection.cursor() as cursor, cursor.copy(COPY) as copy:
+        await copy.write(rows)
+
+
+async def _copy(pipeline: Pipeline, records: list[Record]) -> None:
+    async with pipeline.connection.cursor() as cursor, cursor.copy(COPY) as copy:
+        copy.set_types(COPY_TYPES)
+        for record in records:
+            outstanding = array_of_int4(record.outstanding) if record.outstanding else None
+            await copy.write_row(record._replace(outstanding=outstanding))
+
+
+def _stream_row(stream: PendingStream) -> dict[str, Any]:
+    last = stream.last
+    assert last is not None
+    return {
+        "machine_id": stream.entry.machine_id,
+        "characteristic_id": stream.entry.characteristic_id,
+        "sequence": stream.sequence,
+        "paused_by": stream.paused_by.id if isinstance(stream.paused_by, PendingAlarm) else stream.paused_by,
+        "last_measured_at": stream.last_measured_at,
+        "last_received_at": last.received_at,
+        "last_measured": last.measured,
+        "last_deviation": last.decision.deviation,
+        "last_average": last.decision.average_after,
+        "last_zone": last.decision.zone.value,
+    }
+
+
+def _rarer(pending: PendingWrites) -> Iterable[tuple[str, list[Any]]]:
+    yield (
+        TOUCHES,
+        [
+            {
+                "machine_id": v.stream.entry.machine_id,
+                "characteristic_id": v.stream.entry.characteristic_id,
+                "sequence": v.sequence,
+                "touches": v.reading.touches,
+            }
+            for v in pending.verdicts
+            if v.reading.touches is not None
+        ],
+    )
+    yield (
+        RESULTS,
+        [
+            {
+                "machine_id": v.stream.entry.machine_id,
+                "characteristic_id": v.stream.entry.characteristic_id,
+                "sequence": v.sequence,
+                **v.results._asdict(),
+            }
+            for v in pending.verdicts
+            if v.results is not None
+        ],
+    )
+    yield (
+        MOVE_LEVELS,
+        [
+            {
+                "machine_id": stream.entry.machine_id,
+                "characteristic_id": stream.entry.characteristic_id,
+                "level": stream.level,
+                "level_sequence": stream.level_sequence,
+            }
+            for stream in {id(v.stream): v.stream for v in pending.verdicts if v.stream.level_moved}.values()
+        ],
+    )
+    if pending.touched_machines:
+        yield (
+            COUNTERS,
+            [{"machine_id": m, "last_correction": pending.last_number(m)} for m in pending.touched_machines],
+        )
+        tools = _tools(pending)
+        yield ISSUE, [c for tool in tools for c in tool.written() if c.new]
+        yield (
+            CHANGE_CORRECTIONS,
+            [c for tool in tools for c in tool.written() if not c.new],
+        )
+        yield (
+            MOVE_TOOLS,
+            [
+                {"machine_id": t.machine_id, "number": t.number, "offset": t.offset, "total": t.total}
+                for t in tools
+                if t.changed
+            ],
+        )
+        yield STEPS, pending.offset_changes
+    if pending.raised:
+        yield RAISE, [alarm for alarm in pending.raised if alarm.new]
+        yield REPEAT, [alarm for alarm in pending.raised if not alarm.new]
+
+
+def _tools(pending: PendingWrites) -> list[PendingTool]:
+    """Return the tools of the decided readings."""
+    tools = {id(verdict.stream.tool): verdict.stream.tool for verdict in pending.verdicts}
+    return [tool for tool in tools.values() if tool is not None]
+
+
+def full_blocks(spans: list[tuple[Entry, int, int]]) -> Iterable[tuple[str, list[dict[str, int]]]]:
+    """Return the statements that summarise the blocks which these readings have filled, lowest level first.
+
+    spans: where, the number of the last reading before them, and the number of their last.
+    """
+    for level in range(BASE_LEVEL, TOP_LEVEL + 1, FAN):
+        rows = [
+            {
+                "machine_id": entry.machine_id,
+                "characteristic_id": entry.characteristic_id,
+                "level": level,
+                "first": before >> level,
+                "last": after >> level,
+            }
+            for entry, before, after in spans
+            if before >> level < after >> level
+        ]
+        if not rows:
+            return
+        yield (SUMMARISE_READINGS if level == BASE_LEVEL else SUMMARISE_SUMMARIES), rows
+
+
+def _changes(pending: PendingWrites, touched: list[PendingStream]) -> list[dict[str, Any]]:
+    changes: list[dict[str, Any]] = [
+        {
+            "kind": "reading",
+            "machine": stream.entry.machine,
+            "characteristic": stream.entry.characteristic,
+            "sequence": stream.sequence,
+        }
+        for stream in touched
+    ]
+    streams = {stream.entry.machine_id: stream.entry.machine for stream in touched}
+    characteristics = {stream.entry.characteristic_id: stream.entry.characteristic for stream in touched}
+    for tool in _tools(pending) if pending.touched_machines else ():
+        changes.extend(
+            {
+                "kind": "correction",
+                "machine": streams[tool.machine_id],
+                "characteristic": characteristics.get(c.characteristic_id),
+                "tool": tool.number,
+                "number": c.number,
+                "status": c.status,
+            }
+            for c in tool.written()
+        )
+        if tool.changed:
+            changes.append({"kind": "tool", "machine": streams[tool.machine_id], "tool": tool.number})
+    changes.extend(
+        {
+            "kind": "alarm",
+            "machine": streams[alarm.machine_id],
+            "characteristic": characteristics.get(alarm.characteristic_id or 0),
+            "tool": alarm.tool_memory,
+            "id": alarm.id,
+            "alarm": alarm.kind,
+            "state": "active",
+        }
+        for alarm in pending.raised
+    )
+    return changes

@@ -1,0 +1,137 @@
+"""The snapshot: the state of machines that readings are decided against. Frozen: a decision writes to `PendingWrites` alone.
+
+It is loaded under the machines' locks, or remembered from the transaction before. A remembered snapshot is an optimistic
+lock: with the commit, the database proves that no machine's version has moved (`statements.GUARD`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import NamedTuple
+
+from app.core.parameters import Parameters
+from app.loop.readings.records import Entry
+from app.loop.readings.schemas import ReadingIn
+
+# A remembered tool's corrections grow in number; beyond this they are loaded again, and then are few again.
+MOST_CORRECTIONS = 100
+MOST_NAMED = 10_000
+
+
+class LoadedCorrection(NamedTuple):
+    """A correction that is open, or was applied after a part that is to be decided on was cut. Amount in mm of offset.
+
+    decided_at: a person approved or released it. fetched_at: as program text; the control applies it behind those fetched
+    before. characteristic_id: 0 where it was not asked for.
+    """
+
+    number: int
+    amount: float
+    status: str
+    applied_at: datetime | None = None
+    decided_at: datetime | None = None
+    fetched_at: datetime | None = None
+    characteristic_id: int = 0
+
+
+class NamedCorrection(NamedTuple):
+    """The last correction that a machine had applied when it cut a part: its time, and the time of a person's decision."""
+
+    applied_at: datetime | None
+    decided_at: datetime | None
+    fetched_at: datetime | None = None
+
+
+class LoadedTool(NamedTuple):
+    """One location of the tool memory (R10), with its corrections in the order of their numbers. mm.
+
+    paused_by: the alarm that asks which offset is true. Of the applied corrections there are those with a higher number
+    than `since_number`, and those applied after `since`.
+    """
+
+    machine_id: int
+    number: int
+    offset: float
+    total: float
+    reset_at: datetime | None
+    paused_by: int | None = None
+    corrections: Sequence[LoadedCorrection] = ()
+    since_number: int | None = None
+    since: datetime | None = None
+
+
+class LoadedAverage(NamedTuple):
+    """One location of the average memory (R11): running average and empirical value, mm."""
+
+    machine_id: int
+    location: int
+    average: float
+    empirical_value: float
+
+
+class LoadedStream(NamedTuple):
+    """The state of one characteristic after its last reading.
+
+    average, tool: locations, None without one. level: the deviation expected without corrections, mm; kept where jumps
+    are looked for.
+    """
+
+    entry: Entry
+    sequence: int
+    version: int
+    parameters: Parameters
+    average: int | None
+    tool: int | None
+    paused_by: int | None = None
+    last_measured_at: datetime | None = None
+    level: float | None = None
+    level_sequence: int | None = None
+
+
+class KnownKey(NamedTuple):
+    """A stored reading whose key has come again."""
+
+    sequence: int
+    measured: float
+    parameters: Parameters
+
+
+@dataclass(slots=True)
+class Snapshot:
+    """Rows as the database holds them. Only `load`, and the end of a transaction, put others in their place.
+
+    Keys: characteristic; (machine, location); machine; (machine, correction); (characteristic, key of a reading).
+    """
+
+    streams: dict[int, LoadedStream] = field(default_factory=dict)
+    tools: dict[tuple[int, int], LoadedTool] = field(default_factory=dict)
+    averages: dict[tuple[int, int], LoadedAverage] = field(default_factory=dict)
+    last_correction: dict[int, int] = field(default_factory=dict)
+    versions: dict[int, int] = field(default_factory=dict)
+    named: dict[tuple[int, int], NamedCorrection] = field(default_factory=dict)
+    stored_keys: dict[tuple[int, str], KnownKey] = field(default_factory=dict)
+
+    def covers(self, entry: Entry, reading: ReadingIn) -> bool:
+        """Tell if everything is here that this reading is decided against, if the versions are still true."""
+        stream = self.streams.get(entry.characteristic_id)
+        if stream is None:
+            return False
+        number = reading.correction_in_effect
+        if stream.tool is None or (number is None and reading.machined_at is None):
+            return True
+        tool = self.tools[entry.machine_id, stream.tool]
+        if len(tool.corrections) > MOST_CORRECTIONS:
+            return False
+        if number is None:
+            return tool.since is not None and reading.machined_at is not None and reading.machined_at >= tool.since
+        if tool.since_number is None or number < tool.since_number:
+            return False
+        named = self.named.get((entry.machine_id, number))
+        if named is None:
+            return number == 0
+        return named.applied_at is None or (tool.since is not None and named.applied_at >= tool.since)
+
+    def forget(self) -> None:
+        """Forget everything that was loaded; only keys of this transaction stay."""
+        self.streams, self.tools, self.averages = {}, {}, {}
+        self.last_correction, self.versions, self.named = {}, {}, {}

@@ -1,0 +1,232 @@
+"""The SQL of the writer. Parameters are arrays of numbers and JSON documents of rows.
+
+Rows travel as JSON because the server takes it apart with `json_to_recordset`, which measured faster than arrays for one row
+and for sixty-four.
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+import msgspec
+
+from app.core.decision.limits import Zone
+from app.core.variants import Results
+from app.db.events import CHANNEL, PUBLISHED
+from app.loop.readings.records import Record
+
+_json = msgspec.json.Encoder(enc_hook=list)  # a list that is shared by many rows
+
+
+def as_json(value: Any) -> str:
+    """One statement's rows."""
+    return _json.encode(value).decode()
+
+
+def array(numbers: Iterable[int]) -> str:
+    """An array of numbers."""
+    return "{" + ",".join(map(str, numbers)) + "}"
+
+
+LOCK = """
+SELECT machine_id, last_correction, version FROM machine_state
+WHERE machine_id = ANY($1::int[]) ORDER BY machine_id FOR UPDATE
+"""
+# Ends the transaction (by a division by zero) unless every machine is still at the version that its readings were decided
+# on; moves the versions on. With several machines LOCK comes first, because an update takes rows in any order.
+_GUARD = """
+current AS (
+    UPDATE machine_state m SET version = m.version + 1
+    FROM json_to_recordset($1) AS w(machine_id int, version bigint)
+    WHERE m.machine_id = w.machine_id AND m.version = w.version RETURNING 1
+),
+guard AS MATERIALIZED (SELECT 1 / (count(*) = json_array_length($1))::int FROM current)
+"""
+GUARD = f"WITH {_GUARD} SELECT * FROM guard"  # noqa: S608 - made of constants
+# One statement for all that is needed, as one JSON document, because each statement costs more than what it reads here.
+# Corrections of a tool: the open ones, and those applied since the oldest correction or time that a reading names, or with it if
+# they had waited for a person; `named` are the corrections that readings name as the last ones in effect.
+# The row comparison with the keys can only be had from their own index; plain equalities the planner may also answer by
+# walking the primary key through every reading of the characteristic.
+LOAD = """
+WITH doc AS MATERIALIZED (SELECT $1::json AS d),
+named AS MATERIALIZED (
+    SELECT c.machine_id, c.number, c.applied_at, c.fetched_at,
+        CASE WHEN c.status IN ('pending', 'applied') THEN c.decided_at END AS decided_at  -- not when it was dropped
+    FROM json_to_recordset((SELECT d -> 'named' FROM doc)) AS w(machine_id int, number int)
+    JOIN correction c ON c.machine_id = w.machine_id AND c.number = w.number
+)
+SELECT json_build_object(
+    'streams', (
+        SELECT json_agg(json_build_array(s.machine_id, s.characteristic_id, s.sequence, s.parameters_version, s.paused_by,
+            s.last_measured_at, a.location, a.average, a.empirical_value, t.number, t."offset", t.total, t.reset_at,
+            t.paused_by, s.level, s.level_sequence,
+            CASE WHEN t.number IS NOT NULL THEN (
+                SELECT json_agg(json_build_array(
+                    c.number, c.amount, c.status, c.applied_at, c.decided_at, c.fetched_at) ORDER BY c.number) FROM (
+                    SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
+                    WHERE machine_id = t.machine_id AND tool_memory = t.number
+                        AND status IN ('held', 'awaiting_approval', 'pending')
+                    UNION ALL
+                    SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
+                    WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
+                        AND number > w.number
+                    UNION ALL
+                    SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
+                    WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
+                        AND (applied_at, decided_at IS NOT NULL) >= (least(
+                            w.since, (SELECT min(n.applied_at) FROM named n WHERE n.machine_id = t.machine_id)
+                        ), true) AND (number <= w.number OR w.number IS NULL)
+                ) c
+            ) END))
+        FROM json_to_recordset((SELECT d -> 'streams' FROM doc))
+            AS w(machine_id int, characteristic_id int, number int, since timestamptz)
+        JOIN stream s ON s.machine_id = w.machine_id AND s.characteristic_id = w.characteristic_id
+        LEFT JOIN average_memory a ON a.machine_id = s.machine_id AND a.location = s.average_memory
+        LEFT JOIN tool t ON t.machine_id = s.machine_id AND t.number = s.tool_memory
+    ),
+    'named', (SELECT json_agg(json_build_array(machine_id, number, applied_at, decided_at, fetched_at)) FROM named),
+    'known', (
+        SELECT json_agg(json_build_array(r.characteristic_id, r.key, r.sequence, r.measured, r.parameters_version))
+        FROM json_to_recordset((SELECT d -> 'keys' FROM doc)) AS w(machine_id int, characteristic_id int, key text)
+        CROSS JOIN LATERAL (
+            SELECT * FROM reading
+            WHERE key IS NOT NULL AND (machine_id, characteristic_id, key) >= (w.machine_id, w.characteristic_id, w.key)
+            ORDER BY machine_id, characteristic_id, key LIMIT 1
+        ) r
+        WHERE r.machine_id = w.machine_id AND r.characteristic_id = w.characteristic_id AND r.key = w.key
+    ))::text
+"""
+ACTIVE_ALARMS = """
+SELECT machine_id, characteristic_id, CASE WHEN characteristic_id IS NULL THEN tool_memory END, kind, id FROM alarm
+WHERE machine_id = ANY($1::int[]) AND acknowledged_at IS NULL
+"""
+PARAMETERS = """
+SELECT p.parameters FROM json_to_record($1) AS w(machine_id int, characteristic_id int, version int)
+JOIN parameters_version p ON p.machine_id = w.machine_id AND p.characteristic_id = w.characteristic_id
+    AND p.version = w.version
+"""
+ALARM_NUMBERS = "SELECT nextval('alarm_id') FROM generate_series(1, $1::int)"
+
+_READING = """machine_id int4, characteristic_id int4, sequence int8, measured float8, deviation float8, decided float8,
+    average_before float8, average_after float8, measured_at timestamptz, received_at timestamptz,
+    machined_at timestamptz, parameters_version int4, correction_in_effect int4, correction int4, paused_by int8,
+    late bool, zone text, action text, code text, key text, part text, outstanding int4[], alarms int8[],
+    compensated float8"""
+_COLUMNS = ", ".join(Record._fields)
+# A column that the writer encodes itself goes out as the bytes it is: COPY sends no types.
+COPY_TYPES = ["bytea" if column.split()[0] == "outstanding" else column.split()[1] for column in _READING.split(",")]
+MOVE_STREAMS = """
+UPDATE stream s SET sequence = n.sequence, paused_by = n.paused_by, last_measured_at = n.last_measured_at,
+    last_received_at = n.last_received_at, last_measured = n.last_measured, last_deviation = n.last_deviation,
+    last_average = n.last_average, last_zone = n.last_zone
+FROM json_to_recordset($2) AS n(machine_id int, characteristic_id int, sequence bigint,
+    paused_by bigint, last_measured_at timestamptz, last_received_at timestamptz, last_measured float8,
+    last_deviation float8, last_average float8, last_zone text)
+WHERE s.machine_id = n.machine_id AND s.characteristic_id = n.characteristic_id
+"""
+MOVE_AVERAGES = """
+UPDATE average_memory a SET average = n.average, updated_at = now()
+FROM json_to_recordset($3) AS n(machine_id int, location int, average float8)
+WHERE a.machine_id = n.machine_id AND a.location = n.location
+"""
+# All that an ordinary reading needs, in one statement, because each costs more than what it writes. Parameters: versions (see
+# GUARD; none, if that has been asked), streams, averages, readings, changes, and whether to wake who listens.
+SAVE = f"""
+WITH {_GUARD}, moved AS ({MOVE_STREAMS}), averaged AS ({MOVE_AVERAGES}),
+stored AS (INSERT INTO reading ({_COLUMNS}) SELECT {_COLUMNS} FROM json_to_recordset($4) AS r({_READING})),
+{PUBLISHED.format(changes="$5", after="FROM guard")} WHERE $6::bool
+"""  # noqa: S608 - made of constants
+# For readings stored without a notification; whoever is woken reads on in the journal from where it was.
+NOTIFY = f"NOTIFY {CHANNEL}"
+COPY = f"COPY reading ({_COLUMNS}) FROM STDIN (FORMAT BINARY)"
+# The rarer rows, each statement sent only when there is something for it.
+TOUCHES = """
+INSERT INTO reading_touches (machine_id, characteristic_id, sequence, touches)
+SELECT * FROM json_to_recordset($1) AS r(machine_id int, characteristic_id int, sequence bigint, touches jsonb)
+"""
+_RESULTS = """machine_id int, characteristic_id int, sequence bigint, run_out float8, out_of_roundness float8, taper float8,
+    slope float8, repeat_range float8, repeat_deviation float8, sections_outside smallint, rejected bool"""
+RESULTS = f"""
+INSERT INTO reading_results (machine_id, characteristic_id, sequence, {", ".join(Results._fields)})
+SELECT * FROM json_to_recordset($1) AS r({_RESULTS})
+"""  # noqa: S608 - made of constants
+COUNTERS = """
+UPDATE machine_state m SET last_correction = n.last_correction
+FROM json_to_recordset($1) AS n(machine_id int, last_correction int) WHERE m.machine_id = n.machine_id
+"""
+ISSUE = """
+INSERT INTO correction (machine_id, number, characteristic_id, sequence, tool_memory, size_error, amount, status,
+    decided_at, superseded_by, applied_at, applied_by, offset_after)
+SELECT machine_id, number, characteristic_id, sequence, tool_memory, size_error, amount, status,
+    CASE WHEN superseded_by IS NOT NULL THEN now() END, superseded_by, applied_at, applied_by, offset_after
+FROM json_to_recordset($1) AS r(machine_id int, number int, characteristic_id int, sequence bigint,
+    tool_memory int, size_error float8, amount float8, status text, superseded_by int, applied_at timestamptz,
+    applied_by text, offset_after float8)
+"""
+CHANGE_CORRECTIONS = """
+UPDATE correction c SET status = n.status, superseded_by = n.superseded_by, applied_at = n.applied_at,
+    applied_by = n.applied_by, offset_after = n.offset_after,
+    decided_at = CASE WHEN n.status = 'superseded' THEN now() ELSE c.decided_at END
+FROM json_to_recordset($1) AS n(machine_id int, number int, status text, superseded_by int, applied_at timestamptz,
+    applied_by text, offset_after float8)
+WHERE c.machine_id = n.machine_id AND c.number = n.number
+"""
+MOVE_TOOLS = """
+UPDATE tool t SET "offset" = n."offset", total = n.total
+FROM json_to_recordset($1) AS n(machine_id int, number int, "offset" float8, total float8)
+WHERE t.machine_id = n.machine_id AND t.number = n.number
+"""
+MOVE_LEVELS = """
+UPDATE stream s SET level = n.level, level_sequence = n.level_sequence
+FROM json_to_recordset($1) AS n(machine_id int, characteristic_id int, level float8, level_sequence bigint)
+WHERE s.machine_id = n.machine_id AND s.characteristic_id = n.characteristic_id
+"""
+STEPS = """
+INSERT INTO tool_event (machine_id, number, at, kind, offset_before, offset_after, correction, actor)
+SELECT machine_id, number, at, 'correction', offset_before, offset_after, correction, actor
+FROM json_to_recordset($1) AS r(machine_id int, number int, at timestamptz, offset_before float8,
+    offset_after float8, correction int, actor text)
+"""
+RAISE = """
+INSERT INTO alarm (machine_id, id, kind, characteristic_id, tool_memory, count, sequence, last_sequence, data)
+SELECT * FROM json_to_recordset($1) AS r(machine_id int, id bigint, kind text, characteristic_id int, tool_memory int,
+    count int, sequence bigint, last_sequence bigint, data jsonb)
+"""
+# The sentence tells the newest reading, as the correction that is held does; a tool's alarm keeps the one that raised it.
+REPEAT = """
+UPDATE alarm a SET count = a.count + n.count, last_at = now(), last_sequence = n.last_sequence,
+    data = CASE WHEN a.characteristic_id IS NULL THEN a.data ELSE n.data END
+FROM json_to_recordset($1) AS n(machine_id int, id bigint, count int, last_sequence bigint, data jsonb)
+WHERE a.machine_id = n.machine_id AND a.id = n.id
+"""
+
+BASE_LEVEL, TOP_LEVEL, FAN = 5, 23, 2  # blocks of 32, 128, 512 … readings
+_ZONES = ", ".join(f"count(*) FILTER (WHERE r.zone = '{zone.value}')" for zone in Zone)
+_ZONE_SUMS = ", ".join(f"sum(l.zones[{at}])" for at in range(1, len(Zone) + 1))
+_SUMMARY = """machine_id, characteristic_id, level, block, count, minimum, maximum, sum, sum_squares, first, last, average,
+    corrections, zones, first_at, last_at"""
+SUMMARISE_READINGS = f"""
+INSERT INTO reading_summary ({_SUMMARY})
+SELECT b.machine_id, b.characteristic_id, {BASE_LEVEL}, (r.sequence - 1) >> {BASE_LEVEL} AS block, count(*),
+    min(deviation), max(deviation), sum(deviation), sum(deviation * deviation),
+    min(deviation) FILTER (WHERE (r.sequence - 1) % {1 << BASE_LEVEL} = 0),
+    min(deviation) FILTER (WHERE r.sequence % {1 << BASE_LEVEL} = 0),
+    min(average_after) FILTER (WHERE r.sequence % {1 << BASE_LEVEL} = 0),
+    count(correction), ARRAY[{_ZONES}], min(measured_at), max(measured_at)
+FROM json_to_recordset($1) AS b(machine_id int, characteristic_id int, first bigint, last bigint)
+JOIN reading r ON r.machine_id = b.machine_id AND r.characteristic_id = b.characteristic_id
+    AND r.sequence > b.first << {BASE_LEVEL} AND r.sequence <= b.last << {BASE_LEVEL}
+GROUP BY 1, 2, 4
+"""  # noqa: S608 - made of constants
+SUMMARISE_SUMMARIES = f"""
+INSERT INTO reading_summary ({_SUMMARY})
+SELECT b.machine_id, b.characteristic_id, b.level, l.block >> {FAN} AS block, sum(l.count), min(minimum), max(maximum),
+    sum(l.sum), sum(sum_squares), min(l.first) FILTER (WHERE l.block % {1 << FAN} = 0),
+    min(l.last) FILTER (WHERE l.block % {1 << FAN} = {(1 << FAN) - 1}),
+    min(l.average) FILTER (WHERE l.block % {1 << FAN} = {(1 << FAN) - 1}),
+    sum(corrections), ARRAY[{_ZONE_SUMS}], min(first_at), max(last_at)
+FROM json_to_recordset($1) AS b(machine_id int, characteristic_id int, level int, first bigint, last bigint)
+JOIN reading_summary l ON l.machine_id = b.machine_id AND l.characteristic_id = b.characteristic_id
+    AND l.level = b.level - {FAN} AND l.block >= b.first << {FAN} AND l.block < b.last << {FAN}
+GROUP BY 1, 2, 3, 4
+"""  # noqa: S608 - made of constants

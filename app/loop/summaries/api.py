@@ -1,0 +1,141 @@
+"""JSON route: the numbers of a run of readings."""
+
+from dataclasses import replace
+from datetime import datetime
+from typing import Annotated
+
+from fastapi import Path, Query
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.access.deps import AnyCaller
+from app.errors import FieldError, Invalid
+from app.language.i18n import _
+from app.loop.characteristics import queries as characteristics
+from app.loop.summaries import queries
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep
+from app.web.fields import LARGEST_ID, Moment
+
+router = api_router("statistics")
+
+
+class StatisticsOut(BaseModel):
+    """Deviations in mm. What cannot be said of so few readings is null; excluded readings are left out.
+
+    A probe fault (R36 reached) measured no part: it is in `count` and `zones`, and left out of mean, standard deviation,
+    minimum, maximum and share, as capability and control charts leave it out.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "characteristic": "shaft-d40",
+                "first_sequence": 613,
+                "last_sequence": 812,
+                "count": 199,
+                "excluded": 1,
+                "probe_faults": 0,
+                "mean": 0.00042,
+                "standard_deviation": 0.00193,
+                "minimum": -0.0061,
+                "maximum": 0.0092,
+                "in_tolerance": 198,
+                "share_in_tolerance": 0.99497,
+                "corrections": 17,
+                "rejected": None,
+                "sections_outside": None,
+                "rejected_since_tool_change": None,
+                "sections_outside_since_tool_change": None,
+                "zones": {
+                    "zero": 71,
+                    "average": 109,
+                    "full": 18,
+                    "oversize": 1,
+                    "undersize": 0,
+                    "wear": 0,
+                    "probe_fault": 0,
+                },
+            }
+        }
+    )
+
+    characteristic: str
+    first_sequence: int | None = Field(description="First reading that was looked at.")
+    last_sequence: int | None
+    count: int = Field(description="Readings that nobody excluded, probe faults among them.")
+    excluded: int
+    probe_faults: int = Field(description="Of `count`: left out of every number but `count` and `zones`.")
+    mean: float | None
+    standard_deviation: float | None = Field(description="Of the sample (n - 1); null for fewer than two readings.")
+    minimum: float | None
+    maximum: float | None
+    in_tolerance: int = Field(description="Parts whose raw deviation was within the tolerance in force.")
+    share_in_tolerance: float | None = Field(description="Of the parts measured: `count` less `probe_faults`.")
+    corrections: int = Field(description="Readings that led to a correction.")
+    rejected: int | None = Field(description="With acceptance n of m: parts that were not accepted; else null.")
+    sections_outside: int | None = Field(
+        description="With acceptance n of m: sections out of tolerance, the lathe line's #513; else null."
+    )
+    rejected_since_tool_change: int | None = Field(description="The same of all parts since the tool was changed.")
+    sections_outside_since_tool_change: int | None
+    zones: dict[str, int] = Field(description="How many were decided in each zone.")
+
+
+@router.get("/characteristics/{characteristic}/statistics", responses=problems(404))
+def get_statistics(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])],
+    start: Annotated[
+        Moment | None, Query(alias="from", description="Measured at this moment or later.", examples=[None])
+    ] = None,
+    end: Annotated[
+        Moment | None, Query(alias="to", description="Measured at this moment or earlier.", examples=[None])
+    ] = None,
+    last: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="Only of the last so many readings.")] = None,
+) -> StatisticsOut:
+    """Number, mean, standard deviation, extremes, zones: exact, of all readings or of those measured from … to.
+
+    With `last` as well, of the last so many readings those that were measured from … to count.
+    """
+    check_order(start, end)
+    standing = characteristics.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    window = replace(queries.window_of(session, standing.characteristic, last=last), start=start, end=end)
+    numbers = queries.numbers_of(session, standing.characteristic, window)
+    rejects = of_tool = None
+    if standing.parameters.accept_m > 1:
+        rejects = queries.rejects_of(session, standing.characteristic, window)
+        since_change = queries.since_tool_change(session, standing.characteristic)
+        of_tool = queries.rejects_of(session, standing.characteristic, since_change)
+    return StatisticsOut(
+        characteristic=standing.characteristic.key,
+        first_sequence=window.first if window.count else None,
+        last_sequence=window.last if window.count else None,
+        count=numbers.count,
+        excluded=numbers.excluded,
+        probe_faults=numbers.probe_faults,
+        mean=numbers.mean,
+        standard_deviation=numbers.standard_deviation,
+        minimum=numbers.minimum,
+        maximum=numbers.maximum,
+        in_tolerance=numbers.in_tolerance,
+        share_in_tolerance=numbers.share_in_tolerance,
+        corrections=numbers.corrections,
+        rejected=rejects.parts if rejects else None,
+        sections_outside=rejects.sections if rejects else None,
+        rejected_since_tool_change=of_tool.parts if of_tool else None,
+        sections_outside_since_tool_change=of_tool.sections if of_tool else None,
+        zones=numbers.zones,
+    )
+
+
+def check_order(start: datetime | None, end: datetime | None) -> None:
+    """Raises `Invalid` when from … to runs backwards."""
+    if start is not None and end is not None and start > end:
+        message = _("{start} is later than `to` {end}").format(start=start.isoformat(), end=end.isoformat())
+        raise Invalid(
+            _("`from` {message}.").format(message=message),
+            _("Exchange the two moments."),
+            errors=[FieldError("from", message)],
+        )

@@ -1,0 +1,40 @@
+"""Queries over many readings at once.
+
+Small windows are read directly. Large ones are read from the pyramid of summaries (`reading_summary`), so that ten million
+readings cost little more than ten thousand, and no extreme is thinned away.
+"""
+
+from app.loop.summaries.queries.chart_data import ChartData, ChartReading, chart_data_of, moments_of, single_readings
+from app.loop.summaries.queries.history import History, history_of
+from app.loop.summaries.queries.numbers import MOST_IN_HISTOGRAM, Numbers, histogram_of, numbers_of
+from app.loop.summaries.queries.pyramid import Block
+from app.loop.summaries.queries.results import (
+    Rejects,
+    rejects_by_characteristic,
+    rejects_of,
+    results_of,
+    since_tool_change,
+)
+from app.loop.summaries.queries.window import Window, window_of
+
+__all__ = [
+    "MOST_IN_HISTOGRAM",
+    "Block",
+    "ChartData",
+    "ChartReading",
+    "History",
+    "Numbers",
+    "Rejects",
+    "Window",
+    "chart_data_of",
+    "histogram_of",
+    "history_of",
+    "moments_of",
+    "numbers_of",
+    "rejects_by_characteristic",
+    "rejects_of",
+    "results_of",
+    "since_tool_change",
+    "single_readings",
+    "window_of",
+]

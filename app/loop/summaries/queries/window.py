@@ -1,0 +1,114 @@
+"""Windows of readings: by number, or by the time of measurement."""
+
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import ColumnElement, and_, func, select, true
+from sqlalchemy.orm import Session
+
+from app.loop.summaries.queries.pyramid import Run, cover_of
+from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.readings import Reading, Stream
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A run of readings, first and last included; empty if last < first. `newest` is the stream's last sequence.
+
+    start, end: of the run only those measured from … to are meant. A reading that came late lies between others of another
+    time; so whoever counts, counts by these too.
+    """
+
+    first: int
+    last: int
+    newest: int
+    start: datetime | None = None
+    end: datetime | None = None
+
+    @property
+    def count(self) -> int:
+        return max(0, self.last - self.first + 1)
+
+    @property
+    def reaches_now(self) -> bool:
+        return self.last == self.newest
+
+    @property
+    def timed(self) -> bool:
+        return self.start is not None or self.end is not None
+
+    @property
+    def in_time(self) -> ColumnElement[bool]:
+        """Measured from start to end, as a condition on `Reading`."""
+        conditions = []
+        if self.start is not None:
+            conditions.append(Reading.measured_at >= self.start)
+        if self.end is not None:
+            conditions.append(Reading.measured_at <= self.end)
+        return and_(true(), *conditions)
+
+    def holds(self, measured_at: NDArray[np.datetime64]) -> NDArray[np.bool_]:
+        """Mask of the moments (UTC) from start to end."""
+        held = np.ones(len(measured_at), np.bool_)
+        if self.start is not None:
+            held &= measured_at >= moment_of(self.start)
+        if self.end is not None:
+            held &= measured_at <= moment_of(self.end)
+        return held
+
+
+def moment_of(at: datetime) -> np.datetime64:
+    """As NumPy keeps it, in UTC."""
+    return np.datetime64(at.astimezone(UTC).replace(tzinfo=None), "us")
+
+
+def newest_of(session: Session, characteristic: Characteristic) -> int:
+    """Number of the newest reading, 0 without readings."""
+    return (
+        session.scalar(
+            select(Stream.sequence).where(
+                Stream.machine_id == characteristic.machine_id, Stream.characteristic_id == characteristic.id
+            )
+        )
+        or 0
+    )
+
+
+def window_of(
+    session: Session,
+    characteristic: Characteristic,
+    *,
+    last: int | None = None,
+    first: int | None = None,
+    through: int | None = None,
+    start: datetime | None = None,
+    end: datetime | None = None,
+) -> Window:
+    """The readings first … through; of them the `last` so many; of them those measured in start … end."""
+    newest = newest_of(session, characteristic)
+    low, high = max(1, first or 1), min(newest, newest if through is None else through)
+    if last is not None:
+        low = max(low, high - last + 1)
+    window = Window(low, high, newest)
+    if start is None and end is None:
+        return window
+    window = replace(window, start=start, end=end)
+    cover = cover_of(session, characteristic, low, high, start=start, end=end)
+    ends = [end for block in cover.blocks for end in (block.first, block.last)]
+    ends += _ends_in_time(session, characteristic, cover.runs, window)
+    return replace(window, first=min(ends, default=1), last=max(ends, default=0))
+
+
+def _ends_in_time(session: Session, characteristic: Characteristic, runs: list[Run], window: Window) -> list[int]:
+    ends: list[int] = []
+    for low, high in runs:
+        query = select(func.min(Reading.sequence), func.max(Reading.sequence)).where(
+            Reading.machine_id == characteristic.machine_id,
+            Reading.characteristic_id == characteristic.id,
+            Reading.sequence.between(low, high),
+            window.in_time,
+        )
+        ends += [number for number in session.execute(query).one() if number is not None]
+    return ends

@@ -1,0 +1,255 @@
+"""JSON routes: tool memory (R10), average memory (R11), and the life of corrections."""
+
+from typing import Annotated, Any
+
+from fastapi import Path, Query
+
+from app.access.deps import AnyCaller, Operator
+from app.core.parameters import MOST_LOCATIONS
+from app.core.plausibility import empirical_value_warnings, offset_warnings
+from app.loop.machines.queries import machine_named
+from app.loop.tools import actions, applying, queries, wording
+from app.loop.tools.figures import OffsetChange, offset_figure
+from app.loop.tools.schemas import (
+    AppliedIn,
+    AverageOut,
+    AverageSet,
+    CorrectionOut,
+    DecisionIn,
+    DecisionsIn,
+    EmpiricalValueIn,
+    RejectionIn,
+    Status,
+    ToolChange,
+    ToolEdit,
+    ToolOut,
+    ToolSet,
+    average_out,
+    average_set,
+    correction_out,
+    tool_out,
+    tool_set,
+)
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep
+from app.web.fields import Limit, Page, SerialCursor, page_of
+from app.web.theme import theme_from
+
+router = api_router("offsets")
+MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
+R10 = Annotated[int, Path(description="Tool memory location R10, 1 to what the machine has.", examples=[3])]
+R11 = Annotated[int, Path(description="Average memory location R11, 1 to what the machine has.", examples=[5])]
+Number = Annotated[int, Path(description="Number of the correction; counts per machine.", examples=[18])]
+After = Annotated[SerialCursor, Query(description="Cursor: the `next` of the page before.")]
+
+
+# --- tool memory
+
+
+@router.get("/machines/{machine}/tools", responses=problems(404))
+def list_tools(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineKey,
+    after: After = 0,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[ToolOut]:
+    """The tool memory: every location with its offset, the sum of corrections since the tool was changed, parts cut."""
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "viewer")
+    rows = queries.tools(session, machine_row, after=after, limit=limit + 1)
+    return page_of([tool_out(row, machine_row.key) for row in rows], limit, lambda tool: tool.tool_memory)
+
+
+@router.get("/machines/{machine}/tools/{tool}", responses=problems(404))
+def get_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10) -> ToolOut:
+    """One location of the tool memory."""
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "viewer")
+    queries.tool(session, machine_row, tool)
+    return tool_out(queries.tools(session, machine_row, only=tool)[0], machine_row.key)
+
+
+@router.put("/machines/{machine}/tools/{tool}", responses=problems(404))
+def edit_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, edit: ToolEdit) -> ToolSet:
+    """Say what the offset was set to by hand.
+
+    Corrections that are still open were computed for the offset before: they are superseded. The running averages of the
+    characteristics on this tool begin again at 0, and parts cut before say nothing about the new offset.
+    """
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "operator")
+    before = queries.tool(session, machine_row, tool).offset
+    done = actions.edit_tool(session, machine_row, tool, edit.offset, edit.reason, caller)
+    warnings = offset_warnings(before, edit.offset)
+    return tool_set(queries.tools(session, machine_row, only=tool)[0], machine_row.key, done.superseded, warnings)
+
+
+@router.post("/machines/{machine}/tools/{tool}/change", responses=problems(404))
+def change_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, change: ToolChange) -> ToolSet:
+    """Say that the tool was changed.
+
+    As a manual edit; besides, its parts and the sum of its corrections begin again at 0. Alarms about the old tool stay
+    until somebody acknowledges them.
+    """
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "operator")
+    done = actions.change_tool(session, machine_row, tool, change.offset, change.reason, caller)
+    return tool_set(queries.tools(session, machine_row, only=tool)[0], machine_row.key, done.superseded)
+
+
+@router.get(
+    "/machines/{machine}/tools/{tool}/figure",
+    responses=problems(404) | {200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}},
+)
+def tool_figure(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineKey,
+    tool: R10,
+    theme: Annotated[str | None, Query(description="`light` or `dark`", max_length=20)] = None,
+    limit: Annotated[Limit, Query()] = 500,
+) -> dict[str, Any]:
+    """The history of the offset as a Plotly figure: `{"data", "layout"}`."""
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "viewer")
+    queries.tool(session, machine_row, tool)
+    steps = reversed(queries.offset_history(session, machine_row, tool, limit=limit))
+    changes = [OffsetChange(step.event.at, step.event.offset_after, step.kind, wording.step(step)) for step in steps]
+    return offset_figure(changes, theme=theme_from(theme))
+
+
+# --- average memory
+
+
+@router.get("/machines/{machine}/averages", responses=problems(404))
+def list_averages(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineKey,
+    after: After = 0,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[AverageOut]:
+    """The average memory: running average and empirical value of every location."""
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "viewer")
+    rows = queries.averages(session, machine_row, after=after, limit=limit + 1)
+    return page_of([average_out(row, machine_row.key) for row in rows], limit, lambda average: average.average_memory)
+
+
+@router.get("/machines/{machine}/averages/{location}", responses=problems(404))
+def get_average(session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11) -> AverageOut:
+    """One location of the average memory."""
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "viewer")
+    queries.average(session, machine_row, location)
+    return average_out(queries.averages(session, machine_row, only=location)[0], machine_row.key)
+
+
+@router.put("/machines/{machine}/averages/{location}", responses=problems(404))
+def set_empirical_value(
+    session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11, value: EmpiricalValueIn
+) -> AverageSet:
+    """Set the empirical value; the running average begins again at 0."""
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "operator")
+    actions.set_empirical_value(session, machine_row, location, value.empirical_value, value.reason, caller)
+    warnings = empirical_value_warnings(value.empirical_value)
+    return average_set(queries.averages(session, machine_row, only=location)[0], machine_row.key, warnings)
+
+
+# --- corrections
+
+
+@router.get("/machines/{machine}/corrections", responses=problems(404))
+def list_corrections(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: MachineKey,
+    status: Annotated[list[Status], Query(description="Only these; may be given several times.")] = [],  # noqa: B006 - FastAPI copies it
+    tool_memory: Annotated[
+        int | None, Query(description="Only those of this location R10.", ge=1, le=MOST_LOCATIONS)
+    ] = None,
+    after: After = 0,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[CorrectionOut]:
+    """Corrections, oldest first: the order in which a machine applies the pending ones."""
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "viewer")
+    rows = queries.corrections(
+        session, machine_row, statuses=status, tool_memory=tool_memory, after=after, limit=limit + 1
+    )
+    return page_of([correction_out(row) for row in rows], limit, lambda correction: correction.number)
+
+
+@router.get("/corrections/{machine}/{number}", responses=problems(404))
+def get_correction(session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number) -> CorrectionOut:
+    """One correction."""
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "viewer")
+    return correction_out(queries.row_of(session, machine_row, queries.correction(session, machine_row, number)))
+
+
+@router.post("/corrections/{machine}/{number}/applied", responses=problems(404, 409))
+def mark_applied(
+    session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number, applied: AppliedIn | None = None
+) -> CorrectionOut:
+    """Confirm that the correction is in the offset now. Confirming twice is harmless.
+
+    An `offset_after` that differs from `offset_expected` by more than 0.0005 mm raises the alarm *offset differs*: nothing
+    is corrected through this tool until somebody has said which offset is true. If it is the offset that later pending
+    corrections of the tool lead to, those are confirmed with this one.
+    """
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "operator")
+    confirmation = applied or AppliedIn()
+    done = applying.mark_applied(
+        session, machine_row, number, caller, offset_after=confirmation.offset_after, applied_at=confirmation.applied_at
+    )
+    return correction_out(queries.row_of(session, machine_row, done.correction), done.note)
+
+
+@router.post("/corrections/{machine}/{number}/rejected", responses=problems(404, 409))
+def reject_correction(
+    session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number, decision: RejectionIn
+) -> CorrectionOut:
+    """It will not be applied: the machine refuses the offset, or a person decides against it."""
+    machine_row = machine_named(session, machine)
+    caller.must_at(machine_row.id, "operator")
+    done = actions.decide(
+        session, machine_row, number, "rejected", decision.reason, caller, although_fetched=decision.although_fetched
+    )
+    return correction_out(queries.row_of(session, machine_row, done.correction), done.note)
+
+
+@router.post("/corrections/{machine}/{number}/approve", responses=problems(404, 409))
+def approve_correction(
+    session: SessionDep, caller: Operator, machine: MachineKey, number: Number, decision: DecisionIn
+) -> CorrectionOut:
+    """A person approves a correction that awaits it; the machine may apply it then."""
+    machine_row = machine_named(session, machine)
+    done = actions.decide(session, machine_row, number, "approve", decision.reason, caller)
+    return correction_out(queries.row_of(session, machine_row, done.correction), done.note)
+
+
+@router.post("/corrections/{machine}/approve", responses=problems(404, 409))
+def approve_corrections(
+    session: SessionDep, caller: Operator, machine: MachineKey, decision: DecisionsIn
+) -> Page[CorrectionOut]:
+    """A person approves several corrections together, such as all that wait for one tool.
+
+    All of them or none: if somebody has decided about one meanwhile, the answer is 409 and says who and how.
+    """
+    machine_row = machine_named(session, machine)
+    approved = actions.approve_all(session, machine_row, decision.numbers, decision.reason, caller)
+    return Page(items=[correction_out(row) for row in queries.rows_of(session, machine_row, approved)])
+
+
+@router.post("/corrections/{machine}/{number}/release", responses=problems(404, 409))
+def release_correction(
+    session: SessionDep, caller: Operator, machine: MachineKey, number: Number, decision: DecisionIn
+) -> CorrectionOut:
+    """A person releases a held correction; the machine may apply it then. Its alarm stays until it is acknowledged."""
+    machine_row = machine_named(session, machine)
+    done = actions.decide(session, machine_row, number, "release", decision.reason, caller)
+    return correction_out(queries.row_of(session, machine_row, done.correction), done.note)

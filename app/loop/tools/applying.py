@@ -1,0 +1,183 @@
+"""Confirmations of machines: a correction is in effect, and the control now holds this offset.
+
+Repeating one is harmless, also after a lost answer: the second gets the answer of the first. When the offset in the
+control differs from the expected one, nobody knows with which offset a part was cut, so the tool is paused until a
+person has confirmed the true offset. Lengths are mm.
+"""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from app.access.callers import Caller
+from app.core.decision.limits import nanometres
+from app.core.decision.step import DECIMALS
+from app.db.events import publish
+from app.errors import Conflict
+from app.language.i18n import _
+from app.loop.alarms import actions as alarms
+from app.loop.tables.machines import Machine
+from app.loop.tables.tools import Correction, Tool, ToolEvent
+from app.loop.tools import queries, wording
+from app.loop.tools.actions import Decided, locked, must_be, record_status
+from app.loop.tools.alarm_kinds import OFFSET_DIFFERS
+from app.loop.tools.events import alarm_raised, correction_changed, tool_changed
+from app.loop.tools.queries import OFFSET_TOLERANCE
+from app.loop.tools.superseding import supersede
+
+BY_READING = "reading "  # how `applied_by` begins when a reading confirmed it (`correction_in_effect`)
+
+
+def mark_applied(
+    session: Session,
+    machine: Machine,
+    number: int,
+    caller: Caller,
+    *,
+    offset_after: float | None = None,
+    applied_at: datetime | None = None,
+) -> Decided:
+    """A pending correction is in the offset now. Saying so twice is harmless.
+
+    A machine that applies everything it has fetched and then confirms one after the other reports the last offset each
+    time: if that is what later pending corrections of the tool lead to, they are in effect, too. Any other offset than
+    the expected one raises *offset differs*, becomes the known offset and pauses the tool.
+    Raises `NotFound`; `Conflict` for a correction that is not pending, or when another offset is reported the second time.
+    """
+    correction = locked(session, machine, number)
+    if correction.status == "applied":
+        if offset_after is None or not _differs(offset_after, correction.offset_after):
+            return Decided(correction)
+        if not (correction.applied_by or "").startswith(BY_READING):
+            raise _other_offset(correction, machine, offset_after)
+        # A reading said that it is in effect; only now the machine says what its offset is.
+        tool = queries.tool(session, machine, correction.tool_memory)
+        late = offset_after - (correction.offset_after or 0.0)
+        now = datetime.now(UTC)
+        return _reported(
+            session, machine, [correction], tool, caller, tool.offset + late, tool.offset, tool.offset, now
+        )
+    must_be(correction, machine, "applied", ("pending",))
+    tool = queries.tool(session, machine, correction.tool_memory)
+    together = [correction, *_later_ones(session, machine, tool, correction, offset_after)]
+    now = datetime.now(UTC)
+    at = min(now, applied_at or now)
+    for pending in together:
+        before, tool.offset = tool.offset, round(tool.offset + pending.amount, DECIMALS) + 0.0
+        tool.total = round(tool.total + pending.amount, DECIMALS) + 0.0
+        pending.status, pending.applied_at, pending.applied_by, pending.offset_after = (
+            "applied",
+            at,
+            caller.name,
+            tool.offset,
+        )
+        if pending is not together[-1]:
+            _step(session, machine, tool, pending.number, before, tool.offset, at, caller)
+        if caller.kind != "machine":  # what a machine does all day stands in the history of its tools
+            record_status(session, machine, pending, caller, "correction applied", "pending", None)
+    reported = tool.offset if offset_after is None else offset_after
+    return _reported(session, machine, together, tool, caller, reported, tool.offset, before, at)
+
+
+def _later_ones(
+    session: Session, machine: Machine, tool: Tool, correction: Correction, offset_after: float | None
+) -> list[Correction]:
+    """The pending corrections after this one that the reported offset holds already; none if it is the expected one."""
+    running = round(tool.offset + correction.amount, DECIMALS)
+    if offset_after is None or not _differs(offset_after, running):
+        return []
+    later: list[Correction] = []
+    for waiting in queries.open_corrections(session, machine, tool.number):
+        if waiting.status == "pending" and waiting.number > correction.number:
+            later.append(waiting)
+            running = round(running + waiting.amount, DECIMALS)
+            if not _differs(offset_after, running):
+                return later
+    return []
+
+
+def _reported(
+    session: Session,
+    machine: Machine,
+    confirmed: Sequence[Correction],
+    tool: Tool,
+    caller: Caller,
+    reported: float,
+    expected: float,
+    before: float,
+    at: datetime,
+) -> Decided:
+    """These corrections are in the offset, and this is the offset now; another one than expected pauses the tool.
+
+    before: the offset before the last of them was applied.
+    """
+    first, last = confirmed[0], confirmed[-1]
+    tool.offset = round(reported, DECIMALS) + 0.0
+    for applied in confirmed:  # what was reported, so that saying it again is recognised
+        applied.offset_after, applied.applied_by = tool.offset, caller.name
+    _step(session, machine, tool, last.number, before, tool.offset, at, caller)
+    changes = [
+        *(correction_changed(session, machine, applied) for applied in confirmed),
+        tool_changed(machine, tool.number),
+    ]
+    if not _differs(tool.offset, expected):
+        publish(session, *changes)
+        return Decided(first)
+    alarm = alarms.raise_for_tool(
+        session,
+        machine.id,
+        tool.number,
+        OFFSET_DIFFERS,
+        {
+            "correction": first.number,
+            "expected": expected,
+            "reported": tool.offset,
+            "limit": OFFSET_TOLERANCE / 1e6,
+        },
+    )
+    tool.paused_by = alarm.id
+    fallen = supersede(session, machine, tool.number, datetime.now(UTC), None, f"{wording.PAUSED} {alarm.id}")
+    changes += [correction_changed(session, machine, superseded) for superseded in fallen]
+    publish(session, *changes, alarm_raised(machine, alarm))
+    return Decided(
+        first, wording.offset_differs(alarm.id, expected, tool.offset, [superseded.number for superseded in fallen])
+    )
+
+
+def _step(
+    session: Session,
+    machine: Machine,
+    tool: Tool,
+    number: int,
+    before: float,
+    after: float,
+    at: datetime,
+    caller: Caller,
+) -> None:
+    session.add(
+        ToolEvent(
+            machine_id=machine.id,
+            number=tool.number,
+            at=at,
+            kind="correction",
+            offset_before=before,
+            offset_after=after,
+            correction=number,
+            actor=caller.name,
+        )
+    )
+
+
+def _differs(offset: float, known: float | None) -> bool:
+    return known is not None and abs(nanometres(offset - known)) > OFFSET_TOLERANCE
+
+
+def _other_offset(correction: Correction, machine: Machine, offset_after: float) -> Conflict:
+    return Conflict(
+        _(
+            "Correction {number} of {machine} was confirmed with the offset {known} mm already, not {reported} mm. Nothing was changed."
+        ).format(number=correction.number, machine=machine.key, known=correction.offset_after, reported=offset_after),
+        _("Tell the offset as it is now by a manual edit of tool {tool}.").format(tool=correction.tool_memory),
+        correction_status=correction.status,
+    )

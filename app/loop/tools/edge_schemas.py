@@ -1,0 +1,166 @@
+"""Tool edges and their lives as JSON. Lengths in mm."""
+
+from datetime import UTC, datetime
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from app.core.parameters import LARGEST_LENGTH, MOST_LOCATIONS
+from app.loop.tools.lives import Life, Lives
+from app.web.fields import Body, Reason, Text200
+
+LIFE: dict[str, JsonValue] = {
+    "began_at": "2026-11-20T05:02:11Z",
+    "ended_at": "2026-11-21T05:02:11Z",
+    "seconds": 86400,
+    "parts": 412,
+    "total": -0.0312,
+    "edge": "D1",
+    "name": "T03 finishing",
+    "actor": "ana",
+    "reason": "New insert",
+}
+
+
+class ToolSettings(Body):
+    """The tool in a location. Omitted fields stay as they are; null clears a field."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "edge": "D1",
+                "name": "T03 finishing",
+                "kind": "DCMT 11T304",
+                "planned_parts": 400,
+                "planned_total": 0.05,
+                "sister": 13,
+            }
+        }
+    )
+
+    edge: Annotated[Text200 | None, Field(description="The cutting edge: D number or name.")] = None
+    name: Annotated[Text200 | None, Field(description="What the tool is called.")] = None
+    kind: Annotated[Text200 | None, Field(description="Type of tool or insert.")] = None
+    planned_parts: Annotated[
+        int | None,
+        Field(strict=True, ge=1, le=10_000_000, description="Planned tool life: parts until the edge is changed."),
+    ] = None
+    planned_total: Annotated[
+        float | None,
+        Field(
+            strict=True,
+            ge=0.000001,
+            le=LARGEST_LENGTH,
+            allow_inf_nan=False,
+            description="Planned wear life: largest total correction per edge (magnitude of the sum), mm.",
+        ),
+    ] = None
+    sister: Annotated[
+        int | None,
+        Field(strict=True, ge=1, le=MOST_LOCATIONS, description="R10 of the tool that goes on when this one is worn."),
+    ] = None
+
+
+class SisterIn(Body):
+    """The reason for the change to the sister tool."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"reason": "edge worn after 412 parts"}})
+
+    reason: Reason
+
+
+class SwitchedOut(BaseModel):
+    """The characteristics that correct the sister tool now."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "machine": "lathe-1",
+                "tool": 3,
+                "sister": 13,
+                "characteristics": ["shaft-d40"],
+                "superseded": [19],
+                "averages": [5],
+            }
+        }
+    )
+
+    machine: str
+    tool: Annotated[int, Field(description="R10 of the tool that is not corrected any more.")]
+    sister: Annotated[int, Field(description="R10 of the tool that goes on.")]
+    characteristics: list[str]
+    superseded: Annotated[list[int], Field(description="Corrections that must not be applied any more.")]
+    averages: Annotated[list[int], Field(description="R11 whose running average began again at 0.")]
+
+
+class LifeOut(BaseModel):
+    """One edge, from the tool change that brought it in to the one that took it out."""
+
+    model_config = ConfigDict(json_schema_extra={"example": LIFE})
+
+    began_at: Annotated[datetime | None, Field(description="None if nobody recorded how it came in.")]
+    ended_at: Annotated[datetime | None, Field(description="None while it is in.")]
+    seconds: Annotated[float | None, Field(description="How long it was in, or has been so far.")]
+    parts: Annotated[int, Field(description="Parts cut with it.")]
+    total: Annotated[
+        float | None, Field(description="Sum of the corrections while it was in, mm; None if not on record.")
+    ]
+    edge: str | None
+    name: str | None
+    actor: Annotated[str | None, Field(description="Who said that it was changed.")]
+    reason: Annotated[str | None, Field(description="Why it was changed.")]
+
+
+class LivesOut(BaseModel):
+    """The lives of the edges in one location, newest first; the first is the present one."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "machine": "lathe-1",
+                "tool_memory": 3,
+                "usual_parts": 412.0,
+                "life_used": 0.5275,
+                "parts_left": 189,
+                "lives": [
+                    LIFE | {"ended_at": None, "parts": 211, "total": -0.0081, "actor": None, "reason": None},
+                    LIFE,
+                ],
+            }
+        }
+    )
+
+    machine: str
+    tool_memory: Annotated[int, Field(description="R10")]
+    usual_parts: Annotated[float | None, Field(description="Median of the parts that the edges before have cut.")]
+    life_used: Annotated[float | None, Field(description="Share of the planned life that is used.")]
+    parts_left: Annotated[int | None, Field(description="Parts until the planned life is reached.")]
+    lives: list[LifeOut]
+
+
+def lives_out(found: Lives, machine: str) -> LivesOut:
+    """The lives as they are answered."""
+    now = datetime.now(UTC)
+    return LivesOut(
+        machine=machine,
+        tool_memory=found.tool.number,
+        usual_parts=found.usual,
+        life_used=None if found.use.share is None else round(found.use.share, 4),
+        parts_left=found.use.left,
+        lives=[_life(life, now) for life in found.lives],
+    )
+
+
+def _life(life: Life, now: datetime) -> LifeOut:
+    lasted = life.lasted(now)
+    return LifeOut(
+        began_at=life.began_at,
+        ended_at=life.ended_at,
+        seconds=None if lasted is None else round(lasted.total_seconds(), 3),
+        parts=life.parts,
+        total=life.total,
+        edge=life.edge,
+        name=life.name,
+        actor=life.actor,
+        reason=life.reason,
+    )

@@ -1,0 +1,46 @@
+"""Events of corrections, tools and averages for live pages and event listeners."""
+
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.loop.tables.alarms import Alarm
+from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.machines import Machine
+from app.loop.tables.tools import Correction
+
+
+def correction_changed(session: Session, machine: Machine, correction: Correction) -> dict[str, Any]:
+    return {
+        "kind": "correction",
+        "machine": machine.key,
+        "characteristic": session.scalar(
+            select(Characteristic.key).where(
+                Characteristic.machine_id == machine.id, Characteristic.id == correction.characteristic_id
+            )
+        ),
+        "tool": correction.tool_memory,
+        "number": correction.number,
+        "status": correction.status,
+    }
+
+
+def tool_changed(machine: Machine, number: int) -> dict[str, Any]:
+    return {"kind": "tool", "machine": machine.key, "tool": number}
+
+
+def average_changed(machine: Machine, location: int) -> dict[str, Any]:
+    return {"kind": "average", "machine": machine.key, "average_memory": location}
+
+
+def alarm_raised(machine: Machine, alarm: Alarm) -> dict[str, Any]:
+    return {
+        "kind": "alarm",
+        "machine": machine.key,
+        "characteristic": None,
+        "tool": alarm.tool_memory,
+        "id": alarm.id,
+        "alarm": alarm.kind,
+        "state": "active",
+    }

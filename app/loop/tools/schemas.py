@@ -1,0 +1,369 @@
+"""Tool memory, averages and corrections as JSON. Lengths in mm."""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from app.core.parameters import LARGEST_LENGTH
+from app.core.tool_life import LifePlan, use_of
+from app.core.warning import CodedWarning
+from app.loop.tables.tools import Correction
+from app.loop.tools import wording
+from app.loop.tools.queries import AverageRow, CorrectionRow, ToolRow
+from app.loop.warnings.wording import sentence
+from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Reason
+from app.web.warnings import Warnings, warnings_out
+
+DESCRIBED = ("edge", "name", "kind", "planned_parts", "planned_total", "sister")
+Status = Literal["held", "awaiting_approval", "pending", "applied", "rejected", "superseded"]
+Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
+
+CORRECTION: dict[str, JsonValue] = {
+    "machine": "lathe-1",
+    "number": 18,
+    "tool_memory": 3,
+    "amount": -0.0061,
+    "status": "pending",
+    "characteristic": "shaft-d40",
+    "sequence": 812,
+    "size_error": 0.0061,
+    "created_at": "2026-11-21T07:15:02.131Z",
+    "offset_expected": -0.0142,
+    "applied_at": None,
+    "applied_by": None,
+    "offset_after": None,
+    "decided_at": None,
+    "decided_by": None,
+    "status_reason": None,
+    "superseded_by": None,
+    "fetched_at": None,
+    "fetched_by": None,
+    "reason": {
+        "code": "full_deviation",
+        "text": "Deviation 6.1 µm is beyond the averaging limit 5.3 µm: corrected in full.",
+        "notes": [],
+    },
+    "note": None,
+}
+LAST: dict[str, JsonValue] = {
+    name: CORRECTION[name] for name in ("number", "amount", "status", "created_at", "applied_at")
+}
+TOOL: dict[str, JsonValue] = {
+    "machine": "lathe-1",
+    "tool_memory": 3,
+    "offset": -0.0081,
+    "total": -0.0081,
+    "parts": 211,
+    "changed_at": "2026-11-20T05:02:11Z",
+    "reset_at": "2026-11-20T05:02:11Z",
+    "last_correction": LAST,
+    "open_corrections": [LAST],
+    "characteristics": ["shaft-d40"],
+    "edge": "D1",
+    "name": "T03 finishing",
+    "kind": "DCMT 11T304",
+    "planned_parts": 400,
+    "planned_total": 0.05,
+    "sister": 13,
+    "life_used": 0.5275,
+    "parts_left": 189,
+    "paused_by": None,
+}
+
+
+class AppliedIn(Body):
+    """The machine (or a person at it) says that a correction is in the offset now."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"offset_after": -0.0142}})
+
+    offset_after: Annotated[
+        Length | None, Field(description="The offset that the control holds now; it is compared with the expected one.")
+    ] = None
+    applied_at: Annotated[LatelyOrNow | None, Field(description="When; if left out, now.")] = None
+
+
+class DecisionIn(Body):
+    """Approval, release or rejection of a correction, with a reason."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"reason": "insert looked at, still good"}})
+
+    reason: Reason
+
+
+class DecisionsIn(Body):
+    """Approval of several corrections together, with a reason."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"numbers": [17, 18], "reason": "part measured, agrees"}})
+
+    numbers: Annotated[
+        list[Annotated[int, Field(strict=True, ge=1, le=LARGEST_SERIAL)]],
+        Field(min_length=1, max_length=1000, description="Which ones; all of them, or none if one cannot be approved."),
+    ]
+    reason: Reason
+
+
+class RejectionIn(DecisionIn):
+    """Rejection of a correction, with a reason."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"example": {"reason": "part was dirty, measured again", "although_fetched": False}}
+    )
+
+    although_fetched: Annotated[
+        bool,
+        Field(
+            strict=True,
+            description="Needed for one that was fetched as program text: its text was taken back, and was not run.",
+        ),
+    ] = False
+
+
+class ToolEdit(Body):
+    """The offset as somebody has set it by hand."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"offset": -0.012, "reason": "set at the control"}})
+
+    offset: Length
+    reason: Reason
+
+
+class ToolChange(Body):
+    """A new tool in this location."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"offset": 0.0, "reason": "insert worn after 211 parts"}})
+
+    offset: Annotated[Length, Field(description="The offset that the new tool starts with.")] = 0.0
+    reason: Reason
+
+
+class EmpiricalValueIn(Body):
+    """The empirical value: machine reading minus true value, taken off every measurement."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"example": {"empirical_value": 0.002, "reason": "compared with the CMM, part 812"}}
+    )
+
+    empirical_value: Length
+    reason: Reason
+
+
+class ReadingReason(BaseModel):
+    """Code and sentence of the reading that asked for the correction."""
+
+    code: str
+    text: str
+    notes: list[str] = []
+
+
+class CorrectionOut(BaseModel):
+    """A change of a tool offset, on its way from the reading that asked for it to the machine that makes it."""
+
+    model_config = ConfigDict(json_schema_extra={"example": CORRECTION})
+
+    machine: str
+    number: Annotated[int, Field(description="Counts per machine, without gaps.")]
+    tool_memory: Annotated[int, Field(description="R10")]
+    amount: Annotated[float, Field(description="What the offset changes by, mm.")]
+    status: Status
+    characteristic: str
+    sequence: Annotated[int, Field(description="The reading that asked for it.")]
+    size_error: Annotated[float, Field(description="The error of size that it removes, mm.")]
+    created_at: datetime
+    offset_expected: Annotated[
+        float | None,
+        Field(
+            description="The offset once the pending ones up to this one, and this one, are applied; open ones only."
+        ),
+    ]
+    applied_at: datetime | None
+    applied_by: str | None
+    offset_after: float | None
+    decided_at: Annotated[datetime | None, Field(description="When it was released, approved, rejected or superseded.")]
+    decided_by: str | None
+    status_reason: Annotated[str | None, Field(description="What was said when that was decided.")]
+    superseded_by: int | None
+    fetched_at: Annotated[datetime | None, Field(description="When it was first fetched as program text.")]
+    fetched_by: str | None
+    reason: Annotated[ReadingReason | None, Field(description="The reading that asked for it: code and sentence.")]
+    note: Annotated[str | None, Field(description="What else is to be said about what was just done.")] = None
+
+
+class CorrectionBrief(BaseModel):
+    """A correction, in short."""
+
+    number: int
+    amount: float
+    status: Status
+    created_at: datetime
+    applied_at: datetime | None
+
+
+class ToolOut(BaseModel):
+    """One location of the tool memory."""
+
+    model_config = ConfigDict(json_schema_extra={"example": TOOL})
+
+    machine: str
+    tool_memory: Annotated[int, Field(description="R10")]
+    offset: Annotated[float, Field(description="The offset that the control is known to hold, mm.")]
+    total: Annotated[float, Field(description="Sum of the corrections applied since the tool was changed, mm.")]
+    parts: Annotated[int, Field(description="Parts cut since the tool was changed.")]
+    changed_at: datetime | None
+    reset_at: Annotated[
+        datetime | None, Field(description="Changed, or edited by hand: parts cut before say nothing about it.")
+    ]
+    last_correction: Annotated[CorrectionBrief | None, Field(description="The one issued last, and its status.")]
+    open_corrections: list[CorrectionBrief]
+    characteristics: Annotated[list[str], Field(description="Which characteristics correct it.")]
+    edge: Annotated[str | None, Field(description="The cutting edge: D number or name.")]
+    name: Annotated[str | None, Field(description="What the tool is called.")]
+    kind: Annotated[str | None, Field(description="Type of tool or insert.")]
+    planned_parts: Annotated[int | None, Field(description="Planned tool life in parts.")]
+    planned_total: Annotated[float | None, Field(description="Planned wear life: the sum of corrections, mm.")]
+    sister: Annotated[int | None, Field(description="R10 of the sister tool.")]
+    life_used: Annotated[float | None, Field(description="Share of the planned life that is used; 1 is all of it.")]
+    parts_left: Annotated[int | None, Field(description="Parts until the planned life is reached, at the wear so far.")]
+    paused_by: Annotated[
+        int | None,
+        Field(description="Number of the alarm that asks which offset is true; nothing is corrected till then."),
+    ]
+
+
+class ToolSet(ToolOut):
+    """A location whose offset was set just now."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": TOOL
+            | {
+                "open_corrections": [],
+                "superseded": [18],
+                "note": "Correction 18 was computed for the offset before and is superseded: do not apply it.",
+                "warnings": [],
+            }
+        }
+    )
+
+    superseded: Annotated[list[int], Field(description="Corrections that must not be applied any more.")]
+    note: str | None = None
+    warnings: Warnings
+
+
+AVERAGE: dict[str, JsonValue] = {
+    "machine": "lathe-1",
+    "average_memory": 5,
+    "average": 0.0012,
+    "empirical_value": 0.0,
+    "updated_at": "2026-11-21T07:15:02.131Z",
+    "characteristics": ["shaft-d40"],
+}
+
+
+class AverageOut(BaseModel):
+    """One location of the average memory."""
+
+    model_config = ConfigDict(json_schema_extra={"example": AVERAGE})
+
+    machine: str
+    average_memory: Annotated[int, Field(description="R11")]
+    average: Annotated[float, Field(description="M, the running average of the deviation, mm.")]
+    empirical_value: Annotated[float, Field(description="Taken off every measurement, mm.")]
+    updated_at: datetime | None
+    characteristics: Annotated[list[str], Field(description="Which characteristics share it.")]
+
+
+class AverageSet(AverageOut):
+    """A location whose empirical value was set just now."""
+
+    model_config = ConfigDict(json_schema_extra={"example": AVERAGE | {"warnings": []}})
+
+    warnings: Warnings
+
+
+def correction_out(row: CorrectionRow, note: str | None = None) -> CorrectionOut:
+    """A correction as it is answered."""
+    c = row.correction
+    return CorrectionOut(
+        machine=row.machine,
+        number=c.number,
+        tool_memory=c.tool_memory,
+        amount=c.amount,
+        status=c.status,  # type: ignore[arg-type] # the table's CHECK holds it
+        characteristic=row.characteristic,
+        sequence=c.sequence,
+        size_error=c.size_error,
+        created_at=c.created_at,
+        offset_expected=row.expected,
+        applied_at=c.applied_at,
+        applied_by=c.applied_by,
+        offset_after=c.offset_after,
+        decided_at=c.decided_at,
+        decided_by=c.decided_by,
+        status_reason=wording.why(c),
+        superseded_by=c.superseded_by,
+        fetched_at=c.fetched_at,
+        fetched_by=c.fetched_by,
+        reason=None if row.reason is None else ReadingReason(**row.reason),
+        note=note,
+    )
+
+
+def _brief(c: Correction) -> CorrectionBrief:
+    return CorrectionBrief.model_validate(c, from_attributes=True)
+
+
+def tool_out(row: ToolRow, machine: str) -> ToolOut:
+    """A location of the tool memory as it is answered."""
+    return ToolOut.model_validate(_tool(row, machine))
+
+
+def tool_set(row: ToolRow, machine: str, superseded: list[int], warnings: Sequence[CodedWarning] = ()) -> ToolSet:
+    """The same after its offset was set."""
+    return ToolSet.model_validate(
+        _tool(row, machine)
+        | {
+            "superseded": superseded,
+            "note": wording.edit_note(superseded),
+            "warnings": warnings_out(warnings, sentence),
+        }
+    )
+
+
+def _tool(row: ToolRow, machine: str) -> dict[str, Any]:
+    use = use_of(LifePlan(row.tool.planned_parts, row.tool.planned_total), row.parts, row.tool.total)
+    return {
+        "machine": machine,
+        "tool_memory": row.tool.number,
+        "offset": row.tool.offset,
+        "total": row.tool.total,
+        "parts": row.parts,
+        "changed_at": row.tool.changed_at,
+        "reset_at": row.tool.reset_at,
+        "last_correction": None if row.last is None else _brief(row.last),
+        "open_corrections": [_brief(c) for c in row.open],
+        "characteristics": row.characteristics,
+        **{name: getattr(row.tool, name) for name in DESCRIBED},
+        "life_used": None if use.share is None else round(use.share, 4),
+        "parts_left": use.left,
+        "paused_by": row.tool.paused_by,
+    }
+
+
+def average_out(row: AverageRow, machine: str) -> AverageOut:
+    """A location of the average memory as it is answered."""
+    memory = row.memory
+    return AverageOut(
+        machine=machine,
+        average_memory=memory.location,
+        average=memory.average,
+        empirical_value=memory.empirical_value,
+        updated_at=memory.updated_at,
+        characteristics=row.characteristics,
+    )
+
+
+def average_set(row: AverageRow, machine: str, warnings: Sequence[CodedWarning]) -> AverageSet:
+    """The same after its empirical value was set."""
+    return AverageSet(**average_out(row, machine).model_dump(), warnings=warnings_out(warnings, sentence))

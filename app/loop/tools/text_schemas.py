@@ -1,0 +1,93 @@
+"""Corrections fetched as program text, as JSON."""
+
+from datetime import datetime
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from app.core.programs.corrections import MOST_STEPS
+from app.loop.tools.fetching import Fetched
+from app.web.fields import LARGEST_SERIAL, Body
+
+Number = Annotated[int, Field(strict=True, ge=1, le=LARGEST_SERIAL)]
+Numbers = Annotated[
+    list[Number], Field(min_length=1, max_length=MOST_STEPS, description="Which corrections, by their numbers.")
+]
+
+MARKED: dict[str, JsonValue] = {
+    "number": 18,
+    "fetched_at": "2026-11-21T07:15:40Z",
+    "fetched_by": "ana",
+    "fetched_as": "turning 5e8a0c1d77f2",
+    "fetched_before": False,
+}
+
+
+class FetchedIn(Body):
+    """Corrections that were fetched, and the form of their text."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"numbers": [18], "form": "turning"}})
+
+    numbers: Numbers
+    form: Annotated[
+        str | None, Field(max_length=40, description="The form of the text; if left out, the usual one of the control.")
+    ] = None
+
+
+class FetchedOne(BaseModel):
+    """A correction that was fetched."""
+
+    model_config = ConfigDict(json_schema_extra={"example": MARKED})
+
+    number: int
+    fetched_at: datetime
+    fetched_by: str
+    fetched_as: Annotated[str, Field(description="Form and check sum of the text.")]
+    fetched_before: Annotated[
+        bool, Field(description="It was fetched earlier already: the same text with the same number.")
+    ]
+
+
+class FetchedOut(BaseModel):
+    """Corrections that were marked as fetched."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"items": [MARKED]}})
+
+    items: list[FetchedOne]
+
+
+class ConfirmedIn(Body):
+    """Corrections that are in the control now."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"numbers": [17, 18]}})
+
+    numbers: Numbers
+
+
+class ConfirmedOut(BaseModel):
+    """The result of the confirmation."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"example": {"applied": [18], "applied_before": [17], "must_not_be_in": [], "note": None}}
+    )
+
+    applied: list[int]
+    applied_before: list[int]
+    must_not_be_in: Annotated[list[int], Field(description="Rejected or superseded meanwhile: take them out again.")]
+    note: str | None
+
+
+def fetched_out(marked: list[Fetched]) -> FetchedOut:
+    """Fetched corrections as they are answered."""
+    return FetchedOut(
+        items=[
+            FetchedOne(
+                number=c.number,
+                fetched_at=c.fetched_at,  # type: ignore[arg-type] # it was marked just now, or before
+                fetched_by=c.fetched_by or "",
+                fetched_as=c.fetched_as or "",
+                fetched_before=before,
+            )
+            for c, before in marked
+        ]
+    )

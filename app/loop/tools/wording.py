@@ -1,0 +1,213 @@
+"""The sentences about corrections and tool offsets: what each status means, and why something cannot be done now."""
+
+from datetime import UTC, datetime
+
+from app.language.i18n import _, ngettext
+from app.language.numbers import NOTHING, age, mm, um
+from app.language.times import in_sentence
+from app.loop.tables.tools import Correction
+from app.loop.tools.lives import Life
+from app.loop.tools.queries import OffsetChange
+
+# Why the system itself dropped a correction, as it is stored: the word, and what goes with it.
+EXPIRED = "expired after hours:"
+PAUSED = "offset differs, alarm:"
+
+
+def why(correction: Correction) -> str | None:
+    """The reason given with the decision; automatic reasons in words."""
+    reason = correction.reason
+    if reason is None or correction.decided_by is not None:
+        return reason
+    if reason.startswith(EXPIRED):
+        hours = reason.removeprefix(EXPIRED).strip()
+        return _("expired: nobody had it applied within {hours} h").format(hours=hours)
+    if reason.startswith(PAUSED):
+        alarm = reason.removeprefix(PAUSED).strip()
+        return _("the machine holds another offset than it was computed for (alarm {alarm})").format(alarm=alarm)
+    return reason
+
+
+def has_expired(correction: Correction) -> bool:
+    """Tell if it was dropped because it was never applied in time."""
+    return correction.decided_by is None and (correction.reason or "").startswith(EXPIRED)
+
+
+def status_word(status: str) -> str:
+    """A correction's status as it stands inside a sentence."""
+    return {
+        "held": _("held"),
+        "awaiting_approval": _("awaiting approval"),
+        "pending": _("pending"),
+        "applied": _("applied"),
+        "rejected": _("rejected"),
+        "superseded": _("superseded"),
+    }.get(status, status)
+
+
+def status_explained(status: str) -> str:
+    """The meaning of a status: the awaited action, or the final state."""
+    return {
+        "held": _("Waits for an operator: its reading said that the tool is worn, or was not plausible."),
+        "awaiting_approval": _("Waits until somebody approves it."),
+        "pending": _("Waits for the machine to apply it."),
+        "applied": _("Is in the offset."),
+        "rejected": _("Was refused; it changes nothing."),
+        "superseded": _("Was replaced by something newer; it changes nothing."),
+    }.get(status, status)
+
+
+def moment(at: datetime | None) -> str:
+    """A moment inside a sentence that programs read as well."""
+    return in_sentence(at)
+
+
+def refused(correction: Correction, machine: str, verb: str) -> tuple[str, str]:
+    """The reason why a correction in this status does not allow the action, and what to do instead.
+
+    verb: `applied`, `rejected`, `approve` or `release`.
+    """
+    return _how_it_stands(correction, machine), _instead(correction, verb)
+
+
+def _how_it_stands(correction: Correction, machine: str) -> str:
+    values = {
+        "number": correction.number,
+        "machine": machine,
+        "who": correction.decided_by or _("the system"),
+        "at": moment(correction.decided_at),
+        "why": why(correction) or "–",
+        "tool": correction.tool_memory,
+    }
+    match correction.status:
+        case "held":
+            text = _(
+                "Correction {number} of {machine} is held: its reading said that tool {tool} is worn, or was not plausible."
+            )
+        case "awaiting_approval":
+            text = _("Correction {number} of {machine} still awaits approval.")
+        case "pending":
+            text = _("Correction {number} of {machine} is pending: it waits for the machine to apply it.")
+        case "applied":
+            values |= {"who": correction.applied_by or "?", "at": moment(correction.applied_at)}
+            text = _("Correction {number} of {machine} was applied already, on {at}, confirmed by {who}.")
+        case "rejected":
+            text = _("Correction {number} of {machine} was rejected by {who} on {at}: {why}")
+        case _ if correction.superseded_by is not None:
+            values["by"] = correction.superseded_by
+            text = _("Correction {number} of {machine} was superseded by correction {by}.")
+        case _ if has_expired(correction):
+            text = _("Correction {number} of {machine} was superseded on {at}: {why}.")
+        case _:
+            text = _("Correction {number} of {machine} was superseded by {who} on {at}: {why}")
+    return text.format(**values)
+
+
+def _instead(correction: Correction, verb: str) -> str:
+    closed = correction.status in {"rejected", "superseded"}
+    if verb == "applied":
+        if has_expired(correction):
+            return _(
+                "If the machine has not applied it, leave it out: the next reading decides again. If it has, read the offset "
+                "at the control and tell it by a manual edit of tool {tool}, PUT /api/v1/machines/…/tools/{tool}."
+            ).format(tool=correction.tool_memory)
+        if closed:
+            return _(
+                "It must not be in the offset. If the machine has applied it, take {amount} back out of the offset, "
+                "or tell the offset as it is by a manual edit of tool {tool}."
+            ).format(amount=um(correction.amount), tool=correction.tool_memory)
+        if correction.status == "held":
+            return _("Acknowledge its alarm or release it first. A machine applies pending corrections only.")
+        return _("Approve it first. A machine applies pending corrections only.")
+    if correction.status == "applied":
+        return _("It cannot be taken back. If the offset is wrong, edit the offset of tool {tool} by hand.").format(
+            tool=correction.tool_memory
+        )
+    if closed:
+        return _("There is nothing left to do: the next reading asks for a new correction if one is needed.")
+    return {
+        "pending": _("It needs no release. Reject it if it must not be applied."),
+        "held": _("It is released, not approved: its alarm asks an operator."),
+        "awaiting_approval": _("It is approved, not released: it is not held."),
+    }.get(correction.status, "")
+
+
+def edit_note(superseded: list[int]) -> str | None:
+    """Corrections that were superseded when an offset was edited or a tool changed."""
+    if not superseded:
+        return None
+    return ngettext(
+        "Correction {numbers} was computed for the offset before and is superseded: do not apply it.",
+        "Corrections {numbers} were computed for the offset before and are superseded: do not apply them.",
+        len(superseded),
+    ).format(numbers=", ".join(map(str, superseded)))
+
+
+def will_fall(numbers: list[int]) -> str:
+    """Open corrections that will be superseded when an offset is edited or a tool changed."""
+    return ngettext(
+        "Correction {numbers} was computed for the offset until now and is dropped.",
+        "Corrections {numbers} were computed for the offset until now and are dropped.",
+        len(numbers),
+    ).format(numbers=", ".join(map(str, numbers)))
+
+
+def counted_on(numbers: list[int]) -> str | None:
+    """Said when a correction is rejected on which later ones count."""
+    if not numbers:
+        return None
+    return ngettext(
+        "Correction {numbers} of the same tool was computed as if this one were applied: decide about it, too.",
+        "Corrections {numbers} of the same tool were computed as if this one were applied: decide about them, too.",
+        len(numbers),
+    ).format(numbers=", ".join(map(str, numbers)))
+
+
+def is_out(correction: Correction) -> str:
+    """Said of a correction that was fetched as program text, before it falls and when it fell."""
+    return _(
+        "Correction {number} was fetched as program text by {who} on {at}: it may be in the control already, or come there."
+    ).format(number=correction.number, who=correction.fetched_by, at=moment(correction.fetched_at))
+
+
+def still_active(alarm: int) -> str:
+    """Said when a held correction is released past its alarm."""
+    return _(
+        "Its alarm {alarm} (tool worn) is still active: acknowledge it on the board of alarms, where the decision about "
+        "the tool is recorded."
+    ).format(alarm=alarm)
+
+
+def offset_differs(alarm: int, expected: float, reported: float, fallen: list[int]) -> str:
+    """Said to the machine that reported another offset than expected."""
+    sentence = _(
+        "The machine holds {reported}, expected was {expected}. Nothing is corrected through this tool until somebody has "
+        "said at alarm {alarm} which of them is true."
+    ).format(reported=mm(reported), expected=mm(expected), alarm=alarm)
+    return " ".join(filter(None, (sentence, edit_note(fallen))))
+
+
+def lasted(life: Life) -> str:
+    """Duration of an edge's life, so far if it is still in use."""
+    duration = life.lasted(datetime.now(UTC))
+    return NOTHING if duration is None else age(duration.total_seconds())
+
+
+def event_word(kind: str) -> str:
+    """A step in the history of an offset."""
+    return {
+        "change": _("Tool changed"),
+        "edit": _("Manual edit"),
+        "correction": _("Correction"),
+        "reported": _("Reported by the machine"),
+    }.get(kind, kind)
+
+
+def step(made: OffsetChange) -> str:
+    """The text of a step in the history, without its kind."""
+    event = made.event
+    if event.correction is not None:
+        return _("correction {number}: {amount}, {actor}").format(
+            number=event.correction, amount=um(made.amount), actor=event.actor
+        )
+    return f"{event.reason or '–'}, {event.actor}"

@@ -1,0 +1,29 @@
+"""Acknowledgements of warnings, and the limits of what is plausible on a machine, read. Never writes."""
+
+from collections.abc import Iterable
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.core.geometry.plausible import Bounds
+from app.loop.tables.machines import Machine
+from app.loop.warnings.tables import WarningAcknowledgement
+
+
+def bounds_of(machine: Machine) -> Bounds:
+    """The largest set-up error of a part that is plausible on this machine."""
+    return Bounds(machine.plausible_turn, machine.plausible_shift)
+
+
+def acknowledgement(session: Session, machine_id: int, subject: str) -> WarningAcknowledgement | None:
+    """The acknowledgement of the warnings of this result, if there is one."""
+    return session.get(WarningAcknowledgement, (machine_id, subject))
+
+
+def acknowledgements(session: Session, subjects: Iterable[str]) -> dict[str, WarningAcknowledgement]:
+    """The acknowledgements of these results by their names; numbers of results are unique beyond a machine."""
+    names = list(subjects)
+    if not names:
+        return {}
+    rows = session.scalars(select(WarningAcknowledgement).where(WarningAcknowledgement.subject.in_(names)))
+    return {row.subject: row for row in rows}

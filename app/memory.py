@@ -1,0 +1,40 @@
+"""Memory that is free goes back to the system.
+
+Pages, charts and reports take some megabytes each for a moment, in threads. glibc keeps what is freed: an arena for every few
+threads, with holes that the next request does not fit into, so a server that stores nothing in memory grows for hours. With few
+arenas, large blocks taken straight from the system, and the free rest given back once a minute it comes to rest. Other
+systems' libraries do that by themselves; there nothing is done here.
+"""
+
+import asyncio
+import ctypes
+from functools import cache
+
+ARENAS = 2  # more of them help only threads that allocate at the same time, which Python's own lock keeps from it
+LARGE = 512 * 1024  # bytes from which a block comes from the system and goes back when it is freed
+EVERY = 60.0  # s between two times that free memory is given back
+_M_MMAP_THRESHOLD, _M_ARENA_MAX = -3, -8  # of malloc.h
+
+
+@cache
+def _glibc() -> ctypes.CDLL | None:
+    try:
+        library = ctypes.CDLL("libc.so.6")
+        return library if hasattr(library, "malloc_trim") and hasattr(library, "mallopt") else None
+    except OSError:
+        return None
+
+
+def keep_few_arenas() -> None:
+    """Set how this process takes memory; to be called before it has many threads."""
+    if (library := _glibc()) is not None:
+        library.mallopt(_M_ARENA_MAX, ARENAS)
+        library.mallopt(_M_MMAP_THRESHOLD, LARGE)
+
+
+async def give_back_free_memory() -> None:
+    """Give it back again and again, until cancelled; in a thread, which lets everybody else go on."""
+    library = _glibc()
+    while library is not None:
+        await asyncio.sleep(EVERY)
+        await asyncio.to_thread(library.malloc_trim, 0)

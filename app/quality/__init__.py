@@ -1,0 +1,1 @@
+"""Judgement of processes: control charts, capability, gauge studies, wear, what-if, published proof."""

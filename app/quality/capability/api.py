@@ -1,0 +1,75 @@
+"""JSON routes: the capability of a characteristic, and its figures."""
+
+from typing import Annotated, Any, Literal
+
+import msgspec
+from fastapi import Path, Query, Response
+
+from app.access.deps import AnyCaller
+from app.core.spc.refusal import Refused
+from app.loop.characteristics import queries as characteristics
+from app.quality.capability.figures import CapabilityChart, histogram, probability
+from app.quality.capability.queries import Study
+from app.quality.capability.request import StudyRequestDep, study_of
+from app.quality.capability.schemas import CapabilityOut, capability_out
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep
+from app.web.theme import ThemeName
+
+router = api_router("statistics")
+FIGURE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "A Plotly figure: `data` and `layout`",
+        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
+    }
+}
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+
+
+def drawn(study: Study) -> CapabilityChart:
+    """Values of the capability figure."""
+    result = None if isinstance(study.indices, Refused) else study.indices
+    by_percentile = None if isinstance(study.by_percentile, Refused) else study.by_percentile
+    return CapabilityChart(
+        study.values,
+        study.limits,
+        result.mean if result else None,
+        result.overall.value if result else None,
+        result.within.value if result and study.potential_allowed else None,
+        (by_percentile.low, by_percentile.median, by_percentile.high) if by_percentile else None,
+        study.normal or result is None,
+    )
+
+
+@router.get("/characteristics/{characteristic}/capability", responses=problems(404))
+def get_capability(
+    session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, choice: StudyRequestDep
+) -> CapabilityOut:
+    """Cp, Cpk, Pp, Ppk, Cpm with intervals, percentiles, expected and observed ppm, normality, stability, model in time.
+
+    Of a compensated characteristic also what the tool did without its corrections, and what ideal ones could reach.
+    """
+    standing = characteristics.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    return capability_out(study_of(session, standing, choice))
+
+
+@router.get(
+    "/characteristics/{characteristic}/figures/capability", responses=problems(404) | FIGURE, response_model=None
+)
+def get_capability_figure(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: StudyRequestDep,
+    picture: Annotated[
+        Literal["histogram", "probability"], Query(description="Histogram with fitted curve, or probability plot.")
+    ] = "histogram",
+    theme: Annotated[ThemeName, Query(description="For a light or a dark page.")] = "light",
+) -> Response:
+    """The histogram with its fitted curve and the limits, or the normal probability plot."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    chart = drawn(study_of(session, standing, choice))
+    figure = (histogram if picture == "histogram" else probability)(chart, theme=theme)
+    return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})

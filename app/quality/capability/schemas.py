@@ -1,0 +1,373 @@
+"""Capability as JSON. Lengths in mm."""
+
+from datetime import datetime
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.core.spc.capability import Fallout, Index
+from app.core.spc.in_time import InTime
+from app.core.spc.normality import Normality
+from app.core.spc.refusal import Refused
+from app.loop.summaries import wording as statistics
+from app.quality.capability import wording
+from app.quality.capability.queries import Study
+
+
+class IndexOut(BaseModel):
+    """An index with its two-sided confidence interval."""
+
+    value: float
+    low: float | None
+    high: float | None
+    method: str | None = Field(description="Of the interval: `chi_square`, `bissell`, `noncentral_t`, `boyles`.")
+
+    @classmethod
+    def of(cls, found: Index | None) -> "IndexOut | None":
+        """None where the limits do not define it."""
+        return cls(value=found.value, low=found.low, high=found.high, method=found.interval) if found else None
+
+
+class FalloutOut(BaseModel):
+    """Parts per million beyond the limits."""
+
+    below: float
+    above: float
+    total: float
+
+    @classmethod
+    def of(cls, found: Fallout | None) -> "FalloutOut | None":
+        """None where there is nothing to count."""
+        return cls(below=found.below, above=found.above, total=found.total) if found else None
+
+
+class NormalityOut(BaseModel):
+    """A test of normality; statistic and p_value are null where it could not be made."""
+
+    test: Literal["anderson_darling", "shapiro_wilk"]
+    statistic: float | None
+    p_value: float | None
+    readings: int = Field(description="Looked at; of more than 5000 so many, evenly taken.")
+    text: str
+
+    @classmethod
+    def of(cls, test: Literal["anderson_darling", "shapiro_wilk"], found: Normality | Refused) -> "NormalityOut":
+        """With its verdict in words."""
+        text = wording.normality(found)
+        if isinstance(found, Refused):
+            return cls(test=test, statistic=None, p_value=None, readings=found.have, text=text)
+        return cls(test=test, statistic=found.statistic, p_value=found.p_value, readings=found.readings, text=text)
+
+
+class QuotedOut(BaseModel):
+    """The index that may be quoted, with what it must not be read without."""
+
+    index: Literal["cpk", "ppk", "percentile"]
+    value: float
+    low: float | None = Field(description="Of the interval; null by percentiles.")
+    high: float | None
+    preliminary: bool = Field(description="Fewer than 100 readings, or than 1000 by percentiles.")
+    method: str
+    window: str = Field(description="How many readings, which, and the method, in words.")
+
+
+class PercentileOut(BaseModel):
+    """Pp and Ppk by percentiles (ISO 22514-2), for readings that are not normally distributed."""
+
+    low: float = Field(description="X0.135 %")
+    median: float
+    high: float = Field(description="X99.865 %")
+    pp: float | None
+    ppk: float
+
+
+class TestOut(BaseModel):
+    """A test that the model was chosen by."""
+
+    question: str
+    test: str
+    numbers: str
+    answer: str
+
+
+class InTimeOut(BaseModel):
+    """The time-dependent distribution model of ISO 22514-2."""
+
+    model: Literal["A1", "A2", "B", "C1", "C2", "C3", "C4", "D"]
+    location: Literal["constant", "random", "systematic", "both"]
+    scatter_changes: bool
+    share_between: float = Field(description="Share of the variance that lies between the subgroups.")
+    slope: float = Field(description="Of the line through the subgroup means, mm per reading.")
+    subgroups: int
+    tests: list[TestOut]
+    text: str
+    means: str = Field(description="Which index it allows.")
+
+
+class FiredOut(BaseModel):
+    """Number of signals of a run rule, and the number that chance explains."""
+
+    rule: str
+    signals: int
+    expected: float
+    p_value: float
+
+
+class WithoutOut(BaseModel):
+    """The same readings with what was corrected taken out again (wear curve)."""
+
+    readings: int
+    lives: int = Field(description="Stretches between tool changes and other steps of the reference.")
+    mean: float
+    standard_deviation: float = Field(description="Wear included.")
+    ppk: IndexOut | None = Field(description="Of the tool that nobody corrects.")
+    scatter: float = Field(description="Sigma from part to part about the wear.")
+    ideal: IndexOut | None = Field(description="Cp of that scatter, centred: what an ideal correction could reach.")
+    gain: float = Field(description="Spread without corrections, in spreads as it is.")
+    price: float = Field(description="Spread as it is, in spreads of an ideal correction.")
+    unknown: int = Field(description="Readings left out: nobody knows with which corrections they were cut.")
+
+
+class InForceOut(BaseModel):
+    """Parameters by which readings were judged."""
+
+    version: int
+    target: float
+    half: float = Field(description="Half the tolerance width, R35/2.")
+    readings: int
+
+
+EXAMPLE: dict[str, Any] = {
+    "characteristic": "shaft-d40",
+    "first_sequence": 1,
+    "last_sequence": 200,
+    "first_at": "2026-11-20T06:00:00Z",
+    "last_at": "2026-11-21T08:15:02Z",
+    "readings": 199,
+    "excluded": [17],
+    "probe_faults": [],
+    "far": [],
+    "lower_limit": -0.008,
+    "upper_limit": 0.008,
+    "versions": [{"version": 1, "target": 40.0, "half": 0.008, "readings": 199}],
+    "confidence": 0.95,
+    "mean": 0.00042,
+    "sigma_within": 0.0018,
+    "sigma_overall": 0.0019,
+    "quote": "ppk",
+    "quoted": {
+        "index": "ppk",
+        "value": 1.33,
+        "low": 1.19,
+        "high": 1.47,
+        "preliminary": False,
+        "method": "normal distribution, spread of all readings",
+        "window": "199 readings, 1 to 200; normal distribution, spread of all readings",
+    },
+    "why_none": None,
+    "cp": {"value": 1.48, "low": 1.29, "high": 1.67, "method": "chi_square"},
+    "cpk": {"value": 1.4, "low": 1.2, "high": 1.6, "method": "bissell"},
+    "pp": {"value": 1.4, "low": 1.26, "high": 1.54, "method": "chi_square"},
+    "ppk": {"value": 1.33, "low": 1.19, "high": 1.47, "method": "bissell"},
+    "cpm": {"value": 1.37, "low": 1.24, "high": 1.5, "method": "boyles"},
+    "percentiles": None,
+    "ppm_within": {"below": 1.5, "above": 12.9, "total": 14.4},
+    "ppm_overall": {"below": 4.7, "above": 33.1, "total": 37.8},
+    "ppm_observed": {"below": 0.0, "above": 0.0, "total": 0.0},
+    "outside": 0,
+    "refused": None,
+    "normal": True,
+    "normality": [],
+    "stable": False,
+    "in_control": False,
+    "constant_in_time": True,
+    "stability": "Not in control: more signals than chance explains by Nelson 2 (judged by baseline 1).",
+    "baseline": 1,
+    "signals": [{"rule": "nelson_2", "signals": 4, "expected": 0.4, "p_value": 0.0008}],
+    "in_time": None,
+    "compensated": True,
+    "without": None,
+    "cautions": ["Do not report Cp and Cpk: the process is not in control (run rules)."],
+}
+
+
+class CapabilityOut(BaseModel):
+    """Capability of a run of readings. What cannot be said of them is null, and `refused` or a text says why."""
+
+    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE})
+
+    characteristic: str
+    first_sequence: int | None
+    last_sequence: int | None
+    first_at: datetime | None
+    last_at: datetime | None
+    readings: int
+    excluded: list[int] = Field(description="Sequences that somebody took out of the statistics; at most 1000.")
+    probe_faults: list[int] = Field(description="Probe faults, which are no measurement of a part; at most 1000.")
+    far: list[int] = Field(
+        description="Readings more than ten sigma of the middle half from the median: counted, but to be looked at; at most 1000."
+    )
+    lower_limit: float | None = Field(description="Limits of the deviation, of the newest reading's version.")
+    upper_limit: float | None
+    versions: list[InForceOut] = Field(description="By which the readings were judged, the newest reading's last.")
+    confidence: float
+    mean: float | None
+    sigma_within: float | None = Field(description="Mean moving range / d2.")
+    sigma_overall: float | None
+    quote: Literal["cpk", "ppk", "percentile", "none"] = Field(description="Which number may be quoted.")
+    quoted: "QuotedOut | None" = Field(
+        description="That number with its window and method; null where `quote` is none."
+    )
+    why_none: str | None = Field(description="Why none may be quoted; null where one may.")
+    cp: IndexOut | None
+    cpk: IndexOut | None
+    pp: IndexOut | None
+    ppk: IndexOut | None
+    cpm: IndexOut | None
+    percentiles: PercentileOut | None = Field(description="Of 100 readings and more.")
+    ppm_within: FalloutOut | None = Field(description="Expected under a normal distribution with sigma within.")
+    ppm_overall: FalloutOut | None = Field(description="The same with the sigma of all readings.")
+    ppm_observed: FalloutOut | None = Field(description="Counted, each part by the tolerance in force.")
+    outside: int
+    refused: str | None = Field(description="Why there is no index.")
+    normal: bool
+    normality: list[NormalityOut]
+    stable: bool | None = Field(
+        description="In control and constant in time: Cp and Cpk may be quoted. null: too few readings to say."
+    )
+    in_control: bool | None = Field(
+        description="By the run rules: no more signals than chance explains, none far beyond the limits."
+    )
+    constant_in_time: bool | None = Field(
+        description="By the model in time (ISO 22514): mean and scatter are constant, model A1 or A2."
+    )
+    stability: str
+    baseline: int | None = Field(description="Version of the frozen baseline it was judged by; null: by themselves.")
+    signals: list[FiredOut]
+    in_time: InTimeOut | None = Field(description="Of 50 readings and more.")
+    compensated: bool
+    without: WithoutOut | None = Field(description="Only where corrections were in effect.")
+    cautions: list[str]
+
+
+MOST_NAMED = 1000
+
+
+def capability_out(study: Study) -> CapabilityOut:
+    """The study as JSON."""
+    result = None if isinstance(study.indices, Refused) else study.indices
+    by_percentile = None if isinstance(study.by_percentile, Refused) else study.by_percentile
+    model = None if isinstance(study.in_time, Refused) else study.in_time
+    judged = None if isinstance(study.stability, Refused) else study.stability
+    return CapabilityOut(
+        characteristic=study.standing.characteristic.key,
+        first_sequence=int(study.sequence[0]) if len(study.sequence) else None,
+        last_sequence=int(study.sequence[-1]) if len(study.sequence) else None,
+        first_at=study.first_at,
+        last_at=study.last_at,
+        readings=len(study.values),
+        excluded=study.excluded[:MOST_NAMED],
+        probe_faults=study.faults[:MOST_NAMED],
+        far=study.far[:MOST_NAMED],
+        lower_limit=study.limits.lower,
+        upper_limit=study.limits.upper,
+        versions=[InForceOut(**_fields(version)) for version in study.versions],
+        confidence=study.confidence,
+        mean=result.mean if result else None,
+        sigma_within=result.within.value if result else None,
+        sigma_overall=result.overall.value if result else None,
+        quote=study.quote,
+        quoted=_quoted(study),
+        why_none=wording.why_not(study.quoting.why) if study.quote == "none" else None,
+        cp=IndexOut.of(result.cp if result else None),
+        cpk=IndexOut.of(result.cpk if result else None),
+        pp=IndexOut.of(result.pp if result else None),
+        ppk=IndexOut.of(result.ppk if result else None),
+        cpm=IndexOut.of(result.cpm if result else None),
+        percentiles=PercentileOut(
+            low=by_percentile.low,
+            median=by_percentile.median,
+            high=by_percentile.high,
+            pp=by_percentile.pp,
+            ppk=by_percentile.ppk,
+        )
+        if by_percentile
+        else None,
+        ppm_within=FalloutOut.of(study.within),
+        ppm_overall=FalloutOut.of(study.overall),
+        ppm_observed=FalloutOut.of(study.fallout),
+        outside=study.outside,
+        refused=statistics.refusal(study.indices) if isinstance(study.indices, Refused) else None,
+        normal=study.normal,
+        normality=[
+            NormalityOut.of("anderson_darling", study.anderson),
+            NormalityOut.of("shapiro_wilk", study.shapiro),
+        ],
+        stable=study.stable,
+        in_control=study.in_control,
+        constant_in_time=study.constant_in_time,
+        stability=wording.stability(study.stability, study.baseline),
+        baseline=study.baseline,
+        signals=[
+            FiredOut(rule=fired.rule.value, signals=fired.signals, expected=fired.expected, p_value=fired.p_value)
+            for fired in (judged.fired if judged else ())
+        ],
+        in_time=_in_time(study, model) if model else None,
+        compensated=study.compensated,
+        without=_without(study),
+        cautions=wording.cautions(study),
+    )
+
+
+def _fields(given: Any) -> dict[str, Any]:
+    return {name: getattr(given, name) for name in given.__slots__}
+
+
+def _quoted(study: Study) -> QuotedOut | None:
+    quoting = study.quoting
+    if quoting.value is None or study.quote == "none":
+        return None
+    return QuotedOut(
+        index=study.quote,
+        value=quoting.value,
+        low=quoting.low,
+        high=quoting.high,
+        preliminary=quoting.preliminary,
+        method=wording.method(study.quote),
+        window=wording.window_of(study),
+    )
+
+
+def _in_time(study: Study, found: InTime) -> InTimeOut:
+    return InTimeOut(
+        model=found.model.value,
+        location=found.location.value,
+        scatter_changes=found.scatter_changes,
+        share_between=found.share_between,
+        slope=found.slope,
+        subgroups=found.subgroups,
+        tests=[
+            TestOut(question=question, test=test, numbers=numbers, answer=answer)
+            for question, test, numbers, answer in wording.model_tests(found)
+        ],
+        text=wording.model(found),
+        means=wording.model_means(study),
+    )
+
+
+def _without(study: Study) -> WithoutOut | None:
+    process = study.without
+    if process is None or isinstance(process, Refused):
+        return None
+    return WithoutOut(
+        readings=process.readings,
+        lives=process.lives,
+        mean=process.mean,
+        standard_deviation=process.tool.value,
+        ppk=IndexOut.of(process.ppk),
+        scatter=process.ideal_sigma.value,
+        ideal=IndexOut.of(process.ideal),
+        gain=process.gain,
+        price=process.price,
+        unknown=study.unknown,
+    )

@@ -1,0 +1,386 @@
+"""The words of capability: verdicts, tests, models in time, and which index may be quoted."""
+
+from app.core.spc.capability import Caution, Index
+from app.core.spc.in_time import ALPHA, InTime, Location, Model, Test
+from app.core.spc.normality import Normality
+from app.core.spc.quoting import WhyNot
+from app.core.spc.refusal import Reason, Refused
+from app.core.spc.stability import Fired, Stability
+from app.language.i18n import _, ngettext
+from app.language.numbers import signed
+from app.loop.summaries import wording as statistics
+from app.quality.capability.queries import Study
+
+CAPABLE, VERY_CAPABLE = 4 / 3, 5 / 3
+"""What is usually asked for: four sigma to each limit, five for what matters to safety."""
+MOST_NAMED = 40
+
+
+def verdict(value: float | None) -> tuple[str, str]:
+    """A word for an index, and its tone."""
+    if value is None:
+        return _("No number"), "steady"
+    if value >= VERY_CAPABLE:
+        return _("Very capable"), "steady"
+    if value >= CAPABLE - 0.005:
+        return _("Capable"), "steady"
+    if value >= 1:
+        return _("Barely capable"), "waiting"
+    return _("Not capable"), "attention"
+
+
+def index_name(quote: str) -> str:
+    """The name of the index that may be quoted."""
+    return {"cpk": "Cpk", "percentile": _("Ppk by percentiles")}.get(quote, "Ppk")
+
+
+def method(quote: str) -> str:
+    """Name the method behind the index that may be quoted."""
+    return {
+        "cpk": _("normal distribution, scatter from part to part"),
+        "ppk": _("normal distribution, spread of all readings"),
+        "percentile": _("percentiles (ISO 22514-2)"),
+        "none": "",
+    }[quote]
+
+
+def why_not(code: str | None) -> str:
+    """The reason why no index may be quoted, in a few words."""
+    return {
+        WhyNot.FAR_OFF.value: _("a reading lies far from all others"),
+        WhyNot.NO_SHAPE.value: _("not normal, and no percentiles"),
+        "not_yet": _("not computed yet; ready in a few minutes"),
+        Reason.TOO_FEW_READINGS.value: _("too few readings"),
+        Reason.NO_VARIATION.value: _("all readings are the same"),
+        Reason.UNRESOLVED.value: _("readings too coarse"),
+    }.get(code or "", _("no index can be computed"))
+
+
+def window(count: int, first: int | None, last: int | None, quote: str = "none", *, preliminary: bool = False) -> str:
+    """The window of an index: how many readings, which, by which method.
+
+    >>> window(998, 4003, 5002, "ppk")
+    '998 readings, 4003 to 5002; normal distribution, spread of all readings'
+    """
+    sentence = ngettext("%(num)s reading", "%(num)s readings", count) % {"num": count}
+    if first is not None and last is not None:
+        sentence += _(", {first} to {last}").format(first=first, last=last)
+    if method(quote):
+        sentence += f"; {method(quote)}"
+    return sentence + (_("; preliminary") if preliminary else "")
+
+
+def window_of(study: Study) -> str:
+    """The window and the method of the number that may be quoted."""
+    places = study.sequence
+    first, last = (int(places[0]), int(places[-1])) if len(places) else (None, None)
+    return window(len(study.values), first, last, study.quote, preliminary=study.quoting.preliminary)
+
+
+def index(value: float | None) -> str:
+    """An index with the digits it deserves."""
+    return "–" if value is None else f"{value:.2f}".replace("-", "\N{MINUS SIGN}")
+
+
+def between(found: Index | None) -> str:
+    """Its interval."""
+    if found is None or found.low is None or found.high is None:
+        return "–"
+    return _("{low} to {high}").format(low=index(found.low), high=index(found.high))
+
+
+def ppm(value: float | None) -> str:
+    """Parts per million, with no more digits than can be meant."""
+    if value is None:
+        return "–"
+    if value >= 99.5:
+        return f"{round(value):,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+    return f"{value:.1f}" if value >= 0.05 else "<\N{NARROW NO-BREAK SPACE}0.1" if value > 0 else "0"
+
+
+def p_value(p: float) -> str:
+    """A probability as one reads it."""
+    return _("p < 0.001") if p < 0.001 else f"p = {p:.3f}"
+
+
+def normality(test: Normality | Refused) -> str:
+    """Word the result of a test of normality."""
+    if isinstance(test, Refused):
+        return statistics.refusal(test)
+    if test.p_value < 0.005:
+        return _("Not normal: readings as far from it come by chance in less than one case of 200.")
+    if test.p_value < 0.05:
+        return _("Doubtful: readings as far from normal come by chance in {share} % of cases.").format(
+            share=f"{test.p_value * 100:.1f}"
+        )
+    return _("The readings agree with a normal distribution.")
+
+
+def normality_name(test: str) -> str:
+    """Name the test of normality."""
+    return {"anderson_darling": "Anderson-Darling A²", "shapiro_wilk": "Shapiro-Wilk W"}.get(test, test)
+
+
+def stability(found: Stability | Refused, baseline: int | None) -> str:
+    """Statistical control by the run rules, and by what it was judged."""
+    if isinstance(found, Refused):
+        return _("Cannot be judged: {why}").format(why=statistics.refusal(found))
+    by = (
+        _("judged by baseline {n}").format(n=baseline)
+        if baseline is not None
+        else _("judged by limits of the same readings; a frozen baseline of the deviations is a better judge")
+    )
+    if found.in_control:
+        return _("In control: no run rule fires more often than chance explains ({by}).").format(by=by)
+    why = []
+    if found.beyond_chance:
+        names = ", ".join(statistics.rule_name(fired.rule) for fired in found.beyond_chance)
+        why.append(_("more signals than chance explains by {names}").format(names=names))
+    if found.gross:
+        why.append(
+            ngettext(
+                "%(num)d point lies far beyond the limits, %(size)s sigma from the centre",
+                "%(num)d points lie far beyond the limits, up to %(size)s sigma from the centre",
+                found.gross,
+            )
+            % {"num": found.gross, "size": f"{found.farthest:.0f}"}
+        )
+    return _("Not in control: {why} ({by}).").format(why="; ".join(why), by=by)
+
+
+def unsteady(study: Study) -> str | None:
+    """The answer to the other question, where it differs: in control by the run rules, yet not constant in time."""
+    if not study.in_control or study.constant_in_time is not False:
+        return None
+    assert not isinstance(study.in_time, Refused)
+    return _(
+        "The model in time answers another question: by ISO 22514 (model {model}) mean or scatter are not constant, so Cp and Cpk are not quoted."
+    ).format(model=study.in_time.model.value)
+
+
+def why_not_quoted(study: Study) -> str:
+    """Give the reason why Cp and Cpk are not quoted: one of the two questions, or both."""
+    why = []
+    if study.in_control is False:
+        why.append(_("the process is not in control (run rules)"))
+    if not isinstance(study.in_time, Refused) and study.constant_in_time is False:
+        why.append(
+            _("the process is not constant in time (ISO 22514, model {model})").format(model=study.in_time.model.value)
+        )
+    return _(" and ").join(why)
+
+
+def lives(count: int) -> str:
+    """Number of stretches that make up the wear curve."""
+    return ngettext(
+        "wear included, over %(num)d tool life or stretch.",
+        "wear included, over %(num)d tool lives and stretches.",
+        count,
+    ) % {"num": count}
+
+
+def fired(each: Fired) -> str:
+    """Number of signals against the number that chance explains."""
+    return ngettext(
+        "%(num)d signal, by chance %(expected)s", "%(num)d signals, by chance %(expected)s", each.signals
+    ) % {"num": each.signals, "expected": f"{each.expected:.1f}"}
+
+
+def location(found: InTime) -> str:
+    """Describe the behaviour of the mean."""
+    return {
+        Location.CONSTANT: _("the mean stays"),
+        Location.RANDOM: _("the mean wanders at random"),
+        Location.SYSTEMATIC: _("the mean is driven: it follows a line or a course"),
+        Location.BOTH: _("the mean is driven, and wanders beside it"),
+    }[found.location]
+
+
+def model(found: InTime) -> str:
+    """The model in words."""
+    scatter = _("the scatter changes") if found.scatter_changes else _("the scatter stays")
+    shape = _("all readings together are normal") if found.normal_overall else _("all readings together are not normal")
+    return _("{mean}, {scatter}, {shape}.").format(mean=location(found), scatter=scatter, shape=shape).capitalize()
+
+
+def model_means(study: Study) -> str:
+    """Name the index that the process model allows: the one that `Study.quote` names, for what else is known counts as well.
+
+    A steady model does not outweigh signals of the run rules. Empty where there is no model.
+    """
+    if isinstance(study.in_time, Refused):
+        return ""
+    if study.quote == "none":
+        return _("Do not report an index: {why}.").format(why=why_not(study.quoting.why))
+    which = study.in_time.model
+    index = _("Ppk by percentiles") if study.quote == "percentile" else _("Pp and Ppk")
+    if which.steady and study.stable is not True:
+        why = (
+            _("the process is not in control (run rules)")
+            if study.stable is False
+            else _("too little is known to call it in control")
+        )
+        return _("The mean and the scatter hold, yet {why}: quote {index}, not Cp and Cpk.").format(
+            why=why, index=index
+        )
+    match which:
+        case Model.A1 | Model.A2 if study.quote == "cpk":
+            return _("Cp and Cpk may be quoted, and what was is what will be: 6 sigma hold 99.73 % of the parts.")
+        case Model.A1 | Model.A2 if study.quote == "ppk":
+            return _(
+                "Quote {index}: the process is steady, yet its scatter from part to part is not known well enough."
+            ).format(index=index)
+        case Model.A1 | Model.A2:
+            return _(
+                "Report {index}: the process is steady, but not normal, so sigma does not describe its tails."
+            ).format(index=index)
+        case Model.B:
+            sentence = _("Report {index}: the scatter changes, so one sigma does not describe the process.")
+        case Model.C1 | Model.C2:
+            sentence = _(
+                "Report {index} of all readings: sigma within subgroups does not include the movement of the mean."
+            )
+        case Model.C3:
+            sentence = _("Report {index} over complete drifts, from tool change to tool change.")
+        case Model.C4:
+            sentence = _("Report {index} over a long enough time: it must include drift and jumps.")
+        case Model.D:
+            sentence = _("Find the causes first, then report {index}: mean and scatter both change.")
+    return sentence.format(index=index)
+
+
+def model_tests(found: InTime) -> list[tuple[str, str, str, str]]:
+    """Question, test, its numbers, answer."""
+
+    def answer(said: bool) -> str:
+        return _("yes") if said else _("no")
+
+    def f(test: Test) -> str:
+        return f"F({test.freedom}, {test.freedom_error}) = {test.statistic:.2f}, {p_value(test.p_value)}"
+
+    return [
+        (
+            _("Does the mean move?"),
+            _("analysis of variance between subgroups"),
+            f(found.between),
+            answer(found.between.significant),
+        ),
+        (_("Linear drift?"), _("regression of the subgroup means"), f(found.line), answer(found.line.significant)),
+        (
+            _("Do the means follow each other?"),
+            _("von Neumann's ratio"),
+            f"C = {index(found.successive.statistic)}, {p_value(found.successive.p_value)}",
+            answer(found.successive.significant),
+        ),
+        (
+            _("Deviates from linear drift?"),
+            _("lack of fit of the line"),
+            f(found.beside_line),
+            answer(found.beside_line.significant),
+        ),
+        (
+            _("Does the scatter change?"),
+            _("Brown-Forsythe over differences"),
+            f(found.scatter),
+            answer(found.scatter.significant),
+        ),
+    ]
+
+
+def model_note(found: InTime) -> str:
+    """Of what, and at which level."""
+    sentence = _("{n} subgroups of {size} neighbours; tests at {level} %.").format(
+        n=found.subgroups, size=found.size, level=f"{ALPHA * 100:g}"
+    )
+    if found.spread:
+        sentence += " " + _("Evenly spread over the readings.")
+    if found.few:
+        sentence += " " + _("ISO 22514-2 asks for 125 readings and more: a slow change may not be seen yet.")
+    return sentence
+
+
+def cautions(study: Study) -> list[str]:
+    """Cautions that belong to the numbers."""
+    if isinstance(study.indices, Refused):
+        return [statistics.refusal(study.indices)]
+    sentences = [
+        _not_normal(study) if caution is Caution.NOT_NORMAL else statistics.caution(caution)
+        for caution in study.indices.cautions
+        if caution is not Caution.NOT_IN_CONTROL or study.stable is not False
+    ]
+    if study.quote == "percentile" and not isinstance(study.by_percentile, Refused):
+        sentences += [statistics.caution(caution) for caution in study.by_percentile.cautions]
+    if study.quote == "none":
+        sentences.insert(0, _("Do not report an index: {why}.").format(why=why_not(study.quoting.why)))
+    elif study.stable is False:
+        sentences.insert(
+            0,
+            _("Do not report Cp and Cpk: {why}. Ppk describes past parts only; do not use it to predict.").format(
+                why=why_not_quoted(study)
+            ),
+        )
+    if study.far and study.furthest is not None:
+        sentences.append(
+            ngettext(
+                "Reading %(which)s lies far from all others (%(furthest)s µm), and makes the numbers. Look at it: if the part was not so, exclude it with a reason.",
+                "Readings %(which)s lie far from all others (up to %(furthest)s µm), and make the numbers. Look at them: if a part was not so, exclude it with a reason.",
+                len(study.far),
+            )
+            % {"which": named(study.far), "furthest": signed(study.furthest * 1000, 1)}
+        )
+    if study.limits_differ:
+        sentences.append(
+            _(
+                "The tolerance changed in this time: indices take ±{half} µm of version {version}, parts outside are counted by the tolerance each was judged by."
+            ).format(half=f"{study.versions[-1].half * 1000:g}", version=study.versions[-1].version)
+        )
+    elif study.targets_differ:
+        sentences.append(_("The target changed in this time: every deviation is one from the target in force."))
+    return sentences
+
+
+def _not_normal(study: Study) -> str:
+    """Warn that no normal distribution carries the numbers, and name the method that does, if any."""
+    if not isinstance(study.by_percentile, Refused):
+        return statistics.caution(Caution.NOT_NORMAL)
+    if study.by_percentile.reason is Reason.TOO_FEW_READINGS:
+        return _(
+            "The readings are not normally distributed, and too few for percentiles ({have} of {needed}): no index here describes the tails, and the expected ppm are not valid."
+        ).format(have=study.by_percentile.have, needed=study.by_percentile.needed)
+    return _(
+        "The readings are not normally distributed, and take too few values for percentiles: no index here describes the tails, and the expected ppm are not valid."
+    )
+
+
+def named(sequences: list[int]) -> str:
+    """Readings by their numbers, in runs.
+
+    >>> named([3, 4, 5, 9])
+    '3–5, 9'
+    """
+    runs: list[list[int]] = []
+    for sequence in sequences:
+        if runs and runs[-1][1] + 1 == sequence:
+            runs[-1][1] = sequence
+        else:
+            runs.append([sequence, sequence])
+    numbers = ", ".join(f"{a}" if a == b else f"{a}–{b}" for a, b in runs[:MOST_NAMED])
+    return numbers + (" …" if len(runs) > MOST_NAMED else "")
+
+
+def gain(value: float) -> str:
+    """Effect of the corrections on the standard deviation."""
+    if value >= 1.05:
+        return _("Without corrections the parts would scatter {times} times as much.").format(times=f"{value:.1f}")
+    if value > 0.95:
+        return _("Without corrections the parts would scatter as much: nothing was gained in this time.")
+    return _("The corrections made it worse: without them the parts would scatter {share} % less.").format(
+        share=f"{(1 - value) * 100:.0f}"
+    )
+
+
+def price(value: float) -> str:
+    """Distance from an ideal correction."""
+    return _("An ideal correction would leave {share} % of the spread there is.").format(
+        share=f"{min(100.0, 100 / value):.0f}"
+    )

@@ -1,0 +1,250 @@
+"""JSON routes: baselines, control charts in numbers, and their figures."""
+
+from typing import Annotated, Any
+
+import msgspec
+from fastapi import Path, Query, Response
+
+from app.access.deps import AnyCaller, Engineer, require
+from app.core.spc.quantity import Quantity
+from app.core.spc.shewhart import Chart
+from app.language.i18n import _
+from app.loop.characteristics import queries as characteristics
+from app.loop.characteristics.queries import Standing
+from app.loop.summaries import queries as statistics
+from app.quality.control_charts import actions, charts, queries, signals_queries
+from app.quality.control_charts.answers import baseline_out, control_out, draft_out
+from app.quality.control_charts.drafts import draft_of
+from app.quality.control_charts.editor import PICKED, EditorChoice, picture_of
+from app.quality.control_charts.figures import control_figure
+from app.quality.control_charts.schemas import (
+    BaselineIn,
+    BaselineOut,
+    BaselineWhyIn,
+    ChartName,
+    ControlOut,
+    DraftAnswer,
+    Grouping,
+    PeriodIn,
+)
+from app.quality.control_charts.tables import Baseline
+from app.quality.control_charts.view import Marks
+from app.web.api import api_router, problems
+from app.web.choice import Chosen
+from app.web.deps import SessionDep
+from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Limit, Page, page_of
+from app.web.theme import ThemeName
+
+router = api_router("control charts")
+
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+Version = Annotated[
+    int, Path(ge=1, le=LARGEST_SERIAL, description="Version of the baseline; counts per characteristic.", examples=[3])
+]
+Judge = Annotated[
+    int | None,
+    Query(ge=1, le=LARGEST_SERIAL, alias="baseline", description="Judge by this version, not by the one in force."),
+]
+Kind = Annotated[
+    Chart | None, Query(description="Which chart; individuals or X-bar, whichever the baseline is for, if left out.")
+]
+Theme = Annotated[ThemeName, Query(description="For a light or a dark page.")]
+Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
+FIGURE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "A Plotly figure: `data` and `layout`",
+        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
+    }
+}
+AGAIN: dict[int | str, dict[str, Any]] = {
+    200: {"model": BaselineOut, "description": "It was sent before with the same key; nothing happened now."}
+}
+
+
+def _standing(session: SessionDep, caller: AnyCaller, key: str) -> Standing:
+    standing = characteristics.characteristic_named(session, key)
+    caller.must_at(standing.machine.id, "viewer")
+    return standing
+
+
+def _in_force(session: SessionDep, standing: Standing) -> int | None:
+    baseline = queries.baseline_in_force(session, standing.characteristic)
+    return None if baseline is None else baseline.version
+
+
+def _judge(session: SessionDep, standing: Standing, version: int | None) -> Baseline | None:
+    if version is not None:
+        return queries.baseline_of(session, standing.characteristic, version)
+    return queries.baseline_in_force(session, standing.characteristic)
+
+
+# --- baselines
+
+
+@router.get("/characteristics/{characteristic}/baselines", responses=problems(404))
+def list_baselines(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    after: Annotated[
+        int | None, Query(ge=0, le=LARGEST_SERIAL, description="Cursor: the `next` of the page before.")
+    ] = None,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[BaselineOut]:
+    """Every baseline that was frozen, newest first: who, when, why, and its numbers."""
+    standing = _standing(session, caller, characteristic)
+    rows = queries.baselines(session, standing.characteristic, before=after, limit=limit + 1)
+    now = _in_force(session, standing)
+    listed = [baseline_out(row, characteristic, now) for row in rows]
+    return page_of(listed, limit, lambda row: row.version)
+
+
+@router.post("/characteristics/{characteristic}/baselines", status_code=201, responses=problems(404, 409) | AGAIN)
+def freeze_baseline(
+    session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, given: BaselineIn, response: Response
+) -> BaselineOut:
+    """Freeze a baseline: readings are judged by it from now on, and it is never estimated again.
+
+    Too few readings, or all of them equal, are refused; the answer says how many are missing.
+    """
+    standing = characteristics.characteristic_named(session, characteristic)
+    done = actions.freeze(session, standing, given, caller)
+    if done.again:
+        response.status_code = 200
+    return baseline_out(done.baseline, characteristic, _in_force(session, standing))
+
+
+@router.post(
+    "/characteristics/{characteristic}/baselines/preview", responses=problems(404), dependencies=[require("viewer")]
+)
+def preview_baseline(
+    session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, given: PeriodIn
+) -> DraftAnswer:
+    """Preview the baseline of a period, with the cautions that a person should read before freezing it. Nothing is stored."""
+    standing = _standing(session, caller, characteristic)
+    return draft_out(draft_of(session, standing, given), characteristic)
+
+
+@router.get("/characteristics/{characteristic}/baselines/{version}", responses=problems(404))
+def get_baseline(
+    session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, version: Version
+) -> BaselineOut:
+    """One baseline."""
+    standing = _standing(session, caller, characteristic)
+    baseline = queries.baseline_of(session, standing.characteristic, version)
+    return baseline_out(baseline, characteristic, _in_force(session, standing))
+
+
+@router.post("/characteristics/{characteristic}/baselines/{version}/retire", responses=problems(404, 409))
+def retire_baseline(
+    session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, version: Version, given: BaselineWhyIn
+) -> BaselineOut:
+    """Take the baseline out of force: nothing is judged until another is frozen."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    return baseline_out(actions.retire(session, standing, version, given.reason, caller), characteristic, None)
+
+
+@router.post(
+    "/characteristics/{characteristic}/baselines/{version}/put-in-force",
+    status_code=201,
+    responses=problems(404, 409),
+)
+def put_baseline_in_force(
+    session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, version: Version, given: BaselineWhyIn
+) -> BaselineOut:
+    """Go back to an older baseline: its numbers become a new version, which is in force."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    baseline = actions.put_in_force(session, standing, version, given.reason, caller)
+    return baseline_out(baseline, characteristic, baseline.version)
+
+
+# --- charts
+
+
+@router.get("/characteristics/{characteristic}/control", responses=problems(404))
+def get_control(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: Chosen,
+    chart: Kind = None,
+    version: Judge = None,
+) -> ControlOut:
+    """A control chart in numbers: points, centre, limits, and signals as runs of points.
+
+    All by the frozen baseline, never by the readings shown. Without a baseline in force: deviations and no limits.
+    """
+    standing = _standing(session, caller, characteristic)
+    window = statistics.window_of(session, standing.characteristic, **choice._asdict())
+    baseline = _judge(session, standing, version)
+    if baseline is None:
+        return control_out(charts.unjudged(session, standing, window), characteristic, None)
+    return control_out(charts.view(session, standing, baseline, window, chart), characteristic, baseline)
+
+
+@router.get("/characteristics/{characteristic}/figures/control", responses=problems(404) | FIGURE, response_model=None)
+def get_control_chart(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: Chosen,
+    chart: Kind = None,
+    version: Judge = None,
+    signal: Annotated[
+        int | None, Query(ge=1, le=LARGEST_ID, description="Mark the run of this signal, not the baseline's period.")
+    ] = None,
+    theme: Theme = "light",
+    width: Width = 1240,
+) -> Response:
+    """A control chart as a figure. Of more points than can be drawn the extremes and the signals of each stretch."""
+    standing = _standing(session, caller, characteristic)
+    window = statistics.window_of(session, standing.characteristic, **choice._asdict())
+    baseline = _judge(session, standing, version)
+    if baseline is None:
+        return _answer(
+            control_figure(charts.unjudged(session, standing, window), key=characteristic, theme=theme, width=width)
+        )
+    view = charts.view(session, standing, baseline, window, chart)
+    marked = charts.marked_by(baseline) if signal is None else _run_of(session, standing, signal)
+    return _answer(control_figure(view, key=characteristic, marked=marked, theme=theme, width=width))
+
+
+def _run_of(session: SessionDep, standing: Standing, number: int) -> Marks:
+    row = signals_queries.signal(session, number)
+    if row.characteristic.key != standing.characteristic.key:
+        raise signals_queries.unknown(number)
+    return Marks(row.signal.first_sequence, row.signal.last_sequence, _("Signal {n}").format(n=number))
+
+
+@router.get("/characteristics/{characteristic}/figures/baseline", responses=problems(404) | FIGURE, response_model=None)
+def get_baseline_editor(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: Chosen,
+    quantity: Annotated[Quantity, Query(description="What is charted.")] = Quantity.DEVIATION,
+    chart: Annotated[ChartName, Query(description="Single values or subgroups.")] = "individuals",
+    grouping: Annotated[Grouping | None, Query(description="How readings become subgroups.")] = None,
+    group_size: Annotated[int | None, Query(ge=2, le=1000, description="Readings in a subgroup.")] = None,
+    group_pause: Annotated[float | None, Query(gt=0, le=100_000, description="Minutes that end a subgroup.")] = None,
+    settle: Annotated[int | None, Query(ge=20, le=10_000, description="Readings in which an edge runs in.")] = None,
+    first_sequence: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="First of the period.")] = None,
+    last_sequence: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="Last of the period.")] = None,
+    excluded: Annotated[
+        str, Query(pattern=PICKED, max_length=4000, description="Runs of readings that are left out: 640-641,702-702.")
+    ] = "",
+    theme: Theme = "light",
+    width: Width = 1240,
+) -> Response:
+    """The chart on which a period is chosen: the readings, the period, and the limits that it would give."""
+    standing = _standing(session, caller, characteristic)
+    window = statistics.window_of(session, standing.characteristic, **choice._asdict())
+    picked = EditorChoice(
+        quantity, chart, grouping, group_size, group_pause, settle, first_sequence, last_sequence, excluded
+    )
+    view, marked = picture_of(session, standing, picked, window)
+    return _answer(control_figure(view, key=characteristic, marked=marked, theme=theme, width=width, picks=True))
+
+
+def _answer(figure: dict[str, Any]) -> Response:
+    return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})

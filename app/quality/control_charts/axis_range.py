@@ -1,0 +1,111 @@
+"""Range of the axis of a control chart, and the marks for points that lie far beyond it. Pure; µm.
+
+One broken insert at +400 µm would press limits of ±3 µm into a line. So the axis shows the limits and what lies about them; points
+beyond stand at its edge as open triangles with their value, and the line to them leaves the chart.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.spc.shewhart import Chart
+from app.language.i18n import _
+from app.language.numbers import signed
+from app.quality.control_charts.view import View
+from app.web.theme import Palette
+
+ROOM = 0.08
+TOO_FAR = 4.0  # times as far as limits and most points reach
+WITH_VALUES = 8  # points beyond that are labelled
+CLOSE = 0.05  # of the width of the chart: of points closer than this the farthest is labelled, behind the last of them
+LATE = 0.12  # of the width of the chart: of points nearer to its right edge the label stands before them, not beyond the edge
+MOST = 0.04  # of the points on either side may lie beyond: a broken insert is seen on a few parts before it is changed
+FEW = 8  # points of which none is far
+UNSIGNED = (Chart.MOVING_RANGE, Chart.RANGES, Chart.DEVIATIONS)
+
+
+def reach(view: View) -> tuple[float, float]:
+    """Lowest and highest value on the axis."""
+    limits = [part for part in (view.lower, view.upper, view.centre) if part is not None]
+    points = [part for part in (view.points, view.below) if part is not None]
+    whole = _ends([*limits, *points])
+    if view.kind is Chart.CUSUM or len(view) < FEW:
+        return _open(*whole)
+    most = [np.quantile(part, (MOST, 1 - MOST)) for part in points]
+    low, high = _ends([*limits, *most])
+    if whole[1] - whole[0] <= TOO_FAR * (high - low):
+        return _open(*whole)
+    about = (high - low) / 2
+    return _open(max(whole[0], low - about), min(whole[1], high + about))
+
+
+def _ends(parts: list[Any]) -> tuple[float, float]:
+    return min(float(np.min(part)) for part in parts) * 1000, max(float(np.max(part)) for part in parts) * 1000
+
+
+def _open(low: float, high: float) -> tuple[float, float]:
+    if not high > low:
+        return low - 1, high + 1
+    room = (high - low) * ROOM
+    return low - room, high + room
+
+
+def beyond(
+    view: View, drawn: NDArray[np.int64], custom: list[Any], colours: Palette, low: float, high: float
+) -> list[dict[str, Any]]:
+    """The points that the axis does not reach, at its edge. custom: what each drawn point opens."""
+    values = view.points[drawn] * 1000
+    far = (values > high) | (values < low)
+    if not far.any():
+        return []
+    inset = (high - low) * 0.025
+    above = values[far] > 0.5 * (low + high)
+    values_text = [
+        f"{value:.0f} µm" if view.kind in UNSIGNED else f"{signed(value, 0)} µm" for value in values[far].tolist()
+    ]
+    x = view.last[drawn[far]]
+    wide = view.last[-1] - view.first[0]
+    late = x > view.last[-1] - LATE * wide
+    labels = _spaced(values_text, np.abs(values[far]), x, above, late, CLOSE * wide)
+    return [
+        {
+            "type": "scatter",
+            "mode": "markers+text" if sum(map(bool, labels)) <= WITH_VALUES else "markers",
+            "name": _("Beyond the axis"),
+            "meta": "beyond",
+            "x": x.tolist(),
+            "y": np.where(above, high - inset, low + inset).tolist(),
+            "text": labels,
+            "hovertext": values_text,
+            "textposition": np.where(late, "middle left", "middle right").tolist(),
+            "textfont": {"size": 12, "color": colours.ink},
+            "customdata": [custom[at] for at in np.flatnonzero(far).tolist()],
+            "marker": {
+                "size": 12,
+                "color": colours.attention,
+                "symbol": ["triangle-up-open" if up else "triangle-down-open" for up in above.tolist()],
+                "line": {"width": 2},
+            },
+            "hovertemplate": f"{_('Reading')} %{{x:d}}<br>%{{hovertext}}<extra></extra>",
+        }
+    ]
+
+
+def _spaced(
+    said: list[str],
+    size: NDArray[np.float64],
+    x: NDArray[np.int64],
+    above: NDArray[np.bool_],
+    late: NDArray[np.bool_],
+    close: float,
+) -> list[str]:
+    """The labels of points that lie too close to each other become one: behind the last, late ones before the first."""
+    labels = [""] * len(said)
+    apart = (np.diff(x) > close) | (above[1:] != above[:-1]) | (late[1:] != late[:-1])
+    start = 0
+    for end in [*np.flatnonzero(apart).tolist(), len(said) - 1]:
+        label = said[start + int(np.argmax(size[start : end + 1]))] + "\N{NO-BREAK SPACE}"
+        labels[start if late[start] else end] = label if late[start] else "\N{NO-BREAK SPACE}" + label.strip()
+        start = end + 1
+    return labels

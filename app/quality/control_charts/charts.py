@@ -1,0 +1,292 @@
+"""The charts of a baseline: every kind of them over a window, with their signals. Never writes.
+
+Charts that remember (EWMA, moving average, CUSUM) begin with the first reading of the baseline's period, and again with the
+first one after it; so a point is the same whichever window shows it, as long as its beginning is not further back than
+`queries.LOOK_BACK` readings. They take single values, of baselines of subgroups too.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import inspect
+from sqlalchemy.orm import Session
+
+from app.core.spc import cusum, ewma, rules, shewhart
+from app.core.spc.quantity import Quantity, Series
+from app.core.spc.refusal import Floats
+from app.core.spc.rules import RULES, RuleName, Signals
+from app.core.spc.shewhart import Chart, ControlChart
+from app.core.spc.spread import Subgroups
+from app.errors import FieldError, Invalid
+from app.language.i18n import _
+from app.loop.characteristics.queries import Standing
+from app.loop.summaries import queries as statistics
+from app.loop.summaries.queries import Window
+from app.quality.control_charts import queries
+from app.quality.control_charts.monitoring import Place
+from app.quality.control_charts.queries import LOOK_BACK, Charted, charted, judged_by
+from app.quality.control_charts.rules_queries import rules_in_force
+from app.quality.control_charts.series_queries import read
+from app.quality.control_charts.tables import Baseline
+from app.quality.control_charts.view import Marks, View, only, since
+
+__all__ = ["Marks", "View", "kinds", "marked_by", "only", "unjudged", "view"]
+NEIGHBOURS = (
+    100  # points before the window that are looked at too: runs of points go on, and the one before may be excluded
+)
+REMEMBERING = (Chart.EWMA, Chart.MOVING_AVERAGE, Chart.CUSUM)
+
+
+def kinds(baseline: Baseline) -> list[Chart]:
+    """The charts that this baseline has limits for."""
+    if baseline.quantity == Quantity.DIFFERENCES:
+        return [Chart.INDIVIDUALS]
+    second = {"individuals": Chart.MOVING_RANGE, "xbar_r": Chart.RANGES, "xbar_s": Chart.DEVIATIONS}
+    return [queries.main_chart(baseline), second[baseline.chart], *REMEMBERING]
+
+
+def view(
+    session: Session,
+    standing: Standing,
+    baseline: Baseline,
+    window: Window,
+    kind: Chart | None = None,
+    watched: Iterable[RuleName] | None = None,
+) -> View:
+    """This chart over the window; the main one if none is named. watched: rules; those that are switched on if left out.
+
+    Raises `Invalid` for a chart that this baseline has no limits for.
+    """
+    kind = kind or queries.main_chart(baseline)
+    if kind not in kinds(baseline):
+        wrong = _("this baseline is judged by {charts}").format(charts=", ".join(kinds(baseline)))
+        raise Invalid(
+            _("The baseline in force has no limits for the chart {chart}.").format(chart=kind.value),
+            _("Choose one of its charts, or freeze a baseline for this one."),
+            errors=[FieldError("chart", wrong)],
+        )
+    view = _drawn(session, standing, baseline, window, kind, watched)
+    view = replace(view, left_out=view.left_out and view.left_out.within(window.first, window.last))
+    if not window.timed:
+        return view
+    # What a point is does not depend on the period; whether it is shown does.
+    measured = statistics.history_of(session, standing.characteristic, window, ())["sequence"]
+    view = only(view, np.isin(view.last, measured))
+    return replace(view, left_out=view.left_out and view.left_out.among(measured))
+
+
+def _drawn(
+    session: Session,
+    standing: Standing,
+    baseline: Baseline,
+    window: Window,
+    kind: Chart,
+    watched: Iterable[RuleName] | None,
+) -> View:
+    if kind in REMEMBERING:
+        return _remembering(session, standing, baseline, window, kind)
+    if kind is Chart.MOVING_RANGE:
+        points = charted(session, standing, baseline, replace(window, first=max(1, window.first - NEIGHBOURS)))
+        return _moving_ranges(points, window)
+    before = replace(window, first=max(1, window.first - NEIGHBOURS * (baseline.group_size or 1)))
+    points = charted(session, standing, baseline, before)
+    if kind in (Chart.RANGES, Chart.DEVIATIONS):
+        return since(replace(_within(points, kind), settling=_settling(points, window)), window.first)
+    main = _view(points, kind, points.chart, np.ones(len(points), np.bool_))
+    if points.chart is None:
+        return main
+    on = _switched_on(session, standing) if watched is None else set(watched)
+    chosen = [RULES[name] for name in queries.rules_of(baseline) if name in on]
+    main = replace(main, settling=_settling(points, window), signals=rules.signals_of(points.chart, chosen))
+    return since(main, window.first)
+
+
+def _switched_on(session: Session, standing: Standing) -> set[RuleName]:
+    """The rules that watch the main chart."""
+    return set(rules_in_force(session, standing.characteristic).rules.get(Place.MAIN, {}))
+
+
+def _settling(points: Charted, window: Window) -> int:
+    """Readings of the window that set the level of an edge."""
+    if points.baseline.quantity != Quantity.WEAR_RESIDUALS:
+        return 0
+    read, judged = (
+        int(((series.sequence >= window.first) & window.holds(at)).sum())
+        for series, at in ((points.read.series, points.read.measured_at), (points.series, points.series_at))
+    )
+    return read - judged
+
+
+def marked_by(baseline: Baseline) -> Marks:
+    """The period of the baseline with its name."""
+    excluded = [(run["first"], run["last"]) for run in baseline.excluded]
+    name = _("Baseline {version}").format(version=baseline.version)
+    return Marks(baseline.first_sequence, baseline.last_sequence, name, excluded)
+
+
+def unjudged(session: Session, standing: Standing, window: Window) -> View:
+    """Deviations as they are, for a characteristic without a baseline."""
+    plain = Baseline(quantity=Quantity.DEVIATION.value, excluded=[], first_sequence=1, last_sequence=0, factor=-1.0)
+    readings = read(session, standing, plain, window)
+    return replace(of_series(readings.series, Quantity.DEVIATION), left_out=readings.left_out)
+
+
+def of_series(series: Series, which: Quantity) -> View:
+    """A series as it is, without limits."""
+    sizes = np.ones(len(series), np.int64)
+    return View(Chart.INDIVIDUALS, which, series.sequence, series.sequence, sizes, series.values, series.begins)
+
+
+def _view(points: Charted, kind: Chart, chart: ControlChart | None, kept: NDArray[np.bool_]) -> View:
+    view = View(
+        kind,
+        Quantity(points.baseline.quantity),
+        points.first[kept],
+        points.last[kept],
+        points.sizes[kept],
+        np.zeros(0) if chart is None else chart.points,
+        points.begins[kept],
+        waiting=points.waiting,
+        settling=points.settling,
+        left_out=points.read.left_out,
+    )
+    if chart is None:
+        return view
+    return replace(view, centre=chart.centre, lower=chart.lower, upper=chart.upper, signals=_limits_only(chart))
+
+
+def _limits_only(chart: ControlChart) -> Signals:
+    return rules.signals_of(chart, [RULES[RuleName.NELSON_1]])
+
+
+def _moving_ranges(points: Charted, window: Window) -> View:
+    """Ranges of neighbours; none over a change of tool or of the reference. Lies where the second of both does."""
+    before = points.series.sequence < window.first
+    start = max(0, int(before.sum()) - 1)
+    series = points.series.only(np.arange(len(points.series)) >= start)
+    neighbours = ~series.begins
+    neighbours[:1] = False
+    empty = View(
+        Chart.MOVING_RANGE,
+        Quantity(points.baseline.quantity),
+        *(series.sequence[neighbours],) * 2,
+        np.full(int(neighbours.sum()), 2),
+        np.zeros(0),
+        series.begins[neighbours],
+        settling=_settling(points, window),
+        left_out=points.read.left_out,
+    )
+    if not neighbours.any():
+        return empty
+    whole = shewhart.moving_ranges(judged_by(points.baseline), series.values)
+    chart = replace(whole, points=whole.points[neighbours[1:]], z=whole.z[neighbours[1:]])
+    return replace(
+        empty,
+        points=chart.points,
+        centre=chart.centre,
+        lower=chart.lower,
+        upper=chart.upper,
+        signals=_limits_only(chart),
+    )
+
+
+def _within(points: Charted, kind: Chart) -> View:
+    """Ranges or standard deviations of the subgroups that have any: those of one reading have none."""
+    if points.groups is None or not (points.sizes > 1).any():
+        return _view(points, kind, None, np.zeros(len(points), np.bool_))
+    some, all_ = points.sizes > 1, points.groups
+    groups = Subgroups(all_.sizes[some], all_.means[some], all_.ranges[some], all_.deviations[some])
+    judge = shewhart.ranges if kind is Chart.RANGES else shewhart.deviations
+    return _view(points, kind, judge(judged_by(points.baseline), groups), some)
+
+
+def _remembering(session: Session, standing: Standing, baseline: Baseline, window: Window, kind: Chart) -> View:
+    singly = _singly(baseline)
+    begin = max(1, window.first - LOOK_BACK, min(window.first, _beginning(baseline, window.first)))
+    points = charted(session, standing, singly, replace(window, first=begin))
+    series = points.series.only(points.series.sequence >= begin)  # what was read before set levels
+    sequence, values = series.sequence, series.values
+    monitored = sequence > baseline.last_sequence
+    pieces = [part for part in (values[~monitored], values[monitored]) if len(part)]
+    inside = sequence >= window.first
+    view = View(
+        kind,
+        Quantity(baseline.quantity),
+        *(sequence[inside],) * 2,
+        np.ones(int(inside.sum()), np.int64),
+        np.zeros(0),
+        series.begins[inside],
+        settling=_settling(points, window),
+        left_out=points.read.left_out,
+    )
+    if not inside.any():
+        return view
+    if kind is Chart.CUSUM:
+        return _sums(view, baseline, pieces, inside)
+    charts = [_averaged(baseline, kind, part) for part in pieces]
+    count = [len(part) for part in pieces]
+    lower, upper = (
+        np.concatenate([np.broadcast_to(getattr(part, name), n) for part, n in zip(charts, count, strict=True)])
+        for name in ("lower", "upper")
+    )
+    z = np.concatenate([part.z for part in charts])[inside]
+    together = replace(
+        charts[0],
+        points=np.concatenate([part.points for part in charts])[inside],
+        lower=lower[inside],
+        upper=upper[inside],
+        z=z,
+    )
+    return replace(
+        view,
+        points=together.points,
+        centre=together.centre,
+        lower=together.lower,
+        upper=together.upper,
+        signals=_limits_only(together),
+    )
+
+
+def _singly(baseline: Baseline) -> Baseline:
+    """The same baseline for single values."""
+    if baseline.grouping is None:
+        return baseline
+    names = {column.key for column in inspect(Baseline).column_attrs} - {"grouping", "chart"}
+    return Baseline(**{name: getattr(baseline, name) for name in names}, grouping=None, chart="individuals")
+
+
+def _beginning(baseline: Baseline, first: int) -> int:
+    """First point that a chart with memory needs, for a window that begins there."""
+    if first > baseline.last_sequence:
+        return baseline.last_sequence + 1
+    return min(baseline.first_sequence, first)
+
+
+def _averaged(baseline: Baseline, kind: Chart, values: Floats) -> ControlChart:
+    if kind is Chart.EWMA:
+        judge = judged_by(baseline, baseline.ewma_width)
+        return ewma.ewma(judge, values, baseline.ewma_lambda, exact=baseline.ewma_exact)
+    return ewma.moving_average(judged_by(baseline), values, baseline.average_span)
+
+
+def _sums(made: View, baseline: Baseline, pieces: list[Floats], shown: NDArray[np.bool_]) -> View:
+    charts = [
+        cusum.cusum(judged_by(baseline), part, baseline.cusum_k, baseline.cusum_h, headstart=baseline.cusum_headstart)
+        for part in pieces
+    ]
+    above, below, since_above, since_below = (
+        np.concatenate([getattr(part, name) for part in charts])[shown]
+        for name in ("above", "below", "since_above", "since_below")
+    )
+    together = replace(charts[0], above=above, below=below, since_above=since_above, since_below=since_below)
+    return replace(
+        made,
+        points=together.above,
+        below=-together.below,
+        centre=0.0,
+        lower=-together.limit,
+        upper=together.limit,
+        signals=rules.signals_of_cusum(together),
+    )

@@ -1,0 +1,322 @@
+"""Pages: the control charts of a characteristic with its baselines, and the editor that freezes one."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Annotated, Any, Literal
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Header, Path, Query, Request, Response
+from sqlalchemy.orm import Session
+from starlette.datastructures import FormData, UploadFile
+from starlette.responses import RedirectResponse
+
+from app.access.deps import Caller, Engineer, Viewer
+from app.core.spc.quantity import Quantity
+from app.core.spc.refusal import Reason as Why
+from app.core.spc.refusal import Refused
+from app.core.spc.rules import RuleName
+from app.core.spc.shewhart import FEWEST_READINGS, Chart
+from app.errors import Conflict, InbandError, Invalid
+from app.jobs.queries import failures_of
+from app.jobs.wording import with_job_words
+from app.loop.characteristics import queries as characteristics
+from app.loop.characteristics.queries import Standing
+from app.loop.summaries import queries as statistics
+from app.loop.summaries import wording as statistics_wording
+from app.quality.control_charts import (
+    actions,
+    charts,
+    form_reader,
+    queries,
+    rules_wording,
+    signals_queries,
+    signals_wording,
+    wording,
+)
+from app.quality.control_charts.answers import signals_out
+from app.quality.control_charts.drafts import Draft, draft_of, suited
+from app.quality.control_charts.schemas import BaselineIn, ChartSignalOut, PeriodIn
+from app.quality.control_charts.signals_queries import SignalRow
+from app.quality.control_charts.tables import Baseline
+from app.quality.control_charts.view import View
+from app.quality.proof import queries as proof
+from app.quality.proof import wording as proof_wording
+from app.web.choice import Choice, Chosen
+from app.web.deps import FormDep, SessionDep, texts
+from app.web.fields import LARGEST_SERIAL, Reason
+from app.web.forms import parsed
+from app.web.templates import page
+from app.web.validation import checked
+
+router = APIRouter(include_in_schema=False)
+
+VERSIONS = 25  # baselines on the page
+LISTED = 8  # signals of a chart
+KEPT = 5  # open ones
+Remembering = Literal["ewma", "moving_average", "cusum"]
+Version = Annotated[int, Path(ge=1, le=LARGEST_SERIAL)]
+
+
+class ControlPage:
+    """Content of the page; each part is queried when the template comes to it."""
+
+    def __init__(
+        self, session: Session, standing: Standing, choice: Choice, chart: Chart | None, judge: Baseline | None
+    ) -> None:
+        self._session, self._choice, self._chart = session, choice, chart
+        self.standing, self.judge = standing, judge
+
+    @cached_property
+    def in_force(self) -> Baseline | None:
+        return queries.baseline_in_force(self._session, self.standing.characteristic)
+
+    @cached_property
+    def baselines(self) -> list[Baseline]:
+        return list(queries.baselines(self._session, self.standing.characteristic, limit=VERSIONS))
+
+    @cached_property
+    def kinds(self) -> list[Chart]:
+        """The charts on the page: a pair, or one that remembers."""
+        if self.judge is None:
+            return []
+        if self._chart is not None:
+            return [self._chart]
+        return [kind for kind in charts.kinds(self.judge) if kind not in charts.REMEMBERING]
+
+    @cached_property
+    def views(self) -> list[View]:
+        if self.judge is None:
+            return []
+        window = statistics.window_of(self._session, self.standing.characteristic, **self._choice._asdict())
+        return [charts.view(self._session, self.standing, self.judge, window, kind) for kind in self.kinds]
+
+    @property
+    def missing(self) -> str:
+        """Sentence about the readings that are missing before a baseline can be frozen; empty where there are enough."""
+        have = statistics.window_of(self._session, self.standing.characteristic).newest
+        if have >= FEWEST_READINGS:
+            return ""
+        return statistics_wording.refusal(Refused(Why.TOO_FEW_READINGS, have=have, needed=FEWEST_READINGS))
+
+    @property
+    def excluded_since(self) -> int:
+        """Readings of the baseline that were taken out of the statistics after it was frozen."""
+        return 0 if self.judge is None else queries.excluded_since(self._session, self.judge)
+
+    @cached_property
+    def kept(self) -> list[SignalRow]:
+        """Signals that nobody has explained yet, newest first; one more than the page lists if there are more."""
+        return signals_queries.signals(
+            self._session, characteristic=self.standing.characteristic, state="open", limit=KEPT + 1
+        )
+
+    @property
+    def signals(self) -> list[tuple[View, int, list[ChartSignalOut]]]:
+        """Of each chart how many signals there are, and the newest."""
+        return [
+            (
+                view,
+                sum(len(rows) for rows in view.signals.runs.values()) if view.signals else 0,
+                signals_out(view, LISTED),
+            )
+            for view in self.views
+        ]
+
+
+def _as_query(choice: Choice) -> dict[str, Any]:
+    names = {"start": "from", "end": "to"}
+    chosen = {names.get(name, name): value for name, value in choice._asdict().items() if value is not None}
+    return chosen or {"last": "all"}
+
+
+@router.get("/characteristics/{characteristic}/control")
+def control_page(
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    characteristic: str,
+    choice: Chosen,
+    chart: Annotated[Remembering | None, Query()] = None,
+    baseline: Annotated[int | None, Query(ge=1, le=LARGEST_SERIAL)] = None,
+    x_live_part: Annotated[str | None, Header()] = None,
+) -> Response:
+    """The control charts by the baseline in force, or by an older one to compare."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    return _control(request, session, caller, standing, choice, chart, baseline, x_live_part)
+
+
+def _control(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    standing: Standing,
+    choice: Choice,
+    chart: str | None = None,
+    version: int | None = None,
+    part: str | None = None,
+    *,
+    error: InbandError | None = None,
+) -> Response:
+    key = standing.characteristic.key
+    judge = (
+        queries.baseline_in_force(session, standing.characteristic)
+        if version is None
+        else queries.baseline_of(session, standing.characteristic, version)
+    )
+    kind = Chart(chart) if chart and judge is not None and Chart(chart) in charts.kinds(judge) else None
+    chosen = _as_query(choice)
+
+    def link(**changes: Any) -> str:
+        """This page with something else chosen."""
+        parameters = (chosen if not changes.keys() & {"last", "first"} else {}) | {"chart": kind, "baseline": version}
+        values = {name: value for name, value in {**parameters, **changes}.items() if value is not None}
+        return f"/characteristics/{key}/control?{urlencode(values)}"
+
+    def figure(which: Chart | None) -> str:
+        values = chosen | {"chart": which and which.value, "baseline": version}
+        query = {name: value for name, value in values.items() if value is not None}
+        return f"/api/v1/characteristics/{key}/figures/control?{urlencode(query)}"
+
+    return page(
+        request,
+        "control_charts/control.html",
+        status=error.status if error else 200,
+        shown=ControlPage(session, standing, choice, kind, judge),
+        machine=standing.machine,
+        characteristic=standing.characteristic,
+        parameters=standing.parameters,
+        suits=suited(session, standing) if part is None else None,
+        choice=choice,
+        chart=kind,
+        version=version,
+        remembering=[kind for kind in charts.REMEMBERING if judge is not None and kind in charts.kinds(judge)],
+        link=link,
+        figure=figure,
+        problem=error,
+        wording=wording,
+        said=statistics_wording,
+        rule_name=lambda name, kind: rules_wording.name_of(RuleName(name), kind),
+        words=signals_wording,
+        most_kept=KEPT,
+        proof_failing=proof.failing(),
+        proof_warning=proof_wording.warning(len(proof.failing())),
+        failing=with_job_words(failures_of(session, standing.machine.id, standing.characteristic.id)),
+        may_see_jobs=caller.may("engineer"),
+        may_freeze=caller.may("engineer"),
+        wanted=lambda name: part is None or part == name,
+    )
+
+
+@router.get("/characteristics/{characteristic}/control/freeze")
+def freeze_page(
+    request: Request, session: SessionDep, caller: Engineer, characteristic: str, choice: Chosen
+) -> Response:
+    """Choose a period, see what its baseline would be, and freeze it. What is chosen is in the address."""
+    del caller
+    standing = characteristics.characteristic_named(session, characteristic)
+    return _freeze(request, session, standing, choice, texts_of(request))
+
+
+def texts_of(request: Request) -> dict[str, str]:
+    """The text fields of the address."""
+    return texts(FormData(list[tuple[str, str | UploadFile]](request.query_params.multi_items())))
+
+
+def _freeze(
+    request: Request,
+    session: Session,
+    standing: Standing,
+    choice: Choice,
+    form: Mapping[str, str],
+    error: Invalid | Conflict | None = None,
+) -> Response:
+    key = standing.characteristic.key
+    suits = suited(session, standing)
+    draft: Draft | None = None
+    chosen = bool(form.get("first_sequence") or form.get("last_sequence"))
+    typed = (
+        form_reader.begun(None) | {"quantity": suits.value, "chart": "individuals", "ewma_exact": "true"} | dict(form)
+    )
+    if chosen:
+        try:
+            draft = draft_of(session, standing, parsed(PeriodIn, form_reader.period(typed)))
+        except Invalid as wrong:
+            error = error or wrong
+    return page(
+        request,
+        "control_charts/freeze.html",
+        status=error.status if error else 200,
+        machine=standing.machine,
+        characteristic=standing.characteristic,
+        parameters=standing.parameters,
+        choice=choice,
+        draft=draft,
+        seen_version=queries.newest_version(session, standing.characteristic),
+        suits=suits,
+        typed=typed,
+        fields=form_reader.FIELDS,
+        errors=form_reader.at_fields(error) if error else {},
+        problem=error,
+        quantities=list(Quantity),
+        figure=f"/api/v1/characteristics/{key}/figures/baseline?{urlencode(_pictured(typed, choice))}",
+        link=lambda last: f"/characteristics/{key}/control/freeze?{urlencode({**form, 'last': last})}",
+        wording=wording,
+        said=statistics_wording,
+        proof_failing=proof.failing(),
+        proof_warning=proof_wording.warning(len(proof.failing())),
+    )
+
+
+def _pictured(typed: Mapping[str, str], choice: Choice) -> dict[str, Any]:
+    """Request for the picture: as much of the form as can be understood."""
+    try:
+        period = parsed(PeriodIn, form_reader.period(typed))
+    except Invalid:
+        known = typed.get("quantity") in set(Quantity)
+        return _as_query(choice) | ({"quantity": typed["quantity"]} if known else {})
+    names = ("chart", "grouping", "group_size", "group_pause", "settle", "first_sequence", "last_sequence")
+    values = {name: getattr(period, name) for name in names} | {
+        "quantity": period.quantity.value,
+        "excluded": ",".join(f"{run.first}-{run.last}" for run in period.excluded),
+    }
+    return _as_query(choice) | {name: value for name, value in values.items() if value not in (None, "")}
+
+
+@router.post("/characteristics/{characteristic}/control/freeze")
+def freeze(
+    request: Request, session: SessionDep, caller: Engineer, characteristic: str, choice: Chosen, form: FormDep
+) -> Response:
+    """Freeze what was previewed, with a reason."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    try:
+        with session.begin_nested():
+            seen = form.get("seen_version", "")
+            seen_version = int(seen) if seen.isdecimal() and len(seen) < 10 else None
+            more = {"reason": form.get("reason"), "seen_version": seen_version}
+            actions.freeze(session, standing, parsed(BaselineIn, form_reader.period(form) | more), caller)
+    except (Invalid, Conflict) as error:
+        return _freeze(request, session, standing, choice, form, error)
+    return RedirectResponse(f"/characteristics/{standing.characteristic.key}/control", 303)
+
+
+@router.post("/characteristics/{characteristic}/control/baselines/{version}/{what}")
+def change(
+    request: Request,
+    session: SessionDep,
+    caller: Engineer,
+    characteristic: str,
+    version: Version,
+    what: Literal["retire", "put-in-force"],
+    form: FormDep,
+) -> Response:
+    """Retire the baseline in force, or go back to an older one."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    change = actions.retire if what == "retire" else actions.put_in_force
+    try:
+        with session.begin_nested():
+            change(session, standing, version, checked(Reason, form.get("reason", ""), "reason"), caller)
+    except InbandError as error:
+        if error.status not in (409, 422):
+            raise
+        return _control(request, session, caller, standing, Choice(200, None, None, None, None), error=error)
+    return RedirectResponse(f"/characteristics/{standing.characteristic.key}/control", 303)

@@ -1,0 +1,73 @@
+"""JSON routes: the rules of a characteristic, and what they would have said."""
+
+from typing import Annotated
+
+from fastapi import Path, Query
+
+from app.access.deps import AnyCaller, Engineer
+from app.loop.characteristics import queries as characteristics
+from app.loop.characteristics.queries import Standing
+from app.quality.control_charts import rules_queries
+from app.quality.control_charts.queries import baseline_in_force
+from app.quality.control_charts.rules_actions import set_rules
+from app.quality.control_charts.rules_schemas import PreviewOut, RulesIn, RulesOut
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep
+from app.web.fields import LARGEST_ID
+
+router = api_router("control charts")
+
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+
+
+def _standing(session: SessionDep, caller: AnyCaller, key: str) -> Standing:
+    standing = characteristics.characteristic_named(session, key)
+    caller.must_at(standing.machine.id, "viewer")
+    return standing
+
+
+@router.get("/characteristics/{characteristic}/rules", responses=problems(404))
+def get_rules(session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey) -> RulesOut:
+    """List the rules that watch the charts of a characteristic, and the rules that could: those that make sense there."""
+    row = _standing(session, caller, characteristic).characteristic
+    return RulesOut.of(row.key, rules_queries.rules_in_force(session, row), baseline_in_force(session, row))
+
+
+@router.put("/characteristics/{characteristic}/rules", responses=problems(404, 409))
+def put_rules(session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, given: RulesIn) -> RulesOut:
+    """These rules watch from the next reading on, and no others; a new version, unless nothing is changed.
+
+    Signals that were found before stay, whichever rules are on.
+    """
+    standing = characteristics.characteristic_named(session, characteristic)
+    watched = set_rules(
+        session,
+        standing,
+        given.rules,
+        given.reason,
+        caller,
+        look_back=given.look_back,
+        seen=given.seen_version,
+    )
+    baseline = baseline_in_force(session, standing.characteristic)
+    return RulesOut.of(standing.characteristic.key, watched, baseline)
+
+
+@router.get("/characteristics/{characteristic}/rules/preview", responses=problems(404))
+def preview_rules(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    last: Annotated[
+        int | None,
+        Query(ge=1, le=LARGEST_ID, description="Of the last so many readings; of all, a million at most, if left out."),
+    ] = None,
+) -> PreviewOut:
+    """Count the signals of each rule on the last readings by the baseline in force, and the signals that chance explains.
+
+    Chance: independent, normally distributed readings about the centre of the baseline, with its sigma.
+    """
+    standing = _standing(session, caller, characteristic)
+    watched = rules_queries.rules_in_force(session, standing.characteristic)
+    preview = rules_queries.preview(session, standing, watched.rules, last)
+    return PreviewOut.of(standing.characteristic.key, watched, preview)

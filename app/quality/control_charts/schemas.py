@@ -1,0 +1,306 @@
+"""Baselines and charts as JSON. Lengths in mm; k, h and headstart in sigma."""
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field
+
+from app.core.spc.quantity import Quantity
+from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Body, Reason
+
+ChartName = Literal["individuals", "xbar_r", "xbar_s"]
+Grouping = Literal["consecutive", "pause", "part"]
+Place = Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID)]
+MOST_EXCLUDED = 100
+
+_PERIOD: dict[str, Any] = {
+    "chart": "individuals",
+    "quantity": "wear_residuals",
+    "first_sequence": 613,
+    "last_sequence": 812,
+    "excluded": [{"first": 640, "last": 641, "reason": "Chip on the stylus"}],
+}
+
+
+class ExcludedIn(Body):
+    """A run of readings that is left out of the baseline, and why."""
+
+    first: Place
+    last: Place
+    reason: Reason
+
+
+class PeriodIn(Body):
+    """A period, and what a baseline of it is to be: its chart, its quantity, and the settings of the charts that remember."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, json_schema_extra={"example": _PERIOD})
+
+    chart: ChartName = Field("individuals", description="Single values, or subgroups by their ranges or by s.")
+    quantity: Quantity = Field(description="What is charted; see the how-to about control charts.")
+    first_sequence: Place = Field(description="The first reading of the period.")
+    last_sequence: Place = Field(description="The last reading of the period.")
+    grouping: Grouping | None = Field(
+        None,
+        description="For subgroups: so many readings one after the other, a pause that ends one, or the same part.",
+    )
+    group_size: int | None = Field(
+        None, strict=True, ge=2, le=1000, description="Readings in a subgroup, for `consecutive`."
+    )
+    group_pause: float | None = Field(
+        None, strict=True, gt=0, le=100_000, description="Minutes without a reading that end a subgroup, for `pause`."
+    )
+    ewma_lambda: float = Field(0.2, strict=True, ge=0.001, le=1)
+    ewma_width: float = Field(
+        3.0, strict=True, gt=0, le=10, description="L: limits in standard deviations of the average."
+    )
+    ewma_exact: bool = Field(
+        True, strict=True, description="Exact limits, which widen from the first point on; else asymptotic ones."
+    )
+    cusum_k: float = Field(0.5, strict=True, ge=0, le=10, description="Half the shift that is to be found.")
+    cusum_h: float = Field(5.0, strict=True, gt=0, le=100, description="A sum beyond it is a signal.")
+    cusum_headstart: float = Field(0.0, strict=True, ge=0, lt=100, description="What both sums begin with: 0, or h/2.")
+    settle: int | None = Field(
+        None,
+        strict=True,
+        ge=20,
+        le=10_000,
+        description="For wear_residuals: readings in which an edge runs in; the last 20 of them set its level. Left out: as "
+        "many as the edges of the period take.",
+    )
+    average_span: int = Field(5, strict=True, ge=2, le=1000, description="Readings in a moving average.")
+    excluded: list[ExcludedIn] = Field([], max_length=MOST_EXCLUDED, description="Left out, each run with a reason.")
+
+
+class BaselineIn(PeriodIn):
+    """A baseline to be frozen. Sent again with the same `key`, it is answered again and nothing new is frozen."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        allow_inf_nan=False,
+        json_schema_extra={"example": _PERIOD | {"reason": "New toolholder, stable since Monday"}},
+    )
+
+    reason: Reason
+    key: str | None = Field(None, min_length=1, max_length=128, description="Your own, so that it is frozen once.")
+    seen_version: Annotated[int, Field(strict=True, ge=0, le=LARGEST_SERIAL)] | None = Field(
+        None, description="The newest version you have seen, 0 for none: 409 if there is a newer one meanwhile."
+    )
+
+
+class BaselineWhyIn(Body):
+    """Reason, in words."""
+
+    model_config = ConfigDict(
+        extra="forbid", allow_inf_nan=False, json_schema_extra={"example": {"reason": "The spindle was rebuilt"}}
+    )
+
+    reason: Reason
+
+
+class CautionOut(Body):
+    """Caution that belongs to the numbers."""
+
+    code: str
+    text: str
+
+
+EXAMPLE: dict[str, Any] = _PERIOD | {
+    "characteristic": "shaft-d40",
+    "grouping": None,
+    "group_size": None,
+    "group_pause": None,
+    "ewma_lambda": 0.2,
+    "ewma_width": 3.0,
+    "ewma_exact": True,
+    "cusum_k": 0.5,
+    "cusum_h": 5.0,
+    "cusum_headstart": 0.0,
+    "average_span": 5,
+    "centre": 0.0,
+    "sigma": 0.00121,
+    "lower": -0.00363,
+    "upper": 0.00363,
+    "estimator": "moving_range",
+    "degrees_of_freedom": 119.4,
+    "readings": 198,
+    "groups": 197,
+    "provisional": False,
+    "factor": -1.0,
+    "wear_per_reading": 0.000021,
+    "wear_error": 0.0000014,
+    "settle": 20,
+    "signals": 0,
+    "normal_p": 0.41,
+}
+FROZEN: dict[str, Any] = EXAMPLE | {
+    "version": 3,
+    "in_force": True,
+    "repeats": None,
+    "parameters_version": 4,
+    "at": "2026-11-21T08:15:02Z",
+    "actor": "ana",
+    "reason": "New toolholder, stable since Monday",
+    "retired_at": None,
+    "retired_by": None,
+    "retired_why": None,
+}
+LEFT_OUT: dict[str, Any] = {"excluded": [], "by_baseline": [640, 641], "faults": [], "unknown": [], "count": 2}
+CAUTION = {"code": "provisional", "text": "Fewer than 100 readings: the limits are provisional."}
+
+
+class LeftOutOut(Body):
+    """Readings that count for nothing, by their sequences: the newest 1000 of each kind."""
+
+    excluded: list[int] = Field(description="Excluded from all statistics.")
+    by_baseline: list[int] = Field(description="Left out of its own period by the baseline.")
+    faults: list[int] = Field(description="Faults of the probe: R36 was reached.")
+    unknown: list[int] = Field(description="Nobody knows with which corrections their part was cut.")
+    count: int = Field(description="All of them.")
+
+
+class DraftOut(Body):
+    """Preview of the baseline of this period; nothing is stored."""
+
+    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE | {"left_out": LEFT_OUT, "cautions": [CAUTION]}})
+
+    characteristic: str
+    chart: ChartName
+    quantity: Quantity
+    first_sequence: int
+    last_sequence: int
+    excluded: list[ExcludedIn]
+    grouping: Grouping | None
+    group_size: int | None
+    group_pause: float | None
+    ewma_lambda: float
+    ewma_width: float
+    ewma_exact: bool
+    cusum_k: float
+    cusum_h: float
+    cusum_headstart: float
+    average_span: int
+    centre: float
+    sigma: float = Field(description="Of a single value.")
+    lower: float = Field(description="Centre - 3 sigma: limits of single values; of subgroups the chart says its own.")
+    upper: float
+    estimator: str = Field(description="How sigma was come by.")
+    degrees_of_freedom: float = Field(description="What sigma is worth.")
+    readings: int = Field(description="That sigma was made of.")
+    groups: int = Field(description="Ranges or subgroups that sigma was made of.")
+    provisional: bool = Field(description="Fewer than 100 readings.")
+    factor: float = Field(description="What the corrections were taken out with: mm of offset per mm of size error.")
+    wear_per_reading: float | None = Field(description="For wear_residuals: the slope of the wear line, frozen.")
+    wear_error: float | None = Field(description="Its standard error.")
+    settle: int | None = Field(
+        description="First readings of each edge, which are judged by nothing; the last 20 of them set its level."
+    )
+    signals: int = Field(description="Points of its own period beyond its limits; ranges or s are counted too.")
+    normal_p: float | None = Field(description="Anderson-Darling; small speaks against a normal distribution.")
+
+
+class DraftAnswer(DraftOut):
+    """The draft with what is to be known before it is frozen."""
+
+    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE | {"left_out": LEFT_OUT, "cautions": [CAUTION]}})
+
+    left_out: LeftOutOut = Field(description="Readings of the period that count for nothing.")
+    cautions: list[CautionOut]
+
+
+class BaselineOut(DraftOut):
+    """A frozen baseline. The newest version is in force unless it is retired."""
+
+    model_config = ConfigDict(json_schema_extra={"example": FROZEN})
+
+    version: int
+    in_force: bool
+    repeats: int | None = Field(description="The version whose numbers these are, where it was put in force again.")
+    parameters_version: int
+    at: datetime
+    actor: str
+    reason: str
+    retired_at: datetime | None
+    retired_by: str | None
+    retired_why: str | None
+
+
+class PointsOut(Body):
+    """Points as columns of equal length."""
+
+    first: list[int] = Field(description="First reading of each point.")
+    last: list[int] = Field(description="Last reading of each point; of single values the same.")
+    size: list[int] = Field(description="Readings in it.")
+    value: list[float]
+    below: list[float] | None = Field(description="CUSUM: the lower sum; value is the upper one.")
+    centre: list[float] | float | None
+    lower: list[float] | float | None = Field(description="One number where all points have the same limit.")
+    upper: list[float] | float | None
+
+
+class ChartSignalOut(Body):
+    """A run of points that a rule speaks of."""
+
+    rule: str
+    side: int = Field(description="1 above or rising, -1 below or falling, 0 neither.")
+    first: int = Field(description="The reading that it begins with.")
+    last: int
+    points: int
+    text: str
+
+
+class ControlOut(Body):
+    """A chart in numbers: at most 10 000 points, the newest; signals of all."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "characteristic": "shaft-d40",
+                "chart": "individuals",
+                "quantity": "wear_residuals",
+                "baseline": 3,
+                "first_sequence": 810,
+                "last_sequence": 812,
+                "count": 3,
+                "waiting": 0,
+                "settling": 0,
+                "left_out": LEFT_OUT,
+                "points": {
+                    "first": [810, 811, 812],
+                    "last": [810, 811, 812],
+                    "size": [1, 1, 1],
+                    "value": [0.0004, -0.0011, 0.0052],
+                    "below": None,
+                    "centre": 0.0,
+                    "lower": -0.00363,
+                    "upper": 0.00363,
+                },
+                "signal_count": 1,
+                "signals": [
+                    {
+                        "rule": "nelson_1",
+                        "side": 1,
+                        "first": 812,
+                        "last": 812,
+                        "points": 1,
+                        "text": "A point lies beyond 3 sigma.",
+                    }
+                ],
+            }
+        }
+    )
+
+    characteristic: str
+    chart: str
+    quantity: Quantity
+    baseline: int | None = Field(
+        description="Version that judged; null: there is none in force, so there are no limits."
+    )
+    first_sequence: int | None
+    last_sequence: int | None
+    count: int = Field(description="Points; more than are listed if there are very many.")
+    waiting: int = Field(description="Readings of the last subgroup, which is not complete and no point yet.")
+    settling: int = Field(description="Readings that set the level of an edge and are judged by nothing.")
+    left_out: LeftOutOut
+    points: PointsOut
+    signal_count: int
+    signals: list[ChartSignalOut] = Field(description="Newest first, at most 1000.")

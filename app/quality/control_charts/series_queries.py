@@ -1,0 +1,202 @@
+"""From stored readings to the series that is charted, and its subgroups. Never writes.
+
+Readings taken out of the statistics are left out, and with them what a baseline excludes within its own period, and probe
+faults, which are no measurement of a part. Of the rebuilt quantities so are readings that do not say with which corrections
+their part was cut.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.core import wear
+from app.core.decision.limits import FAULT, in_nanometres
+from app.core.spc.quantity import Quantity, Series
+from app.loop.characteristics.queries import Standing
+from app.loop.summaries import queries as statistics
+from app.loop.summaries.queries import Window
+from app.loop.tables.readings import Reading
+from app.loop.tables.tools import ToolEvent
+
+Whole = NDArray[np.int64]
+Moments = NDArray[np.datetime64]
+
+
+class Plan(Protocol):
+    """Rules of a baseline for turning readings into points; of a frozen one, or one that is being tried."""
+
+    quantity: str
+    grouping: str | None
+    group_size: int | None
+    group_pause: float | None
+    first_sequence: int
+    last_sequence: int
+    excluded: list[Any]
+    factor: float
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """Readings that count for nothing, by their sequences, each once.
+
+    excluded: from all statistics. by_baseline: from its own period. faults: of the probe (R36). unknown: nobody knows with
+    which corrections their part was cut.
+    """
+
+    excluded: Whole
+    by_baseline: Whole
+    faults: Whole
+    unknown: Whole
+
+    def within(self, first: int, last: int) -> "LeftOut":
+        """Those of a window."""
+        return LeftOut(*(numbers[(numbers >= first) & (numbers <= last)] for numbers in self._each))
+
+    def among(self, sequence: Whole) -> "LeftOut":
+        """Those of these readings."""
+        return LeftOut(*(numbers[np.isin(numbers, sequence)] for numbers in self._each))
+
+    @property
+    def _each(self) -> tuple[Whole, Whole, Whole, Whole]:
+        return self.excluded, self.by_baseline, self.faults, self.unknown
+
+    def __len__(self) -> int:
+        """Number of readings."""
+        return len(self.excluded) + len(self.by_baseline) + len(self.faults) + len(self.unknown)
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingSeries:
+    """Readings as a series: D, or w where a rebuilt quantity is wanted. mm; moments in UTC.
+
+    labels: a number for the part that each reading names, 0 where it names none.
+    """
+
+    series: Series
+    measured_at: Moments
+    labels: Whole
+    left_out: LeftOut
+
+
+def read(session: Session, standing: Standing, plan: Plan, window: Window) -> ReadingSeries:
+    """The readings of the window as the plan's quantity is made of."""
+    rebuilt = plan.quantity != Quantity.DEVIATION
+    columns = ["deviation", "measured", "measured_at", "received_at", "zone"]
+    history = statistics.history_of(
+        session, standing.characteristic, window, [*columns, "compensated"] if rebuilt else columns
+    )
+    sequence, values = history["sequence"], history["deviation"]
+    by_plan = excluded_by(plan, sequence) & ~history.excluded
+    faults = (history["zone"] == FAULT) & ~history.excluded & ~by_plan
+    keep = ~(history.excluded | by_plan | faults)
+    unknown = np.zeros_like(keep)
+    if rebuilt:
+        unknown = np.isnan(history["compensated"]) & keep
+        keep &= ~unknown
+        values = wear.wear(values, history["compensated"], plan.factor)
+    begins = _begins(session, standing, history["received_at"], history["measured"] - history["deviation"])
+    labels = _labels(session, standing, window, sequence) if plan.grouping == "part" else np.zeros_like(sequence)
+    left_out = LeftOut(sequence[history.excluded], sequence[by_plan], sequence[faults], sequence[unknown])
+    return ReadingSeries(
+        Series(sequence, values, begins).only(keep), history["measured_at"][keep], labels[keep], left_out
+    )
+
+
+def excluded_by(plan: Plan, sequence: Whole) -> NDArray[np.bool_]:
+    """Mask of the readings that the baseline leaves out of its own period."""
+    out = np.zeros(len(sequence), np.bool_)
+    for run in plan.excluded:
+        out |= (sequence >= run["first"]) & (sequence <= run["last"])
+    return out & (sequence >= plan.first_sequence) & (sequence <= plan.last_sequence)
+
+
+def _begins(
+    session: Session, standing: Standing, received_at: Moments, reference: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Mask of the readings after a tool change, an offset edited by hand, or a change of target plus empirical value."""
+    begins = np.ones(len(reference), np.bool_)
+    begins[1:] = in_nanometres(np.diff(reference)) != 0
+    number = standing.parameters.tool_memory
+    if not number or not len(reference):
+        return begins
+    for moment in session.scalars(
+        select(ToolEvent.at).where(
+            ToolEvent.machine_id == standing.machine.id, ToolEvent.number == number, ToolEvent.kind != "correction"
+        )
+    ):
+        at = int(np.searchsorted(received_at, _naive(moment), side="right"))
+        if at < len(begins):
+            begins[at] = True
+    return begins
+
+
+def _naive(moment: datetime) -> np.datetime64:
+    return np.datetime64(moment.replace(tzinfo=None), "us")
+
+
+def _labels(session: Session, standing: Standing, window: Window, sequence: Whole) -> Whole:
+    """Changes of the part that readings name, as numbers that grow; 0 where none is named."""
+    before = func.lag(Reading.part).over(order_by=Reading.sequence)
+    named = (
+        select(Reading.sequence, Reading.part, before.label("before"))
+        .where(
+            Reading.machine_id == standing.machine.id,
+            Reading.characteristic_id == standing.characteristic.id,
+            Reading.sequence.between(window.first, window.last),
+        )
+        .subquery()
+    )
+    rows = session.execute(
+        select(named.c.sequence, named.c.part.is_not(None))
+        .where(named.c.part.is_distinct_from(named.c.before))
+        .order_by(named.c.sequence)
+    ).all()
+    starts: Sequence[int] = [row[0] for row in rows]
+    ids = np.array([0, *(place + 1 if row[1] else 0 for place, row in enumerate(rows))], np.int64)
+    return ids[np.searchsorted(np.array(starts, np.int64), sequence, side="right")]
+
+
+def groups_of(plan: Plan, made: ReadingSeries, window: Window) -> tuple[Whole, int]:
+    """To which subgroup each value belongs (numbers that grow), -1 for those of the last one that is not complete.
+
+    Subgroups of n readings are counted from the first reading of the baseline's period, and again from the first one after
+    it; so the same readings make the same subgroup whichever of them are looked at. What was excluded makes its subgroup
+    smaller. window: what was read, to its end. The second number: how many readings the newest subgroup has so far.
+    """
+    sequence = made.series.sequence
+    if not len(sequence):
+        return sequence, 0
+    after = sequence > plan.last_sequence
+    if plan.grouping == "consecutive":
+        size = plan.group_size or 1
+        start = np.where(after, plan.last_sequence + 1, plan.first_sequence)
+        block = (sequence - start) // size
+        ends = start + (block + 1) * size - 1
+        complete = ends <= np.where(after, window.last, min(window.last, plan.last_sequence))
+    else:
+        complete = np.ones(len(sequence), np.bool_)
+        block = _parted(plan, made)
+        if after[-1] or window.last < plan.last_sequence:
+            complete[(block == block[-1]) & (after == after[-1])] = False  # it may still grow
+    changes = np.ones(len(sequence), np.bool_)
+    changes[1:] = (np.diff(block) != 0) | (np.diff(after.astype(np.int8)) != 0)
+    number = np.cumsum(changes) - 1
+    grows = window.last == window.newest and after[-1]
+    waiting = int((~complete & (number == number[-1])).sum()) if grows else 0
+    return np.where(complete, number, -1), waiting
+
+
+def _parted(plan: Plan, made: ReadingSeries) -> Whole:
+    new = np.ones(len(made.labels), np.bool_)
+    if plan.grouping == "part":
+        new[1:] = (np.diff(made.labels) != 0) | (made.labels[1:] == 0)
+    else:
+        pause = np.timedelta64(round((plan.group_pause or 0) * 60e6), "us")
+        new[1:] = np.diff(made.measured_at) > pause
+    return np.cumsum(new)

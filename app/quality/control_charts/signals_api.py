@@ -1,0 +1,64 @@
+"""JSON routes: the signals that rules gave, and what they were."""
+
+from typing import Annotated
+
+from fastapi import Path, Query
+
+from app.access.deps import AnyCaller, Engineer
+from app.loop.characteristics.queries import characteristic_named
+from app.loop.machines.queries import machine_named
+from app.quality.control_charts import signals_actions, signals_queries
+from app.quality.control_charts.signals_queries import State
+from app.quality.control_charts.signals_schemas import CommentIn, SignalOut, signal_out
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep
+from app.web.fields import LARGEST_ID, Limit, Page, Slug, page_of
+
+router = api_router("control charts")
+Number = Annotated[int, Path(description="Number of the signal.", examples=[17])]
+
+
+@router.get("/signals", responses=problems(404))
+def list_signals(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: Annotated[Slug | None, Query(description="Only those of this characteristic.")] = None,
+    machine: Annotated[Slug | None, Query(description="Only those of this machine.", examples=["lathe-1"])] = None,
+    state: Annotated[State, Query(description="`open`, `explained`, `withdrawn`, or all of them.")] = "all",
+    before: Annotated[
+        int | None, Query(ge=1, le=LARGEST_ID, description="Cursor: the `next` of the page before.")
+    ] = None,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[SignalOut]:
+    """Signals, newest first. The key of a machine sees those of that machine."""
+    machine_id = caller.only_machine
+    if machine is not None:
+        machine_id = machine_named(session, machine).id
+        caller.must_at(machine_id, "viewer")
+    only = None
+    if characteristic is not None:
+        standing = characteristic_named(session, characteristic)
+        caller.must_at(standing.machine.id, "viewer")
+        only = standing.characteristic
+    elif machine_id is None:
+        caller.must("viewer")
+    if only is not None and machine_id is not None and only.machine_id != machine_id:
+        return Page(items=[])
+    rows = signals_queries.signals(
+        session, machine_id=machine_id, characteristic=only, state=state, before=before, limit=limit + 1
+    )
+    return page_of([signal_out(row) for row in rows], limit, lambda signal: signal.id)
+
+
+@router.get("/signals/{signal}", responses=problems(404))
+def get_signal(session: SessionDep, caller: AnyCaller, signal: Number) -> SignalOut:
+    """One signal, and what it was if somebody has said so."""
+    row = signals_queries.signal(session, signal)
+    caller.must_at(row.machine.id, "viewer")
+    return signal_out(row)
+
+
+@router.post("/signals/{signal}/comment", responses=problems(404))
+def comment_signal(session: SessionDep, caller: Engineer, signal: Number, given: CommentIn) -> SignalOut:
+    """Say what a signal was; it is open no longer. Said again, the record of changes keeps both."""
+    return signal_out(signals_actions.explain(session, signal, given.cause, given.comment, caller))

@@ -1,0 +1,119 @@
+"""Pages: the signals of a characteristic, and one of them with its chart, where an engineer says what it was."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request, Response
+from starlette.responses import RedirectResponse
+
+from app.access.deps import Caller, Engineer, Viewer, require
+from app.core.spc.rules import RuleName
+from app.core.spc.shewhart import Chart
+from app.errors import Invalid
+from app.language.i18n import _
+from app.loop.characteristics import queries as characteristics
+from app.loop.summaries import wording as statistics
+from app.quality.control_charts import rules_wording, signals_actions, signals_queries
+from app.quality.control_charts import signals_wording as words
+from app.quality.control_charts.signals_queries import SignalRow, State
+from app.quality.control_charts.signals_schemas import CommentIn
+from app.quality.control_charts.signals_wording import Cause
+from app.quality.proof import queries as proof
+from app.quality.proof import wording as proof_wording
+from app.web.deps import FormDep, SessionDep
+from app.web.fields import LARGEST_ID
+from app.web.forms import by_field, parsed
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+ON_PAGE = 30
+
+
+@router.get("/characteristics/{characteristic}/signals", dependencies=[require("viewer")])
+def signals_page(
+    request: Request,
+    session: SessionDep,
+    characteristic: str,
+    state: Annotated[State, Query()] = "all",
+    before: Annotated[int | None, Query(ge=1, le=LARGEST_ID)] = None,
+) -> Response:
+    """List the signals, newest first."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    rows = signals_queries.signals(
+        session, characteristic=standing.characteristic, state=state, before=before, limit=ON_PAGE + 1
+    )
+
+    def link(which: str, older: int | None = None) -> str:
+        query = {"state": which} | ({} if older is None else {"before": older})
+        return f"/characteristics/{characteristic}/signals?{urlencode(query)}"
+
+    return page(
+        request,
+        "control_charts/signals_page.html",
+        characteristic=standing.characteristic,
+        machine=standing.machine,
+        rows=rows[:ON_PAGE],
+        more=len(rows) > ON_PAGE,
+        counts=signals_queries.counts(session, standing.characteristic),
+        state=state,
+        before=before,
+        link=link,
+        words=words,
+        **_proof(),
+    )
+
+
+@router.get("/signals/{number}")
+def signal_page(request: Request, session: SessionDep, caller: Viewer, number: int) -> Response:
+    """One signal on its chart, and what it was."""
+    return _signal(request, signals_queries.signal(session, number), caller)
+
+
+@router.post("/signals/{number}")
+def explain(request: Request, session: SessionDep, caller: Engineer, number: int, form: FormDep) -> Response:
+    """Say what it was."""
+    try:
+        comment = parsed(CommentIn, {"cause": form.get("cause"), "comment": form.get("comment", "").strip()})
+        signals_actions.explain(session, number, comment.cause, comment.comment, caller)
+    except Invalid as error:
+        return _signal(request, signals_queries.signal(session, number), caller, form, error)
+    return RedirectResponse(f"/signals/{number}", 303)
+
+
+def _signal(
+    request: Request,
+    row: SignalRow,
+    caller: Caller,
+    form: Mapping[str, str] | None = None,
+    error: Invalid | None = None,
+) -> Response:
+    data = words.data_of(row.signal)
+    query = words.window(data) | {
+        "chart": row.signal.chart,
+        "baseline": row.signal.baseline_version,
+        "signal": row.signal.id,
+    }
+    return page(
+        request,
+        "control_charts/signal.html",
+        status=error.status if error else 200,
+        row=row,
+        told=data,
+        chart=Chart(row.signal.chart),
+        rule=RuleName(row.signal.rule),
+        figure=f"/api/v1/characteristics/{row.characteristic.key}/figures/control?{urlencode(query)}",
+        causes=[("", _("Choose what it was")), *((cause.value, words.cause(cause)) for cause in Cause)],
+        form=form or {},
+        errors=by_field(error) if error else {},
+        words=words,
+        rules=rules_wording,
+        said=statistics,
+        may_explain=caller.may("engineer"),
+        **_proof(),
+    )
+
+
+def _proof() -> dict[str, Any]:
+    failing = proof.failing()
+    return {"proof_failing": failing, "proof_warning": proof_wording.warning(len(failing))}

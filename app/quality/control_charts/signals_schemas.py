@@ -1,0 +1,121 @@
+"""Signals as JSON."""
+
+from datetime import datetime
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.core.spc.rules import RuleName
+from app.core.spc.shewhart import Chart
+from app.quality.control_charts import signals_wording as wording
+from app.quality.control_charts.signals_queries import SignalRow
+from app.quality.control_charts.signals_wording import Cause
+from app.web.fields import Body, Reason
+
+SIGNAL: dict[str, Any] = {
+    "id": 17,
+    "state": "open",
+    "machine": "lathe-1",
+    "characteristic": "shaft-d40",
+    "chart": "individuals",
+    "rule": "nelson_2",
+    "side": "above",
+    "first_sequence": 812,
+    "last_sequence": 825,
+    "points": 14,
+    "text": "Nelson 2, Individuals, readings 812 to 825: 14 points in a row on one side of the centre, above",
+    "baseline": 3,
+    "rules_version": 2,
+    "at": "2026-11-21T07:15:02.131Z",
+    "last_at": "2026-11-21T07:20:02.004Z",
+    "alarm": None,
+    "excluded": 0,
+    "withdrawn_at": None,
+    "explained_at": None,
+    "explained_by": None,
+    "cause": None,
+    "comment": None,
+}
+
+
+class SignalOut(BaseModel):
+    """A run of points that a rule has found. It is kept for good; while the run goes on, its end moves."""
+
+    model_config = ConfigDict(json_schema_extra={"example": SIGNAL})
+
+    id: int
+    state: Literal["open", "explained", "withdrawn"] = Field(
+        description="explained: somebody has said what it was, here or by acknowledging its alarm. withdrawn: readings of it "
+        "were taken out of the statistics, and what is left is no signal."
+    )
+    machine: str
+    characteristic: str
+    chart: Chart
+    rule: RuleName = Field(description="nelson_1 on charts that know none but their limits.")
+    side: Literal["above", "below", "rising", "falling"] | None = Field(description="null: the rule knows no side.")
+    first_sequence: int = Field(description="The first reading of the run.")
+    last_sequence: int
+    points: int = Field(description="How many points make it.")
+    text: str
+    baseline: int = Field(description="The version of the baseline that it was judged by.")
+    rules_version: int
+    at: datetime = Field(description="When it was found.")
+    last_at: datetime = Field(description="When its run was last seen to go on.")
+    alarm: int | None = Field(description="The alarm that it raised.")
+    excluded: int = Field(description="Readings of the run that were taken out of the statistics since.")
+    withdrawn_at: datetime | None
+    explained_at: datetime | None
+    explained_by: str | None
+    cause: Cause | None
+    comment: str | None
+
+
+class CommentIn(Body):
+    """Cause of a signal."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        allow_inf_nan=False,
+        json_schema_extra={"example": {"cause": "material", "comment": "New batch, harder by 20 HB"}},
+    )
+
+    cause: Cause
+    comment: Reason
+
+
+def signal_out(row: SignalRow) -> SignalOut:
+    """A signal as it is answered."""
+    signal, data = row.signal, wording.data_of(row.signal)
+    answered = row.alarm is not None and row.alarm.acknowledged_at is not None and signal.explained_at is None
+    return SignalOut(
+        id=signal.id,
+        state=row.state,  # type: ignore[arg-type] # never "all"
+        machine=row.machine.key,
+        characteristic=row.characteristic.key,
+        chart=Chart(signal.chart),
+        rule=RuleName(signal.rule),
+        side=_side(signal.rule, signal.side),  # type: ignore[arg-type] # one of these
+        first_sequence=signal.first_sequence,
+        last_sequence=signal.last_sequence,
+        points=signal.points,
+        text=wording.sentence(data),
+        baseline=signal.baseline_version,
+        rules_version=signal.rules_version,
+        at=signal.at,
+        last_at=signal.last_at,
+        alarm=signal.alarm,
+        excluded=signal.excluded,
+        withdrawn_at=signal.withdrawn_at,
+        explained_at=row.alarm.acknowledged_at if row.alarm and answered else signal.explained_at,
+        explained_by=row.alarm.acknowledged_by if row.alarm and answered else signal.explained_by,
+        cause=Cause(signal.cause) if signal.cause else None,
+        comment=row.alarm.comment if row.alarm and answered else signal.comment,
+    )
+
+
+def _side(rule: str, side: int) -> str | None:
+    if side == 0:
+        return None
+    if rule == RuleName.NELSON_3:
+        return "rising" if side > 0 else "falling"
+    return "above" if side > 0 else "below"

@@ -1,0 +1,213 @@
+"""Entering gauge studies, taking them from readings, and putting them right. Lengths in mm."""
+
+from typing import Any, NamedTuple
+
+from sqlalchemy.orm import Session
+
+from app.access.audit.actions import record as audit
+from app.access.callers import Caller
+from app.db.events import publish
+from app.errors import Conflict, FieldError, Invalid
+from app.language.i18n import _
+from app.loop.characteristics import queries as characteristics
+from app.loop.characteristics.queries import Standing
+from app.loop.machines.queries import lock_machines
+from app.loop.tables.machines import Machine
+from app.quality.gauge_studies import queries
+from app.quality.gauge_studies.evaluation import design
+from app.quality.gauge_studies.queries import StudyRow
+from app.quality.gauge_studies.schemas import CorrectionIn, FromReadingsIn, SettingsIn, StudyIn
+from app.quality.gauge_studies.tables import GaugeStudy, GaugeStudyRevision
+from app.web.forms import parsed
+
+
+class StoreResult(NamedTuple):
+    """A study; again: it was sent before with the same key, and nothing happened now."""
+
+    row: StudyRow
+    again: bool = False
+
+
+def add_study(
+    session: Session, machine: Machine, given: StudyIn, caller: Caller, source: dict[str, Any] | None = None
+) -> StoreResult:
+    """Keep a study with all its values. source: the readings that it was taken from.
+
+    Raises `NotFound`; `Invalid` for what is no study of its kind; `Conflict` for a key that was used otherwise.
+    """
+    lock_machines(session, [machine.id])  # of two that send the same key, one waits for the other
+    standing = _served(session, machine, given.characteristic)
+    settings, rows = _settings(given, standing, source), [_row(row.model_dump()) for row in given.rows]
+    before = None if given.key is None else queries.by_key(session, machine, given.key)
+    if before is not None:
+        if _same(before, given.kind, settings, rows):
+            return StoreResult(before, again=True)
+        raise Conflict(
+            _("Gauge study {number} was sent with the key {key} already, and with other values.").format(
+                number=before.study.id, key=repr(given.key)
+            ),
+            _("A key names one study permanently: use another one."),
+            id=before.study.id,
+        )
+    design(given.kind, settings, rows)
+    study = GaugeStudy(
+        machine_id=machine.id,
+        kind=given.kind,
+        characteristic_id=None if standing is None else standing.characteristic.id,
+        key=given.key,
+        created_by=caller.name,
+    )
+    session.add(study)
+    session.flush()
+    _keep(session, study, 1, settings, rows, caller, None)
+    subject, values = f"gauge-study/{study.id}", sum(len(row["values"]) for row in rows)
+    audit(session, caller.name, "gauge study entered", subject, None, {"kind": given.kind, "values": values})
+    publish(session, _news(machine, standing, study.id))
+    return StoreResult(queries.study(session, study.id))
+
+
+def take_study(session: Session, standing: Standing, given: FromReadingsIn, caller: Caller) -> StoreResult:
+    """A study of readings that are stored: one part probed again and again, or the repeats of each touch.
+
+    Raises `Invalid` where these readings make no study, `Conflict` for a key that was used otherwise.
+    """
+    rows = rows_from_readings(session, standing, given.kind, given.first, given.through, given.take)
+    fields = given.model_dump(exclude={"first", "through", "take", "characteristic"})
+    fields["each"] = "touch" if given.take == "touches" else "reading"
+    named = {"machine": standing.machine.key, "characteristic": standing.characteristic.key, "rows": rows}
+    study = parsed(StudyIn, fields | named)
+    source = source_of(session, standing, given.first, given.through, given.take)
+    return add_study(session, standing.machine, study, caller, source)
+
+
+def source_of(session: Session, standing: Standing, first: int, through: int, take: str) -> dict[str, Any]:
+    """From which readings values are taken, which of them were left out, and the empirical values that were taken off."""
+    missing = queries.left_out(session, standing, first, through)
+    empirical = queries.empirical_values(session, standing, first, through)
+    source = {"first": first, "through": through, "take": take, "empirical_values": empirical}
+    return source | ({"left_out": missing} if missing else {})
+
+
+def _same(before: StudyRow, kind: str, settings: dict[str, Any], rows: list[dict[str, Any]]) -> bool:
+    """Tell if this was sent before. For readings the question counts, whatever became of them since."""
+    names = ("first", "through", "take")
+    old, new = before.settings, settings
+    if "source" in old and "source" in new:
+        same = [old["source"][name] for name in names] == [new["source"][name] for name in names]
+        old, new = ({k: v for k, v in fields.items() if k != "source"} for fields in (old, new))
+        return same and (before.study.kind, old) == (kind, new)
+    return (before.study.kind, old, before.revision.rows) == (kind, new, rows)
+
+
+def rows_from_readings(
+    session: Session, standing: Standing, kind: str, first: int, through: int, take: str
+) -> list[dict[str, Any]]:
+    """The rows of a study that these readings make. Raises `Invalid`."""
+    if kind == "grr" and take != "touches":
+        wrong = _("a study of parts and operators takes the touches of each reading: a reading alone has no repeats")
+        raise Invalid(f"take: {wrong}.", _("Take the touches."), errors=[FieldError("take", wrong)])
+    sizes = queries.taken(session, standing, first, through, take)
+    if kind == "grr":
+        return [{"part": str(sequence), "operator": "1", "values": values} for sequence, values in sizes]
+    return [{"values": [value for _sequence, values in sizes for value in values]}]
+
+
+def correct_study(session: Session, number: int, given: CorrectionIn, caller: Caller) -> StudyRow:
+    """Put a study right, with a reason: a new revision. Nothing that was entered before is lost.
+
+    Raises `NotFound`, `Invalid`; `Conflict` if another revision was made since the one that was seen.
+    """
+    study = queries.study(session, number)
+    lock_machines(session, [study.machine.id])
+    study = queries.study(session, number)  # read again under the lock
+    if given.seen_revision is not None and given.seen_revision != study.newest:
+        wrong = _("{who} has made revision {n} meanwhile: your correction does not contain it").format(
+            who=study.revision.actor, n=study.newest
+        )
+        raise Conflict(
+            f"{wrong}.",
+            _("Look at it; store yours again if it is to replace it."),
+            errors=[FieldError("seen_revision", wrong)],
+        )
+    standing = _served(session, study.machine, study.characteristic)
+    settings = _settings(given, standing, study.settings.get("source"))
+    rows = [_row(row.model_dump()) for row in given.rows]
+    if (settings, rows) == (study.settings, study.revision.rows):
+        wrong = _("nothing differs from revision {n}").format(n=study.newest)
+        raise Invalid(
+            f"rows: {wrong}.",
+            _("Change what is wrong, or leave the study as it is."),
+            errors=[FieldError("rows", wrong)],
+        )
+    design(study.study.kind, settings, rows)
+    _keep(session, study.study, study.newest + 1, settings, rows, caller, given.reason)
+    before, after = _changes(study, settings, rows)
+    audit(session, caller.name, "gauge study corrected", f"gauge-study/{number}", before, after, given.reason)
+    publish(session, _news(study.machine, standing, number))
+    return queries.study(session, number)
+
+
+def _served(session: Session, machine: Machine, key: str | None) -> Standing | None:
+    if key is None:
+        return None
+    standing = characteristics.characteristic_named(session, key)
+    if standing.machine.id != machine.id:
+        wrong = _("belongs to machine {machine}").format(machine=standing.machine.key)
+        raise Invalid(
+            f"characteristic: {wrong}.",
+            _("Name one of the same machine."),
+            errors=[FieldError("characteristic", wrong)],
+        )
+    return standing
+
+
+def _settings(given: SettingsIn, standing: Standing | None, source: dict[str, Any] | None) -> dict[str, Any]:
+    settings = {name: getattr(given, name) for name in SettingsIn.model_fields}
+    if settings["tolerance"] is None and standing is not None:
+        settings["tolerance"] = standing.parameters.tolerance_width
+    return settings | ({} if source is None else {"source": source})
+
+
+def _row(row: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in row.items() if value is not None}
+
+
+def _keep(
+    session: Session,
+    made: GaugeStudy,
+    revision: int,
+    settings: dict[str, Any],
+    rows: list[dict[str, Any]],
+    caller: Caller,
+    reason: str | None,
+) -> None:
+    session.add(
+        GaugeStudyRevision(
+            machine_id=made.machine_id,
+            study_id=made.id,
+            revision=revision,
+            actor=caller.name,
+            reason=reason,
+            settings=settings,
+            rows=rows,
+        )
+    )
+    session.flush()
+
+
+def _changes(
+    found: StudyRow, settings: dict[str, Any], rows: list[dict[str, Any]]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Differences for the record of changes: settings, and the rows that are not as they were."""
+    names = [name for name in settings if settings[name] != found.settings.get(name)]
+    before = {name: found.settings.get(name) for name in names} | {"revision": found.newest}
+    after = {name: settings[name] for name in names} | {"revision": found.newest + 1}
+    old = [row for row in found.revision.rows if row not in rows]
+    new = [row for row in rows if row not in found.revision.rows]
+    return before | ({"rows": old[:20]} if old else {}), after | ({"rows": new[:20]} if new else {})
+
+
+def _news(machine: Machine, standing: Standing | None, number: int) -> dict[str, Any]:
+    """Event for live pages."""
+    event = {"kind": "gauge_study", "machine": machine.key, "id": number}
+    return event if standing is None else event | {"characteristic": standing.characteristic.key}

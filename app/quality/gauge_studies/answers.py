@@ -1,0 +1,296 @@
+"""Gauge studies as JSON answers. Lengths in mm."""
+
+from datetime import datetime
+from math import isnan
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.core.spc.gauge.crossed import Study
+from app.core.spc.gauge.linearity import Coefficient, Linearity
+from app.core.spc.gauge.single import Bias, TypeOne
+from app.core.spc.refusal import Refused
+from app.loop.warnings.wording import sentence
+from app.quality.gauge_studies import wording
+from app.quality.gauge_studies.evaluation import Evaluation
+from app.quality.gauge_studies.queries import Advice, StudyRow
+from app.quality.gauge_studies.schemas import Kind
+from app.web.warnings import Warnings, warnings_out
+
+
+class BiasOut(BaseModel):
+    """Mean less reference, with the t-test against 0."""
+
+    readings: int
+    mean: float
+    bias: float
+    repeatability: float = Field(description="Standard deviation of one value.")
+    t: float
+    p_value: float
+    low: float = Field(description="95 % interval of the bias.")
+    high: float
+    significant: bool
+
+
+class TypeOneOut(BaseModel):
+    """Cg = 0.2 T / 6 s, Cgk = (0.1 T - |bias|) / 3 s."""
+
+    cg: float
+    cgk: float
+    tolerance: float
+    resolution: float = Field(description="As it was entered, else the smallest step between the values.")
+    resolved: bool = Field(description="It is no coarser than 5 % of the tolerance; without it nothing is capable.")
+    few: bool = Field(description="Fewer than 25 values.")
+
+
+class CoefficientOut(BaseModel):
+    """Of the line through the biases, with the test against 0."""
+
+    value: float
+    standard_error: float
+    t: float
+    p_value: float
+
+
+class LinearityOut(BaseModel):
+    """bias = intercept + slope x reference."""
+
+    readings: int
+    biases: dict[str, float] = Field(description="Mean bias at each reference.")
+    average_bias: float
+    slope: CoefficientOut
+    intercept: CoefficientOut
+    r_squared: float
+    s: float
+    by_size: bool = Field(description="The slope differs from 0, or the biases lie beside the line (5 %).")
+    biased_at: list[float] = Field(description="References at which the 95 % band of the line leaves 0 out.")
+    holds_zero: bool = Field(description="The zero line lies inside the band at every size between the references.")
+    acceptable: bool = Field(description="holds_zero, and neither slope, intercept nor lack of fit is significant.")
+
+
+class LineOut(BaseModel):
+    """A line of the table of variance; f and p_value are null where nothing is tested."""
+
+    source: str
+    freedom: int
+    squares: float
+    mean_square: float | None
+    f: float | None
+    p_value: float | None
+
+
+class ComponentOut(BaseModel):
+    """A standard deviation as a share of the total variation and of the tolerance (6 sigma)."""
+
+    name: Literal["grr", "repeatability", "reproducibility", "interaction", "part", "total"]
+    sigma: float
+    percent: float
+    percent_tolerance: float | None
+
+
+class CrossedOut(BaseModel):
+    """Gauge R&R by one method."""
+
+    method: Literal["anova", "average_range"]
+    parts: int
+    operators: int
+    trials: int
+    components: list[ComponentOut]
+    ndc: int = Field(description="Number of distinct categories.")
+    pooled: bool = Field(description="The interaction is counted as repeatability (p above 0.25).")
+    zeroed: list[str] = Field(description="Components whose estimated variance was negative and counts as 0.")
+    table: list[LineOut] = Field(description="Of the analysis of variance; empty for average and range.")
+
+
+class VerdictOut(BaseModel):
+    """A number beside its published limit."""
+
+    name: str
+    value: str
+    verdict: str
+    limit: str
+
+
+class AdviceOut(BaseModel):
+    """R33 as the repeatability suggests it. Nothing is changed by it."""
+
+    zero_range: float
+    fits: bool | None = Field(description="Whether it is below R34.")
+    reasoning: list[str]
+
+
+class StudyOut(BaseModel):
+    """A gauge study with what it says; computed from its values whenever it is asked for."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "id": 7,
+                "kind": "type_one",
+                "machine": "lathe-1",
+                "characteristic": "shaft-d40",
+                "gauge": "Probe T8",
+                "revision": 1,
+                "newest_revision": 1,
+                "at": "2026-11-21T08:15:02Z",
+                "by": "engineer",
+                "reason": None,
+                "settings": {"gauge": "Probe T8", "reference": 39.9921, "tolerance": 0.016, "each": "reading"},
+                "rows": [{"values": [39.9922, 39.9921, 39.992]}],
+                "refused": None,
+                "bias": None,
+                "type_one": None,
+                "linearity": None,
+                "grr": [],
+                "values_left_out": 0,
+                "verdicts": [{"name": "Cg", "value": "1.52", "verdict": "capable", "limit": "at least 1.33 (VDA 5)"}],
+                "zero_range": None,
+                "taken_from": "readings 788 to 812 of shaft-d40; less the empirical value +1.4 µm",
+                "caution": None,
+                "warnings": [],
+            }
+        }
+    )
+
+    id: int
+    kind: Kind
+    machine: str
+    characteristic: str | None
+    gauge: str
+    revision: int
+    newest_revision: int
+    at: datetime
+    by: str
+    reason: str | None = Field(description="Why it was put right; null of the first revision.")
+    settings: dict[str, Any]
+    rows: list[dict[str, Any]]
+    refused: str | None = Field(description="Why the values say nothing.")
+    bias: BiasOut | None
+    type_one: TypeOneOut | None
+    linearity: LinearityOut | None
+    grr: list[CrossedOut] = Field(description="By analysis of variance, and by average and range.")
+    values_left_out: int = Field(description="Of cells longer than the shortest, with `unbalanced` = `fewest`.")
+    verdicts: list[VerdictOut]
+    zero_range: AdviceOut | None = Field(description="null where it serves no characteristic.")
+    taken_from: str | None = Field(description="Readings that it was taken from, and the empirical value taken off.")
+    caution: str | None = Field(description="Where the empirical value changed inside the study.")
+    warnings: Warnings
+
+
+def study_out(row: StudyRow, advice: Advice | Refused | None) -> StudyOut:
+    """The study as JSON."""
+    evaluation = row.evaluation
+    return StudyOut(
+        id=row.study.id,
+        kind=row.study.kind,  # type: ignore[arg-type]  # a CHECK holds it
+        machine=row.machine.key,
+        characteristic=row.characteristic,
+        gauge=row.settings["gauge"],
+        revision=row.revision.revision,
+        newest_revision=row.newest,
+        at=row.revision.at,
+        by=row.revision.actor,
+        reason=row.revision.reason,
+        settings=row.settings,
+        rows=row.revision.rows,
+        refused=wording.refusal(evaluation.refused) if evaluation.refused else None,
+        bias=_bias(evaluation.bias) if isinstance(evaluation.bias, Bias) else None,
+        type_one=_type_one(evaluation.type_one) if isinstance(evaluation.type_one, TypeOne) else None,
+        linearity=_linearity(evaluation.linearity) if isinstance(evaluation.linearity, Linearity) else None,
+        grr=_crossed(evaluation, row.tolerance),
+        values_left_out=evaluation.cut,
+        verdicts=[
+            VerdictOut(name=verdict.name, value=verdict.value, verdict=verdict.word, limit=verdict.limit)
+            for verdict in wording.verdicts(evaluation, row.tolerance)
+        ],
+        zero_range=AdviceOut(
+            zero_range=advice.suggestion.zero_range, fits=advice.suggestion.fits, reasoning=wording.advice(advice)
+        )
+        if isinstance(advice, Advice)
+        else None,
+        taken_from=wording.taken_from(row.settings["source"], row.characteristic) if "source" in row.settings else None,
+        caution=wording.empirical_value_changed(row.settings),
+        warnings=warnings_out(row.warnings, sentence),
+    )
+
+
+def _bias(found: Bias) -> BiasOut:
+    names = ("readings", "mean", "bias", "repeatability", "t", "p_value", "low", "high", "significant")
+    return BiasOut(**{name: getattr(found, name) for name in names})
+
+
+def _type_one(found: TypeOne) -> TypeOneOut:
+    return TypeOneOut(
+        cg=found.cg,
+        cgk=found.cgk,
+        tolerance=found.tolerance,
+        resolution=found.resolution,
+        resolved=found.resolved,
+        few=found.few,
+    )
+
+
+def _linearity(found: Linearity) -> LinearityOut:
+    def coefficient(c: Coefficient) -> CoefficientOut:
+        return CoefficientOut(value=c.value, standard_error=c.standard_error, t=c.t, p_value=c.p_value)
+
+    return LinearityOut(
+        readings=found.readings,
+        biases={f"{reference:g}": value for reference, value in found.biases.items()},
+        average_bias=found.average_bias,
+        slope=coefficient(found.slope),
+        intercept=coefficient(found.intercept),
+        r_squared=found.r_squared,
+        s=found.s,
+        by_size=found.by_size,
+        biased_at=list(found.biased_at),
+        holds_zero=found.holds_zero,
+        acceptable=found.acceptable,
+    )
+
+
+def _crossed(found: Evaluation, tolerance: float | None) -> list[CrossedOut]:
+    return [
+        CrossedOut(
+            method=study.method.value,
+            parts=study.parts,
+            operators=study.operators,
+            trials=study.trials,
+            components=[
+                ComponentOut(
+                    name=name,  # type: ignore[arg-type]
+                    sigma=sigma,
+                    percent=study.percent(sigma),
+                    percent_tolerance=study.percent_tolerance(sigma, tolerance) if tolerance else None,
+                )
+                for name, sigma in _sigmas(study)
+            ],
+            ndc=study.ndc,
+            pooled=study.pooled,
+            zeroed=["reproducibility" if name == "appraiser" else name for name in study.zeroed],
+            table=[
+                LineOut(
+                    source=line.source,
+                    freedom=line.freedom,
+                    squares=line.squares,
+                    mean_square=_number(line.mean_square),
+                    f=_number(line.f),
+                    p_value=_number(line.p_value),
+                )
+                for line in study.table
+            ],
+        )
+        for study in (found.anova, found.ranges)
+        if isinstance(study, Study)
+    ]
+
+
+def _sigmas(found: Study) -> list[tuple[str, float]]:
+    sigmas = [("grr", found.grr), ("repeatability", found.equipment), ("reproducibility", found.appraiser)]
+    if found.interaction is not None:
+        sigmas.append(("interaction", found.interaction))
+    return [*sigmas, ("part", found.part), ("total", found.total)]
+
+
+def _number(value: float) -> float | None:
+    return None if isnan(value) else value

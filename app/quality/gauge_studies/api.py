@@ -1,0 +1,114 @@
+"""JSON routes: gauge studies."""
+
+from typing import Annotated, Any, Literal
+
+import msgspec
+from fastapi import Path, Query, Response
+
+from app.access.deps import AnyCaller, Engineer
+from app.loop.characteristics.queries import characteristic_named
+from app.loop.machines.queries import machine_named
+from app.quality.gauge_studies import actions, queries
+from app.quality.gauge_studies.answers import StudyOut, study_out
+from app.quality.gauge_studies.figures import figure_of
+from app.quality.gauge_studies.schemas import CorrectionIn, FromReadingsIn, StudyIn
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep
+from app.web.fields import LARGEST_ID, Limit, Page, page_of
+from app.web.theme import ThemeName
+
+router = api_router("gauges")
+Number = Annotated[int, Path(description="Number of the study.", examples=[7])]
+Revision = Annotated[int | None, Query(ge=1, description="Of this revision; of the newest if not said.")]
+AGAIN: dict[int | str, dict[str, Any]] = {
+    200: {"model": StudyOut, "description": "It was sent before with the same key; nothing happened now."}
+}
+FIGURE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "A Plotly figure: `data` and `layout`",
+        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
+    }
+}
+
+
+@router.post("/gauge-studies", status_code=201, responses=problems(404, 409) | AGAIN)
+def add_gauge_study(session: SessionDep, caller: AnyCaller, given: StudyIn, response: Response) -> StudyOut:
+    """Keep a gauge study with all its values, and answer what it says."""
+    machine = machine_named(session, given.machine)
+    caller.must_at(machine.id, "operator")
+    result = actions.add_study(session, machine, given, caller)
+    response.status_code = 200 if result.again else 201
+    return study_out(result.row, queries.advice(session, result.row))
+
+
+@router.post("/gauge-studies/from-readings", status_code=201, responses=problems(404, 409) | AGAIN)
+def take_gauge_study(session: SessionDep, caller: AnyCaller, given: FromReadingsIn, response: Response) -> StudyOut:
+    """Make a gauge study of stored readings: one part probed again and again, or the repeats of each touch.
+
+    Excluded readings are left out. The values are copied: what becomes of the readings later does not change the study.
+    """
+    standing = characteristic_named(session, given.characteristic)
+    caller.must_at(standing.machine.id, "operator")
+    result = actions.take_study(session, standing, given, caller)
+    response.status_code = 200 if result.again else 201
+    return study_out(result.row, queries.advice(session, result.row))
+
+
+@router.get("/gauge-studies", responses=problems(404))
+def list_gauge_studies(
+    session: SessionDep,
+    caller: AnyCaller,
+    machine: Annotated[str | None, Query(description="Only of this machine.", max_length=64)] = None,
+    characteristic: Annotated[str | None, Query(description="Only for this characteristic.", max_length=64)] = None,
+    before: Annotated[
+        int, Query(ge=0, le=LARGEST_ID, description="Cursor: the `next` of the page before; 0 for the first.")
+    ] = 0,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[StudyOut]:
+    """Gauge studies, newest first."""
+    chosen = None if characteristic is None else characteristic_named(session, characteristic)
+    where = None if machine is None else machine_named(session, machine)
+    for place in filter(None, (where, chosen.machine if chosen else None)):
+        caller.must_at(place.id, "viewer")
+    rows = queries.studies(
+        session,
+        machine_id=where.id if where else caller.only_machine,
+        characteristic_id=chosen.characteristic.id if chosen else None,
+        before=before or None,
+        limit=limit + 1,
+    )
+    return page_of([study_out(row, None) for row in rows], limit, lambda made: made.id)
+
+
+@router.get("/gauge-studies/{study}", responses=problems(404))
+def get_gauge_study(session: SessionDep, caller: AnyCaller, study: Number, revision: Revision = None) -> StudyOut:
+    """One study with what it says and what it suggests for R33."""
+    row = queries.study(session, study, revision)
+    caller.must_at(row.machine.id, "viewer")
+    return study_out(row, queries.advice(session, row))
+
+
+@router.put("/gauge-studies/{study}", responses=problems(404))
+def correct_gauge_study(session: SessionDep, caller: Engineer, study: Number, given: CorrectionIn) -> StudyOut:
+    """Put a study right, with the reason: it becomes a new revision, the one before stays on record."""
+    row = actions.correct_study(session, study, given, caller)
+    return study_out(row, queries.advice(session, row))
+
+
+@router.get("/gauge-studies/{study}/figure", responses=problems(404) | FIGURE, response_model=None)
+def get_gauge_figure(
+    session: SessionDep,
+    caller: AnyCaller,
+    study: Number,
+    picture: Annotated[
+        Literal["values", "components", "parts", "operators"],
+        Query(description="The values themselves; of gauge R&R also its components, by part and by operator."),
+    ] = "values",
+    revision: Revision = None,
+    theme: Annotated[ThemeName, Query(description="For a light or a dark page.")] = "light",
+) -> Response:
+    """Draw the results of the study as a chart."""
+    row = queries.study(session, study, revision)
+    caller.must_at(row.machine.id, "viewer")
+    figure = figure_of(picture, row.study.kind, row.settings, row.revision.rows, row.evaluation, theme=theme)
+    return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})

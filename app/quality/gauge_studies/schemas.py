@@ -1,0 +1,136 @@
+"""Gauge studies as they come in. Lengths in mm."""
+
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field
+
+from app.core.parameters import LARGEST_LENGTH
+from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Body, Reason, Slug, Text200
+
+Kind = Literal["type_one", "bias", "linearity", "grr"]
+Value = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
+MOST_ROWS, MOST_IN_ROW, MOST_VALUES = 2_000, 1_000, 10_000
+
+
+class RowIn(Body):
+    """Values of one cell of the study: of one reference, or of one part by one operator."""
+
+    part: Text200 | None = Field(None, max_length=64, description="Gauge R&R: which part.", examples=["3"])
+    operator: Text200 | None = Field(
+        None,
+        max_length=64,
+        description="Gauge R&R: who or what measured it; `1` where there is but one.",
+        examples=["A"],
+    )
+    reference: Value | None = Field(None, description="Linearity: the true size, mm.", examples=[None])
+    values: list[Value] = Field(
+        min_length=1,
+        max_length=MOST_IN_ROW,
+        description="What was measured, in order of time, mm.",
+        examples=[[40.001, 40.002]],
+    )
+
+
+class SettingsIn(Body):
+    """Subject and settings of a study."""
+
+    gauge: Text200 = Field(description="Which gauge or probe.", examples=["Probe T8, ruby 2 mm"])
+    reference: Value | None = Field(None, description="True size of what is measured, mm: type 1 and bias.")
+    tolerance: Positive | None = Field(
+        None, description="Width of the tolerance, mm; that of the characteristic where it is not said."
+    )
+    resolution: Positive | None = Field(None, description="Smallest step that the gauge shows, mm.")
+    each: Literal["reading", "touch"] = Field(
+        "reading", description="Whether each value is a reading (mean of R27 touches) or a single touch."
+    )
+    unbalanced: Literal["refuse", "fewest"] = Field(
+        "refuse",
+        description="Gauge R&R with cells of unequal size: refuse them, or take of every cell its first values, as many as "
+        "the smallest cell has.",
+    )
+
+
+class StudyIn(SettingsIn):
+    """A gauge study with all its values."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "kind": "grr",
+                "machine": "lathe-1",
+                "characteristic": "shaft-d40",
+                "gauge": "Probe T8, ruby 2 mm",
+                "tolerance": 0.016,
+                "rows": [
+                    {"part": "1", "operator": "A", "values": [40.001, 40.0012]},
+                    {"part": "1", "operator": "B", "values": [40.0011, 40.0012]},
+                    {"part": "2", "operator": "A", "values": [39.997, 39.9968]},
+                    {"part": "2", "operator": "B", "values": [39.9972, 39.9971]},
+                ],
+            }
+        }
+    )
+
+    kind: Kind = Field(description="type_one: Cg, Cgk. bias. linearity. grr: repeatability and reproducibility.")
+    machine: Slug = Field(examples=["lathe-1"])
+    characteristic: Slug | None = Field(None, description="Which the study is to serve.", examples=["shaft-d40"])
+    rows: list[RowIn] = Field(min_length=1, max_length=MOST_ROWS)
+    key: Text200 | None = Field(
+        None,
+        max_length=128,
+        description="Unique per machine: sent again, the answer is the first answer and nothing happens twice.",
+    )
+
+
+class FromReadingsIn(SettingsIn):
+    """A gauge study of readings that are stored already: one part probed again and again."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "kind": "type_one",
+                "characteristic": "shaft-d40",
+                "gauge": "Probe T8",
+                "reference": 39.9921,
+                "first": 788,
+                "through": 812,
+                "take": "readings",
+            }
+        }
+    )
+
+    kind: Literal["type_one", "bias", "grr"] = Field(
+        description="grr: of touches alone, each reading is a part and its touches are the trials."
+    )
+    characteristic: Slug = Field(examples=["shaft-d40"])
+    first: int = Field(strict=True, ge=1, le=LARGEST_ID, description="From this reading on.", examples=[788])
+    through: int = Field(
+        strict=True, ge=1, le=LARGEST_ID, description="To this reading, itself included.", examples=[812]
+    )
+    take: Literal["readings", "touches"] = Field(
+        "readings", description="What each reading says, or the repeats at its first point."
+    )
+    key: Text200 | None = Field(None, max_length=128, description="As of POST /gauge-studies.")
+
+
+class CorrectionIn(SettingsIn):
+    """A study put right: settings and all values anew, and why. The revision before stays on record."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "gauge": "Probe T8, ruby 2 mm",
+                "reference": 39.992,
+                "tolerance": 0.016,
+                "rows": [{"values": [39.9921, 39.9923, 39.992, 39.9922, 39.9921]}],
+                "reason": "Third value was typed 39.9202",
+            }
+        }
+    )
+
+    rows: list[RowIn] = Field(min_length=1, max_length=MOST_ROWS)
+    reason: Reason
+    seen_revision: Annotated[int, Field(strict=True, ge=1, le=LARGEST_SERIAL)] | None = Field(
+        None, description="The revision that is put right: 409 if there is a newer one meanwhile."
+    )

@@ -1,0 +1,79 @@
+"""Tables pasted from a spreadsheet or a file: tabs, semicolons or commas; decimal comma or point.
+
+Numbers are read as everywhere (`core.number_text`): a comma or a point is the decimal sign, and a cell with a blank inside or
+with separators of thousands is refused. µm and mm behind a number are not read: values are mm throughout.
+"""
+
+import csv
+import io
+from collections.abc import Sequence
+
+from app.core.number_text import number_or_none
+from app.language.i18n import _
+
+MOST_CHARACTERS = 400_000
+
+
+class Unreadable(ValueError):
+    """A cell that is no number; `row` and `column` count from 1."""
+
+    def __init__(self, row: int, column: int, message: str) -> None:
+        super().__init__(message)
+        self.row, self.column = row, column
+
+
+def cells_of(text: str) -> list[list[str]]:
+    r"""The rows of a pasted table, empty ones left out.
+
+    >>> cells_of("A\tB\n1,5\t2,5\n"), cells_of("40.001; 40.002"), cells_of("1,5\n1,6")
+    ([['A', 'B'], ['1,5', '2,5']], [['40.001', '40.002']], [['1,5'], ['1,6']])
+    """
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    rows = csv.reader(io.StringIO(text), delimiter=_delimiter(text))
+    try:
+        table = [[cell.strip() for cell in row] for row in rows]
+    except csv.Error:  # a quotation mark that is never closed: take the lines as they are
+        table = [[cell.strip() for cell in line.split(_delimiter(text))] for line in text.split("\n")]
+    table = [row for row in table if any(row)]
+    while table and all(not row[-1] for row in table) and len(table[0]) > 1:
+        table = [row[:-1] for row in table]
+    return table
+
+
+def _delimiter(text: str) -> str:
+    if "\t" in text:
+        return "\t"
+    if ";" in text:
+        return ";"
+    lines = [line for line in text.split("\n") if line.strip()]
+    if "," in text and ("." in text or any(line.count(",") > 1 or ", " in line for line in lines)):
+        return ","
+    return "\t"
+
+
+def number(text: str) -> float | None:
+    """The number in a cell; None where it is none.
+
+    >>> number("40,002"), number("−0.5"), number("1 234,5"), number("1.234,5"), number("nan")
+    (40.002, -0.5, None, None, None)
+    """
+    return number_or_none(text) if len(text) <= 60 else None
+
+
+def numbers(cells: Sequence[Sequence[str]]) -> list[list[float | None]]:
+    """Every cell as a number, None where it is empty. Raises `Unreadable` that names the first cell that is none."""
+    table = []
+    for at, row in enumerate(cells, 1):
+        values: list[float | None] = []
+        for place, cell in enumerate(row, 1):
+            value = number(cell) if cell.strip() else None
+            if cell.strip() and value is None:
+                raise Unreadable(at, place, _("“{text}” is no number").format(text=cell[:30]))
+            values.append(value)
+        table.append(values)
+    return table
+
+
+def is_heading(row: Sequence[str]) -> bool:
+    """A first line that holds no number at all."""
+    return all(number(cell) is None for cell in row)

@@ -1,0 +1,118 @@
+"""The proof as JSON."""
+
+from math import isnan
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.quality.proof.cases import Basis
+from app.quality.proof.queries import Check, Proof, Result
+
+Number = float | bool
+Numbers = Number | list[Number]
+
+
+class CheckOut(BaseModel):
+    """One number of an example, or one list of them."""
+
+    name: str = Field(examples=["upper"])
+    expected: Numbers = Field(description="As it was published, or as `basis` says.")
+    got: Numbers | None = Field(description="What this program computes now.")
+    tolerance: float = Field(description="How far apart they may be.")
+    difference: float | None = Field(description="How far apart they are; of a list the entry that is furthest off.")
+    passed: bool
+
+    @classmethod
+    def of(cls, check: Check) -> "CheckOut":
+        """From what the proof found."""
+        difference = check.difference
+        return cls(
+            name=check.name,
+            expected=check.expected,
+            got=check.got,
+            tolerance=check.tolerance,
+            difference=None if difference is None or isnan(difference) else difference,
+            passed=check.passed,
+        )
+
+
+class ExampleOut(BaseModel):
+    """One example."""
+
+    kind: str = Field(examples=["individuals"])
+    name: str = Field(examples=["flow rate of ten batches"])
+    source: str = Field(examples=["NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2"])
+    basis: Basis = Field(
+        description="published in `source`; derived by hand, or computed independently, as `source` says.",
+        examples=["published"],
+    )
+    note: str = Field(description="Why it cannot come out nearer, where that needs saying.")
+    passed: bool
+    error: str | None = Field(description="What went wrong when it could not be computed at all.")
+    checks: list[CheckOut]
+
+    @classmethod
+    def of(cls, result: Result) -> "ExampleOut":
+        """From what the proof found."""
+        return cls(
+            kind=result.case.kind,
+            name=result.case.name,
+            source=result.case.source,
+            basis=result.case.basis,
+            note=result.case.note,
+            passed=result.passed,
+            error=result.error,
+            checks=[CheckOut.of(check) for check in result.checks],
+        )
+
+
+class ProofOut(BaseModel):
+    """All published examples, run through the engine of this process."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "passed": True,
+                "examples": 1,
+                "failing": 0,
+                "numbers": 1,
+                "results": [
+                    {
+                        "kind": "individuals",
+                        "name": "flow rate of ten batches",
+                        "source": "NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2",
+                        "basis": "published",
+                        "note": "",
+                        "passed": True,
+                        "error": None,
+                        "checks": [
+                            {
+                                "name": "moving_range",
+                                "expected": 1.8778,
+                                "got": 1.8777777777777784,
+                                "tolerance": 5e-05,
+                                "difference": 2.2e-05,
+                                "passed": True,
+                            }
+                        ],
+                    }
+                ],
+            }
+        }
+    )
+
+    passed: bool
+    examples: int = Field(description="How many examples were run.")
+    failing: int = Field(description="How many of them do not come out as published.")
+    numbers: int = Field(description="How many numbers were compared.")
+    results: list[ExampleOut]
+
+    @classmethod
+    def of(cls, proof: Proof) -> "ProofOut":
+        """From what the proof found."""
+        return cls(
+            passed=proof.passed,
+            examples=len(proof.results),
+            failing=len(proof.failing),
+            numbers=proof.numbers,
+            results=[ExampleOut.of(result) for result in proof.results],
+        )

@@ -1,0 +1,1 @@
+"""Wear of edges behind the corrections, remaining tool life, and loops that over-correct."""

@@ -1,0 +1,141 @@
+"""The periodic job that works out the outlook of each characteristic, and alarms where a loop begins to hunt.
+
+Outlooks are not what readings are decided by: no machine is locked for them, and what the writer has in memory stays true.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+from sqlalchemy import Select, func, or_, select
+from sqlalchemy.dialects.postgresql import insert
+from sqlalchemy.orm import Session
+
+from app.core.hunting import Hunting, LoopVerdict
+from app.core.wear import LONGEST, Record
+from app.db.events import publish
+from app.jobs.actions import PeriodicJob, Unit
+from app.loop.alarms import actions as alarms
+from app.loop.characteristics import queries as characteristics
+from app.loop.characteristics.queries import Standing
+from app.loop.machines.queries import lock_machines
+from app.loop.summaries.queries import Window
+from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.readings import Stream
+from app.quality.wear import queries, wording
+from app.quality.wear.alarm_kinds import HUNTING
+from app.quality.wear.queries import Wear
+from app.quality.wear.tables import Outlook
+
+
+def to_look_ahead(session: Session) -> list[Unit]:
+    """Characteristics that have been measured, or set otherwise, since their outlook was made, the oldest first."""
+    return [
+        Unit(f"characteristic/{key}", (key,), machine, characteristic)
+        for key, machine, characteristic in session.execute(_moved())
+    ]
+
+
+def look_ahead(session: Session, unit: Unit) -> None:
+    """Work out the outlook of one characteristic, and raise *hunting* once where its loop has begun to hunt."""
+    standing = characteristics.characteristic_named(session, str(unit.key[0]))
+    before = session.get(Outlook, (standing.machine.id, standing.characteristic.id))
+    hunted = before is not None and before.hunting in queries.OVERCORRECTS
+    changed, record = _record(session, standing, before)
+    wear = queries.wear_of(session, standing, _newest(session, standing))
+    _note(session, replace(wear, record=record), changed)
+    hunting = wear.hunting
+    if hunting is not None and hunting.state.value in queries.OVERCORRECTS and not hunted:
+        lock_machines(session, [standing.machine.id])
+        publish(session, _tell(session, standing, hunting))
+
+
+def _tell(session: Session, standing: Standing, found: Hunting) -> dict[str, Any]:
+    """Raise the alarm: under the machine's lock, as whoever acknowledges the one before it. What is told to live pages."""
+    alarm = alarms.raise_for_characteristic(
+        session,
+        standing.machine.id,
+        standing.characteristic.id,
+        standing.parameters.tool_memory,
+        HUNTING,
+        wording.hunting_data(found) | {"settings": {name: standing.version.parameters[name] for name in SAID}},
+    )
+    return {
+        "kind": "alarm",
+        "machine": standing.machine.key,
+        "characteristic": standing.characteristic.key,
+        "tool": alarm.tool_memory,
+        "id": alarm.id,
+        "alarm": alarm.kind,
+        "state": "active",
+    }
+
+
+SAID = ("zero_range", "averaging_limit", "weighting_factor", "tolerance_width")  # settings that the sentences name
+
+
+def _moved() -> Select[str, int, int]:
+    return (
+        select(Characteristic.key, Characteristic.machine_id, Characteristic.id)
+        .join(
+            Stream,
+            (Stream.machine_id == Characteristic.machine_id) & (Stream.characteristic_id == Characteristic.id),
+        )
+        .outerjoin(
+            Outlook,
+            (Outlook.machine_id == Stream.machine_id) & (Outlook.characteristic_id == Stream.characteristic_id),
+        )
+        .where(
+            Stream.sequence > 0,
+            or_(
+                Outlook.sequence.is_(None),
+                Outlook.sequence != Stream.sequence,
+                Outlook.parameters_version != Stream.parameters_version,
+            ),
+        )
+        .order_by(Outlook.at.nulls_first())
+    )
+
+
+def _newest(session: Session, standing: Standing) -> Window:
+    """Readings that the outlook is made of: the line needs no more."""
+    life = queries.life_of(session, standing)
+    return Window(max(1, life.last - LONGEST + 1), life.last, life.newest)
+
+
+def _record(session: Session, standing: Standing, before: Outlook | None) -> tuple[int, Record | None]:
+    """Accuracy of the forecasts of earlier edges, and its tool change: computed once after each change."""
+    changed = queries.life_of(session, standing).first - 1
+    if before is not None and before.record_of == changed:
+        return changed, queries.record_of(before)
+    record = queries.backtested(session, standing)
+    return changed, record if record.tested else None
+
+
+def _note(session: Session, wear: Wear, changed: int) -> None:
+    towards, forecast = wear.first or (None, None)
+    finite = forecast is not None and forecast.high != float("inf")
+    values = {
+        "sequence": wear.window.last,
+        "parameters_version": wear.standing.version.version,
+        "at": func.now(),
+        "towards": towards.value if towards else None,
+        "parts": forecast.parts if forecast else None,
+        "parts_low": forecast.low if forecast else None,
+        "parts_high": forecast.high if forecast and finite else None,
+        "hunting": (wear.hunting.state if wear.hunting else LoopVerdict.QUIET).value,
+        "record_of": changed,
+        "lives": wear.record.lives if wear.record else None,
+        "tested": wear.record.tested if wear.record else None,
+        "held": wear.record.held if wear.record else None,
+        "widening": wear.record.widening if wear.record else None,
+    }
+    where = {"machine_id": wear.standing.machine.id, "characteristic_id": wear.standing.characteristic.id}
+    session.execute(
+        insert(Outlook)
+        .values(**where, **values)
+        .on_conflict_do_update(index_elements=["machine_id", "characteristic_id"], set_=values)
+        .execution_options(synchronize_session=False)
+    )
+
+
+JOB = PeriodicJob("wear_and_hunting", to_look_ahead, look_ahead)

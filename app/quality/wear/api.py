@@ -1,0 +1,75 @@
+"""JSON routes: the wear of a characteristic in numbers, and its curve."""
+
+from typing import Annotated, Any
+
+import msgspec
+from fastapi import Path, Query, Response
+
+from app.access.deps import AnyCaller
+from app.loop.characteristics import queries as characteristics
+from app.loop.summaries import queries as statistics
+from app.quality.wear import queries
+from app.quality.wear.chart import chart_of
+from app.quality.wear.figures import wear_figure
+from app.quality.wear.schemas import WearOut
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep
+from app.web.fields import LARGEST_ID
+from app.web.theme import ThemeName
+
+router = api_router("wear")
+
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+FIGURE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "A Plotly figure: `data` and `layout`",
+        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
+    }
+}
+
+
+@router.get("/characteristics/{characteristic}/wear", responses=problems(404))
+def get_wear(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    last: Annotated[
+        int | None, Query(ge=1, le=LARGEST_ID, description="Of the tool's readings only those among the last so many.")
+    ] = None,
+) -> WearOut:
+    """Wear per part with its interval, parts left as a forecast, and whether the loop hunts.
+
+    Without `last` of the present tool life. Excluded readings, probe faults and parts cut before the tool change are left out.
+    """
+    standing = characteristics.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    window = queries.life_of(session, standing)
+    if last is not None:
+        window = statistics.window_of(session, standing.characteristic, last=last, first=window.first)
+    return WearOut.of(queries.wear_of(session, standing, window))
+
+
+@router.get("/characteristics/{characteristic}/figures/wear", responses=problems(404) | FIGURE, response_model=None)
+def get_wear_figure(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    last: Annotated[
+        str | None,
+        Query(
+            pattern=r"^([1-9][0-9]{0,17}|all|tool)$",
+            description="The last so many readings, `all`, or `tool`: since the tool was changed.",
+        ),
+    ] = None,
+    theme: Annotated[ThemeName, Query(description="For a light or a dark page.")] = "light",
+    width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")] = 1240,
+) -> Response:
+    """The wear curve with its line, what the corrections took out of it, and the forecast to the limits that are near."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    wear = queries.wear_of(session, standing, queries.shown(session, standing, last))
+    return Response(
+        msgspec.json.encode(wear_figure(chart_of(wear), theme=theme, width=width)),
+        media_type="application/json",
+        headers={"Cache-Control": "no-store"},
+    )

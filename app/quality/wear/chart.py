@@ -1,0 +1,25 @@
+"""From the wear curve as it is read to the one that is drawn."""
+
+from app.quality.wear.figures import Life, WearChart
+from app.quality.wear.queries import Curve, Wear
+
+
+def chart_of(wear: Wear) -> WearChart:
+    """Values of the wear figure."""
+    parameters = wear.standing.parameters
+    return WearChart(
+        key=wear.standing.characteristic.key,
+        now=_life(wear.now),
+        lives=[_life(curve) for curve in wear.lives],
+        fit=wear.fit,
+        forecasts=wear.forecasts,
+        limits=wear.limits,
+        half=parameters.tolerance_width / 2,
+        removed=wear.total / parameters.factor + wear.now.lifted,
+        corrects=not parameters.measures_only,
+        widening=wear.record.widening if wear.record else 1.0,
+    )
+
+
+def _life(curve: Curve) -> Life:
+    return Life(curve.sequence.tolist(), curve.worn.tolist(), curve.removed.tolist(), curve.counts.tolist())

@@ -1,0 +1,214 @@
+"""Wear, forecasts and hunting as JSON. Lengths in mm."""
+
+from datetime import datetime
+from math import isfinite
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.core.hunting import Hunting
+from app.core.wear import Fit, Forecast, Towards
+from app.quality.wear import wording
+from app.quality.wear.queries import Wear
+
+
+class PerPartOut(BaseModel):
+    """The slope of the least-squares line through the newest readings, as far back as they follow one line."""
+
+    value: float = Field(description="mm per part; the sign says which way sizes go.")
+    low: float = Field(description="95 % confidence interval.")
+    high: float
+    standard_error: float
+    is_wear: bool = Field(description="Whether the interval leaves 0 out: otherwise there is no wear to be seen.")
+    first_sequence: int = Field(description="The readings that the line goes through.")
+    last_sequence: int
+    readings: int
+    left_out: int = Field(description="Outliers among them.")
+    off: int = Field(description="Newest readings beyond a step, as when an edge breaks; no forecast then.")
+    level: float = Field(description="Of the line at the last reading.")
+    scatter: float = Field(description="Standard deviation about the line.")
+    correlation: float = Field(description="Of neighbours (lag 1); it widens the interval.")
+
+
+class ForecastOut(BaseModel):
+    """Parts until the line reaches a limit; 0 is reached."""
+
+    towards: Literal["wear", "tolerance", "offset"] = Field(
+        description="wear: R37, had nothing been corrected since the tool change. tolerance: out of tolerance, if nothing were "
+        "corrected from now on. offset: the sum of corrections reaches max_total."
+    )
+    limit: float = Field(description="Where the limit lies on the wear curve.")
+    parts: float
+    low: float = Field(
+        description="95 % interval of a single part, with room for wear that does not go on evenly: from here on parts may lie beyond."
+    )
+    high: float | None = Field(description="null: nobody can say how many at most.")
+
+
+class RecordOut(BaseModel):
+    """Accuracy of the forecasts of earlier edges: made at several moments of each life, for the level it came to."""
+
+    lives: int = Field(description="Tool lives that forecasts were tested on.")
+    tested: int
+    held: int = Field(
+        description="How many held the true number of parts in their interval, as it is without widening."
+    )
+    widening: float = Field(
+        description="Exponent of (1 + parts / parts seen), by which both ends of the interval are moved; above 1 where forecasts missed."
+    )
+
+
+class RemedyOut(BaseModel):
+    """The least change with which scatter alone corrects no more than 1 % of the readings; null: no such value."""
+
+    weighting_factor: float | None = Field(description="k, R33 as it is.")
+    zero_range: float | None = Field(description="R33, k as it is; never below the uncertainty of the signal path.")
+    averaging_limit: float | None = Field(description="R34, where R33 and k alone do not help; then together with R33.")
+
+
+class HuntingOut(BaseModel):
+    """Over-correction of the loop, by the corrections of the last 200 readings with the settings of now."""
+
+    state: Literal["unknown", "quiet", "hunting", "swinging"] = Field(
+        description="hunting: scatter alone explains it. swinging: it does not."
+    )
+    readings: int
+    corrections: int
+    reversals: int = Field(description="Corrections that took the one before back.")
+    mean_size: float | None = Field(description="Mean size error that a correction removed.")
+    scatter: float = Field(description="Standard deviation of the process, told by successive differences.")
+    probability: float = Field(
+        description="Of so many reversals where 1 reading in 10 is tolerable; alarm below 0.001."
+    )
+    expected_corrections: float | None = Field(description="Per reading, by scatter alone with these settings.")
+    expected_reversals: float | None
+    expected_size: float | None
+    excess: float | None = Field(description="By what share the parts scatter more than with no correction at all.")
+    remedy: RemedyOut | None
+    text: str = Field(description="The verdict in words.")
+    what_to_do: str
+
+
+EXAMPLE: dict[str, Any] = {
+    "characteristic": "shaft-d40",
+    "first_sequence": 613,
+    "last_sequence": 812,
+    "tool_memory": 3,
+    "changed_at": "2026-11-21T05:58:40Z",
+    "corrections_total": -0.0121,
+    "wear_per_part": {
+        "value": 0.0000612,
+        "low": 0.0000563,
+        "high": 0.0000661,
+        "standard_error": 0.0000025,
+        "is_wear": True,
+        "first_sequence": 613,
+        "last_sequence": 812,
+        "readings": 199,
+        "left_out": 1,
+        "off": 0,
+        "level": 0.0128,
+        "scatter": 0.00094,
+        "correlation": 0.03,
+    },
+    "forecasts": [{"towards": "tolerance", "limit": 0.0201, "parts": 119.0, "low": 54.0, "high": 248.0}],
+    "first": "wear",
+    "record": {"lives": 4, "tested": 15, "held": 14, "widening": 1.2},
+    "hunting": {
+        "state": "quiet",
+        "readings": 200,
+        "corrections": 14,
+        "reversals": 3,
+        "mean_size": 0.0014,
+        "scatter": 0.00091,
+        "probability": 0.999,
+        "expected_corrections": 0.041,
+        "expected_reversals": 0.038,
+        "expected_size": 0.0014,
+        "excess": 0.11,
+        "remedy": None,
+        "text": "14 corrections in 200 readings, 3 took the one before back. Scatter of 0.91 µm alone would correct 4.1 % of the readings.",
+        "what_to_do": "",
+    },
+}
+
+
+class WearOut(BaseModel):
+    """True wear behind the corrections: deviation + corrections in effect / factor, since the tool was changed."""
+
+    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE})
+
+    characteristic: str
+    first_sequence: int | None = Field(description="First reading of this tool that was looked at.")
+    last_sequence: int | None
+    tool_memory: int = Field(description="R10; 0: nothing is corrected.")
+    changed_at: datetime | None = Field(description="When the tool was changed.")
+    corrections_total: float = Field(description="Of the tool since then, those on their way included; mm of offset.")
+    wear_per_part: PerPartOut | None = Field(description="null for fewer than 12 readings of this tool.")
+    forecasts: list[ForecastOut] = Field(description="Empty where no wear is to be seen. Nearest first.")
+    first: Literal["wear", "tolerance", "offset"] | None = Field(
+        description="What comes first while the loop goes on as it does."
+    )
+    record: RecordOut | None = Field(description="null where no edge before tells of it.")
+    hunting: HuntingOut | None = Field(description="null where nothing is corrected.")
+
+    @classmethod
+    def of(cls, wear: Wear) -> "WearOut":
+        """As it is answered."""
+        standing, sequence = wear.standing, wear.now.sequence
+        return cls(
+            characteristic=standing.characteristic.key,
+            first_sequence=int(sequence[0]) if len(sequence) else None,
+            last_sequence=int(sequence[-1]) if len(sequence) else None,
+            tool_memory=standing.parameters.tool_memory,
+            changed_at=wear.changed_at,
+            corrections_total=round(wear.total, 9) + 0.0,
+            wear_per_part=_per_part(wear.fit),
+            forecasts=[
+                _forecast(name, wear.limits[name], forecast)
+                for name, forecast in sorted(wear.forecasts.items(), key=lambda item: item[1].parts)
+            ],
+            first=wear.first[0].value if wear.first else None,
+            record=RecordOut(**wear.record._asdict()) if wear.record else None,
+            hunting=_hunting(wear.hunting, standing.version.parameters),
+        )
+
+
+def _per_part(fit: Fit | None) -> PerPartOut | None:
+    if fit is None:
+        return None
+    low, high = fit.slope_interval
+    return PerPartOut(
+        value=fit.slope,
+        low=low,
+        high=high,
+        standard_error=fit.slope_error,
+        is_wear=fit.is_wear,
+        first_sequence=fit.first,
+        last_sequence=fit.last,
+        readings=fit.count,
+        left_out=fit.left_out,
+        off=fit.off,
+        level=fit.level,
+        scatter=fit.scatter,
+        correlation=fit.correlation,
+    )
+
+
+def _forecast(towards: Towards, limit: float, forecast: Forecast) -> ForecastOut:
+    high = forecast.high if isfinite(forecast.high) else None
+    return ForecastOut(towards=towards.value, limit=limit, parts=forecast.parts, low=forecast.low, high=high)
+
+
+def _hunting(found: Hunting | None, settings: dict[str, Any]) -> HuntingOut | None:
+    if found is None:
+        return None
+    data = wording.hunting_data(found)
+    remedy = data.pop("remedy")
+    return HuntingOut(
+        **data,
+        probability=found.probability,
+        remedy=None if remedy is None else RemedyOut(**{name: remedy[name] for name in RemedyOut.model_fields}),
+        text=wording.hunting_sentence(data),
+        what_to_do=wording.remedy_sentence(data | {"remedy": remedy}, settings),
+    )

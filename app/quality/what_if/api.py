@@ -1,0 +1,181 @@
+"""JSON routes: what if, as numbers, map and figure; proposals of changes and what becomes of them."""
+
+from typing import Annotated, Any, Literal
+
+import msgspec
+from fastapi import Depends, Path, Query, Response
+
+from app.access.deps import AnyCaller, Engineer, Operator, require
+from app.core.replay import LONGEST_DELAY
+from app.loop.characteristics import queries as characteristics
+from app.quality.what_if import actions, proposals, simulation
+from app.quality.what_if.chart import chart_of
+from app.quality.what_if.figures import course_figure
+from app.quality.what_if.schemas import (
+    LARGEST_LENGTH,
+    DecisionIn,
+    MapIn,
+    MapOut,
+    ProposalIn,
+    ProposalOut,
+    WhatIfIn,
+    WhatIfOut,
+)
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep
+from app.web.fields import LARGEST_ID, Limit, Moment, Page, page_of
+from app.web.theme import ThemeName
+
+router = api_router("what-if")
+
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+Number = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the proposal.", examples=[1])]
+Status = Annotated[
+    Literal["open", "outdated", "approved", "rejected", "withdrawn"] | None,
+    Query(description="Only those with this status."),
+]
+Before = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="Cursor: the `next` of the page before.")]
+FIGURE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "A Plotly figure: `data` and `layout`",
+        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
+    }
+}
+
+
+@router.post(
+    "/characteristics/{characteristic}/what-if", responses=problems(404, 429), dependencies=[require("viewer")]
+)
+def replay_readings(session: SessionDep, characteristic: CharacteristicKey, asked: WhatIfIn) -> WhatIfOut:
+    """Replay stored readings with other settings, side by side with today's; nothing is changed.
+
+    The corrections in effect are taken out, the process without them is rebuilt, and the other policy is run in closed loop
+    on it. `likeness` says how far the rebuilt loop is to be believed. At most a million readings; two replays at once.
+    """
+    standing = characteristics.characteristic_named(session, characteristic)
+    return WhatIfOut.of(simulation.replayed(session, standing, asked))
+
+
+@router.post(
+    "/characteristics/{characteristic}/what-if/map", responses=problems(404, 429), dependencies=[require("viewer")]
+)
+def map_settings(session: SessionDep, characteristic: CharacteristicKey, asked: MapIn) -> MapOut:
+    """Replay a grid of k and R33, and say where it is best; cells where R33 < R34 does not hold are blank.
+
+    At most 2500 settings, and 200 million decisions (settings times readings).
+    """
+    standing = characteristics.characteristic_named(session, characteristic)
+    return MapOut.of(simulation.mapped(session, standing, asked))
+
+
+def asked_for(
+    weighting_factor: Annotated[float | None, Query(ge=1, le=1_000_000, description="k (R29); else today's.")] = None,
+    zero_range: Annotated[float | None, Query(ge=0, le=LARGEST_LENGTH, description="R33, mm; else today's.")] = None,
+    averaging_limit: Annotated[
+        float | None, Query(ge=0, le=LARGEST_LENGTH, description="R34, mm; else today's.")
+    ] = None,
+    factor: Annotated[float | None, Query(ge=-1000, le=1000, description="Else today's.")] = None,
+    delay: Annotated[int | None, Query(ge=0, le=LONGEST_DELAY, description="Parts; else as it was most often.")] = None,
+    effect: Annotated[float, Query(ge=0.05, le=5, description="The share of a correction that acts.")] = 1.0,
+    measured: Annotated[bool, Query(description="As measured on these readings, whatever `effect` says.")] = False,
+    last: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="The last so many readings.")] = None,
+    start: Annotated[Moment | None, Query(alias="from", description="Measured at this moment or later.")] = None,
+    end: Annotated[Moment | None, Query(alias="to", description="Measured at this moment or earlier.")] = None,
+) -> WhatIfIn:
+    """The question as an address says it."""
+    return WhatIfIn.model_validate(
+        {
+            "weighting_factor": weighting_factor,
+            "zero_range": zero_range,
+            "averaging_limit": averaging_limit,
+            "factor": factor,
+            "delay": delay,
+            "effect": None if measured else effect,
+            "last": last,
+            "from": start,
+            "to": end,
+        }
+    )
+
+
+@router.get(
+    "/characteristics/{characteristic}/figures/what-if", responses=problems(404, 429) | FIGURE, response_model=None
+)
+def get_what_if_figure(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    asked: Annotated[WhatIfIn, Depends(asked_for)],
+    theme: Annotated[ThemeName, Query(description="For a light or a dark page.")] = "light",
+    width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")] = 1240,
+) -> Response:
+    """Deviations with today's and the other settings, and what each loop had taken out by its corrections."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    figure = course_figure(chart_of(simulation.replayed(session, standing, asked)), theme=theme, width=width)
+    return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})
+
+
+@router.post("/characteristics/{characteristic}/proposals", status_code=201, responses=problems(404, 409, 429))
+def propose_change(
+    session: SessionDep, caller: Operator, characteristic: CharacteristicKey, proposal: ProposalIn, response: Response
+) -> ProposalOut:
+    """Propose settings as a change of the parameters; the figures side by side are kept with it as evidence."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    row = actions.propose(session, simulation.replayed(session, standing, proposal), proposal.reason, caller)
+    response.headers["Location"] = f"/api/v1/proposals/{row.proposal.id}"
+    return ProposalOut.of(row)
+
+
+@router.get("/characteristics/{characteristic}/proposals", responses=problems(404))
+def list_proposals_of(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    status: Status = None,
+    before: Before = None,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[ProposalOut]:
+    """Proposals for this characteristic, newest first."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    rows = proposals.proposals(
+        session, characteristic=standing.characteristic, status=status, before=before, limit=limit + 1
+    )
+    return page_of([ProposalOut.of(row) for row in rows], limit, lambda row: row.id)
+
+
+@router.get("/proposals", dependencies=[require("viewer")])
+def list_proposals(
+    session: SessionDep,
+    status: Status = None,
+    before: Before = None,
+    limit: Annotated[Limit, Query()] = 100,
+) -> Page[ProposalOut]:
+    """All proposals, newest first."""
+    rows = proposals.proposals(session, status=status, before=before, limit=limit + 1)
+    return page_of([ProposalOut.of(row) for row in rows], limit, lambda row: row.id)
+
+
+@router.get("/proposals/{proposal}", responses=problems(404), dependencies=[require("viewer")])
+def get_proposal(session: SessionDep, proposal: Number) -> ProposalOut:
+    """One proposal with its evidence."""
+    return ProposalOut.of(proposals.proposal(session, proposal))
+
+
+@router.post("/proposals/{proposal}/approve", responses=problems(404, 409))
+def approve_proposal(session: SessionDep, caller: Engineer, proposal: Number, decision: DecisionIn) -> ProposalOut:
+    """Put it in force as a new version of the parameters; 409 if they have changed since it was proposed."""
+    return ProposalOut.of(actions.approve(session, proposal, decision.reason, caller))
+
+
+@router.post("/proposals/{proposal}/reject", responses=problems(404, 409))
+def reject_proposal(session: SessionDep, caller: Engineer, proposal: Number, decision: DecisionIn) -> ProposalOut:
+    """Say no, and why."""
+    return ProposalOut.of(actions.reject(session, proposal, decision.reason, caller))
+
+
+@router.post("/proposals/{proposal}/withdraw", responses=problems(404, 409))
+def withdraw_proposal(session: SessionDep, caller: Operator, proposal: Number, decision: DecisionIn) -> ProposalOut:
+    """Take back what one has proposed oneself."""
+    return ProposalOut.of(actions.withdraw(session, proposal, decision.reason, caller))

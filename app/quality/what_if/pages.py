@@ -1,0 +1,226 @@
+"""Pages: the what-if of a characteristic, the list of proposals, and one proposal with its evidence."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.access.deps import Caller, Operator, Viewer, require
+from app.core.policy_map import Criterion
+from app.errors import Conflict, InbandError, Invalid, TooManyRequests
+from app.language.i18n import _
+from app.loop.characteristics import queries as characteristics
+from app.loop.characteristics.queries import Standing
+from app.quality.proof import queries as proof
+from app.quality.proof import wording as proof_wording
+from app.quality.what_if import actions, form_reader, map_axes, proposals, simulation, wording
+from app.quality.what_if.evidence import effect_of, period_of, quote_of
+from app.quality.what_if.map_view import view_of
+from app.quality.what_if.queries import Map, Simulation
+from app.quality.what_if.schemas import DecisionIn, ProposalIn
+from app.web.deps import FormDep, SessionDep
+from app.web.fields import LARGEST_ID
+from app.web.forms import by_field, parsed
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+ON_PAGE = 50
+Number = Annotated[int, Path(ge=1, le=LARGEST_ID)]
+VERBS = {
+    "approve": (actions.approve, "approved"),
+    "reject": (actions.reject, "rejected"),
+    "withdraw": (actions.withdraw, "withdrawn"),
+}
+Word = Annotated[str | None, Query(max_length=40)]
+
+
+@router.get("/characteristics/{characteristic}/what-if")
+def what_if_page(request: Request, session: SessionDep, caller: Viewer, characteristic: str) -> Response:
+    """Today's settings and others side by side, the map, and the form to propose them."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    return _what_if(request, session, caller, standing, form_reader.typed_from(request.query_params))
+
+
+def _what_if(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    standing: Standing,
+    typed: dict[str, str],
+    *,
+    reason: str = "",
+    refused: InbandError | None = None,
+) -> Response:
+    answer: Simulation | None = None
+    map_result: Map | Invalid | None = None
+    status, problem, errors = 200, refused, form_reader.at_fields(by_field(refused)) if refused else {}
+    try:
+        request_body = form_reader.request_of(typed)
+        answer, map_result = simulation.both(session, standing, request_body, form_reader.map_request(typed))
+    except (Invalid, TooManyRequests) as error:
+        # That a period holds nothing to replay is no mistake of who looks at it.
+        status = error.status if error.errors or isinstance(error, TooManyRequests) else 200
+        problem, errors = error, form_reader.at_fields(by_field(error))
+    changes = wording.changed(asdict(answer.past.standing.parameters), actions.changes_of(answer)) if answer else []
+    key, failing = standing.characteristic.key, proof.failing()
+    criterion = Criterion(typed["goal"]) if typed["goal"] in set(Criterion) else Criterion.PPK
+    return page(
+        request,
+        "what_if/what_if.html",
+        status=refused.status if refused else status,
+        characteristic=standing.characteristic,
+        machine=standing.machine,
+        version=standing.version.version,
+        today=standing.parameters,
+        typed=typed,
+        periods=form_reader.periods(typed["last"]),
+        placeholders=form_reader.placeholders(standing.parameters, answer.past.delay if answer else None),
+        errors=errors,
+        problem=problem,
+        answer=answer,
+        changes=changes,
+        rows=_rows(answer, other=bool(changes)) if answer else [],
+        gained=wording.gained(answer.today, answer.other) if answer else [],
+        measured=effect_of(answer.effect) if answer else None,
+        assumed=wording.assumed(answer.settings.effect, answer.delay) if answer else "",
+        period=period_of(answer.past) if answer else None,
+        effects=form_reader.effects(typed["effect"]),
+        cautions=wording.cautions(answer.past) if answer else [],
+        map=view_of(map_result, answer, typed, key) if answer and isinstance(map_result, Map) else None,
+        no_map=map_result if isinstance(map_result, Invalid) else None,
+        criteria=[(criterion_.value, wording.criterion(criterion_)) for criterion_ in Criterion],
+        criterion=criterion,
+        averaging_limits=[
+            (
+                wording.short_um(r34),
+                form_reader.address(key, typed, r34=wording.short_um(r34)) + "#map",
+                _same(r34, answer),
+            )
+            for r34 in map_axes.averaging_limits(standing.parameters)
+        ],
+        link=lambda **changes: form_reader.address(key, typed, **changes),
+        figure_url=f"/api/v1/characteristics/{key}/figures/what-if?{form_reader.figure_query(request_body)}"
+        if answer
+        else None,
+        open_proposals=proposals.proposals(session, characteristic=standing.characteristic, status="open"),
+        reason=reason,
+        may_propose=caller.may("operator"),
+        wording=wording,
+        proof_failing=failing,
+        proof_warning=proof_wording.warning(len(failing)),
+    )
+
+
+def _rows(answer: Simulation, *, other: bool) -> list[tuple[str, list[str]]]:
+    """Side by side, with the other settings where there are any."""
+    columns = list(zip((answer.truly, answer.today, answer.other), answer.quotes, strict=True))[: 3 if other else 2]
+    return wording.rows([figures for figures, _quote in columns], [quote_of(quote) for _figures, quote in columns])
+
+
+def _same(r34: float, answer: Simulation | None) -> bool:
+    return answer is not None and abs(answer.parameters.averaging_limit - r34) < 1e-9
+
+
+@router.post("/characteristics/{characteristic}/what-if")
+def send_proposal(
+    request: Request, session: SessionDep, caller: Operator, characteristic: str, form: FormDep
+) -> Response:
+    """Propose what was replayed; the evidence is worked out anew from the same question."""
+    standing = characteristics.characteristic_named(session, characteristic)
+    typed = form_reader.typed_from(form)
+    try:
+        fields = form_reader.request_of(typed).model_dump(by_alias=True)
+        proposal = parsed(ProposalIn, fields | {"reason": form.get("reason", "").strip()})
+        answer = simulation.replayed(session, standing, proposal)
+        with session.begin_nested():  # what is refused lets the machine go at once
+            row = actions.propose(session, answer, proposal.reason, caller)
+    except (Invalid, Conflict, TooManyRequests) as error:
+        session.expire_all()
+        standing = characteristics.characteristic_named(session, characteristic)
+        return _what_if(request, session, caller, standing, typed, reason=form.get("reason", ""), refused=error)
+    return RedirectResponse(f"/proposals/{row.proposal.id}?done=proposed", 303)
+
+
+@router.get("/proposals", dependencies=[require("viewer")])
+def proposals_page(
+    request: Request,
+    session: SessionDep,
+    status: Annotated[str | None, Query(max_length=20)] = None,
+    before: Annotated[int | None, Query(ge=1, le=LARGEST_ID)] = None,
+) -> Response:
+    """Proposals, newest first: those that wait, or all."""
+    chosen = status if status in proposals.STATUSES else "all" if status == "all" else "open"
+    rows = proposals.proposals(session, status=None if chosen == "all" else chosen, before=before, limit=ON_PAGE + 1)
+    older = f"/proposals?status={chosen}&before={rows[ON_PAGE - 1].proposal.id}" if len(rows) > ON_PAGE else None
+    return page(
+        request,
+        "what_if/proposals.html",
+        rows=rows[:ON_PAGE],
+        chosen=chosen,
+        statuses=[*proposals.STATUSES, "all"],
+        older=older,
+        newest=f"/proposals?status={chosen}" if before else None,
+        wording=wording,
+        changes=wording.proposed,
+    )
+
+
+@router.get("/proposals/{number}")
+def proposal_page(request: Request, session: SessionDep, caller: Viewer, number: Number, done: Word = None) -> Response:
+    """One proposal: what it changes, what the replay found, who decides."""
+    return _proposal(request, session, caller, number, done=done)
+
+
+@router.post("/proposals/{number}")
+def send_decision(request: Request, session: SessionDep, caller: Operator, number: Number, form: FormDep) -> Response:
+    """Approve it, reject it or withdraw it, with a reason."""
+    verb = form.get("do", "")
+    if verb not in VERBS:
+        raise Invalid(_("Say what to do: approve, reject or withdraw."))
+    act, becomes = VERBS[verb]
+    try:
+        reason = parsed(DecisionIn, {"reason": form.get("reason", "").strip()}).reason
+        with session.begin_nested():
+            act(session, number, reason, caller)
+    except (Invalid, Conflict) as error:
+        session.expire_all()
+        return _proposal(request, session, caller, number, typed=form, error=error)
+    return RedirectResponse(f"/proposals/{number}?done={becomes}", 303)
+
+
+def _proposal(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    number: int,
+    *,
+    done: str | None = None,
+    typed: Mapping[str, Any] | None = None,
+    error: InbandError | None = None,
+) -> Response:
+    row = proposals.proposal(session, number)
+    evidence = row.proposal.evidence
+    truly, today, other = (wording.stored(evidence[name]) for name in ("truly", "today", "other"))
+    return page(
+        request,
+        "what_if/proposal.html",
+        status=error.status if error else 200,
+        row=row,
+        proposal=row.proposal,
+        evidence=evidence,
+        differences=wording.proposed(row),
+        rows=wording.rows([truly, today, other], [evidence[name] for name in ("truly", "today", "other")]),
+        gained=wording.gained(today, other),
+        assumed=wording.assumed(evidence["effect"], evidence["delay"]),
+        replay_again=form_reader.again(row.characteristic.key, row.proposal.changes, evidence),
+        done=wording.done(done) if done else None,
+        typed=typed or {},
+        errors=by_field(error) if error else {},
+        problem=error,
+        may_decide=caller.may("engineer"),
+        may_withdraw=caller.may("operator") and row.proposal.proposed_by == caller.name,
+        wording=wording,
+    )

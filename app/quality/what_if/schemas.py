@@ -1,0 +1,289 @@
+"""What-if, map and proposals as JSON. Lengths in mm."""
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.core.policy_map import Criterion
+from app.core.replay import LONGEST_DELAY
+from app.quality.what_if.evidence import cell_of, evidence_of, period_of
+from app.quality.what_if.examples import EXAMPLE_ANSWER, EXAMPLE_MAP, EXAMPLE_PROPOSAL
+from app.quality.what_if.proposals import ProposalRow
+from app.quality.what_if.queries import USUAL, Map, Simulation
+from app.web.fields import LARGEST_ID, Body, Moment, Reason
+
+LARGEST_LENGTH = 100_000.0
+Length = Annotated[float, Field(ge=0, le=LARGEST_LENGTH, strict=True)]
+
+
+class PeriodIn(Body):
+    """Readings to replay: the last so many of those measured from … to; 1000 unless chosen otherwise."""
+
+    last: Annotated[int | None, Field(ge=1, le=LARGEST_ID, strict=True, description="The last so many readings.")] = (
+        None
+    )
+    start: Annotated[Moment | None, Field(alias="from", description="Measured at this moment or later.")] = None
+    end: Annotated[Moment | None, Field(alias="to", description="Measured at this moment or earlier.")] = None
+
+    @property
+    def newest(self) -> int | None:
+        """Largest number of readings."""
+        return USUAL if self.last is None and self.start is None and self.end is None else self.last
+
+
+class SettingsIn(PeriodIn):
+    """Settings in place of today's; what is left out is as today."""
+
+    averaging_limit: Annotated[Length | None, Field(description="R34.")] = None
+    factor: Annotated[
+        float | None,
+        Field(
+            ge=-1000,
+            le=1000,
+            strict=True,
+            description="The factor that the loop believes in; the machine keeps its own.",
+        ),
+    ] = None
+    delay: Annotated[
+        int | None,
+        Field(
+            ge=0,
+            le=LONGEST_DELAY,
+            strict=True,
+            description="Parts that come out with the old offset after a correction was issued; null: as it was most often.",
+        ),
+    ] = None
+    effect: Annotated[
+        float | None,
+        Field(
+            ge=0.05,
+            le=5,
+            strict=True,
+            description="The share of a correction that acts: 1 is in full; null: as measured on these readings.",
+        ),
+    ] = 1.0
+
+
+class WhatIfIn(SettingsIn):
+    """Readings to replay, and the selected settings."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"example": {"zero_range": 0.0027, "weighting_factor": 3, "last": 1000}}
+    )
+
+    weighting_factor: Annotated[float | None, Field(ge=1, le=1_000_000, strict=True, description="k (R29).")] = None
+    zero_range: Annotated[Length | None, Field(description="R33.")] = None
+
+
+class MapIn(SettingsIn):
+    """A grid of k and R33 to replay; left out it is made of round values about today's."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {"weighting_factors": [1, 2, 3], "zero_ranges": [0.001, 0.002], "criterion": "ppk", "last": 1000}
+        }
+    )
+
+    weighting_factors: Annotated[
+        list[Annotated[float, Field(ge=1, le=1_000_000, strict=True)]] | None,
+        Field(min_length=1, max_length=200, description="Values of k, a row each."),
+    ] = None
+    zero_ranges: Annotated[
+        list[Length] | None, Field(min_length=1, max_length=200, description="Values of R33, a column each.")
+    ] = None
+    criterion: Annotated[Criterion, Field(description="By what the best region is found.")] = Criterion.PPK
+
+
+class ProposalIn(WhatIfIn):
+    """The settings to propose; the evidence is worked out anew."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {"zero_range": 0.0027, "last": 1000, "reason": "Half the corrections, fewer rejects"}
+        }
+    )
+
+    reason: Reason
+
+
+class DecisionIn(Body):
+    """Reason why it is approved, rejected or withdrawn."""
+
+    model_config = ConfigDict(json_schema_extra={"example": {"reason": "Agreed with the shop floor"}})
+
+    reason: Reason
+
+
+class FiguresOut(BaseModel):
+    """Result of a replay. Mean, spread, Ppk and largest deviation are of the readings within R37."""
+
+    readings: int = Field(description="Readings that count; excluded ones do not.")
+    rejects: int = Field(description="Parts out of tolerance by their raw deviation; probe faults apart.")
+    oversize: int
+    undersize: int
+    worn: int = Field(description="Readings in the wear zone.")
+    faults: int = Field(description="Probe faults.")
+    offset_limit: int = Field(description="Corrections not made because of max_total.")
+    corrections: int
+    of_tool: int = Field(description="Corrections of its tool in all, those of other characteristics included.")
+    held: int = Field(description="Corrections that were held.")
+    mean_size: float | None = Field(description="Mean size error that a correction removed.")
+    inner: int = Field(description="Readings within R37.")
+    mean: float | None
+    spread: float | None = Field(description="Standard deviation of the sample.")
+    ppk: float | None = Field(
+        description="As if the readings were normal, to compare settings by; `quoted` is what may be quoted. null of fewer than 20 readings, and of readings that are too coarse."
+    )
+    largest: float | None = Field(description="Largest deviation, without its sign.")
+    alarms: int = Field(description="Readings that raise an alarm by their size.")
+    quote: Literal["cpk", "ppk", "percentile", "none"] | None = Field(
+        None, description="The index that may be quoted, as on the page of capability; null in the cells of a map."
+    )
+    quoted: float | None = Field(None, description="Its value.")
+    why_none: str | None = Field(None, description="Code of the reason why none may be.")
+
+
+class ReplayOut(FiguresOut):
+    """A replay with its settings."""
+
+    settings: dict[str, float] = Field(description="k, R33, R34 and factor by name.")
+
+
+class LikenessOut(BaseModel):
+    """The replay as it was set then, held against what truly happened."""
+
+    verdict: Literal["well", "roughly", "badly", "unknown"]
+    off: float | None = Field(description="Root mean square of the difference between parts.")
+    same: float | None = Field(description="Share of parts that are the same to 0.1 µm.")
+    text: str
+    replayed: FiguresOut
+
+
+class EffectOut(BaseModel):
+    """Measured share of a correction that acts: the slope with its 95 % interval; null where the readings do not show it."""
+
+    value: float | None
+    low: float | None
+    high: float | None
+    corrections: int | None
+    readings: int | None
+    typical: float | None = Field(description="Median change of size that was commanded.")
+    scatter: float | None
+    is_full: bool | None = Field(description="Whether the interval holds 1.")
+    text: str
+
+
+class PeriodOut(BaseModel):
+    """The readings that were replayed."""
+
+    characteristic: str
+    first_sequence: int
+    last_sequence: int
+    start: datetime
+    end: datetime
+    readings: int
+    left_out: int = Field(description="Readings of which nobody knows with which corrections they were cut.")
+
+
+class WhatIfOut(PeriodOut):
+    """Side by side: what was, today's settings and the others, both replayed."""
+
+    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE_ANSWER})
+
+    parameters_version: int = Field(description="Today's.")
+    delay: int = Field(description="Parts between a correction and its effect in the replay.")
+    effect: float = Field(description="The share of a correction that acts in the replay.")
+    truly: FiguresOut
+    likeness: LikenessOut
+    today: ReplayOut
+    other: ReplayOut
+    measured_effect: EffectOut
+    cautions: list[str]
+
+    @classmethod
+    def of(cls, answer: Simulation) -> "WhatIfOut":
+        """As it is answered."""
+        return cls.model_validate(evidence_of(answer))
+
+
+class CellOut(BaseModel):
+    """One setting of the map."""
+
+    weighting_factor: float
+    zero_range: float
+    figures: FiguresOut | None = Field(description="null where R33 < R34 does not hold.")
+    inside: bool = Field(description="As good as the best: within two standard errors of it, or 5 %.")
+    best: bool
+    calmest: bool = Field(description="Of those as good as the best the one that corrects least.")
+    reason: str | None = Field(description="Why there are no figures.")
+
+
+class MapOut(PeriodOut):
+    """A grid of settings, row by row of k."""
+
+    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE_MAP})
+
+    criterion: Criterion
+    averaging_limit: float
+    delay: int
+    today: FiguresOut = Field(description="Today's settings, replayed.")
+    cells: list[CellOut]
+
+    @classmethod
+    def of(cls, made: Map) -> "MapOut":
+        """As it is answered."""
+        return cls.model_validate(
+            period_of(made.past)
+            | {
+                "criterion": made.criterion,
+                "averaging_limit": made.averaging_limit,
+                "delay": made.delay,
+                "today": made.today._asdict() | {"alarms": made.today.alarms},
+                "cells": [cell_of(made, at, cell) for at, cell in enumerate(made.cells)],
+            }
+        )
+
+
+class ProposalOut(BaseModel):
+    """A change of parameters that somebody proposed, with its evidence."""
+
+    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE_PROPOSAL})
+
+    id: int
+    characteristic: str
+    machine: str
+    status: Literal["open", "outdated", "approved", "rejected", "withdrawn"] = Field(
+        description="outdated: open, but the parameters have changed since."
+    )
+    from_version: int = Field(description="The version it changes.")
+    changes: dict[str, float] = Field(description="Parameters by name.")
+    reason: str
+    proposed_by: str
+    proposed_at: datetime
+    decided_by: str | None
+    decided_at: datetime | None
+    decided_why: str | None
+    made_version: int | None = Field(description="The version that approving it made.")
+    evidence: dict[str, Any] = Field(description="What the what-if answered when it was proposed.")
+
+    @classmethod
+    def of(cls, row: ProposalRow) -> "ProposalOut":
+        """As it is answered."""
+        proposal = row.proposal
+        return cls(
+            id=proposal.id,
+            characteristic=row.characteristic.key,
+            machine=row.machine.key,
+            status=row.status,  # type: ignore[arg-type]
+            from_version=proposal.from_version,
+            changes=proposal.changes,
+            reason=proposal.reason,
+            proposed_by=proposal.proposed_by,
+            proposed_at=proposal.proposed_at,
+            decided_by=proposal.decided_by,
+            decided_at=proposal.decided_at,
+            decided_why=proposal.decided_why,
+            made_version=proposal.made_version,
+            evidence=proposal.evidence,
+        )

@@ -1,0 +1,93 @@
+"""From what somebody asks to what is replayed, one at a turn."""
+
+from sqlalchemy.orm import Session
+
+from app.core.policy_map import with_settings
+from app.core.spc.refusal import Refused
+from app.errors import FieldError, Invalid
+from app.language.i18n import _
+from app.loop.characteristics.queries import Standing
+from app.loop.summaries import queries as statistics
+from app.quality.what_if import map_axes, queries
+from app.quality.what_if.queries import Map, Settings, Simulation
+from app.quality.what_if.schemas import MapIn, PeriodIn, SettingsIn, WhatIfIn
+from app.quality.what_if.tool_history import ToolHistory
+from app.quality.what_if.turn_limit import turn
+
+
+def replayed(session: Session, standing: Standing, given: WhatIfIn) -> Simulation:
+    """Side by side. Raises `Invalid`, `TooManyRequests`."""
+    with turn():
+        past = _past(session, standing, given)
+        answer = queries.side_by_side(session, past, settings(past, given))
+        _said = answer.effect  # worked out in turn, too
+    return answer
+
+
+def mapped(session: Session, standing: Standing, given: MapIn) -> Map:
+    """The map. Raises `Invalid`, `TooManyRequests`."""
+    with turn():
+        return map_of(_past(session, standing, given), given)
+
+
+def map_of(past: ToolHistory, given: MapIn) -> Map:
+    """The map of a past that is loaded already."""
+    today = past.standing.parameters
+    r34 = today.averaging_limit if given.averaging_limit is None else given.averaging_limit
+    chosen = Settings(averaging_limit=given.averaging_limit, factor=given.factor)
+    queries.check_order(with_settings(chosen.applied_to(today), zero_range=0.0), chosen)
+    ks, r33s = map_axes.weighting_factors(today), map_axes.zero_ranges(today, r34)
+    if len(ks) * len(r33s) * len(past.trace.free) > queries.MOST_DECISIONS:
+        ks, r33s = map_axes.coarser(ks, today.weighting_factor), map_axes.coarser(r33s, today.zero_range)
+    return queries.map_of(
+        past,
+        settings(past, given),
+        ks if given.weighting_factors is None else given.weighting_factors,
+        r33s if given.zero_ranges is None else given.zero_ranges,
+        given.criterion,
+    )
+
+
+def both(session: Session, standing: Standing, given: WhatIfIn, around: MapIn) -> tuple[Simulation, Map | Invalid]:
+    """Side by side, and the map of the same period, or why there is none."""
+    with turn():
+        past = _past(session, standing, given)
+        answer = queries.side_by_side(session, past, settings(past, given))
+        _said = answer.effect
+        try:
+            return answer, map_of(past, around)
+        except Invalid as refused:
+            return answer, refused
+
+
+def settings(past: ToolHistory, given: SettingsIn) -> Settings:
+    """The settings asked for; a measured effect is measured. Raises `Invalid` where it cannot be."""
+    effect = 1.0
+    if given.effect is None:
+        measured = queries.effect_of(past)
+        if isinstance(measured, Refused):
+            message = _("These readings do not show the effect of corrections.")
+            raise Invalid(message, _("Assume that they act in full."), errors=[FieldError("effect", message)])
+        effect = measured.value
+        if not 0.05 <= effect <= 5:
+            message = _("The effect that was measured, {value}, is none to replay with.").format(value=f"{effect:.2f}")
+            raise Invalid(message, _("Look at the factor first."), errors=[FieldError("effect", message)])
+    else:
+        effect = given.effect
+    one = given if isinstance(given, WhatIfIn) else None
+    return Settings(
+        weighting_factor=one.weighting_factor if one else None,
+        zero_range=one.zero_range if one else None,
+        averaging_limit=given.averaging_limit,
+        factor=given.factor,
+        delay=given.delay,
+        effect=effect,
+    )
+
+
+def _past(session: Session, standing: Standing, given: PeriodIn) -> ToolHistory:
+    if given.start is not None and given.end is not None and given.start > given.end:
+        message = _("is later than `to`; exchange the two moments")
+        raise Invalid(f"from: {message}.", errors=[FieldError("from", message)])
+    window = statistics.window_of(session, standing.characteristic, last=given.newest, start=given.start, end=given.end)
+    return queries.load(session, standing, window)

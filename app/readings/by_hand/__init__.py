@@ -1,1 +1,0 @@
-"""What people measure by hand, with a micrometer or a plug gauge, beside the machine's own value of the same part."""

@@ -1,1 +1,0 @@
-"""What a run of readings amounts to: its numbers, its spread, and the course that charts are drawn from."""

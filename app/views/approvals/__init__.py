@@ -1,0 +1,1 @@
+"""Approvals: corrections that wait for a person, and what may be done with them."""

@@ -1,0 +1,1 @@
+"""The page of one characteristic: zone chart, results, decisions."""

@@ -1,0 +1,139 @@
+"""Page: the capability of a characteristic."""
+
+from datetime import datetime
+from typing import Annotated, Any
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request, Response
+
+from app.access.deps import AnyCaller, require
+from app.core.spc.refusal import Refused
+from app.errors import Invalid
+from app.files.formats import cell_values
+from app.language.i18n import _
+from app.language.times import plant_zone
+from app.loop.characteristics import queries as characteristics
+from app.loop.summaries import wording as statistics
+from app.quality.capability import wording
+from app.quality.capability.pictures import interval
+from app.quality.capability.queries import CONFIDENCE, USUAL, Side
+from app.quality.capability.request import Confidence, Last, OneSide, StudyRequest, in_order, study_of
+from app.quality.gauge_studies import queries as gauges
+from app.quality.gauge_studies import wording as gauge_wording
+from app.quality.proof import queries as proof
+from app.quality.proof import wording as proof_wording
+from app.web.deps import SessionDep
+from app.web.forms import by_field
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+RUNS = ("125", "500", "1000", "5000", "all")
+
+
+def _typed(
+    given: dict[str, str], last: str | None, side: Side, confidence: float
+) -> tuple[StudyRequest, dict[str, str]]:
+    """Read the typed window, with errors by field; if there are any, the last readings. Moments are of the plant's time zone, unless another is named."""
+    errors: dict[str, str] = {}
+    zone, moments = None, dict[str, datetime | None]()
+    try:
+        zone = cell_values.zone_named(given["timezone"].strip() or plant_zone().key)
+    except (cell_values.Unreadable, ValueError) as error:
+        errors["timezone"] = str(error)
+    for name in ("from", "to"):
+        text = given[name].strip()
+        try:
+            moments[name] = cell_values.moment(text, zone, fold=1 if name == "to" else 0) if text else None
+        except cell_values.Unreadable as error:
+            errors[name] = str(error)
+    choice = StudyRequest(last, None, None, side, confidence)
+    if not errors:
+        try:
+            return in_order(choice._replace(start=moments["from"], end=moments["to"])), {}
+        except Invalid as error:
+            errors |= by_field(error)
+    return choice, errors
+
+
+Typed = Annotated[str, Query(max_length=64)]
+
+
+@router.get("/characteristics/{characteristic}/capability", dependencies=[require("viewer")])
+def capability_page(
+    request: Request,
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: str,
+    start: Annotated[str, Query(alias="from", max_length=64)] = "",
+    end: Annotated[str, Query(alias="to", max_length=64)] = "",
+    timezone: Typed = "",
+    last: Last = None,
+    side: OneSide = "both",
+    confidence: Confidence = CONFIDENCE,
+) -> Response:
+    """Indices with intervals and what they are worth, spread and shape, behaviour in time, the tool without corrections."""
+    typed = {"from": start, "to": end, "timezone": timezone}
+    choice, errors = _typed(typed, last, side, confidence)
+    standing = characteristics.characteristic_named(session, characteristic)
+    study = study_of(session, standing, choice)
+    path = f"/characteristics/{standing.characteristic.key}/capability"
+    now = _query(choice)
+
+    def link(**changes: Any) -> str:
+        unchanged = now if not changes.keys() & {"last"} else {"side": choice.side}
+        return f"{path}?{urlencode({name: value for name, value in (unchanged | changes).items() if value})}"
+
+    def figure(picture: str) -> str:
+        address = f"/api/v1/characteristics/{standing.characteristic.key}/figures/capability"
+        return f"{address}?{urlencode(now | {'picture': picture})}"
+
+    place = {"machine_id": standing.machine.id, "characteristic_id": standing.characteristic.id}
+    timed = choice.start is not None or choice.end is not None
+    failing = proof.failing()
+    return page(
+        request,
+        "capability/capability.html",
+        status=422 if errors else 200,
+        typed=typed,
+        errors=errors,
+        study=study,
+        characteristic=standing.characteristic,
+        machine=standing.machine,
+        parameters=standing.parameters,
+        choice=choice,
+        runs=[
+            (_("All") if run == "all" else run, link(last=run), not timed and run == (choice.last or str(USUAL)))
+            for run in RUNS
+        ],
+        sides=[
+            (words, link(side=side), side == choice.side)
+            for side, words in (
+                ("both", _("Both limits")),
+                ("upper", _("Upper only")),
+                ("lower", _("Lower only")),
+            )
+        ],
+        figure=figure,
+        interval=interval,
+        refused=lambda value: isinstance(value, Refused),
+        wording=wording,
+        words=statistics,
+        gauge_studies=gauges.studies(session, **place, limit=3),
+        about_zero_range=gauges.latest_advice(session, standing),
+        gauge_wording=gauge_wording,
+        may_enter=caller.may("operator"),
+        proof_failing=failing,
+        proof_warning=proof_wording.warning(len(failing)),
+    )
+
+
+def _query(choice: StudyRequest) -> dict[str, str]:
+    """The choice as the address says it."""
+    named = {
+        "last": choice.last,
+        "from": choice.start.isoformat() if choice.start else None,
+        "to": choice.end.isoformat() if choice.end else None,
+        "side": None if choice.side == "both" else choice.side,
+        "confidence": None if choice.confidence == 0.95 else f"{choice.confidence:g}",
+    }
+    return {name: value for name, value in named.items() if value is not None}

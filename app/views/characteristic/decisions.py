@@ -1,0 +1,129 @@
+"""The decisions on the readings of one characteristic, as its page lists and opens them. Never writes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.core.decision.limits import within_tolerance
+from app.core.decision.step import deviation_of
+from app.core.parameters import Parameters
+from app.core.probing import sections_of
+from app.errors import NotFound
+from app.language.i18n import _
+from app.loop.characteristics.queries import Standing
+from app.loop.readings import queries as readings
+from app.loop.tables.alarms import Alarm
+from app.loop.tables.characteristics import ParametersVersion
+from app.loop.tables.readings import ReadingTouches
+from app.loop.tables.tools import Correction
+
+
+class Section(NamedTuple):
+    """One section of a part, mm: its corrected size and its deviation; `inside` is on the limit too."""
+
+    size: float
+    deviation: float
+    inside: bool
+
+
+@dataclass(frozen=True)
+class Decision:
+    """One reading with everything that hangs on it, as it stands now.
+
+    reading: the answer that it was given (`app.loop.readings.answers`). touches: one list of repeats per point, mm.
+    """
+
+    reading: dict[str, Any]
+    correction: Correction | None
+    alarms: list[Alarm]
+    touches: list[list[float]] | None
+
+    @property
+    def sequence(self) -> int:
+        return int(self.reading["sequence"])
+
+    def sections(self, limits: Parameters) -> list[Section]:
+        """The sections of a part accepted by n of m, judged as the reading was: with the empirical value of then."""
+        if not self.touches or limits.accept_m == 1:
+            return []
+        empirical_value = self.reading["measured"] - limits.target - self.reading["deviation"]
+        deviations = [
+            deviation_of(value, limits.target, empirical_value) for value in sections_of(limits, self.point_means)
+        ]
+        return [
+            Section(limits.target + deviation, deviation, within_tolerance(deviation, limits.limits))
+            for deviation in deviations
+        ]
+
+    @property
+    def point_means(self) -> list[float]:
+        """The mean of the repeats at each point, mm."""
+        return [sum(point) / len(point) for point in self.touches or () if point]
+
+
+def decisions(session: Session, standing: Standing, *, before: int | None = None, limit: int = 25) -> list[Decision]:
+    """The decisions before a reading's number (or the last ones), newest first."""
+    entry = readings.entry_of(session, standing.characteristic.key)
+    assert entry is not None
+    answers = readings.answers(session, entry, readings.latest(session, entry, before, limit))
+    return _complete(session, standing, answers)
+
+
+def decision(session: Session, standing: Standing, sequence: int) -> Decision:
+    """The decision on one reading. Raises `NotFound`."""
+    entry = readings.entry_of(session, standing.characteristic.key)
+    assert entry is not None
+    (only,) = _complete(session, standing, [readings.detail(session, entry, sequence)])
+    return only
+
+
+def _complete(session: Session, standing: Standing, answers: Sequence[dict[str, Any]]) -> list[Decision]:
+    machine_id, characteristic_id = standing.machine.id, standing.characteristic.id
+    numbers = [answer["correction"]["number"] for answer in answers if answer["correction"]]
+    corrections: dict[int, Correction] = {}
+    if numbers:
+        rows = session.scalars(
+            select(Correction).where(Correction.machine_id == machine_id, Correction.number.in_(numbers))
+        )
+        corrections = {row.number: row for row in rows}
+    ids = {alarm["id"] for answer in answers for alarm in answer["alarms"]}
+    alarms: dict[int, Alarm] = {}
+    if ids:
+        alarm_rows = session.scalars(select(Alarm).where(Alarm.machine_id == machine_id, Alarm.id.in_(ids)))
+        alarms = {row.id: row for row in alarm_rows}
+    touches: dict[int, list[list[float]]] = {}
+    if answers:
+        rows_of_touches = session.execute(
+            select(ReadingTouches.sequence, ReadingTouches.touches).where(
+                ReadingTouches.machine_id == machine_id,
+                ReadingTouches.characteristic_id == characteristic_id,
+                ReadingTouches.sequence.in_([answer["sequence"] for answer in answers]),
+            )
+        )
+        touches = {sequence: stored for sequence, stored in rows_of_touches}  # noqa: C416 - rows are no pairs to mypy
+    return [
+        Decision(
+            answer,
+            corrections.get(answer["correction"]["number"]) if answer["correction"] else None,
+            [alarms[alarm["id"]] for alarm in answer["alarms"] if alarm["id"] in alarms],
+            touches.get(answer["sequence"]),
+        )
+        for answer in answers
+    ]
+
+
+def version_of(session: Session, standing: Standing, version: int) -> ParametersVersion:
+    """The version of the parameters that a reading was judged by. Raises `NotFound`."""
+    characteristic = standing.characteristic
+    row = session.get(ParametersVersion, (characteristic.machine_id, characteristic.id, version))
+    if row is None:
+        raise NotFound(
+            _("Characteristic {key} has no version {version} of its parameters.").format(
+                key=characteristic.key, version=version
+            ),
+            _("The page of the characteristic lists its versions."),
+        )
+    return row

@@ -1,0 +1,183 @@
+"""Bands of the chart: their backgrounds, the limits above and below, and the words at the right."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from app.core.decision.limits import HasLimits
+from app.language.i18n import _
+from app.language.numbers import MINUS, NO_BREAK_SPACE, NOTHING
+from app.views.characteristic.figures.scale import Band, Scale, ZoneScale, bands
+from app.web.theme import Palette
+
+# In the linear scale close limits would write over each other: the least distance as a share of the whole height.
+LEAST_DISTANCE = 0.046
+TWO_THIRDS = 0.0005  # from ⅔ at most, to be called so: 5.333 µm of 8 µm are
+
+
+def limit_title(limit: str, limits: HasLimits) -> str:
+    """The name of a limit in the manual; of R34 its true share of the half tolerance, which the manual puts at ⅔."""
+    return {
+        "R33": _("zero compensation"),
+        "R34": _("{share} of the half tolerance").format(share=_share(limits)),
+        "R35/2": _("tolerance"),
+        "R37": _("dimensional difference"),
+        "R36": _("safe area"),
+    }[limit]
+
+
+def _share(limits: HasLimits) -> str:
+    """R34 as a share of R35/2."""
+    half = limits.tolerance_width / 2
+    if half <= 0:
+        return NOTHING
+    share = limits.averaging_limit / half
+    return "⅔" if abs(share - 2 / 3) < TWO_THIRDS else f"{share * 100:.3g}{NO_BREAK_SPACE}%"
+
+
+def band_text(band: Band, sign: int) -> str:
+    """Action of the loop in a band, above (+1) or below (-1) the target, in the words of the manual's diagram."""
+    return {
+        "zero": _("averaging is stored"),
+        "average": _("averaging and correction"),
+        "full": _("correction of current deviation"),
+        "out_of_tolerance": _("correction of current deviation, alarm “oversize”")
+        if sign > 0
+        else _("correction of current deviation, alarm “undersize”"),
+        "wear": _("alarm “permissible dimensional difference overrun”"),
+        "probe_fault": _("alarm “safe area overrun”"),
+    }[band.name]
+
+
+def band_shapes(limits: HasLimits, ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+    """Backgrounds of the bands: grey inside the tolerance, a light colour outside."""
+    return [
+        {
+            "type": "rect",
+            "layer": "below",
+            "xref": "paper",
+            "x0": 0,
+            "x1": 1,
+            "yref": "y",
+            "y0": sign * _edge(band.lower, ruler),
+            "y1": sign * (ruler.extent if band.upper is None else _edge(band.upper, ruler)),
+            "fillcolor": colours.bands[band.number],
+            "line": {"width": 0},
+        }
+        for band in bands(limits)
+        for sign in (1, -1)
+        if _edge(band.lower, ruler) < ruler.extent
+    ]
+
+
+def limit_lines(limits: HasLimits, ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+    """The limits, the tolerance the strongest, and the target, dashed."""
+    lines = [_line(0, colours.quiet, 1, "4px,4px")]
+    for band in bands(limits):
+        if not band.limits or not band.lower or not ruler.fits(band.lower):
+            continue  # a limit of 0 is the target
+        colour, width = (colours.ink, 1.75) if "R35/2" in band.limits else (colours.faint, 1.0)
+        edge = _edge(band.lower, ruler)
+        lines += [_line(y, colour, width, "solid") for y in (edge, -edge)]
+    return lines
+
+
+def _line(y: float, colour: str, width: float, dash: str) -> dict[str, Any]:
+    return {
+        "type": "line",
+        "layer": "below",
+        "xref": "paper",
+        "x0": 0,
+        "x1": 1,
+        "yref": "y",
+        "y0": y,
+        "y1": y,
+        "line": {"color": colour, "width": width, "dash": dash},
+    }
+
+
+def limit_labels(limits: HasLimits, ruler: Scale, colours: Palette, size: int) -> list[dict[str, Any]]:
+    """At the right: on each limit its name, value and title; in each band what happens there."""
+    all_bands = bands(limits)
+    height = 2 * ruler.extent
+    middle = [] if isinstance(ruler, ZoneScale) else [_("target")]
+    if all_bands[0].limits:  # R33 = 0 lies on the target: one label for both sides
+        middle.append(f"{' = '.join(all_bands[0].limits)}  0{NO_BREAK_SPACE}µm")
+    title = f"  {limit_title(all_bands[0].limits[-1], limits)}" if all_bands[0].limits else ""
+    notes: list[dict[str, Any]] = [
+        _note(0, f"<b>{' = '.join(middle)}</b>{title}" if middle else "", colours.quiet, size)
+    ]
+    for sign in (1, -1):
+        written = 0.0 if not isinstance(ruler, ZoneScale) else -height
+        for band in all_bands:
+            lower = _edge(band.lower, ruler)
+            if band.limits and band.lower and ruler.fits(band.lower):
+                strong = "R35/2" in band.limits
+                place = max(lower, written + LEAST_DISTANCE * height)
+                written = place
+                names = " = ".join(band.limits)
+                title = limit_title(band.limits[-1], limits)
+                ink = colours.ink if strong else colours.quiet
+                notes.append(
+                    _note(sign * place, f"<b>{names}  {_signed_limit(sign * band.lower)}</b>  {title}", ink, size)
+                )
+            elif band.limits and band.lower:
+                continue
+            upper = ruler.extent if band.upper is None else _edge(band.upper, ruler)
+            room = (upper - max(lower, written)) / height
+            if isinstance(ruler, ZoneScale):
+                if band.number > 0:
+                    notes.append(_note(sign * (lower + upper) / 2, band_text(band, sign), colours.quiet, size))
+                elif sign > 0:
+                    notes.append(_note(0, band_text(band, sign), colours.quiet, size))
+            elif room > 1.6 * LEAST_DISTANCE and band.number > 0:
+                place = max((max(lower, written) + upper) / 2, written + LEAST_DISTANCE * height)
+                written = place
+                notes.append(_note(sign * place, band_text(band, sign), colours.quiet, size))
+    return [note for note in notes if note["text"]]
+
+
+def _note(y: float, text: str, colour: str, size: int) -> dict[str, Any]:
+    return {
+        "xref": "paper",
+        "x": 1,
+        "xanchor": "left",
+        "xshift": 8,
+        "yref": "y",
+        "y": y,
+        "yanchor": "middle",
+        "text": text,
+        "showarrow": False,
+        "align": "left",
+        "font": {"size": size, "color": colour},
+    }
+
+
+def _signed_limit(deviation: float) -> str:
+    sign = MINUS if deviation < 0 else "+"
+    size = abs(deviation)
+    if size >= 1:
+        return f"{sign}{size:.6g}{NO_BREAK_SPACE}mm"
+    return f"{sign}{size * 1000:.6g}{NO_BREAK_SPACE}µm"
+
+
+def size_ticks(limits: HasLimits, ruler: Scale, centre: float | None) -> tuple[list[float], list[str]]:
+    """Places and words of the left axis: the sizes (mm) at target and limits, or the deviations if the centre is not known."""
+    ticks: list[float] = []
+    words: list[str] = []
+    least = LEAST_DISTANCE * 2 * ruler.extent
+    for band in bands(limits):
+        place = _edge(band.lower, ruler)
+        if not ruler.fits(band.lower) or (band.limits and ticks and place - max(ticks) < least):
+            continue
+        for sign in (1, -1) if band.lower else (1,):
+            deviation = sign * band.lower
+            ticks.append(sign * place)
+            text = _signed_limit(deviation) if centre is None else f"{centre + deviation:.4f}"
+            words.append(f"<b>{text}</b>" if not band.lower or "R35/2" in band.limits else text)
+    return ticks, words
+
+
+def _edge(deviation: float, ruler: Scale) -> float:
+    """The place of a limit; a limit beyond the chart lies at its edge."""
+    return ruler.position(deviation) if ruler.fits(deviation) else ruler.extent

@@ -1,0 +1,137 @@
+"""JSON routes: the figures of a characteristic, as Plotly takes them."""
+
+from typing import Annotated, Any, Literal
+
+import msgspec
+from fastapi import Path, Query, Response
+
+from app.access.deps import AnyCaller
+from app.core.variants import yielded_by
+from app.loop.characteristics import queries
+from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.wording import result_label
+from app.loop.summaries import queries as statistics
+from app.loop.summaries.queries import Window
+from app.views.characteristic.chart import chart_of, results_of, run_of
+from app.views.characteristic.figures import counting_edges, histogram_figure, result_figure, run_figure, zone_chart
+from app.web.api import api_router, problems
+from app.web.choice import Choice, Chosen
+from app.web.deps import SessionDep
+from app.web.fields import LARGEST_ID
+from app.web.theme import ThemeName
+
+router = api_router("characteristics")
+
+FIGURE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "A Plotly figure: `data` and `layout`",
+        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
+    }
+}
+ResultName = Literal["run_out", "out_of_roundness", "taper", "repeat_range", "repeat_deviation"]
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+Theme = Annotated[ThemeName, Query(description="For a light or a dark page.")]
+Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
+
+
+def _found(session: SessionDep, caller: AnyCaller, characteristic: str, choice: Choice) -> tuple[Standing, Window]:
+    standing = queries.characteristic_named(session, characteristic)
+    caller.must_at(standing.machine.id, "viewer")
+    return standing, statistics.window_of(session, standing.characteristic, **choice._asdict())
+
+
+def _answer(figure: dict[str, object]) -> Response:
+    # Thousands of numbers: written at once, not walked through by a validator first.
+    return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})
+
+
+@router.get("/characteristics/{characteristic}/figures/zones", responses=problems(404) | FIGURE, response_model=None)
+def get_zone_chart(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: Chosen,
+    scale: Annotated[
+        Literal["zones", "true"], Query(description="Each band equally tall, or linear in µm around the tolerance.")
+    ] = "zones",
+    ringed: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="The reading with a ring about it.")] = None,
+    theme: Theme = "light",
+    width: Width = 1240,
+) -> Response:
+    """The zone chart: readings in their zones, running average, corrections, tool changes, alarms.
+
+    Of more readings than can be drawn, blocks with their extremes: no extreme is ever thinned away.
+    """
+    standing, window = _found(session, caller, characteristic, choice)
+    chart = chart_of(session, standing, window)
+    return _answer(
+        zone_chart(
+            chart.points,
+            standing.parameters,
+            blocks=chart.blocks,
+            steps=chart.steps,
+            marks=chart.marks,
+            hands=chart.hands,
+            scale=scale,
+            theme=theme,
+            sizes=chart.sizes,
+            total_before=chart.total_before,
+            width=width,
+            ringed=ringed or ("newest" if window.reaches_now else None),
+        )
+    )
+
+
+@router.get("/characteristics/{characteristic}/figures/run", responses=problems(404) | FIGURE, response_model=None)
+def get_run_chart(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: Chosen,
+    theme: Theme = "light",
+    width: Width = 1240,  # noqa: ARG001 - every chart is asked with its width
+) -> Response:
+    """Sizes over time, corrected by the empirical value of each reading; of more than 2 000 readings the last 2 000."""
+    standing, window = _found(session, caller, characteristic, choice)
+    points, sizes = run_of(session, standing, window)
+    return _answer(run_figure(points, standing.parameters, sizes=sizes, theme=theme))
+
+
+@router.get("/characteristics/{characteristic}/figures/results", responses=problems(404) | FIGURE, response_model=None)
+def get_result_chart(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: Chosen,
+    result: Annotated[
+        ResultName | None, Query(description="Which one; what the variant of the characteristic yields if left out.")
+    ] = None,
+    theme: Theme = "light",
+    width: Width = 1240,  # noqa: ARG001 - every chart is asked with its width
+) -> Response:
+    """Results of the measuring variant beside the value: run-out, out-of-roundness, taper, repeatability.
+
+    Of more readings than can be drawn, blocks with their extremes; of more than 500 000 the last ones.
+    """
+    standing, window = _found(session, caller, characteristic, choice)
+    name: str = result or next(iter(yielded_by(standing.parameters)), "repeat_range")
+    points, ranges = results_of(session, standing, window, name)
+    return _answer(result_figure(name, result_label(name), points, ranges, theme=theme))
+
+
+@router.get(
+    "/characteristics/{characteristic}/figures/histogram", responses=problems(404) | FIGURE, response_model=None
+)
+def get_histogram(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: Chosen,
+    theme: Theme = "light",
+    width: Width = 300,  # noqa: ARG001 - every chart is asked with its width
+) -> Response:
+    """Histogram of the deviations, without excluded readings and probe faults; of more than 100 000 the last 100 000."""
+    standing, window = _found(session, caller, characteristic, choice)
+    parameters = standing.parameters
+    counts = statistics.histogram_of(session, standing.characteristic, window, counting_edges(parameters))
+    return _answer(histogram_figure(counts, parameters, theme=theme))

@@ -1,0 +1,109 @@
+"""Pictures small enough for a list: inline SVG, no script. Their colours come from the page's style sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from markupsafe import Markup, escape
+
+from app.core.decision.limits import HasLimits, Limits, classify, within_tolerance
+from app.language.i18n import _
+from app.language.numbers import um
+from app.views.characteristic.figures.scale import ZoneScale, bands
+from app.web.states import tone_of
+from app.web.theme import ZONE_OUTLINES, zone_name
+
+WIDTH, HEIGHT = 240.0, 44.0
+TOP, BOTTOM = 7.0, 37.0  # of the bands; the reading's mark and the average reach a little beyond them
+
+
+def _mark(zone: str, x: float, y: float, size: float) -> str:
+    """The outline of a zone's shape about a point."""
+    scale = size / 24
+    return (
+        f'<path class="reading" data-tone="{tone_of(zone)}" d="{ZONE_OUTLINES.get(zone, ZONE_OUTLINES["zero"])}" '
+        f'transform="translate({x - size / 2:.2f} {y - size / 2:.2f}) scale({scale:.4f})" vector-effect="non-scaling-stroke"/>'
+    )
+
+
+def band_picture(
+    deviation: float | None, limits: HasLimits, zone: str | None = None, average: float | None = None
+) -> Markup:
+    """The last deviation (mm) in its band, too small at the left, too large at the right; the running average as a bar.
+
+    zone: as it was decided; worked out from the deviation if not given.
+    """
+    scale = ZoneScale.of(limits)
+
+    def x(position: float) -> float:
+        return WIDTH / 2 + position / scale.extent * (WIDTH / 2 - 1)
+
+    parts = []
+    for place, band in reversed(list(enumerate(bands(limits)))):
+        outer = x(place + 1)
+        parts.append(
+            f'<rect class="band-{band.number}" x="{WIDTH - outer:.2f}" y="{TOP:g}" width="{2 * outer - WIDTH:.2f}" height="{BOTTOM - TOP:g}"/>'
+        )
+    for place, band in enumerate(bands(limits)):
+        if band.limits:
+            kind = "tolerance" if "R35/2" in band.limits else "limit"
+            parts += [f'<path class="{kind}" d="M{at:.2f} {TOP:g}V{BOTTOM:g}"/>' for at in (x(place), WIDTH - x(place))]
+    parts.extend(
+        (
+            f'<path class="target" d="M{WIDTH / 2:g} {TOP:g}V{BOTTOM:g}"/>',
+            f'<rect class="frame" x="0.5" y="{TOP:g}" width="{WIDTH - 1:g}" height="{BOTTOM - TOP:g}"/>',
+        )
+    )
+    label = _("No reading yet")
+    if average is not None:
+        at = x(scale.position(average))
+        parts.append(f'<path class="mean" d="M{at:.2f} {TOP - 4:g}V{BOTTOM + 4:g}"/>')
+    if deviation is not None:
+        zone = zone or classify(deviation, Limits.of(limits))
+        at = min(max(x(scale.position(deviation)), 9), WIDTH - 9)
+        parts.append(_mark(zone, at, (TOP + BOTTOM) / 2, 18))
+        label = _("Last deviation {deviation}, zone {zone}").format(deviation=um(deviation), zone=zone_name(zone))
+        if average is not None:
+            label += "; " + _("running average {average}").format(average=um(average))
+    return Markup(  # noqa: S704 - built here out of numbers and our own words, the label escaped
+        f'<svg class="band-picture flat" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(label)}">'
+        f"{''.join(parts)}</svg>"
+    )
+
+
+def sparkline(deviations: Sequence[float], limits: HasLimits) -> Markup:
+    """The last deviations (mm), oldest first, between the tolerance limits (dashed); those outside are marked.
+
+    Twice the tolerance is high enough: what lies further out is drawn at the edge, as a mark.
+    """
+    width, height = 200.0, 44.0
+    borders = Limits.of(limits)
+    tolerance = max(limits.tolerance_width / 2, 1e-6)
+    reach = max(1.0, min(2.0, max((abs(d) for d in deviations), default=0.0) / tolerance)) * tolerance * 1.08
+
+    def y(deviation: float) -> float:
+        return height / 2 - max(-1.0, min(1.0, deviation / reach)) * (height / 2 - 3)
+
+    step = (width - 8) / max(len(deviations) - 1, 1)
+    points = [(4 + i * step, y(d)) for i, d in enumerate(deviations)]
+    parts = [
+        f'<path class="target" d="M0 {height / 2:g}H{width:g}"/>',
+        f'<path class="edge" d="M0 {y(tolerance):.2f}H{width:g}M0 {y(-tolerance):.2f}H{width:g}"/>',
+    ]
+    if points:
+        parts.append(f'<polyline class="line" points="{" ".join(f"{px:.1f},{py:.1f}" for px, py in points)}"/>')
+        # Dots are lines of no length with wide ends: they stay round however the picture is stretched.
+        parts += [
+            f'<path class="outside" d="M{px:.1f} {py:.1f}h0"/>'
+            for (px, py), d in zip(points, deviations, strict=True)
+            if not within_tolerance(d, borders)
+        ]
+        parts.append(f'<path class="last" d="M{points[-1][0]:.1f} {points[-1][1]:.1f}h0"/>')
+        label = _("Trend of the last {n} deviations, from {first} to {last}").format(
+            n=len(deviations), first=um(deviations[0]), last=um(deviations[-1])
+        )
+    else:
+        label = _("No reading yet")
+    return Markup(  # noqa: S704 - as above
+        f'<svg class="sparkline" viewBox="0 0 {width:g} {height:g}" preserveAspectRatio="none" role="img" aria-label="{escape(label)}">{"".join(parts)}</svg>'
+    )

@@ -1,0 +1,326 @@
+"""Pages: one characteristic with its zone chart and decisions, and one of its readings.
+
+The live parts of the page are fetched one by one (header `X-Live-Part`), so nothing is looked up that is not shown.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from functools import cached_property
+from typing import Annotated, Any, Literal
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Header, Path, Query, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.access.deps import Caller, Operator, Viewer
+from app.core.parameters import BY_NAME
+from app.core.probing import start_and_end
+from app.core.variants import yielded_by
+from app.errors import InbandError
+from app.jobs.queries import failures_of
+from app.jobs.wording import with_job_words
+from app.language.i18n import _
+from app.loop.alarm_response.wording import action_word
+from app.loop.calibration import queries as calibrations
+from app.loop.characteristics import queries
+from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.wording import history, in_order, label, result_label, worded
+from app.loop.readings import actions as readings
+from app.loop.readings import queries as reading_queries
+from app.loop.summaries import queries as statistics
+from app.loop.summaries.queries import MOST_IN_HISTOGRAM, Numbers, Rejects, Window
+from app.quality.wear import queries as wear
+from app.quality.wear.queries import Wear
+from app.quality.wear.wording import WearWords
+from app.views.characteristic import chart
+from app.views.characteristic import state_queries as plant
+from app.views.characteristic.decisions import Decision, decision, decisions, version_of
+from app.views.characteristic.figures import angle_of, residuals_of, touches_picture
+from app.views.characteristic.figures_api import ResultName
+from app.views.characteristic.glance import band_picture
+from app.views.characteristic.wording import state_word
+from app.web.choice import Choice, Chosen
+from app.web.deps import FormDep, SessionDep
+from app.web.fields import LARGEST_ID, Reason
+from app.web.forms import by_field
+from app.web.templates import page
+from app.web.validation import checked
+
+router = APIRouter(include_in_schema=False)
+
+DECISIONS_ON_PAGE = 25  # decisions on a page
+AROUND = 25  # readings on either side of one, in its own chart
+VERSIONS = 50
+Sequence_ = Annotated[int, Path(ge=1, le=LARGEST_ID, alias="sequence")]
+
+
+class CharacteristicView:
+    """Content of the page of a characteristic, each part queried when the template comes to it."""
+
+    def __init__(
+        self, session: Session, standing: Standing, choice: Choice, before: int | None, edge: str = "tool"
+    ) -> None:
+        self._session, self._choice, self._before, self._edge = session, choice, before, edge
+        self.standing = standing
+        self.now = datetime.now(UTC)
+
+    @cached_property
+    def row(self) -> plant.Row:
+        return plant.row_of(self._session, self.standing.machine.key, self.standing.characteristic.key)
+
+    @cached_property
+    def empirical_value(self) -> float:
+        return chart.empirical_value_of(self._session, self.standing)
+
+    @cached_property
+    def last(self) -> dict[str, Any] | None:
+        """The last reading, as it was answered."""
+        entry = reading_queries.entry_of(self._session, self.standing.characteristic.key)
+        assert entry is not None
+        newest = reading_queries.answers(self._session, entry, reading_queries.latest(self._session, entry, None, 1))
+        return newest[0] if newest else None
+
+    @cached_property
+    def window(self) -> Window:
+        return statistics.window_of(self._session, self.standing.characteristic, **self._choice._asdict())
+
+    @property
+    def counted(self) -> Window:
+        """The readings whose numbers are shown: of very many the last ones."""
+        first = max(self.window.first, self.window.last - MOST_IN_HISTOGRAM + 1)
+        return replace(self.window, first=first)
+
+    @cached_property
+    def numbers(self) -> Numbers:
+        return statistics.numbers_of(self._session, self.standing.characteristic, self.counted)
+
+    @cached_property
+    def rejects(self) -> tuple[Rejects, Rejects] | None:
+        """With acceptance n of m: parts and sections outside among the shown readings, and since the tool change."""
+        if self.standing.parameters.accept_m == 1:
+            return None
+        session, characteristic = self._session, self.standing.characteristic
+        of_tool = statistics.since_tool_change(session, characteristic)
+        return (
+            statistics.rejects_of(session, characteristic, self.counted),
+            statistics.rejects_of(session, characteristic, of_tool),
+        )
+
+    @cached_property
+    def wear(self) -> Wear:
+        """Of the tool in the machine."""
+        return wear.wear_of(self._session, self.standing, wear.shown(self._session, self.standing, self._edge))
+
+    @cached_property
+    def decisions(self) -> list[Decision]:
+        return decisions(self._session, self.standing, before=self._before, limit=DECISIONS_ON_PAGE + 1)
+
+    @cached_property
+    def history(self) -> list[Any]:
+        versions = queries.versions(self._session, self.standing.characteristic, limit=VERSIONS + 1)
+        return history(versions)[:VERSIONS]
+
+
+@router.get("/characteristics/{characteristic}")
+def characteristic_page(
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    characteristic: str,
+    choice: Chosen,
+    scale: Annotated[Literal["zones", "true", "time"], Query()] = "zones",
+    before: Annotated[int | None, Query(ge=1, le=LARGEST_ID)] = None,
+    edge: Annotated[Literal["tool", "1000", "all"], Query()] = "tool",
+    result: Annotated[ResultName | None, Query()] = None,
+    x_live_part: Annotated[str | None, Header()] = None,
+) -> Response:
+    """The zone chart, the numbers, the decisions and the parameters of one characteristic."""
+    standing = queries.characteristic_named(session, characteristic)
+    path = f"/characteristics/{standing.characteristic.key}"
+    chosen = _as_query(choice)
+
+    def link(**changes: Any) -> str:
+        """This page with something else chosen."""
+        unchanged = (chosen if not changes.keys() & {"last", "first"} else {}) | {
+            "scale": scale,
+            "edge": edge,
+            "result": result,
+        }
+        values = {name: value for name, value in {**unchanged, **changes}.items() if value is not None}
+        usual = {("scale", "zones"), ("edge", "tool")}
+        return f"{path}?{urlencode({name: v for name, v in values.items() if (name, v) not in usual})}"
+
+    yielded = yielded_by(standing.parameters)
+    drawn_result = result if result in yielded else next(iter(yielded), None)
+    figure = "run" if scale == "time" else "zones"
+    chart_query = chosen if scale == "time" else chosen | {"scale": scale}
+    return page(
+        request,
+        "characteristics/characteristic.html",
+        shown=CharacteristicView(session, standing, choice, before, edge),
+        edge=edge,
+        wear_url=f"/api/v1{path}/figures/wear?{urlencode({'last': edge})}",
+        wear_words=WearWords,
+        wanted=lambda part: x_live_part is None or x_live_part == part,
+        failing=with_job_words(failures_of(session, standing.machine.id, standing.characteristic.id)),
+        may_see_jobs=caller.may("engineer"),
+        characteristic=standing.characteristic,
+        machine=standing.machine,
+        parameters=standing.parameters,
+        travel=start_and_end(standing.parameters),
+        in_force=standing.version,
+        table=parameter_table(standing.version.parameters),
+        choice=choice,
+        scale=scale,
+        before=before,
+        page_size=DECISIONS_ON_PAGE,
+        most=MOST_IN_HISTOGRAM,
+        link=link,
+        chart_url=f"/api/v1{path}/figures/{figure}?{urlencode(chart_query)}",
+        results=[(result_label(name), link(result=name), name == drawn_result) for name in yielded],
+        result_url=f"/api/v1{path}/figures/results?{urlencode(chosen | {'result': drawn_result})}",
+        histogram_url=f"/api/v1{path}/figures/histogram?{urlencode(chosen)}",
+        may_edit=caller.may("engineer"),
+        state_word=state_word,
+        action_word=action_word,
+    )
+
+
+def _as_query(choice: Choice) -> dict[str, Any]:
+    """The choice as the address says it."""
+    if choice == Choice(None, None, None, None, None):
+        return {"last": "all"}
+    named = {
+        "last": choice.last,
+        "first": choice.first,
+        "through": choice.through,
+        "from": choice.start and choice.start.isoformat(),
+        "to": choice.end and choice.end.isoformat(),
+    }
+    return {name: value for name, value in named.items() if value is not None}
+
+
+def parameter_table(stored: Mapping[str, Any]) -> Sequence[tuple[str, str, str]]:
+    """R number, name and value of every parameter that is set, in the order of the cycles."""
+    ordered = in_order(stored)
+    return [
+        ((BY_NAME[name].r or "") if name in BY_NAME else "", label(name), worded(name, ordered))
+        for name, value in ordered.items()
+        if value is not None
+    ]
+
+
+@router.get("/characteristics/{characteristic}/readings/{sequence}")
+def reading_page(
+    request: Request, session: SessionDep, caller: Viewer, characteristic: str, sequence: Sequence_
+) -> Response:
+    """One reading: what was measured, what was decided, why, by which parameters, and what followed."""
+    return _reading(request, session, caller, queries.characteristic_named(session, characteristic), sequence)
+
+
+@router.post("/characteristics/{characteristic}/readings/{sequence}/by-hand")
+def send_measured_by_hand(
+    request: Request, session: SessionDep, caller: Operator, characteristic: str, sequence: Sequence_, form: FormDep
+) -> Response:
+    """Enter what was measured by hand on this part."""
+    standing = queries.characteristic_named(session, characteristic)
+    entry = reading_queries.entry_of(session, characteristic)
+    assert entry is not None
+    try:
+        readings.measure_typed_by_hand(session, entry, sequence, form, caller.name)
+    except InbandError as error:
+        if error.status == 404:
+            raise
+        session.expire_all()
+        return _reading(request, session, caller, standing, sequence, status=error.status, typed=form, problem=error)
+    return RedirectResponse(chart.reading_link(characteristic, sequence), 303)
+
+
+@router.post("/characteristics/{characteristic}/readings/{sequence}/exclude")
+def send_exclusion(
+    request: Request, session: SessionDep, caller: Operator, characteristic: str, sequence: Sequence_, form: FormDep
+) -> Response:
+    """Take the reading out of the statistics."""
+    standing = queries.characteristic_named(session, characteristic)
+    entry = reading_queries.entry_of(session, characteristic)
+    assert entry is not None
+    try:
+        reason = checked(Reason, form.get("reason", ""), "reason")
+        readings.exclude(session, entry, sequence, caller.name, reason)
+    except InbandError as error:
+        if error.status == 404:
+            raise
+        session.expire_all()
+        return _reading(request, session, caller, standing, sequence, status=error.status, typed=form, problem=error)
+    return RedirectResponse(chart.reading_link(characteristic, sequence), 303)
+
+
+def _reading(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    standing: Standing,
+    sequence: int,
+    *,
+    status: int = 200,
+    typed: Mapping[str, str] | None = None,
+    problem: InbandError | None = None,
+) -> Response:
+    shown_decision = decision(session, standing, sequence)
+    version = version_of(session, standing, shown_decision.reading["parameters_version"])
+    limits = queries.parameters_of(
+        session, standing.machine.id, standing.characteristic.id, shown_decision.reading["parameters_version"]
+    )
+    newest = statistics.window_of(session, standing.characteristic).newest
+    key = standing.characteristic.key
+    around = {"first": max(1, sequence - AROUND), "through": min(newest, sequence + AROUND), "ringed": sequence}
+    return page(
+        request,
+        "characteristics/reading.html",
+        status=status,
+        decision=shown_decision,
+        reading=shown_decision.reading,
+        characteristic=standing.characteristic,
+        machine=standing.machine,
+        judged_by=version,
+        origin=calibrations.origin(
+            session, standing.machine, limits.average_memory, shown_decision.reading["received_at"]
+        )
+        if "empirical_value" in shown_decision.reading["reason"]["notes"]
+        else None,
+        limits=limits,
+        table=parameter_table(version.parameters),
+        band=band_picture(
+            shown_decision.reading["deviation"],
+            limits,
+            None,
+            shown_decision.reading["average_after"] if limits.average_memory else None,
+        ),
+        newest=newest,
+        older=chart.reading_link(key, sequence - 1) if sequence > 1 else None,
+        newer=chart.reading_link(key, sequence + 1) if sequence < newest else None,
+        chart_url=f"/api/v1/characteristics/{key}/figures/zones?{urlencode(around)}",
+        may_exclude=caller.may("operator"),
+        typed=typed or {},
+        problem=problem,
+        errors=by_field(problem) if problem else {},
+        picture=touches_picture(limits, shown_decision.point_means) if shown_decision.touches else None,
+        residuals=residuals_of(limits, shown_decision.point_means) if shown_decision.touches else [],
+        sections=shown_decision.sections(limits),
+        angle_of=angle_of,
+        result_label=result_label,
+        code_word=code_word,
+        action_word=action_word,
+    )
+
+
+def code_word(action: str) -> str:
+    """Decision in a few words."""
+    return {
+        "none": _("No correction"),
+        "correct": _("Corrected"),
+        "hold": _("Correction held"),
+        "stop": _("Machine told to stop"),
+    }.get(action, action)

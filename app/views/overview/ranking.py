@@ -1,0 +1,97 @@
+"""Ranking of the characteristics by need for attention, with reasons. Pure.
+
+What is urgent comes before what is wrong in the long run; within that, what is worse by its number comes first. Nothing is
+weighed against anything else: the order can be explained, reason by reason.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from math import inf
+
+from app.core.state import NEED_SOMEONE, State
+
+CAPABLE = 1.33
+"""Cpk or Ppk from which a process is usually called capable (ISO 22514-2; AIAG SPC asks for 1.33 or more)."""
+NEAR = 100
+"""Parts: a limit that wear comes to sooner than this is to be planned for now."""
+ALARM_FLOOD = 1.0
+"""Alarms per shift of one characteristic, from which people begin to acknowledge without looking."""
+
+
+class AttentionReason(IntEnum):
+    """Reasons for attention, from the most urgent on."""
+
+    STOPPED = 1  # probe fault, paused, tool worn, held
+    OUTSIDE = 2  # the last part was out of tolerance, or somebody has to release a correction
+    ALARM = 3
+    NOT_EVALUATED = 4  # background work on it fails: what follows may be missing
+    SIGNAL = 5
+    NOT_CAPABLE = 6  # index below 1
+    WEAR = 7
+    HUNTING = 8
+    ALARM_FLOOD = 9
+    BARELY_CAPABLE = 10  # index below 1.33
+    OLD = 11
+
+    @property
+    def code(self) -> str:
+        """Code of the reason in the API."""
+        return "loud" if self is AttentionReason.ALARM_FLOOD else self.name.lower()
+
+
+STOPPED = frozenset({State.PROBE_FAULT, State.PAUSED, State.TOOL_WORN, State.HELD})
+
+
+@dataclass(frozen=True, slots=True)
+class AttentionInputs:
+    """Inputs of the ranking. ppk: Cpk or Ppk, None where none may be quoted; parts_left: None while no wear is to be seen.
+
+    alarms: active ones. signals: open ones. per_shift: alarms raised per shift.
+    failing: a periodic job fails on it.
+    """
+
+    state: State
+    alarms: int
+    signals: int
+    ppk: float | None
+    parts_left: float | None
+    hunting: bool
+    per_shift: float
+    old: bool = False
+    failing: bool = False
+
+    @property
+    def reasons(self) -> tuple[AttentionReason, ...]:
+        """Reasons why it needs attention, the most urgent first; empty if it does not.
+
+        >>> AttentionInputs(State.IN_BAND, 0, 2, 0.9, None, False, 0.0).reasons
+        (<AttentionReason.SIGNAL: 5>, <AttentionReason.NOT_CAPABLE: 6>)
+        """
+        ppk = inf if self.ppk is None else self.ppk
+        holds = {
+            AttentionReason.STOPPED: self.state in STOPPED,
+            AttentionReason.OUTSIDE: self.state in NEED_SOMEONE - STOPPED,
+            AttentionReason.ALARM: self.alarms > 0 and self.state not in STOPPED,  # else that is its alarm
+            AttentionReason.NOT_EVALUATED: self.failing,
+            AttentionReason.SIGNAL: self.signals > 0,
+            AttentionReason.NOT_CAPABLE: ppk < 1.0,
+            AttentionReason.WEAR: self.parts_left is not None and self.parts_left <= NEAR,
+            AttentionReason.HUNTING: self.hunting,
+            AttentionReason.ALARM_FLOOD: self.per_shift > ALARM_FLOOD,
+            AttentionReason.BARELY_CAPABLE: 1.0 <= ppk < CAPABLE,
+            AttentionReason.OLD: self.old,
+        }
+        return tuple(reason for reason, true in holds.items() if true)
+
+    @property
+    def rank(self) -> tuple[float, ...]:
+        """Smaller comes first: by the reasons in their order, then by Ppk and by the alarms per shift.
+
+        >>> calm = AttentionInputs(State.IN_BAND, 0, 0, 1.7, None, False, 0.0)
+        >>> near = AttentionInputs(State.IN_BAND, 0, 0, 1.9, 40.0, False, 0.0)
+        >>> worn = AttentionInputs(State.TOOL_WORN, 1, 0, 1.9, None, False, 0.3)
+        >>> sorted([calm, near, worn], key=lambda each: each.rank) == [worn, near, calm]
+        True
+        """
+        reasons = (*self.reasons, *(len(AttentionReason) + 1,) * len(AttentionReason))[: len(AttentionReason)]
+        return (*reasons, inf if self.ppk is None else self.ppk, -self.per_shift)

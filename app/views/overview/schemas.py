@@ -1,0 +1,134 @@
+"""The ranking as JSON."""
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.core.spc.quoting import Quote
+from app.quality.capability import wording as capability
+from app.views.overview import wording
+from app.views.overview.queries import Ranked
+
+
+class ReasonOut(BaseModel):
+    """Reason why attention is needed."""
+
+    code: str
+    text: str
+
+
+class RankedOut(BaseModel):
+    """A characteristic with what it is ranked by."""
+
+    characteristic: str
+    name: str
+    machine: str
+    state: str
+    reasons: list[ReasonOut] = Field(description="The most urgent first; empty where nobody is needed.")
+    ppk: float | None = Field(
+        description="The index that may be quoted of the last 1000 readings, as on the page of capability; `quote` says which one: Cpk, Ppk, or Ppk by percentiles. null where none may."
+    )
+    quote: Literal["cpk", "ppk", "percentile", "none"] = Field(description="Which index it is, and by which method.")
+    low: float | None = Field(description="Its 95 % interval; null where it has none.")
+    high: float | None = Field(description="Its 95 % interval; null where it has none.")
+    preliminary: bool = Field(description="Of too few readings to stand without its interval.")
+    method: str = Field(
+        description="Distribution and scatter that the index was computed by; empty where there is none."
+    )
+    why_none: str | None = Field(description="Why none may be quoted; null where one may.")
+    readings: int = Field(description="Number of readings that the index was computed from.")
+    first_reading: int | None = Field(description="The first of them.")
+    last_reading: int | None = Field(description="The last of them.")
+    first_at: datetime | None = Field(description="When the first of them was measured.")
+    last_at: datetime | None = Field(description="When the last of them was: the verdict is of then.")
+    judged_at: datetime = Field(description="When it was worked out.")
+    now: str | None = Field(
+        description="Why the newest readings carry no index, where the last one that could be quoted is kept; else null."
+    )
+    parts_left: float | None = Field(description="Parts until wear comes to the first limit, as foretold.")
+    signals: list[int] = Field(description="Numbers of the open signals.")
+    alarms: int = Field(description="Active alarms.")
+    alarms_per_shift: float = Field(description="Alarms that parts gave per 8 hours, over the last 7 days.")
+
+
+class Overview(BaseModel):
+    """A page of the ranking."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "items": [
+                    {
+                        "characteristic": "plate-d30",
+                        "name": "Bore Ø30 H7",
+                        "machine": "mill-1",
+                        "state": "correcting",
+                        "reasons": [
+                            {"code": "hunting", "text": "over-corrects"},
+                            {"code": "barely_capable", "text": "Barely capable"},
+                        ],
+                        "ppk": 1.21,
+                        "quote": "ppk",
+                        "low": 1.15,
+                        "high": 1.27,
+                        "preliminary": False,
+                        "method": "normal distribution, spread of all readings",
+                        "why_none": None,
+                        "readings": 998,
+                        "first_reading": 4003,
+                        "last_reading": 5002,
+                        "first_at": "2026-11-19T06:00:12Z",
+                        "last_at": "2026-11-21T08:15:02Z",
+                        "judged_at": "2026-11-21T08:15:40Z",
+                        "now": None,
+                        "parts_left": 312.0,
+                        "signals": [],
+                        "alarms": 0,
+                        "alarms_per_shift": 0.3,
+                    }
+                ],
+                "next": None,
+            }
+        }
+    )
+
+    items: list[RankedOut]
+    next: int | None = Field(description="`after` of the next page; null at the end.")
+
+    @classmethod
+    def of(cls, ranked: list[Ranked], after: int, limit: int) -> "Overview":
+        """The page behind the first `after` ones."""
+        return cls(
+            items=[
+                RankedOut(
+                    characteristic=entry.row.characteristic.key,
+                    name=entry.row.characteristic.name,
+                    machine=entry.machine.key,
+                    state=entry.inputs.state.value,
+                    reasons=[
+                        ReasonOut(code=sentence.reason.code, text=sentence.text) for sentence in wording.reasons(entry)
+                    ],
+                    ppk=entry.inputs.ppk,
+                    quote=Quote(entry.verdict.of.quote).value,
+                    low=entry.verdict.of.low,
+                    high=entry.verdict.of.high,
+                    preliminary=entry.verdict.of.preliminary,
+                    method=capability.method(entry.verdict.of.quote),
+                    why_none=None if entry.inputs.ppk is not None else capability.why_not(entry.verdict.of.why),
+                    readings=entry.verdict.of.readings,
+                    first_reading=entry.verdict.of.first,
+                    last_reading=entry.verdict.of.last,
+                    first_at=entry.verdict.of.first_at,
+                    last_at=entry.verdict.of.last_at,
+                    judged_at=entry.verdict.of.at,
+                    now=capability.why_not(entry.verdict.now) if entry.verdict.now else None,
+                    parts_left=entry.inputs.parts_left,
+                    signals=entry.signals,
+                    alarms=entry.inputs.alarms,
+                    alarms_per_shift=round(entry.inputs.per_shift, 3),
+                )
+                for entry in ranked[after : after + limit]
+            ],
+            next=after + limit if after + limit < len(ranked) else None,
+        )

@@ -1,0 +1,134 @@
+"""Many reports at once as JSON."""
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field
+
+from app.files.documents.content import Paper
+from app.language.i18n import current_language
+from app.language.times import plant_zone
+from app.views.reports.actions import KEPT_DAYS, MOST_AT_ONCE
+from app.views.reports.bundle import Bundle, BundleFormat
+from app.views.reports.request import ReportRequest, SectionName, section_names
+from app.views.reports.tables import ReportJob
+from app.web.fields import LARGEST_ID, Body, Moment, Slug
+
+Keys = Annotated[list[Slug], Field(max_length=MOST_AT_ONCE)]
+
+
+class ReportsIn(Body):
+    """Request for reports: the characteristics (by name, or all of these machines), the period and the format.
+
+    `format`: a ZIP of files, or one `workbook` with a sheet for each characteristic.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "characteristics": ["shaft-d40"],
+                "machines": ["lathe-1"],
+                "from": "2026-11-16T06:00:00+01:00",
+                "to": "2026-11-21T22:00:00+01:00",
+                "format": "pdf",
+                "paper": "a4",
+                "timezone": "Europe/Belgrade",
+            }
+        }
+    )
+
+    characteristics: Keys = Field(default=[], description="Keys of characteristics.")
+    machines: Keys = Field(default=[], description="Keys of machines: all of their characteristics.")
+    start: Moment | None = Field(default=None, alias="from", description="Measured at this moment or later.")
+    end: Moment | None = Field(default=None, alias="to", description="Measured at this moment or earlier.")
+    last: int | None = Field(
+        default=None,
+        strict=True,
+        ge=1,
+        le=LARGEST_ID,
+        description="Of each only the last so many readings; without any period the last 1000. A very large number means all.",
+    )
+    sections: list[SectionName] = Field(
+        default=[], max_length=len(SectionName), description="Only these sections; all of them where none is named."
+    )
+    format: BundleFormat = "pdf"
+    paper: Paper = Paper.A4
+    timezone: str | None = Field(
+        default=None, max_length=64, description="In which moments are written; the plant's if left out."
+    )
+
+    def bundle(self) -> Bundle:
+        """Return the reports to make. Raises `Invalid`."""
+        request = ReportRequest(
+            self.start, self.end, self.last, section_names(self.sections), self.paper, self.timezone or plant_zone().key
+        )
+        return Bundle(request, self.format, self.characteristics, self.machines, current_language())
+
+
+class TroubleOut(Body):
+    """A characteristic without a report, and why."""
+
+    characteristic: str
+    problem: str
+
+
+class ReportsOut(Body):
+    """Progress of a request for reports. `done` of `total` characteristics are ready; `current` is worked on."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "example": {
+                "id": 7,
+                "state": "running",
+                "done": 3,
+                "total": 12,
+                "current": "shaft-d35",
+                "format": "pdf",
+                "asked_by": "Ana",
+                "asked_at": "2026-11-21T15:05:00Z",
+                "finished_at": None,
+                "problem": None,
+                "problems": 0,
+                "without_report": [],
+                "file": None,
+                "size": None,
+            }
+        }
+    )
+
+    id: int
+    state: Literal["queued", "running", "done", "failed", "cancelled"]
+    done: int
+    total: int
+    current: str | None
+    format: BundleFormat
+    asked_by: str
+    asked_at: datetime
+    finished_at: datetime | None
+    problem: str | None = Field(description="Why they failed.")
+    problems: int = Field(description="How many characteristics have no report, once done.")
+    without_report: list[TroubleOut] = Field(description="Which these are, and why; only where one job is asked for.")
+    file: str | None = Field(description=f"Where the file is, once done; kept for {KEPT_DAYS} days.")
+    size: int | None = Field(description="Of the file, in bytes.")
+
+    @classmethod
+    def of(cls, job: ReportJob, troubles: list[tuple[str, str]] | None = None) -> "ReportsOut":
+        """As it stands."""
+        return cls.model_validate(
+            {
+                "id": job.id,
+                "state": job.state,
+                "done": job.done,
+                "total": job.total,
+                "current": job.current,
+                "format": job.request["format"],
+                "asked_by": job.asked_by,
+                "asked_at": job.asked_at,
+                "finished_at": job.finished_at,
+                "problem": job.trouble,
+                "problems": job.problems,
+                "without_report": [{"characteristic": key, "problem": why} for key, why in troubles or ()],
+                "file": f"/api/v1/reports/{job.id}/file" if job.state == "done" else None,
+                "size": job.size,
+            }
+        )

@@ -1,0 +1,114 @@
+"""Capability as its page judges it: indices with intervals, what may be quoted, or why there is no number."""
+
+from app.core.spc.capability import Index
+from app.core.spc.refusal import Refused
+from app.files.documents.content import Fact, Section, count, deviation, number, probability, width, words
+from app.language.i18n import _
+from app.loop.summaries import wording as statistics
+from app.quality.capability import queries as capabilities
+from app.quality.capability import wording
+from app.quality.capability.queries import Study
+from app.views.reports.queries.frame import Frame
+
+FEW = 100  # of a million: more than these are told without decimals
+
+
+def capability(frame: Frame) -> Section:
+    """Cp, Cpk, Pp, Ppk and Cpm with intervals; of a corrected process also of the tool without corrections."""
+    study = capabilities.capability_of(frame.session, frame.standing, frame.window)
+    title = _("Capability")
+    if isinstance(study.indices, Refused):
+        why = _("No capability: {why}").format(why=statistics.refusal(study.indices))
+        return Section("capability", title, warnings=(why,))
+    word, _tone = wording.verdict(study.quoted)
+    if study.quote == "none":
+        verdict = _("No index may be quoted: {why}.").format(why=wording.why_not(study.quoting.why))
+    else:
+        verdict = _("{verdict}: quote {index} = {value}. Intervals hold with {confidence} confidence.").format(
+            verdict=word,
+            index=wording.index_name(study.quote),
+            value=wording.index(study.quoted),
+            confidence=f"{study.confidence * 100:g}\N{NO-BREAK SPACE}%",
+        )
+    sentences = [
+        verdict,
+        _("Of {window}.").format(window=wording.window_of(study)),
+        wording.stability(study.stability, study.baseline),
+    ]
+    if not isinstance(study.in_time, Refused):
+        model = study.in_time.model
+        sentence = _("Time-dependent model {model} (ISO 22514-2): {words} {means}")
+        sentences.append(
+            sentence.format(model=model.value, words=wording.model(study.in_time), means=wording.model_means(study))
+        )
+    return Section(
+        "capability",
+        title,
+        sentences=tuple(sentences),
+        warnings=tuple(wording.cautions(study)),
+        facts=(*_indices(study), *_spread(study), *_without(study)),
+    )
+
+
+def _indices(study: Study) -> list[Fact]:
+    indices = study.indices
+    assert not isinstance(indices, Refused)
+    named = (("cp", "Cp", indices.cp), ("cpk", "Cpk", indices.cpk), ("pp", "Pp", indices.pp), ("ppk", "Ppk", indices.ppk), ("cpm", "Cpm", indices.cpm))  # fmt: skip
+    potential, overall = study.quote == "cpk", study.quote in {"cpk", "ppk"}
+    quotable = {"cp": potential, "cpk": potential, "pp": overall, "ppk": overall}
+    facts = [
+        _index(key, name, index, quotable=quotable.get(key, True)) for key, name, index in named if index is not None
+    ]
+    by_percentile = study.by_percentile
+    if not isinstance(by_percentile, Refused):
+        note = "" if study.quote == "percentile" else _("do not report")
+        facts.append(Fact("ppk_percentile", _("Ppk by percentiles"), number(by_percentile.ppk), note=note))
+    return facts
+
+
+def _index(key: str, name: str, index: Index, *, quotable: bool = True) -> Fact:
+    note = "" if quotable else _("do not report")
+    return Fact(key, name, number(index.value), note=note, low=number(index.low), high=number(index.high))
+
+
+def _spread(study: Study) -> list[Fact]:
+    indices = study.indices
+    assert not isinstance(indices, Refused)
+    facts = [
+        Fact("readings", _("Readings"), count(indices.readings)),
+        Fact("mean", _("Mean deviation"), deviation(indices.mean, 2)),
+        Fact("sigma_within", _("Sigma within"), width(indices.within.value, 3)),
+        Fact("sigma_overall", _("Sigma overall"), width(indices.overall.value, 3)),
+        Fact("outside", _("Counted out of tolerance"), count(study.outside)),
+    ]
+    for key, name, fallout, holds in (
+        ("ppm_observed", _("Counted, ppm"), study.fallout, True),
+        ("ppm_within", _("Expected by sigma within, ppm"), study.within, study.quote == "cpk"),
+        ("ppm_overall", _("Expected by sigma overall, ppm"), study.overall, study.normal),
+    ):
+        if fallout is not None:
+            note = "" if holds else _("do not report")
+            facts.append(Fact(key, name, number(fallout.total, 1 if fallout.total < FEW else 0), note=note))
+    for test in (study.anderson, study.shapiro):
+        if not isinstance(test, Refused):
+            facts.append(Fact(test.test, wording.normality_name(test.test), number(test.statistic, 4)))
+            facts.append(Fact(f"{test.test}_p", _("p, normal distribution"), probability(test.p_value)))
+    for key, name, sequences in (
+        ("excluded", _("Left out: excluded"), study.excluded),
+        ("faults", _("Left out: probe faults"), study.faults),
+    ):
+        facts.append(Fact(key, name, count(len(sequences)), note=wording.named(sequences) if sequences else ""))
+    return facts
+
+
+def _without(study: Study) -> list[Fact]:
+    """Of the tool that nobody corrects, from the wear curve."""
+    uncorrected = study.without
+    if uncorrected is None:
+        return []
+    if isinstance(uncorrected, Refused):
+        return [Fact("without_corrections", _("Without corrections"), words(statistics.refusal(uncorrected)))]
+    facts = [_index("ppk_without", _("Ppk without corrections"), uncorrected.ppk)]
+    if uncorrected.ideal is not None:
+        facts.append(Fact("cp_ideal", _("Cp of scatter alone, centred"), number(uncorrected.ideal.value)))
+    return facts

@@ -1,0 +1,124 @@
+"""Common input of all sections of a report: the characteristic, its readings in the period, what is in force."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from typing import NamedTuple
+
+from sqlalchemy import ColumnElement, select
+from sqlalchemy.orm import InstrumentedAttribute, Session
+
+from app.core.parameters import Parameters
+from app.loop.characteristics import queries as characteristics
+from app.loop.characteristics.queries import Standing
+from app.loop.summaries import queries as statistics
+from app.loop.summaries.queries import History, Numbers, Window
+from app.loop.tables.characteristics import ParametersVersion
+from app.loop.tables.readings import Reading
+from app.views.reports.request import ReportRequest
+
+MOST_VERSIONS = 200
+
+
+class End(NamedTuple):
+    """The first or the last reading of a period."""
+
+    sequence: int
+    measured_at: datetime
+    received_at: datetime
+    version: int
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One characteristic and one period. `now` is when the report is made."""
+
+    session: Session
+    standing: Standing
+    request: ReportRequest
+    now: datetime
+
+    @property
+    def parameters(self) -> Parameters:
+        """In force now: the charts of the pages judge by them too."""
+        return self.standing.parameters
+
+    @cached_property
+    def window(self) -> Window:
+        """The readings measured in the period."""
+        request = self.request
+        return statistics.window_of(
+            self.session, self.standing.characteristic, last=request.newest, start=request.start, end=request.end
+        )
+
+    @cached_property
+    def numbers(self) -> Numbers:
+        return statistics.numbers_of(self.session, self.standing.characteristic, self.window)
+
+    @cached_property
+    def history(self) -> History:
+        """The deviations of the period and their zones, without excluded ones. Raises `Invalid` for more than ten million."""
+        return statistics.history_of(
+            self.session, self.standing.characteristic, self.window, ("deviation", "zone")
+        ).counted
+
+    def holds(self, sequence: InstrumentedAttribute[int] | InstrumentedAttribute[int | None]) -> ColumnElement[bool]:
+        """Condition that a row belongs, by its sequence, to a reading of the period."""
+        inside = sequence.between(self.window.first, self.window.last)
+        if not self.window.timed:
+            return inside
+        return (
+            inside
+            & select(Reading.sequence)
+            .where(
+                Reading.machine_id == self.standing.machine.id,
+                Reading.characteristic_id == self.standing.characteristic.id,
+                Reading.sequence == sequence,
+                self.window.in_time,
+            )
+            .correlate_except(Reading)
+            .exists()
+        )
+
+    @cached_property
+    def ends(self) -> tuple[End, End] | None:
+        """The first and the last reading of the window; None without any."""
+        if not self.window.count:
+            return None
+        first, last = (self._end(sequence) for sequence in (self.window.first, self.window.last))
+        return first, last
+
+    def _end(self, sequence: int) -> End:
+        row = self.session.execute(
+            select(Reading.sequence, Reading.measured_at, Reading.received_at, Reading.parameters_version).where(
+                Reading.machine_id == self.standing.machine.id,
+                Reading.characteristic_id == self.standing.characteristic.id,
+                Reading.sequence == sequence,
+            )
+        ).one()
+        return End(*row)
+
+    @cached_property
+    def span(self) -> tuple[datetime, datetime] | None:
+        """From when to when: the period that was asked for, else that of its readings; None if neither says."""
+        start, end = self.request.start, self.request.end
+        if self.ends is not None:
+            start = start or min(self.ends[0].measured_at, self.ends[0].received_at)
+            end = end or (self.now if self.window.reaches_now else self.ends[1].received_at)
+        if start is None or end is None:
+            return (start or datetime(2000, 1, 1, tzinfo=UTC), end or self.now) if start or end else None
+        return start, end
+
+    @cached_property
+    def versions(self) -> Sequence[ParametersVersion]:
+        """All versions of the parameters, newest first; of very many the last ones."""
+        return characteristics.versions(self.session, self.standing.characteristic, limit=MOST_VERSIONS)
+
+    @cached_property
+    def versions_used(self) -> list[ParametersVersion]:
+        """Those that the readings of the period were judged by, newest first; without readings the one in force."""
+        if self.ends is None:
+            return [self.standing.version]
+        low, high = sorted((self.ends[0].version, self.ends[1].version))
+        return [parameters_version for parameters_version in self.versions if low <= parameters_version.version <= high]

@@ -1,0 +1,207 @@
+"""Sections on the record of the period: alarms, parameters, excluded readings, decisions."""
+
+from sqlalchemy import func, or_, select
+
+from app.core.parameters import BY_NAME
+from app.files.documents.content import Column, Fact, Section, Table, count, deviation, moment, size, words
+from app.language.i18n import _
+from app.loop.alarm_response import wording as alarm_wording
+from app.loop.characteristics import wording
+from app.loop.readings import queries as readings
+from app.loop.tables.alarms import Alarm
+from app.loop.tables.readings import Exclusion, Reading
+from app.loop.tools.wording import status_word
+from app.views.reports.queries.frame import Frame
+from app.web.theme import zone_name
+
+MOST_ROWS = 100
+MOST_DECISIONS = 50
+
+
+def alarms(frame: Frame) -> Section:
+    """Alarms of the readings of the period, and of their tool in that time, with what was said to them; newest first."""
+    tools = {int(version.parameters.get("tool_memory") or 0) for version in frame.versions_used} - {0}
+    own = (Alarm.characteristic_id == frame.standing.characteristic.id) & frame.holds(Alarm.sequence)
+    which = [own]
+    if frame.span is not None:
+        in_time = Alarm.raised_at.between(*frame.span)
+        which.append((Alarm.characteristic_id == frame.standing.characteristic.id) & Alarm.sequence.is_(None) & in_time)
+        which.append(Alarm.characteristic_id.is_(None) & Alarm.tool_memory.in_(tools) & in_time)
+    here = (Alarm.machine_id == frame.standing.machine.id, or_(*which))
+    total = frame.session.scalar(select(func.count()).select_from(Alarm).where(*here)) or 0
+    waiting = frame.session.scalar(
+        select(func.count()).select_from(Alarm).where(*here, Alarm.acknowledged_at.is_(None))
+    )
+    rows = frame.session.scalars(select(Alarm).where(*here).order_by(Alarm.id.desc()).limit(MOST_ROWS)).all()
+    table = Table(
+        (
+            Column("number", _("Number"), 0.9, "right"),
+            Column("raised_at", _("Raised at"), 1.6),
+            Column("kind", _("Kind"), 1.1),
+            Column("reading", _("Reading"), 0.8, "right"),
+            Column("times", _("Times"), 0.5, "right"),
+            Column("what", _("What was wrong"), 2.8),
+            Column("acknowledged_at", _("Acknowledged at"), 1.6),
+            Column("by", _("By whom"), 1.0),
+            Column("action", _("What was done"), 1.1),
+            Column("comment", _("Comment"), 1.5),
+        ),
+        tuple(
+            (
+                count(row.id),
+                moment(row.raised_at),
+                words(alarm_wording.kind_word(row.kind)),
+                count(row.sequence),
+                count(row.count),
+                words(alarm_wording.sentence(row)),
+                moment(row.acknowledged_at),
+                words(row.acknowledged_by),
+                words(alarm_wording.action_word(row.action) if row.action else ""),
+                words(row.comment),
+            )
+            for row in rows
+        ),
+        more=total - len(rows),
+    )
+    facts = (
+        Fact("raised", _("Alarms"), count(total)),
+        Fact("active", _("Not acknowledged yet"), count(waiting)),
+    )
+    return Section("alarms", _("Alarms"), facts=facts, table=table if rows else None)
+
+
+def parameters(frame: Frame) -> Section:
+    """The set in force, and what was changed while the period lasted, by whom and why."""
+    in_force = wording.in_order(frame.standing.version.parameters)
+    facts = [
+        Fact(
+            name,
+            wording.label(name),
+            words(wording.worded(name, in_force)),
+            (BY_NAME[name].r or "") if name in BY_NAME else "",
+        )
+        for name, value in in_force.items()
+        if value is not None
+    ]
+    span = frame.span
+    changed = [
+        (version, differences)
+        for version, differences in wording.history(frame.versions)
+        if version.version > 1 and span is not None and span[0] <= version.created_at <= span[1]
+    ]
+    table = Table(
+        (
+            Column("version", _("Version"), 0.6, "right"),
+            Column("at", _("At"), 1.4),
+            Column("by", _("By whom"), 1.0),
+            Column("changes", _("What changed"), 3.0),
+            Column("why", _("Why"), 2.2),
+        ),
+        tuple(
+            (
+                count(version.version),
+                moment(version.created_at),
+                words(version.created_by),
+                words(
+                    "; ".join(
+                        f"{answer.r or ''} {answer.name}: {answer.before} → {answer.after}".strip()
+                        for answer in differences
+                    )
+                    or "–"
+                ),
+                words(version.reason),
+            )
+            for version, differences in changed
+        ),
+    )
+    sentences = [_("In force now: version {version}.").format(version=frame.standing.version.version)]
+    if not changed:
+        sentences.append(_("Nothing was changed in this period."))
+    return Section(
+        "parameters", _("Parameters"), sentences=tuple(sentences), facts=tuple(facts), table=table if changed else None
+    )
+
+
+def excluded(frame: Frame) -> Section | None:
+    """Readings of the period that were taken out of the statistics, and why; nothing where none was."""
+    query = (
+        select(
+            Exclusion.sequence, Reading.measured_at, Reading.deviation, Exclusion.at, Exclusion.actor, Exclusion.reason
+        )
+        .join(
+            Reading,
+            (Reading.machine_id == Exclusion.machine_id)
+            & (Reading.characteristic_id == Exclusion.characteristic_id)
+            & (Reading.sequence == Exclusion.sequence),
+        )
+        .where(
+            Exclusion.machine_id == frame.standing.machine.id,
+            Exclusion.characteristic_id == frame.standing.characteristic.id,
+            frame.holds(Exclusion.sequence),
+        )
+    )
+    rows = frame.session.execute(query.order_by(Exclusion.sequence.desc()).limit(MOST_ROWS)).all()
+    if not rows:
+        return None
+    table = Table(
+        (
+            Column("reading", _("Reading"), 0.7, "right"),
+            Column("measured_at", _("Measured at"), 1.5),
+            Column("deviation", _("Deviation"), 0.9, "right"),
+            Column("at", _("Excluded at"), 1.5),
+            Column("by", _("By whom"), 1.0),
+            Column("why", _("Why"), 2.5),
+        ),
+        tuple(
+            (count(sequence), moment(measured_at), deviation(value), moment(at), words(actor), words(reason))
+            for sequence, measured_at, value, at, actor, reason in rows
+        ),
+        more=frame.numbers.excluded - len(rows),
+    )
+    sentence = _("Excluded from all numbers above; they stay on record.")
+    return Section("excluded", _("Excluded readings"), sentences=(sentence,), table=table)
+
+
+def decisions(frame: Frame) -> Section | None:
+    """The newest decisions of the period; nothing where there are no readings."""
+    if not frame.window.count:
+        return None
+    entry = readings.entry_of(frame.session, frame.standing.characteristic.key)
+    assert entry is not None
+    records = readings.latest(
+        frame.session, entry, frame.window.last + 1, MOST_DECISIONS,
+        Reading.sequence >= frame.window.first, frame.window.in_time,
+    )  # fmt: skip
+    answers = readings.answers(frame.session, entry, records)
+    table = Table(
+        (
+            Column("reading", _("Reading"), 0.8, "right"),
+            Column("measured_at", _("Measured at"), 1.2),
+            Column("part", _("Part"), 1.3),
+            Column("size", _("Size"), 1.2, "right"),
+            Column("measured", _("Machine reading"), 1.2, "right"),
+            Column("deviation", _("Deviation"), 0.8, "right"),
+            Column("zone", _("Zone"), 0.8),
+            Column("correction", _("Correction"), 0.9, "right"),
+            Column("status", _("Issued as"), 0.9),
+            Column("reason", _("Reason"), 4.8),
+        ),
+        tuple(
+            (
+                count(answer["sequence"]),
+                moment(answer["measured_at"]),
+                words(answer["part"]),
+                size(answer["size"]),
+                size(answer["measured"]),
+                deviation(answer["deviation"]),
+                words(zone_name(answer["zone"])),
+                deviation(answer["correction"]["amount"] if answer["correction"] else None),
+                words(status_word(answer["correction"]["status"]) if answer["correction"] else ""),
+                words(answer["reason"]["text"]),
+            )
+            for answer in answers
+        ),
+        more=frame.numbers.count + frame.numbers.excluded - len(records),
+    )
+    sentence = _("Newest first; the export of readings holds all of them.")
+    return Section("decisions", _("Decisions"), sentences=(sentence,), table=table)

@@ -1,0 +1,136 @@
+"""Request for a report: its period, sections, paper and time zone."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from enum import StrEnum
+from zoneinfo import ZoneInfo
+
+from app.core.spc import USUAL_READINGS
+from app.errors import FieldError, Invalid
+from app.files.documents.content import Paper
+from app.files.formats import cell_values
+from app.language.i18n import _
+from app.language.times import plant_zone
+
+LAST = USUAL_READINGS
+"""Readings of a report for which no period was named."""
+
+
+EVERYTHING = 2**62
+"""More readings than there can be: `all`."""
+
+
+class SectionName(StrEnum):
+    """The sections, in the order in which they stand."""
+
+    NUMBERS = "numbers"
+    CAPABILITY = "capability"
+    CHART = "chart"
+    CONTROL = "control"
+    WEAR = "wear"
+    CORRECTIONS = "corrections"
+    ALARMS = "alarms"
+    TOOLS = "tools"
+    PARAMETERS = "parameters"
+    EXCLUDED = "excluded"
+    DECISIONS = "decisions"
+
+
+def _in_every_zone(moment: datetime) -> bool:
+    """Tell if a report can write it in any time zone: not on the first and the last day of the calendar."""
+    try:
+        _around = [moment.astimezone(UTC) + timedelta(days=way) for way in (-1, 1)]
+    except OverflowError:
+        return False
+    return True
+
+
+@dataclass(frozen=True)
+class ReportRequest:
+    """Request for a report. `last`: only the last so many readings; of them those measured from `start` to `end`."""
+
+    start: datetime | None = None
+    end: datetime | None = None
+    last: int | None = None
+    sections: Sequence[SectionName] = field(default=tuple(SectionName))
+    paper: Paper = Paper.A4
+    zone: str = field(default_factory=lambda: plant_zone().key)
+
+    def __post_init__(self) -> None:
+        """Raises `Invalid` for a period that runs backwards and for a time zone that there is not."""
+        errors = []
+        if self.start is not None and self.end is not None and self.start > self.end:
+            message = _("{start} is later than `to` {end}; exchange the two").format(
+                start=self.start.isoformat(), end=self.end.isoformat()
+            )
+            errors.append(FieldError("from", message))
+        errors += [
+            FieldError(name, _("lies outside the years 1 to 9999"))
+            for name, at in (("from", self.start), ("to", self.end))
+            if at is not None and not _in_every_zone(at)
+        ]
+        try:
+            cell_values.zone_named(self.zone)
+        except (cell_values.Unreadable, ValueError) as error:
+            errors.append(FieldError("timezone", str(error)))
+        if errors:
+            raise Invalid(
+                "; ".join(f"{error.field}: {error.message}" for error in errors),
+                _("Correct the named fields and send it again."),
+                errors=errors,
+            )
+
+    @property
+    def newest(self) -> int | None:
+        """Number of the last readings in the report; `LAST` where nothing else was asked for."""
+        return LAST if self.last is None and self.start is None and self.end is None else self.last
+
+
+def section_names(names: Sequence[str]) -> tuple[SectionName, ...]:
+    """Sections by name, in their order; none named means all. Raises `Invalid`."""
+    unknown = [name for name in names if name not in set(SectionName)]
+    if unknown:
+        message = _("there is no section {name}; there are {names}").format(
+            name=repr(unknown[0][:40]), names=", ".join(SectionName)
+        )
+        raise Invalid(
+            f"section: {message}.",
+            _("Name only these sections, or none for all of them."),
+            errors=[FieldError("section", message)],
+        )
+    return tuple(name for name in SectionName if not names or name in names)
+
+
+def typed(fields: Mapping[str, str], sections: Sequence[str]) -> ReportRequest:
+    """As people type it: moments without an offset are those of the named time zone, else the plant's. Raises `Invalid`, naming every field."""
+    errors: list[FieldError] = []
+    zone: ZoneInfo | None = None
+    try:
+        zone = cell_values.zone_named(fields.get("timezone", "").strip() or plant_zone().key)
+    except (cell_values.Unreadable, ValueError) as error:
+        errors.append(FieldError("timezone", str(error)))
+    moments: dict[str, datetime | None] = {}
+    for name in ("from", "to"):
+        text = fields.get(name, "").strip()
+        try:
+            moments[name] = cell_values.moment(text, zone, fold=1 if name == "to" else 0) if text else None
+        except cell_values.Unreadable as error:
+            errors.append(FieldError(name, str(error)))
+    last = fields.get("last", "").strip()
+    if last and last != "all" and not (last.isascii() and last.isdigit() and 0 < int(last) < 10**15):
+        errors.append(FieldError("last", _("must be a whole number from 1 on, or `all`")))
+    paper = fields.get("paper", "").strip() or Paper.A4
+    if paper not in set(Paper):
+        errors.append(FieldError("paper", _("must be one of: {names}").format(names=", ".join(Paper))))
+    if errors:
+        detail = "; ".join(f"{error.field}: {error.message}" for error in errors)
+        raise Invalid(detail, _("Correct the named fields."), errors=errors)
+    return ReportRequest(
+        start=moments.get("from"),
+        end=moments.get("to"),
+        last=EVERYTHING if last == "all" else int(last) if last else None,
+        sections=section_names(sections),
+        paper=Paper(paper),
+        zone=zone.key if zone else plant_zone().key,
+    )

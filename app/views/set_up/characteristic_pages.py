@@ -1,0 +1,234 @@
+"""Set-up pages: characteristics and their parameters."""
+
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import quote, urlencode
+
+from fastapi import APIRouter, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.access.deps import Caller, Engineer, Viewer
+from app.core.parameters import BY_NAME
+from app.core.plausibility import suggested_jump
+from app.errors import Conflict, InbandError, Invalid
+from app.loop.characteristics import actions, queries
+from app.loop.characteristics.actions import CharacteristicChange, CharacteristicIn
+from app.loop.characteristics.wording import history
+from app.loop.machines import queries as machines
+from app.loop.programs import queries as programs
+from app.loop.readings import queries as readings
+from app.quality.what_if import queries as what_if
+from app.quality.what_if import wording
+from app.views.set_up import parameter_form
+from app.views.set_up.frame import setup_page
+from app.web.deps import FormDep, SessionDep
+from app.web.forms import by_field, parsed
+
+router = APIRouter()
+ON_PAGE = 200
+LOOKED_BACK = 100  # readings from which a plausible jump is suggested
+
+
+@router.get("/setup/characteristics")
+def characteristics_page(
+    request: Request, session: SessionDep, caller: Viewer, machine: str = "", after: str = ""
+) -> Response:
+    chosen = machines.find_machine(session, machine)
+    rows = queries.characteristics(session, machine_id=chosen.id if chosen else None, after=after, limit=ON_PAGE + 1)
+    more = rows[ON_PAGE - 1].characteristic.key if len(rows) > ON_PAGE else None
+    return setup_page(
+        request,
+        "characteristics.html",
+        caller,
+        "characteristics",
+        rows=rows[:ON_PAGE],
+        older=_page_of(chosen.key if chosen else None, more) if more else None,
+        newest=_page_of(chosen.key if chosen else None, None) if after else None,
+        machines=machines.machines(session, limit=100_000),
+        machine=chosen,
+        mode_words=lambda mode: parameter_form.choice("mode", mode.value),
+    )
+
+
+def _page_of(machine: str | None, after: str | None) -> str:
+    query = urlencode({name: value for name, value in (("machine", machine), ("after", after)) if value})
+    return "/setup/characteristics" + (f"?{query}" if query else "")
+
+
+@router.get("/setup/characteristics/new")
+def new_characteristic_page(
+    request: Request, session: SessionDep, caller: Engineer, machine: str = "", like: str = ""
+) -> Response:
+    typed = parameter_form.typed_defaults() | {"machine": machine}
+    if like:
+        standing = queries.characteristic_named(session, like)
+        typed = parameter_form.typed_from(standing.version.parameters) | {
+            "machine": standing.machine.key,
+            "part": standing.characteristic.part or "",
+        }
+    return _new(request, session, caller, typed, {})
+
+
+@router.post("/setup/characteristics/new")
+def send_new_characteristic(request: Request, session: SessionDep, caller: Engineer, form: FormDep) -> Response:
+    named = {name: form.get(name, "") for name in ("key", "name", "machine", "part")}
+    try:
+        new = parsed(CharacteristicIn, named | {"parameters": parameter_form.parameters_from(form)})
+        stored = actions.add_characteristic(session, new, caller.name)
+    except InbandError as error:
+        if not error.errors:
+            raise
+        return _new(request, session, caller, form, _all_errors(error, form), error.status)
+    return RedirectResponse(f"/setup/characteristics/{stored.characteristic.key}?done=added", 303)
+
+
+def _all_errors(error: InbandError, form: Mapping[str, str]) -> dict[str, str]:
+    """Errors of the names and of the parameters together, each once."""
+    errors = [*error.errors, *actions.refusals(parameter_form.parameters_from(form))]
+    return by_field(Invalid(error.detail, errors=dict.fromkeys(errors)))
+
+
+def _new(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    typed: Mapping[str, str],
+    errors: Mapping[str, str],
+    status: int = 200,
+) -> Response:
+    return setup_page(
+        request,
+        "characteristic_new.html",
+        caller,
+        "characteristics",
+        status=status,
+        machines=[(machine.key, machine.name) for machine in machines.machines(session, limit=100_000)],
+        **_form(typed, errors),
+    )
+
+
+def prefilled_new(request: Request, session: Session, caller: Caller, typed: Mapping[str, str]) -> Response:
+    """The form of a new characteristic with what is known of it already, as if it had been typed."""
+    return _new(request, session, caller, typed, {})
+
+
+@router.get("/setup/characteristics/{characteristic}")
+def characteristic_page(request: Request, session: SessionDep, caller: Viewer, characteristic: str) -> Response:
+    """Parameters named in the address (`?zero_range=0.0012&reason=…`) are typed into the form; nothing is changed by it."""
+    standing = queries.characteristic_named(session, characteristic)
+    suggested = {name: text[:1000] for name, text in request.query_params.items() if name in {*BY_NAME, "reason"}}
+    if not suggested:
+        return _characteristic(request, session, caller, standing)
+    typed = parameter_form.typed_from(standing.version.parameters) | suggested
+    return prefilled_change(request, session, caller, standing, typed)
+
+
+@router.post("/setup/characteristics/{characteristic}")
+def send_characteristic(
+    request: Request, session: SessionDep, caller: Engineer, characteristic: str, form: FormDep
+) -> Response:
+    version = form.get("parameters_version", "")
+    looked_at = int(version) if version.isascii() and version.isdigit() and len(version) < 10 else None
+    standing = queries.characteristic_named(session, characteristic)
+    before = (standing.version.version, standing.characteristic.name, standing.characteristic.part)
+    try:
+        change = parsed(
+            CharacteristicChange,
+            {
+                "name": form.get("name", "").strip() or " ",  # refused in words; left out it would just stay
+                "parameters": parameter_form.parameters_from(form),
+                "parameters_version": looked_at,
+                "reason": form.get("reason", "").strip(),
+            },
+        )
+        part = parsed(CharacteristicChange, {"part": form.get("part", "").strip()}).part
+        change = change.model_copy(update={"part": part})
+        standing = actions.change_characteristic(session, characteristic, change, caller.name)
+    except InbandError as error:
+        if not error.errors and error.status != Conflict.status:
+            raise
+        session.expire_all()
+        return _characteristic(
+            request,
+            session,
+            caller,
+            queries.characteristic_named(session, characteristic),
+            status=error.status,
+            typed=form,
+            errors=by_field(error),
+            problem=error if error.status == Conflict.status else None,
+        )
+    after = (standing.version.version, standing.characteristic.name, standing.characteristic.part)
+    done = "same" if before == after else "changed"
+    return RedirectResponse(f"/setup/characteristics/{quote(characteristic)}?done={done}", 303)
+
+
+def prefilled_change(
+    request: Request, session: Session, caller: Caller, standing: queries.Standing, typed: Mapping[str, str]
+) -> Response:
+    """The form of a characteristic with other parameters typed into it; nothing is changed until it is sent."""
+    names = {"name": standing.characteristic.name, "part": standing.characteristic.part or ""}
+    return _characteristic(request, session, caller, standing, typed=names | dict(typed))
+
+
+def _characteristic(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    standing: queries.Standing,
+    *,
+    status: int = 200,
+    typed: Mapping[str, str] | None = None,
+    errors: Mapping[str, str] | None = None,
+    problem: InbandError | None = None,
+) -> Response:
+    characteristic = standing.characteristic
+    if typed is None:
+        typed = parameter_form.typed_from(standing.version.parameters) | {
+            "name": characteristic.name,
+            "part": characteristic.part or "",
+        }
+    return setup_page(
+        request,
+        "characteristic.html",
+        caller,
+        "characteristics",
+        status=status,
+        characteristic=characteristic,
+        machine=standing.machine,
+        version=standing.version,
+        problem=problem,
+        warnings=actions.warnings_of(standing, queries.target_before(session, standing)),
+        history=history(queries.versions(session, characteristic)),
+        program=programs.program_view(standing),
+        proposals=[
+            (row, wording.proposed(row))
+            for row in what_if.proposals(session, characteristic=characteristic, status="open")
+        ],
+        suggested_jump=_suggested_jump(session, standing),
+        **_form(typed, errors or {}),
+    )
+
+
+def _suggested_jump(session: Session, standing: queries.Standing) -> float | None:
+    """Largest plausible jump that the last readings suggest, mm."""
+    factor = standing.parameters.factor
+    characteristic = standing.characteristic
+    return suggested_jump(
+        readings.course_of(session, characteristic.machine_id, characteristic.id, factor, LOOKED_BACK)
+    )
+
+
+def _form(typed: Mapping[str, str], errors: Mapping[str, str]) -> dict[str, Any]:
+    fields = parameter_form.typed_defaults() | {"key": "", "name": "", "machine": "", "part": "", "reason": ""}
+    return {
+        "typed": fields | dict(typed),
+        "errors": errors,
+        "inputs": parameter_form.inputs(),
+        "factors": parameter_form.factor_choices(),
+        "diagram": parameter_form.diagram(typed),
+        "sentences": parameter_form.sentences(),
+        "short": parameter_form.short,
+        "micrometres": lambda name: parameter_form.micrometres(name, typed.get(name, "")),
+    }

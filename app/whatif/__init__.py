@@ -1,1 +1,0 @@
-"""What if: stored readings replayed with other settings, and the changes of parameters that are proposed from it."""

@@ -1,0 +1,110 @@
+"""Permissions: every set-up route with every kind of caller."""
+
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.shop import PARAMETERS, Shop
+
+ROLES = ["nobody", "machine", "other machine", "viewer", "operator", "engineer", "admin"]
+
+
+@pytest.fixture(scope="module")
+def shop(server: Any) -> Shop:
+    return Shop(server)
+
+
+@pytest.fixture(scope="module")
+def callers(server: Any, shop: Shop) -> dict[str, httpx.Client]:
+    other = Shop(server)
+    return {
+        "nobody": server.client(),
+        "machine": shop.machine_client,
+        "other machine": other.machine_client,
+        **{role: server.client(server.key(role)) for role in ROLES[3:]},
+    }
+
+
+NEW_MACHINE = {"key": "fresh", "name": "Fresh", "control": "other"}
+NEW_CHARACTERISTIC = {"key": "fresh", "name": "Fresh", "machine": "nowhere", "parameters": PARAMETERS}
+# method, path, body, who may (from this role on), may the machine's own key, status for those who may
+ROUTES: list[tuple[str, str, Any, str, bool, int]] = [
+    ("GET", "/machines", None, "viewer", True, 200),
+    ("GET", "/machines/{machine}", None, "viewer", True, 200),
+    ("POST", "/machines", {**NEW_MACHINE, "control": "none"}, "engineer", False, 422),
+    ("PATCH", "/machines/{machine}", {"name": "Lathe"}, "engineer", False, 200),
+    ("GET", "/machines/{machine}/keys", None, "engineer", False, 200),
+    ("POST", "/machines/{machine}/keys", {"name": "k"}, "engineer", False, 201),
+    ("DELETE", "/machines/{machine}/keys/2000000000", None, "engineer", False, 404),
+    ("GET", "/characteristics", None, "viewer", True, 200),
+    ("GET", "/characteristics?machine={machine}", None, "viewer", True, 200),
+    ("GET", "/characteristics/{characteristic}", None, "viewer", True, 200),
+    ("GET", "/characteristics/{characteristic}/parameters", None, "viewer", True, 200),
+    ("POST", "/characteristics", NEW_CHARACTERISTIC, "engineer", False, 422),
+    ("PATCH", "/characteristics/{characteristic}", {"part": "p"}, "engineer", False, 200),
+    ("GET", "/people", None, "admin", False, 200),
+    ("GET", "/people/2000000000", None, "admin", False, 404),
+    ("PATCH", "/people/2000000000", {"role": "viewer"}, "admin", False, 404),
+    ("POST", "/people/invitations", {"role": "viewer"}, "admin", False, 201),
+    ("GET", "/keys", None, "admin", False, 200),
+    ("POST", "/keys", {"name": "k", "role": "viewer"}, "admin", False, 201),
+    ("DELETE", "/keys/2000000000", None, "admin", False, 404),
+    ("GET", "/audit", None, "engineer", False, 200),
+]
+
+
+@pytest.mark.parametrize("who", ROLES)
+@pytest.mark.parametrize(("method", "path", "body", "role", "own", "status"), ROUTES)
+def test_roles(
+    shop: Shop,
+    callers: dict[str, httpx.Client],
+    who: str,
+    method: str,
+    path: str,
+    body: Any,
+    role: str,
+    own: bool,
+    status: int,
+) -> None:
+    path = path.format(machine=shop.machine, characteristic=shop.characteristic)
+    if who == "nobody":
+        expected = 401
+    elif who == "machine":
+        expected = status if own else 403
+    elif who == "other machine":
+        expected = status if own and path in {"/machines", "/characteristics"} else 403  # its own part of the list
+    else:
+        expected = status if ROLES.index(who) >= ROLES.index(role) else 403
+    answer = callers[who].request(method, f"/api/v1{path}", json=body)
+    assert answer.status_code == expected, answer.text
+    if expected >= 400:
+        problem = answer.json()
+        assert answer.headers["content-type"] == "application/problem+json"
+        assert problem["what_to_do"]
+    if expected in {401, 403}:
+        assert (expected == 401) == ("www-authenticate" in answer.headers)
+
+
+def test_a_machine_sees_itself_alone_in_lists(shop: Shop, callers: dict[str, httpx.Client]) -> None:
+    Shop(shop.server)
+    machines = callers["machine"].get("/api/v1/machines").json()["items"]
+    assert [machine["key"] for machine in machines] == [shop.machine]
+    characteristics = callers["machine"].get("/api/v1/characteristics").json()["items"]
+    assert {characteristic["machine"] for characteristic in characteristics} == {shop.machine}
+
+
+@pytest.mark.parametrize(
+    "header", ["", "Bearer", "Basic YTpi", "Bearer nothing-we-know", "bearer inband_" + "x" * 5000]
+)
+def test_unknown_ways_to_sign_in_are_401(server: Any, header: str) -> None:
+    answer = server.client().get("/api/v1/machines", headers={"Authorization": header})
+    assert answer.status_code == 401
+    assert "Bearer" in answer.headers["www-authenticate"]
+
+
+@pytest.mark.parametrize("path", ["/setup", "/setup/machines/new", "/account", "/setup/people?x=1"])
+def test_people_are_asked_to_sign_in_and_brought_back(server: Any, path: str) -> None:
+    answer = server.client().get(path)
+    assert answer.status_code == 303
+    assert answer.headers["location"] == f"/sign-in?next={path.replace('?', '%3F').replace('=', '%3D')}"

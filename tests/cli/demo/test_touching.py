@@ -1,0 +1,28 @@
+"""The vice of the demonstration: it creeps until it warns, and a casting is aligned."""
+
+import threading
+
+import pytest
+
+from app.cli.demo import plant, touching
+from app.cli.demo.client import Client
+from app.cli.demo.installing import set_up
+from tests.conftest import Server
+
+
+def test_a_creeping_vice_and_an_aligned_casting_are_there_once(server: Server) -> None:
+    admin = Client(server.url, server.key("admin"), threading.Event())
+    set_up(admin, plant.MILL_1)
+    for _again in range(2):
+        touching.behind(admin, plant.MILL_1.key, 1)
+    zeros = list(admin.items("/work-zeros", machine="mill-1"))
+    assert len(zeros) == touching.ZEROS
+    assert [each["shift"]["state"] for each in zeros[1 : touching.STEADY]] == ["steady"] * (touching.STEADY - 1)
+    assert zeros[-1]["shift"]["state"] == "warning"
+    assert zeros[-1]["shift"]["shifts"]["x"] == pytest.approx(10 * touching.CREEP[0], abs=0.004)
+    (aligned,) = admin.items("/alignments", machine="mill-1")
+    assert aligned["misfits"] == []
+    assert aligned["angles"]["z"] == pytest.approx(0.118, abs=0.002)
+    assert list(admin.items("/alarms", state="active", machine="mill-1")) == []
+    touching.behind(admin, "lathe-1", 1)  # which has no vice
+    admin.close()

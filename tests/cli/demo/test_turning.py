@@ -1,0 +1,32 @@
+"""The rotary table of the demonstration: last month's run is entered, today's says what to enter."""
+
+import threading
+
+import pytest
+
+from app.cli.demo import plant, turning
+from app.cli.demo.client import Client
+from app.cli.demo.installing import set_up
+from tests.conftest import Server
+
+
+def test_a_month_of_runs_is_there_once(server: Server) -> None:
+    admin = Client(server.url, server.key("admin"), threading.Event())
+    set_up(admin, plant.MILL_1)
+    for _again in range(2):
+        turning.behind(admin, plant.MILL_1.key, 1)
+    runs = list(admin.items("/kinematics/runs", machine="mill-1"))
+    assert [run["status"] for run in runs] == ["entered", "measured", "measured", "measured", "measured"]
+    for run, stand in zip(runs, turning.WEEKS, strict=True):
+        errors = [each["value"] for each in run["axes"][0]["errors"].values()]
+        assert errors[:2] == pytest.approx(stand[:2], abs=0.001)
+        assert errors[2:] == pytest.approx(stand[2:], abs=0.0005)
+        assert run["axes"][0]["backlash"]["value"] == pytest.approx(turning.BACKLASH, abs=0.0004)
+    changes = admin.get(f"/kinematics/runs/{runs[-1]['run']}/comparison", **{"with": runs[0]["run"]})["changes"]
+    x = next(each for each in changes if each["name"] == "EX0C")
+    assert (x["difference"], x["enter"]) == (pytest.approx(0.0058, abs=0.001), pytest.approx(0.0058, abs=0.001))
+    drift = next(each for each in admin.get("/machines/mill-1/kinematics")["drift"] if each["name"] == "EX0C")
+    assert drift["slope_low"] > 0, "the drift of the table is seen"
+    assert list(admin.items("/alarms", state="active", machine="mill-1")) == []
+    turning.behind(admin, "lathe-1", 1)  # which has no rotary table
+    admin.close()

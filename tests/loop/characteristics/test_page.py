@@ -1,0 +1,205 @@
+"""The page of a characteristic and of a reading: as plain HTML, and live in a real browser."""
+
+import re
+import time
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.conftest import Server
+from tests.shop import PARAMETERS, Person, Shop
+
+PLOT = "document.querySelector('plotly-chart.zones .plot')"
+XSS = """<b>"Кључ" d'Ø</b>"""
+
+
+@pytest.fixture
+def shop(server: Any) -> Shop:
+    return Shop(server)
+
+
+@pytest.fixture(scope="module")
+def operator(server: Server) -> Person:
+    return Person(server, "operator")
+
+
+@pytest.fixture(scope="module")
+def viewer(server: Server) -> Person:
+    return Person(server, "viewer")
+
+
+def eventually(page: Page, condition: str, seconds: float = 10) -> None:
+    """Until this is true in the page. Playwright's own way needs eval, which our policy forbids."""
+    deadline = time.monotonic() + seconds
+    while not page.evaluate(condition):
+        assert time.monotonic() < deadline, f"not within {seconds} s: {condition}"
+        time.sleep(0.05)
+
+
+def path(shop: Shop, rest: str = "") -> str:
+    return f"/characteristics/{shop.characteristic}{rest}"
+
+
+class TestWithoutScripts:
+    def test_it_waits_for_its_first_reading(self, shop: Shop, viewer: Person) -> None:
+        text = viewer.open(path(shop))
+        assert "No readings yet" in text
+        assert "waits for its first reading" in text
+
+    def test_decisions_newest_first_with_their_reasons(self, shop: Shop, viewer: Person) -> None:
+        shop.read(0.4)
+        number = shop.read(6.1)["correction"]["number"]
+        text = viewer.open(path(shop))
+        assert re.findall(r'id="reading-(\d+)"', text) == ["2", "1"]
+        assert "Deviation 6.1 µm is beyond the averaging limit 5.0 µm: corrected in full." in text
+        assert f"Correction {number}" in text
+        assert "−6.1\xa0µm" in text
+        assert "version 1" in text
+
+    def test_pages_of_decisions(self, shop: Shop, viewer: Person) -> None:
+        batch = [{"characteristic": shop.characteristic, "measured": 40.0} for _ in range(30)]
+        assert shop.admin.post("/api/v1/readings/batch", json=batch).status_code == 201
+        text = viewer.open(path(shop, "?last=50"))
+        assert re.findall(r'id="reading-(\d+)"', text) == [str(n) for n in range(30, 5, -1)]
+        older = re.search(r'href="([^"]+)#decisions" rel="next"', text)
+        assert older is not None
+        rest = viewer.open(older[1].replace("&amp;", "&"))
+        assert re.findall(r'id="reading-(\d+)"', rest) == ["5", "4", "3", "2", "1"]
+        assert "figures/zones?last=50" in rest
+
+    def test_the_numbers_beside_the_chart(self, shop: Shop, viewer: Person) -> None:
+        for deviation in (1.0, -1.0, 12.0):
+            shop.read(deviation)
+        text = viewer.open(path(shop))
+        assert '+4.00<span class="unit">µm' in text
+        assert '66.6<span class="unit">%' in text
+
+    def test_what_was_decided_on_another_value_says_so(self, shop: Shop, viewer: Person) -> None:
+        shop.read(20.0)
+        shop.read(20.5, correction_in_effect=0)
+        assert "counts as +0.5" in viewer.open(path(shop))
+        text = viewer.open(path(shop, "/readings/2"))
+        assert "The part was cut before correction" in text
+        assert "Decided on" in text
+
+    def test_touches_and_parameters_of_the_time(self, shop: Shop, viewer: Person) -> None:
+        shop.call("PATCH", path(shop), parameters={"repeats": 2, "variant": "round", "points": 2}, reason="two points")
+        touches = [[40.001, 40.003], [39.999, 40.001]]
+        answer = shop.admin.post("/api/v1/readings", json={"characteristic": shop.characteristic, "touches": touches})
+        assert answer.status_code == 201, answer.text
+        shop.call("PATCH", path(shop), parameters={"zero_range": 0.002}, reason="calmer machine")
+        text = viewer.open(path(shop, "/readings/1"))
+        assert '40.0030<span class="unit">mm' in text
+        assert '40.00200<span class="unit">mm' in text
+        assert "Judged by version 2" in text
+        assert "two points" in text
+        assert "0.001 mm" in text
+        history = viewer.open(path(shop))
+        assert "<del>0.001 mm</del> → <ins>0.002 mm</ins>" in history
+        assert "calmer machine" in history
+
+    def test_an_operator_excludes_with_a_reason(self, shop: Shop, operator: Person) -> None:
+        shop.read(0.4)
+        where = path(shop, "/readings/1")
+        assert "Must not be empty" in operator.send(f"{where}/exclude", 422, reason=" ")
+        assert "chip on the stylus" in operator.send(f"{where}/exclude", reason="chip on the stylus")
+        again = operator.send(f"{where}/exclude", 409, reason="again")
+        assert "was excluded by" in again
+        assert shop.call("GET", f"/characteristics/{shop.characteristic}/statistics")["count"] == 0
+
+    def test_a_viewer_does_not(self, shop: Shop, viewer: Person) -> None:
+        shop.read(0.4)
+        assert "/exclude" not in viewer.open(path(shop, "/readings/1"))
+        assert "needs the role operator" in viewer.send(path(shop, "/readings/1/exclude"), 403, reason="why not")
+
+    @pytest.mark.parametrize(
+        ("rest", "status"),
+        [
+            ("/readings/1", 404),
+            ("/readings/0", 422),
+            ("/readings/99999999999999999999", 422),
+            ("?last=some", 422),
+            ("?scale=log", 422),
+            ("?first=5&through=2", 422),
+            ("?before=0", 422),
+        ],
+    )
+    def test_a_wrong_address_is_answered_in_words(self, shop: Shop, viewer: Person, rest: str, status: int) -> None:
+        text = viewer.open(path(shop, rest), status)
+        assert "<h1" in text
+        assert "Traceback" not in text
+
+    def test_a_part_of_the_page_is_fetched_alone(self, shop: Shop, viewer: Person) -> None:
+        shop.read(0.4)
+        part = viewer.browser.get(path(shop), headers={"X-Live-Part": "decisions"}).text
+        assert 'id="decisions"' in part
+        assert 'id="now"' not in part
+
+
+class TestInTheBrowser:
+    def test_a_push_moves_chart_and_decisions_without_a_reload(self, shop: Shop, viewer: Person, page: Page) -> None:
+        shop.read(0.4)
+        viewer.sign_in(page)
+        page.goto(path(shop))
+        expect(page.locator("plotly-chart.zones .main-svg").first).to_be_visible()
+        eventually(page, f"{PLOT}.data?.length > 0")
+        page.evaluate("window.untouched = true")
+        begun = time.monotonic()
+        shop.read(6.1)
+        eventually(page, f"{PLOT}.data.find(t => t.meta === 'readings').x.length === 2", 3)
+        expect(page.locator("#reading-2")).to_contain_text("+6.1")
+        expect(page.locator("#now")).to_contain_text("Correcting")
+        expect(page.locator("#numbers dd").first).to_have_text("2")
+        assert time.monotonic() - begun < 5
+        assert page.evaluate("window.untouched")
+
+    def test_a_click_on_a_point_opens_its_reading(self, shop: Shop, viewer: Person, page: Page) -> None:
+        for deviation in (0.4, 3.0, -2.0):
+            shop.read(deviation)
+        viewer.sign_in(page)
+        page.goto(path(shop))
+        eventually(page, f"{PLOT}.data?.length > 0")
+        page.locator("plotly-chart.zones .scatterlayer .trace .points path").nth(1).click(force=True)
+        page.wait_for_url(f"**{path(shop, '/readings/')}*")
+
+    def test_an_opened_decision_stays_open_when_a_new_one_arrives(self, shop: Shop, viewer: Person, page: Page) -> None:
+        shop.read(6.1)
+        viewer.sign_in(page)
+        page.goto(path(shop))
+        page.locator("#reading-1 summary").click()
+        expect(page.locator("#reading-1 .reason")).to_be_visible()
+        shop.read(0.2)
+        expect(page.locator("#reading-2")).to_be_visible()
+        expect(page.locator("#reading-1 .reason")).to_be_visible()
+
+    def test_excluding_by_hand(self, shop: Shop, operator: Person, page: Page) -> None:
+        shop.read(6.1)
+        operator.sign_in(page)
+        page.goto(path(shop, "/readings/1"))
+        page.get_by_role("button", name="Exclude from the statistics").click()
+        page.get_by_label("Reason").fill("chip on the stylus")
+        page.get_by_role("button", name="Exclude", exact=True).click()
+        expect(page.locator("#reading")).to_contain_text("chip on the stylus")
+
+    def test_scale_and_number_are_in_the_address(self, shop: Shop, viewer: Person, page: Page) -> None:
+        shop.read(6.1)
+        viewer.sign_in(page)
+        page.goto(path(shop))
+        page.get_by_role("link", name="True scale").click()
+        page.get_by_role("link", name="50", exact=True).click()
+        page.wait_for_url(lambda url: "last=50" in url and "scale=true" in url)
+        page.get_by_role("link", name="Over time").click()
+        eventually(page, f"{PLOT}.data?.some(t => t.meta === 'run')")
+
+    def test_names_are_text_everywhere(self, shop: Shop, operator: Person, page: Page) -> None:
+        key = f"{shop.characteristic}-x"
+        body: dict[str, Any] = {"key": key, "machine": shop.machine, "name": XSS, "part": XSS, "parameters": PARAMETERS}
+        shop.call("POST", "/characteristics", 201, **body)
+        shop.read(6.1, key, part=XSS, key=XSS)
+        shop.call("POST", f"/readings/{key}/1/exclude", reason=XSS)
+        operator.sign_in(page)
+        for where in ("/", f"/characteristics/{key}", f"/characteristics/{key}/readings/1"):
+            page.goto(where)
+            expect(page.locator("main")).to_contain_text(XSS)
+            assert page.locator("main b", has_text="Кључ").count() == 0

@@ -1,0 +1,186 @@
+"""What a file's columns mean, and what is wrong with its lines: no database."""
+
+import json
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from app.errors import Invalid
+from app.loop.readings.importing.layout import MOST_COLUMNS, Wishes, look
+from app.loop.readings.importing.lines import Flaw, Line, lines
+
+NOW = datetime(2026, 11, 21, 12, tzinfo=UTC)
+
+
+def read(path: Path, **wishes: object) -> list[Line | Flaw]:
+    return list(lines(path, look(path, Wishes(**wishes)), "shaft-d40", now=NOW))  # type: ignore[arg-type]
+
+
+def good(path: Path, **wishes: object) -> list[tuple[float | None, str | None]]:
+    found = read(path, **wishes)
+    flaws = [str(each) for each in found if isinstance(each, Flaw)]
+    assert flaws == []
+    return [(each.reading.measured, each.reading.part) for each in found if isinstance(each, Line)]
+
+
+def write(tmp_path: Path, text: str, encoding: str = "utf-8", name: str = "file.csv") -> Path:
+    path = tmp_path / name
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("header", "row"),
+    [
+        ("measured,measured_at,part", "39.998,2026-11-20T08:00:00Z,Дугме"),
+        ("Messwert;Datum;Uhrzeit;Teil", "39,998;20.11.2026;08:00:00;Дугме"),
+        ("Izmereno\tVreme\tDeo", "39,998\t20.11.2026. 08:00:00\tДугме"),
+        ("Izmerjena vrednost;Čas meritve;Kos", "39,998;2026-11-20 08:00:00;Дугме"),
+        ("Значение|Дата и время|Серийный номер", "39,998|20.11.2026 08:00|Дугме"),
+        ("Wert [µm];Zeitstempel;Seriennummer", "39998;2026-11-20T08:00:00Z;Дугме"),
+    ],
+)
+def test_files_in_five_languages_are_understood_by_their_headers(tmp_path: Path, header: str, row: str) -> None:
+    path = write(tmp_path, f"{header}\n{row}\n")
+    assert good(path, timezone="UTC") == [(39.998, "Дугме")]
+    first = read(path, timezone="UTC")[0]
+    assert isinstance(first, Line)
+    assert first.reading.measured_at == datetime(2026, 11, 20, 8, tzinfo=UTC)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1250", "cp1251", "cp1252"])
+def test_encodings(tmp_path: Path, encoding: str) -> None:
+    part = {"cp1251": "Шипка", "cp1252": "Welle Ø"}.get(encoding, "Žižek")
+    path = write(tmp_path, f"measured,part\r\n39.998,{part}\r\n", encoding)
+    named = encoding if encoding.startswith("cp") else None
+    assert good(path, encoding=named) == [(39.998, part)]
+
+
+def test_a_file_in_an_unnamed_windows_encoding_is_told_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(Invalid, match="cp1250 for Serbian"):
+        look(write(tmp_path, "measured,part\n39.998,Žižek\n", "cp1250"), Wishes())
+
+
+def test_quotes_blank_lines_and_the_line_a_spreadsheet_writes(tmp_path: Path) -> None:
+    path = write(tmp_path, 'sep=;\n"measured";"part"\n\n39,998;"a ""b""; c"\n;\n39,997;"two\nlines is one"\n')
+    found = read(path)
+    assert isinstance(found[0], Line)
+    assert found[0].reading.part == 'a "b"; c'
+    assert isinstance(found[1], Flaw), "a text of two lines cannot be a part's name"
+    assert found[1].line == 6
+
+
+def test_a_decimal_comma_in_quotes_between_commas(tmp_path: Path) -> None:
+    assert good(write(tmp_path, 'measured,part\n"39,998",a\n')) == [(39.998, "a")]
+    flaw = read(write(tmp_path, "measured,part\n39,998,a\n"))[0]
+    assert isinstance(flaw, Flaw)
+    assert "decimal comma" in flaw.reason
+
+
+def test_columns_that_are_named_or_numbered_win(tmp_path: Path) -> None:
+    path = write(tmp_path, "value,Höhe,x\n1,39.998,a\n")
+    assert good(path, mapping={"measured": "Höhe", "part": "3"}) == [(39.998, "a")]
+    assert look(path, Wishes(mapping={"measured": "2"})).ignored == ["value", "x"]
+    with pytest.raises(Invalid, match="no column 'Hohe'; the file has: value, Höhe, x"):
+        look(path, Wishes(mapping={"measured": "Hohe"}))
+    with pytest.raises(Invalid, match="no field 'size'"):
+        look(path, Wishes(mapping={"size": "x"}))
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "The file is empty"),
+        ("\n\n", "The file is empty"),
+        ("Höhe;Breite\n1;2\n", "No column is recognised as the measured value.*The columns are: Höhe, Breite"),
+        ('measured,part\n39.99,"open\n', "never closed"),
+    ],
+)
+def test_files_that_cannot_be_read_at_all_say_why(tmp_path: Path, text: str, why: str) -> None:
+    path = write(tmp_path, text)
+    with pytest.raises(Invalid) as refusal:
+        found = list(lines(path, look(path, Wishes()), "c", now=NOW))
+        raise Invalid(str(found))
+    assert re.search(why, refusal.value.detail)
+
+
+def test_every_flaw_has_its_line_its_column_and_a_reason(tmp_path: Path) -> None:
+    rows = ["1e999,a", "NaN,b", ",c", "39.998,ok", "four,d", "5e7,e", "39.99", "39.99,f,g", "39.99,\x07bell"]
+    found = read(write(tmp_path, "measured,part\n" + "\n".join(rows) + "\n"))
+    flaws = [each for each in found if isinstance(each, Flaw)]
+    assert [(f.line, f.column) for f in flaws] == [
+        (2, "measured"), (3, "measured"), (4, "measured"), (6, "measured"), (7, "measured"), (8, ""), (9, ""), (10, "part"),
+    ]  # fmt: skip
+    assert "longer than any machine" in flaws[4].reason
+    assert str(flaws[0]) == "line 2, measured: '1e999' is too large to be a number of this world"
+
+
+def test_times_of_tomorrow_and_of_the_last_century_are_refused(tmp_path: Path) -> None:
+    path = write(
+        tmp_path, "measured,measured_at\n40,2026-11-23T12:00:01Z\n40,1999-12-31T23:59:59Z\n40,2026-11-20T12:00Z\n"
+    )
+    found = read(path)
+    assert [type(each) for each in found] == [Flaw, Flaw, Line]
+
+
+def test_the_key_of_a_line_comes_from_the_files_content_not_its_name(tmp_path: Path) -> None:
+    text = "measured\n39.998\n39.997\n"
+    one, two = read(write(tmp_path, text)), read(write(tmp_path, text, name="other.csv"))
+    keys = [each.reading.key for each in one if isinstance(each, Line)]
+    assert keys == [each.reading.key for each in two if isinstance(each, Line)]
+    assert len(set(keys)) == 2
+    changed = read(write(tmp_path, text + "39.996\n"))[0]
+    assert isinstance(changed, Line)
+    assert changed.reading.key != keys[0]
+
+
+def test_json_lines_and_json_lists(tmp_path: Path) -> None:
+    objects: list[object] = [
+        {"measured": 39.998, "part": "a", "measured_at": "2026-11-20T08:00:00Z", "zone": "zero"},
+        {"measured": "39.998"},
+        {"part": "b"},
+        17,
+        {"measured": 39.997},
+    ]
+    as_lines = write(tmp_path, "\n".join(map(json.dumps, objects)) + "\nnot json\n", name="a.ndjson")
+    as_list = write(tmp_path, json.dumps(objects), name="a.json")
+    for path, numbers in ((as_lines, [2, 3, 4, 6]), (as_list, [2, 3, 4])):
+        found = read(path)
+        assert [each.line for each in found if isinstance(each, Flaw)] == numbers
+        assert [each.number for each in found if isinstance(each, Line)] == [1, 5]
+        assert look(path, Wishes()).ignored == ["zone"]
+
+
+def test_touches_stand_in_place_of_a_measured_value(tmp_path: Path) -> None:
+    path = write(tmp_path, '{"measured": 40, "touches": [[39.998], [39.996]]}\n', name="a.ndjson")
+    (line,) = read(path)
+    assert isinstance(line, Line)
+    assert line.reading.touches == [[39.998], [39.996]]
+    assert line.reading.measured is None
+
+
+def test_comments_above_the_header_are_passed_over_and_a_column_of_numbers_called_hash_is_not(tmp_path: Path) -> None:
+    plain = write(tmp_path, "# written by the cell, line 3\n# second shift\nmeasured;part\n40.001;a\n39.998;b\n")
+    assert good(plain) == [(40.001, "a"), (39.998, "b")]
+    numbered = write(tmp_path, "#;measured;part\n1;40.001;a\n2;39.998;b\n", name="numbered.csv")
+    assert good(numbered) == [(40.001, "a"), (39.998, "b")]
+
+
+@pytest.mark.parametrize("name", ["wide.csv", "wide.ndjson", "wide.json"])
+def test_a_file_of_very_many_columns_is_refused_before_each_is_looked_at(tmp_path: Path, name: str) -> None:
+    def file(columns: int) -> Path:
+        names = ["measured", *(f"c{number}" for number in range(1, columns))]
+        as_json = json.dumps(dict.fromkeys(names, 39.998))
+        texts = {
+            "wide.csv": f"{','.join(names)}\n{','.join(['39.998'] * columns)}\n",
+            "wide.ndjson": as_json,
+            "wide.json": f"[{as_json}]",
+        }
+        return write(tmp_path, texts[name], name=name)
+
+    assert len(look(file(MOST_COLUMNS), Wishes()).header) == MOST_COLUMNS
+    for columns in (MOST_COLUMNS + 1, 50_000):
+        with pytest.raises(Invalid, match=rf"{columns} columns; at most {MOST_COLUMNS}"):
+            look(file(columns), Wishes())

@@ -1,0 +1,275 @@
+"""The pages of program text: with and without scripts, in the real browser."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.shop import Person, Shop
+
+L15 = """L15
+N5 R103 R115 R240 R250 R271 R281 R292 R301
+N10 R33=0,0012345678901 R44=0.0053 R36=1 R37=0.3
+N12 R33=R50*2
+N13 R33=0.0012345678901
+N15 R400 R41-0.016 R4240
+N20 L75
+N25 L93
+N30 M17
+"""
+
+
+@pytest.fixture
+def shop(server: Any) -> Shop:
+    return Shop(server)
+
+
+@pytest.fixture(scope="module")
+def engineer(server: Any) -> Person:
+    return Person(server, "engineer")
+
+
+@pytest.fixture(scope="module")
+def operator(server: Any) -> Person:
+    return Person(server, "operator")
+
+
+def hidden_fields(text: str) -> dict[str, str]:
+    return dict(re.findall(r'<input type="hidden" name="(?!csrf)(\w+)" value="([^"]*)">', text))
+
+
+class TestReading:
+    def test_pasted_text_becomes_a_characteristic(self, shop: Shop, engineer: Person, page: Page) -> None:
+        engineer.sign_in(page)
+        page.goto("/setup/programs")
+        page.get_by_label("Program text").fill(L15)
+        page.get_by_role("button", name="Read it").click()
+        expect(page.locator("#lines tr[data-verdict=not_understood]")).to_have_count(1)
+        expect(page.locator("#lines tr[data-verdict=not_understood]")).to_contain_text("R50*2")
+        expect(page.locator("#lines tbody tr")).to_have_count(9)
+        expect(page.locator("zone-diagram")).to_contain_text("39.9920")
+        expect(page.get_by_text("The factor is missing")).to_be_visible()
+        page.get_by_role("button", name="Make a characteristic of it").click()
+        key = f"{shop.characteristic}-pasted"
+        page.get_by_label("Name").fill("Pasted")
+        page.get_by_label("Key").fill(key)
+        page.get_by_label("Machine").select_option(shop.machine)
+        page.locator("input[name=factor][value='-1']").check()
+        page.get_by_role("button", name="Add characteristic").click()
+        page.wait_for_url(f"**/setup/characteristics/{key}?done=added")
+        made = shop.call("GET", f"/characteristics/{key}")["parameters"]
+        assert (made["zero_range"], made["averaging_limit"], made["tool_memory"]) == (0.0012345678901, 0.0053, 3)
+
+    def test_a_file_gives_its_parameters_to_one_that_stands(
+        self, shop: Shop, engineer: Person, page: Page, tmp_path: Path
+    ) -> None:
+        before = shop.call("GET", f"/characteristics/{shop.characteristic}")
+        file = tmp_path / "L15.spf"
+        file.write_bytes("(Sitz Ø40 außen)\r\nR33=0.0015 R29=3\r\n".encode("latin-1"))
+        engineer.sign_in(page)
+        page.goto("/setup/programs")
+        page.get_by_label("or a file").set_input_files(file)
+        page.get_by_role("button", name="Read it").click()
+        page.get_by_label("or give its parameters to").select_option(shop.characteristic)
+        page.get_by_role("button", name="Change it").click()
+        expect(page.get_by_label("Zero range")).to_have_value("0.0015")
+        assert shop.call("GET", f"/characteristics/{shop.characteristic}") == before
+        page.get_by_role("button", name="Save").click()
+        page.wait_for_url(f"**/setup/characteristics/{shop.characteristic}?done=changed")
+        after = shop.call("GET", f"/characteristics/{shop.characteristic}")
+        assert after["parameters_version"] == 2
+        assert after["parameters"] == before["parameters"] | {"zero_range": 0.0015, "weighting_factor": 3.0}
+
+    def test_without_scripts_it_is_a_plain_form(self, engineer: Person) -> None:
+        text = engineer.send("/setup/programs", text=L15, do="read")
+        assert text.count('<tr data-verdict="') == 9
+        assert 'data-verdict="not_understood"' in text
+        assert "Not understood" in text
+
+    def test_results_are_shown_as_touches(self, engineer: Person) -> None:
+        text = engineer.send("/setup/programs", text="#510=40.012\n#511=40.013\n#512=40.011", do="read")
+        assert "[[40.012], [40.013], [40.011]]" in text
+        assert "Make a characteristic" not in text
+
+    def test_a_calibration_makes_no_characteristic(self, engineer: Person) -> None:
+        text = engineer.send("/setup/programs", text="R115 R211 R230 R32199.852\nL92\nM17", do="create")
+        assert "199.852 mm" in text
+        assert "Make a characteristic" not in text
+
+    @pytest.mark.parametrize(
+        ("fields", "status"),
+        [
+            ({"text": ""}, 422),
+            ({"text": "x" * 70_000}, 422),
+            ({"text": "R33=1", "control": "nonsense"}, 200),
+            ({"text": "R33=1", "do": "change", "characteristic": "nowhere"}, 404),
+            ({"text": "R33=1", "do": "change", "characteristic": ""}, 404),
+            ({}, 422),
+        ],
+    )
+    def test_bad_input_is_a_page_in_words(self, engineer: Person, fields: dict[str, str], status: int) -> None:
+        assert "Traceback" not in engineer.send("/setup/programs", status, **fields)
+
+    def test_a_viewer_reads_but_makes_nothing(self, server: Any) -> None:
+        viewer = Person(server, "viewer")
+        assert "Make a characteristic" not in viewer.send("/setup/programs", text=L15, do="read")
+        viewer.send("/setup/programs", 403, text=L15, do="create")
+
+
+class TestWriting:
+    def test_copy_and_download(self, shop: Shop, engineer: Person, page: Page) -> None:
+        engineer.sign_in(page)
+        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        page.goto(f"/setup/characteristics/{shop.characteristic}")
+        area = page.get_by_label("Measuring program of this characteristic")
+        page.get_by_role("button", name="Copy").click()
+        expect(page.get_by_role("button", name="Copied")).to_be_visible()
+        assert page.evaluate("navigator.clipboard.readText()") == area.input_value()
+        assert "L93" in area.input_value()
+        with page.expect_download() as download:
+            page.get_by_role("link", name="Download").click()
+        assert download.value.suggested_filename == f"{shop.characteristic}-L15.spf"
+        assert Path(download.value.path()).read_text() == area.input_value()
+
+    def test_calibration_for_a_gauge(self, shop: Shop, engineer: Person, page: Page) -> None:
+        engineer.sign_in(page)
+        page.goto(f"/setup/characteristics/{shop.characteristic}/program")
+        page.get_by_role("link", name="Calibration L05").click()
+        page.get_by_label("Size of the gauge").fill("199,852")
+        page.get_by_label("Surface").select_option("groove")
+        page.get_by_role("button", name="Write it").click()
+        expect(page.locator("#program-text")).to_have_value(re.compile(r"R21=0 R22=1 R23=1.*R32=199\.852", re.DOTALL))
+        page.get_by_role("link", name="Fanuc").click()
+        expect(page.locator("#program-text")).to_have_value(re.compile("G65 P9010"))
+
+    def test_what_is_no_size_is_said(self, shop: Shop, engineer: Person) -> None:
+        for gauge in ("large", "-1", "1e9", "NaN"):
+            text = engineer.open(f"/setup/characteristics/{shop.characteristic}/program?kind=calibration&gauge={gauge}")
+            assert "Must be a size in mm" in text
+        engineer.open("/setup/characteristics/nowhere/program", 404)
+        engineer.open(f"/setup/characteristics/{shop.characteristic}/program?control=x&kind=y&surface=z&probe=q")
+
+    def test_a_control_without_measuring_programs_offers_the_others(self, shop: Shop, engineer: Person) -> None:
+        shop.call("PATCH", f"/machines/{shop.machine}", control="heidenhain")
+        assert 'id="program-text"' not in engineer.open(f"/setup/characteristics/{shop.characteristic}")
+        assert "L93" in engineer.open(f"/setup/characteristics/{shop.characteristic}/program")
+
+
+class TestCorrections:
+    def address(self, shop: Shop) -> str:
+        return f"/machines/{shop.machine}/corrections/program"
+
+    def test_copied_fetched_and_applied(self, shop: Shop, operator: Person, page: Page) -> None:
+        shop.read(6.1)
+        operator.sign_in(page)
+        page.goto(f"/machines/{shop.machine}/tools")
+        page.get_by_role("link", name="As program text").click()
+        expect(page.locator("#corrections-text")).to_have_value(re.compile(r"\$TC_DP12\[3,1\]=-0\.0061"))
+        page.get_by_role("button", name="Mark fetched").click()
+        expect(page.locator("#in-text")).to_contain_text("Fetched")
+        expect(page.get_by_role("button", name="Marked as fetched")).to_be_disabled()
+        page.goto(f"/machines/{shop.machine}/tools")
+        expect(page.locator("#correction-1")).to_contain_text("fetched")
+        page.goto(self.address(shop))
+        page.get_by_role("link", name="All of these are applied now").click()
+        page.get_by_role("dialog").get_by_role("button", name="All are applied").click()
+        expect(page.get_by_text("1 correction is applied now.")).to_be_visible()
+        assert shop.correction(1)["status"] == "applied"
+        assert shop.tool()["offset"] == -0.0061
+
+    def test_what_comes_later_is_announced_and_not_slipped_in(self, shop: Shop, operator: Person, page: Page) -> None:
+        shop.read(6.1)
+        operator.sign_in(page)
+        page.goto(self.address(shop))
+        before = page.locator("#corrections-text").input_value()
+        expect(page.locator("live-status")).to_contain_text("live")
+        shop.read(20.0, correction_in_effect=0)
+        expect(page.locator("#newer")).to_contain_text("have changed since")
+        assert page.locator("#corrections-text").input_value() == before
+        page.get_by_role("button", name="Mark fetched").click()
+        expect(page.locator("#in-text tbody tr")).to_have_count(2)
+        assert shop.correction(1)["fetched_at"]
+        assert shop.correction(2)["fetched_at"] is None
+
+    def test_a_correction_that_fell_is_called_back(self, shop: Shop, operator: Person, page: Page) -> None:
+        shop.read(6.1)
+        shop.call("POST", f"/machines/{shop.machine}/corrections/fetched", numbers=[1])
+        operator.sign_in(page)
+        page.goto(f"/machines/{shop.machine}/tools")
+        page.locator("#correction-1").get_by_role("link", name="Reject").click()
+        dialog = page.get_by_role("dialog")
+        expect(dialog).to_contain_text("was fetched as program text")
+        dialog.get_by_role("radio", name="Set by hand instead").check()
+        dialog.get_by_role("button", name="Reject").click()
+        page.wait_for_url("**/tools?**")
+        assert shop.correction(1)["status"] == "rejected"
+        page.goto(self.address(shop))
+        expect(page.get_by_role("alert")).to_contain_text("must not be run any more")
+        page.goto(f"/machines/{shop.machine}/corrections/1")
+        expect(page.locator("#correction")).to_contain_text("Take the text back")
+
+    def test_fetched_while_somebody_was_asked(self, shop: Shop, operator: Person) -> None:
+        """The question was answered before anybody had fetched: it is asked again, with the warning, and nothing fell."""
+        shop.read(6.1)
+        shop.call("POST", f"/machines/{shop.machine}/corrections/fetched", numbers=[1])
+        text = operator.send(f"/machines/{shop.machine}/corrections/1", do="rejected", reason="False reading")
+        assert "was fetched as program text" in text
+        assert shop.correction(1)["status"] == "pending"
+        operator.send(f"/machines/{shop.machine}/corrections/1", 200, **hidden_fields(text), reason="False reading")
+        assert shop.correction(1)["status"] == "rejected"
+
+    def test_applied_twice_from_an_old_page_is_harmless(self, shop: Shop, operator: Person) -> None:
+        shop.read(6.1)
+        fields = hidden_fields(operator.open(f"{self.address(shop)}?do=applied"))
+        assert fields["numbers"] == "1"
+        operator.send(self.address(shop), 200, **fields)
+        assert "had been confirmed before" in operator.send(self.address(shop), 200, **fields)
+        assert shop.tool()["offset"] == -0.0061
+
+    @pytest.mark.parametrize(
+        ("fields", "status"),
+        [
+            ({}, 404),
+            ({"do": "applied"}, 404),
+            ({"do": "applied", "numbers": "x ٣ 0 -1 99999999999999999999"}, 404),
+            ({"do": "applied", "numbers": "77"}, 404),
+            ({"do": "fetched", "numbers": "77"}, 404),
+            ({"do": "dance", "numbers": "1"}, 404),
+            ({"do": "fetched", "numbers": "1", "form": "g10"}, 200),
+        ],
+    )
+    def test_bad_input_is_a_page_in_words(
+        self, shop: Shop, operator: Person, fields: dict[str, str], status: int
+    ) -> None:
+        shop.read(6.1)
+        operator.send(self.address(shop), status, **fields)
+        assert shop.correction(1)["status"] == "pending"
+
+    def test_a_viewer_sees_and_does_nothing(self, shop: Shop, server: Any) -> None:
+        shop.read(6.1)
+        viewer = Person(server, "viewer")
+        text = viewer.open(f"{self.address(shop)}?do=applied")
+        assert "corrections-text" in text
+        assert "Mark fetched" not in text
+        viewer.send(self.address(shop), 403, do="fetched", numbers="1")
+
+    def test_every_form_and_no_other(self, shop: Shop, operator: Person) -> None:
+        for form in ("turning", "milling", "list"):
+            operator.open(f"{self.address(shop)}?form={form}")
+        operator.open(f"{self.address(shop)}?form=g10", 422)
+        operator.open(f"{self.address(shop)}?form=x", 422)
+
+
+def test_an_edge_finders_macro_fills_in_the_form_of_a_work_zero(operator: Person) -> None:
+    """Work offset, tip and feeler go on to where they are needed; a feeler that the macro would refuse is warned of."""
+    macro = "#2=0.1\n#501=#5021\n#502=#5021\n#503=[#501+#502]/2\n#5241=#503\n#511=ABS[#502-#501]-6"
+    page = operator.send("/setup/programs", text=macro, control="fanuc")
+    address = re.search(r'href="(/work-zeros/new[^"]*)"', page)
+    assert address is not None
+    form = operator.open(address[1].replace("&amp;", "&"))
+    for name, value in (("work_offset", "G55"), ("tip", "6"), ("feeler", "0.1")):
+        assert re.search(rf'<input[^>]*name="{name}"[^>]*value="{value}"', form), name
+    warned = operator.send("/setup/programs", text=macro.replace("0.1", "5."), control="fanuc")
+    assert "raises an alarm outside 0 to 1 mm" in warned

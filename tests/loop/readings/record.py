@@ -1,0 +1,231 @@
+"""What must hold of the record whatever happened on the way, and a replay of it by the core alone."""
+
+from collections import defaultdict
+from collections.abc import Iterable
+from typing import Any
+
+import psycopg
+import pytest
+
+from app.core.decision.decide import Decision, State, decide, outstanding_effect
+from app.core.decision.limits import Zone
+from app.core.decision.step import deviation_of
+from app.core.parameters import Parameters
+from app.loop.readings.records import MOST_OUTSTANDING
+from app.loop.readings.writer.statements import BASE_LEVEL, FAN, TOP_LEVEL
+
+
+def rows(dsn: str, query: str, *values: Any) -> list[tuple[Any, ...]]:
+    """What a question to the database is answered."""
+    with psycopg.connect(dsn, autocommit=True) as connection:
+        return connection.execute(query, values).fetchall()
+
+
+def counts(dsn: str) -> dict[str, int]:
+    """How many rows each table has, but for what the rounds foretell while nobody asks."""
+    with psycopg.connect(dsn, autocommit=True) as connection:
+        tables = [
+            name
+            for (name,) in connection.execute(
+                "SELECT relname::text FROM pg_class WHERE relkind = 'r' AND relnamespace = 'public'::regnamespace"
+            )
+        ]
+        return {name: _count(connection, name) for name in tables if name not in {"outlook", "capability_verdict"}}
+
+
+def _count(connection: psycopg.Connection[Any], table: str) -> int:
+    row = connection.execute(f'SELECT count(*) FROM "{table}"').fetchone()  # noqa: S608 - of the catalogue
+    assert row is not None
+    return int(row[0])
+
+
+def must_hold(dsn: str) -> None:
+    """Fail unless the whole record is consistent: numbers without gaps, states, summaries, corrections, tools, alarms."""
+    with psycopg.connect(dsn, autocommit=True) as connection:
+        for query in BROKEN:
+            found = connection.execute(query).fetchmany(5)
+            assert not found, f"{query}\n{found}"
+        for level in range(BASE_LEVEL, TOP_LEVEL + 1, FAN):
+            _summaries_must_hold(connection, level)
+
+
+# Each finds what must not be there.
+BROKEN = (
+    # sequences 1 … n, and the stream knows n and its last reading
+    """SELECT s.*, r.* FROM stream s JOIN LATERAL (
+           SELECT count(*) AS n, coalesce(max(sequence), 0) AS last, coalesce(min(sequence), 1) AS first FROM reading r
+           WHERE r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id) r ON true
+       WHERE r.n <> s.sequence OR r.last <> s.sequence OR r.first <> 1""",
+    """SELECT s.*, r.* FROM stream s JOIN reading r
+           ON r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id AND r.sequence = s.sequence
+       WHERE (s.last_measured, s.last_deviation, s.last_average, s.last_zone, s.last_received_at)
+           IS DISTINCT FROM (r.measured, r.deviation, r.average_after, r.zone, r.received_at)""",
+    """SELECT s.characteristic_id, s.last_measured_at, max(r.measured_at) FROM stream s JOIN reading r
+           ON r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
+       GROUP BY s.machine_id, s.characteristic_id HAVING s.last_measured_at <> max(r.measured_at)""",
+    "SELECT * FROM reading r LEFT JOIN stream s USING (machine_id, characteristic_id) WHERE s.sequence IS NULL",
+    # a key names one reading
+    "SELECT characteristic_id, key FROM reading WHERE key IS NOT NULL GROUP BY 1, 2 HAVING count(*) > 1",
+    # corrections 1 … n of each machine, each from one reading that names it
+    """SELECT m.*, c.* FROM machine_state m JOIN LATERAL (
+           SELECT count(*) AS n, coalesce(max(number), 0) AS last FROM correction c WHERE c.machine_id = m.machine_id
+       ) c ON true WHERE c.n <> m.last_correction OR c.last <> m.last_correction""",
+    """SELECT c.*, r.sequence FROM correction c LEFT JOIN reading r ON r.machine_id = c.machine_id
+           AND r.characteristic_id = c.characteristic_id AND r.sequence = c.sequence
+       WHERE r.correction IS DISTINCT FROM c.number""",
+    "SELECT machine_id, correction FROM reading WHERE correction IS NOT NULL GROUP BY 1, 2 HAVING count(*) > 1",
+    # one held correction per tool at most
+    "SELECT machine_id, tool_memory FROM correction WHERE status = 'held' GROUP BY 1, 2 HAVING count(*) > 1",
+    # the sum of a tool is that of its applied corrections since it was changed; the offset is that of its last step
+    """SELECT t.*, c.total FROM tool t JOIN LATERAL (
+           SELECT coalesce(sum(amount), 0) AS total FROM correction c
+           WHERE c.machine_id = t.machine_id AND c.tool_memory = t.number AND c.status = 'applied'
+               AND (t.changed_at IS NULL OR c.applied_at > t.changed_at)) c ON true
+       WHERE abs(t.total - c.total) > 1e-9""",
+    """SELECT t.*, e.* FROM tool t JOIN LATERAL (
+           SELECT offset_after FROM tool_event e WHERE e.machine_id = t.machine_id AND e.number = t.number
+           ORDER BY id DESC LIMIT 1) e ON true WHERE abs(t."offset" - e.offset_after) > 1e-9""",
+    """SELECT c.machine_id, c.number, count(e.id) FROM correction c LEFT JOIN tool_event e
+           ON e.machine_id = c.machine_id AND e.correction = c.number
+       GROUP BY c.machine_id, c.number, c.status HAVING count(e.id) <> (c.status = 'applied')::int""",
+    # one active alarm for one trouble, counted as often as readings name it
+    """SELECT machine_id, characteristic_id, kind FROM alarm WHERE acknowledged_at IS NULL
+       GROUP BY machine_id, characteristic_id, kind, CASE WHEN characteristic_id IS NULL THEN tool_memory END
+       HAVING count(*) > 1""",
+    """SELECT a.*, r.n FROM alarm a JOIN LATERAL (
+           SELECT count(*) AS n, max(sequence) AS last FROM reading r WHERE r.machine_id = a.machine_id
+               AND r.characteristic_id = a.characteristic_id AND a.id = ANY(r.alarms)) r ON true
+       WHERE a.sequence IS NOT NULL AND a.characteristic_id IS NOT NULL
+           AND (r.n <> a.count OR r.last <> a.last_sequence)""",
+    # a summary for each full block and for no other
+    f"""SELECT s.characteristic_id, g.lv, s.sequence, count(b.block) FROM stream s
+           CROSS JOIN generate_series({BASE_LEVEL}, {TOP_LEVEL}, {FAN}) AS g(lv)
+           LEFT JOIN reading_summary b ON b.machine_id = s.machine_id AND b.characteristic_id = s.characteristic_id
+               AND b.level = g.lv
+       GROUP BY s.machine_id, s.characteristic_id, s.sequence, g.lv HAVING count(b.block) <> s.sequence >> g.lv""",  # noqa: S608
+    # touches belong to readings
+    """SELECT t.* FROM reading_touches t LEFT JOIN reading r USING (machine_id, characteristic_id, sequence)
+       WHERE r.measured IS NULL""",
+)
+
+_ZONES = ", ".join(f"count(*) FILTER (WHERE zone = '{zone.value}')" for zone in Zone)
+_SUMMARIES = f"""
+SELECT b.count, b.minimum, b.maximum, b.sum, b.sum_squares, b.first, b.last, b.average, b.corrections, b.zones,
+    b.first_at, b.last_at, r.*
+FROM reading_summary b JOIN LATERAL (
+    SELECT count(*) AS count_, min(deviation), max(deviation), sum(deviation), sum(deviation * deviation),
+        (array_agg(deviation ORDER BY sequence))[1], (array_agg(deviation ORDER BY sequence DESC))[1],
+        (array_agg(average_after ORDER BY sequence DESC))[1], count(correction), ARRAY[{_ZONES}],
+        min(measured_at), max(measured_at)
+    FROM reading r WHERE r.machine_id = b.machine_id AND r.characteristic_id = b.characteristic_id
+        AND r.sequence > b.block << b.level AND r.sequence <= (b.block + 1) << b.level) r ON true
+WHERE b.level = %s
+"""  # noqa: S608 - made of constants
+
+
+def _summaries_must_hold(connection: psycopg.Connection[Any], level: int) -> None:
+    for row in connection.execute(_SUMMARIES, [level]):
+        kept, counted = row[: len(row) // 2], row[len(row) // 2 :]
+        assert kept[0] == 1 << level
+        for one, other in zip(kept, counted, strict=True):
+            assert (pytest.approx(one, rel=1e-9, abs=1e-12) if isinstance(one, float) else one) == other, (
+                kept,
+                counted,
+            )
+
+
+def history(dsn: str, characteristic: str) -> list[dict[str, Any]]:
+    """The stored readings of a characteristic in the order of arrival, with the amount of each correction."""
+    with psycopg.connect(dsn, row_factory=psycopg.rows.dict_row) as connection:
+        return connection.execute(
+            """SELECT r.*, c.amount, c.status, c.tool_memory FROM reading r
+               JOIN characteristic ch ON ch.machine_id = r.machine_id AND ch.id = r.characteristic_id
+               LEFT JOIN correction c ON c.machine_id = r.machine_id AND c.number = r.correction
+               WHERE ch.key = %s ORDER BY r.sequence""",
+            [characteristic],
+        ).fetchall()
+
+
+def replay(parameters: Parameters, stored: Iterable[dict[str, Any]]) -> list[tuple[dict[str, Any], Decision]]:
+    """Decide each reading again, one after the other, by `app.core` and the plainest bookkeeping there is.
+
+    For a characteristic that has its tool and its average to itself and is paused by nobody. A part is cut with the
+    corrections up to its `correction_in_effect`, or with none that is not confirmed.
+    """
+    average = 0.0
+    issued: dict[int, float] = {}
+    confirmed: set[int] = set()
+    decided = []
+    for reading in stored:
+        in_effect = reading["correction_in_effect"]
+        if in_effect is None:
+            outstanding = [number for number in issued if number not in confirmed]
+        else:
+            confirmed |= {number for number in issued if number <= in_effect}
+            outstanding = [number for number in issued if number > in_effect]
+        decision = decide(
+            parameters,
+            State(average),
+            deviation_of(reading["measured"], parameters.target),
+            outstanding=outstanding_effect((issued[number] for number in outstanding), parameters.factor),
+        )
+        average = decision.average_after
+        if decision.amount is not None:
+            issued[reading["correction"]] = decision.amount
+        decided.append((reading | {"expected_outstanding": outstanding[:MOST_OUTSTANDING]}, decision))
+    return decided
+
+
+def must_replay(parameters: Parameters, stored: Iterable[dict[str, Any]]) -> int:
+    """Fail unless every stored decision is the one that the core takes in that order; the number of corrections."""
+    corrections = 0
+    for reading, decision in replay(parameters, stored):
+        assert (
+            reading["deviation"],
+            reading["decided"],
+            reading["zone"],
+            reading["action"],
+            reading["code"],
+            reading["average_before"],
+            reading["average_after"],
+            reading["amount"],
+            reading["outstanding"] or [],
+        ) == (
+            decision.deviation,
+            decision.decided,
+            decision.zone,
+            decision.action,
+            decision.code,
+            decision.average_before,
+            decision.average_after,
+            decision.amount,
+            reading["expected_outstanding"],
+        ), reading
+        corrections += decision.amount is not None
+    return corrections
+
+
+def by_answer(answers: Iterable[dict[str, Any]]) -> dict[tuple[str, int], dict[str, Any]]:
+    """Answers by characteristic and sequence; no two may have the same."""
+    found: dict[tuple[str, int], dict[str, Any]] = {}
+    for answer in answers:
+        at = (answer["characteristic"], answer["sequence"])
+        assert at not in found, f"{answer} and {found[at]}"
+        found[at] = answer
+    return found
+
+
+def must_be_stored(dsn: str, answers: Iterable[dict[str, Any]]) -> None:
+    """Fail unless each answered reading is in the record under its number, as it was answered."""
+    wanted: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    for (characteristic, _sequence), answer in by_answer(answers).items():
+        wanted[characteristic].append(answer)
+    for characteristic, given in wanted.items():
+        stored = {reading["sequence"]: reading for reading in history(dsn, characteristic)}
+        for answer in given:
+            reading = stored[answer["sequence"]]
+            assert reading["key"] == answer["key"]
+            assert reading["measured"] == answer["measured"]
+            assert reading["average_after"] == answer["average_after"]
+            assert reading["zone"] == answer["zone"]
+            assert reading["correction"] == (answer["correction"] and answer["correction"]["number"])

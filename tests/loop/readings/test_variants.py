@@ -1,0 +1,149 @@
+"""What the measuring variants yield beside the value: answered, kept, found again, in single readings, batches and imports."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from tests.conftest import Server
+from tests.loop.readings.record import must_hold, rows
+from tests.shop import Shop
+
+NOTHING = dict.fromkeys(
+    [
+        *("run_out", "out_of_roundness", "taper", "slope", "repeat_range", "repeat_deviation"),
+        *("sections_outside", "rejected"),
+    ]
+)
+
+
+@pytest.fixture
+def shop(server: Server) -> Iterator[Shop]:
+    made = Shop(server)
+    yield made
+    must_hold(server.database.dsn)
+
+
+def touched(shop: Shop, name: str, touches: list[Any], status: int = 201) -> Any:
+    return shop.call("POST", "/readings", status, characteristic=name, touches=touches)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "touches", "results"),
+    [
+        ({"variant": "indexed", "index": 180}, [[40.004], [39.998]], {"run_out": 0.003}),
+        ({"variant": "round", "points": 3}, [[40.004], [39.998], [40.0]], {"out_of_roundness": 0.006}),
+        (
+            {"variant": "along", "points": 3, "index": -10},
+            [[39.998], [40.0], [40.002]],
+            {"taper": 0.004, "slope": -0.0002},
+        ),
+        ({"repeats": 2}, [[40.0, 40.002]], {"repeat_range": 0.002, "repeat_deviation": 0.001414214}),
+        (
+            {"points": 3, "accept": {"n": 2, "m": 3}},
+            [[40.008], [39.99], [39.992]],
+            {"sections_outside": 1, "rejected": False},
+        ),
+        (
+            {"points": 3, "accept": {"n": 2, "m": 3}},
+            [[40.0081], [39.99], [39.992]],
+            {"sections_outside": 2, "rejected": True},
+        ),
+    ],
+)
+def test_a_reading_is_answered_with_the_results_of_its_variant(
+    shop: Shop, parameters: dict[str, Any], touches: list[Any], results: dict[str, Any]
+) -> None:
+    name = f"{shop.characteristic}-v"
+    shop.add(name, average_memory=0, **parameters)
+    answer = touched(shop, name, touches)
+    assert answer["results"] == NOTHING | results
+    stored = shop.call("GET", f"/readings/{name}/1")
+    assert (stored["results"], stored["touches"]) == (NOTHING | results, touches)
+    (listed,) = shop.call("GET", f"/readings?characteristic={name}")["items"]
+    assert listed["results"] == NOTHING | results
+
+
+def test_a_reading_without_results_has_none_and_no_row(shop: Shop, server: Server) -> None:
+    name = f"{shop.characteristic}-v"
+    shop.add(name, variant="two_point", average_memory=0)
+    assert touched(shop, name, [[-20.0], [20.001]])["results"] is None
+    assert shop.read(1.0)["results"] is None
+    found = rows(
+        server.database.dsn,
+        "SELECT count(*) FROM reading_results r JOIN characteristic c ON c.id = r.characteristic_id WHERE c.key IN (%s, %s)",
+        name,
+        shop.characteristic,
+    )
+    assert found == [(0,)]
+
+
+def test_sent_again_the_first_results_come_again(shop: Shop) -> None:
+    name = f"{shop.characteristic}-v"
+    shop.add(name, variant="round", points=2, average_memory=0)
+    body: dict[str, Any] = {"characteristic": name, "touches": [[40.0], [40.002]], "key": "k"}
+    first = shop.call("POST", "/readings", 201, **body)
+    assert first["results"]["out_of_roundness"] == 0.002
+    assert shop.call("POST", "/readings", 200, **body) == first
+
+
+def test_a_batch_keeps_results_however_large(shop: Shop, server: Server) -> None:
+    """Small ones go as JSON, large ones by COPY."""
+    name = f"{shop.characteristic}-v"
+    shop.add(name, variant="round", points=2, average_memory=0)
+    for count in (3, 600):
+        batch = [
+            {"characteristic": name, "touches": [[40.0], [round(40.0 + at / 1e6, 6)]], "key": f"{count}:{at}"}
+            for at in range(count)
+        ]
+        answer = shop.admin.post("/api/v1/readings/batch?decisions=true", json=batch)
+        assert answer.status_code == 201
+        found = [item["results"]["out_of_roundness"] for item in answer.json()["items"]]
+        assert found == [round(at / 1e6, 9) for at in range(count)]
+    stored = rows(
+        server.database.dsn,
+        "SELECT count(*), max(out_of_roundness) FROM reading_results r JOIN characteristic c ON c.id = r.characteristic_id "
+        "WHERE c.key = %s",
+        name,
+    )
+    assert stored == [(603, 0.000599)]
+
+
+@pytest.mark.parametrize(
+    ("touches", "says"),
+    [
+        ([[40.0, None], [40.0, 40.0]], "Point 1, repeat 2: the touch is missing, the probe did not trigger."),
+        ([[40.0, 40.0], None], "Point 2 has 0 touches, 2 are expected (R27): repeat 1 is missing."),
+        ([[40.0, 40.0], []], "Point 2 has 0 touches, 2 are expected (R27): repeat 1 is missing."),
+        ([[40.0, 40.0], [40.0]], "Point 2 has 1 touches, 2 are expected (R27): repeat 2 is missing."),
+        ([[40.0, 40.0], [40.0] * 3], "Point 2 has 3 touches, 2 are expected (R27): repeat 3 is one too many."),
+        ([[40.0, 40.0]], "1 points came, 2 are expected: point 2 is missing."),
+        ([[40.0, 40.0]] * 3, "3 points came, 2 are expected: point 3 is one too many."),
+        ([[40.0, 40.0], [40.0, 41.0001]], "Point 2, repeat 2: the touch at 41.0001 mm lies more than 1"),
+        ([[40.0, "40"], [40.0, 40.0]], "Point 1, repeat 2: This must be a number in mm"),
+        ([[40.0, 40.0], 7], "Touches are one list per point"),
+    ],
+)
+def test_touches_that_cannot_be_used_are_refused_by_point_and_repeat(shop: Shop, touches: list[Any], says: str) -> None:
+    name = f"{shop.characteristic}-v"
+    shop.add(name, variant="indexed", index=180, repeats=2, average_memory=0)
+    problem = touched(shop, name, touches, 422)
+    assert says in problem["detail"]
+    assert [error["field"] for error in problem["errors"]] == ["touches"]
+    assert shop.call("GET", f"/readings?characteristic={name}")["items"] == []
+
+
+def test_points_that_do_not_fit_the_sections_are_refused(shop: Shop) -> None:
+    problem = shop.call(
+        *("POST", "/characteristics", 422),
+        key=f"{shop.characteristic}-v",
+        name="Bore",
+        machine=shop.machine,
+        parameters={"R32": 40.0, "R35": 0.016, "R33": 0, "R36": 1, "R37": 0.3, "R23": 4, "accept": {"n": 2, "m": 3}},
+    )
+    assert problem["errors"] == [
+        {
+            "field": "parameters.points",
+            "message": "R23 measuring points 4 do not fit acceptance by 3 sections; say 3, or leave it out",
+        }
+    ]

@@ -1,0 +1,336 @@
+"""The capability of a characteristic through the front door: by hand, by limits in force, and with the loop taken out."""
+
+from random import Random
+from typing import Any
+
+import pytest
+
+from app.jobs.actions import Unit
+from app.loop.characteristics.queries import characteristic_named
+from app.quality.capability import verdict_queries
+from app.quality.capability.actions import JOB
+from app.quality.capability.verdict_queries import Verdict, verdicts_by_characteristic
+from tests.conftest import Server
+from tests.shop import Person, Shop
+
+
+@pytest.fixture
+def shop(server: Server) -> Shop:
+    return Shop(server)
+
+
+def push(shop: Shop, values: list[float], characteristic: str | None = None) -> None:
+    """Readings that deviate by so many µm, at once."""
+    body = [
+        {"characteristic": characteristic or shop.characteristic, "measured": round(40 + value / 1000, 6)}
+        for value in values
+    ]
+    answer = shop.admin.post("/api/v1/readings/batch", json=body)
+    assert answer.status_code == 201, answer.text
+
+
+def of(shop: Shop, query: str = "last=all", characteristic: str | None = None, status: int = 200) -> Any:
+    return shop.call("GET", f"/characteristics/{characteristic or shop.characteristic}/capability?{query}", status)
+
+
+def quiet(count: int, seed: int = 1, sigma: float = 0.9, mean: float = 0.0) -> list[float]:
+    rng = Random(seed)
+    return [round(rng.gauss(mean, sigma), 3) for _ in range(count)]
+
+
+def test_by_hand(shop: Shop) -> None:
+    """-2, -1, 0, 1, 2 µm by turns, 20 of each: mean 0, s^2 = 2 x 100/99; limits ±8 µm."""
+    shop.add("by-hand", mode="measure_only", tool_memory=0)
+    push(shop, [-2.0, -1.0, 0.0, 1.0, 2.0] * 20, "by-hand")
+    found = of(shop, characteristic="by-hand")
+    s = (2 * 100 / 99) ** 0.5
+    assert found["readings"] == 100
+    assert found["sigma_overall"] * 1000 == pytest.approx(s)
+    assert found["ppk"]["value"] == found["pp"]["value"] == pytest.approx(8 / (3 * s))
+    assert found["ppk"]["low"] < found["ppk"]["value"] < found["ppk"]["high"]
+    # Moving ranges: 1, 1, 1, 1 and from 2 to -2 4; 80 of 1 and 19 of 4 over 99.
+    assert found["sigma_within"] * 1000 == pytest.approx((80 + 19 * 4) / 99 / 1.1283791671)
+    assert (found["outside"], found["ppm_observed"]["total"], found["compensated"]) == (0, 0.0, False)
+    upper = of(shop, "last=all&side=upper", "by-hand")
+    assert (upper["lower_limit"], upper["cp"], upper["ppk"]["method"]) == (None, None, "noncentral_t")
+
+
+def test_what_too_few_readings_carry(shop: Shop) -> None:
+    nothing = of(shop)
+    assert (nothing["readings"], nothing["ppk"], nothing["stable"], nothing["quote"]) == (0, None, None, "none")
+    assert "20 are missing" in nothing["refused"]
+    push(shop, quiet(1))
+    assert "19 are missing" in of(shop)["refused"]
+    push(shop, quiet(40))
+    some = of(shop)
+    assert some["ppk"] is not None
+    assert some["in_time"] is None
+    assert any("Fewer than 100" in each for each in some["cautions"])
+    shop.add("equal", mode="measure_only", tool_memory=0)
+    push(shop, [1.0] * 60, "equal")
+    equal = of(shop, characteristic="equal")
+    assert "All values are the same" in equal["refused"]
+    assert [each["p_value"] for each in equal["normality"]] == [None, None]
+
+
+def test_what_is_not_normal_says_whether_percentiles_carry_it(server: Server, shop: Shop) -> None:
+    for key, count in (("skew-few", 80), ("skew", 400)):
+        shop.add(key, mode="measure_only", tool_memory=0, wear_limit=0.9)
+        push(shop, [value**2 for value in quiet(count, seed=count)], key)
+    few, more = (" ".join(of(shop, characteristic=key)["cautions"]) for key in ("skew-few", "skew"))
+    assert "too few for percentiles (80 of 100)" in few
+    assert "take the percentile method" not in few
+    assert of(shop, characteristic="skew")["quote"] == "percentile"
+    assert "hardly more than the smallest and the largest" in more
+    sections = shop.call("GET", "/characteristics/skew/report.json?last=all&section=capability")["sections"]
+    assert "hardly more than the smallest" in " ".join(sections[0]["warnings"])
+    page = Person(server, "viewer").open("/characteristics/skew/capability?last=all")
+    assert page.count("hardly more than the smallest") == 1
+
+
+def test_a_number_of_readings_that_is_none_is_told_in_words(shop: Shop) -> None:
+    problem = of(shop, "last=0", status=422)
+    assert problem["detail"] == "last: must be a number of readings from 1 on, such as 500, or one of: all"
+
+
+def test_excluded_readings_and_probe_faults_are_named_and_left_out(shop: Shop) -> None:
+    shop.add("named", mode="measure_only", tool_memory=0)
+    push(shop, [*quiet(60), 7.9, 1500.0], "named")
+    shop.call("POST", "/readings/named/61/exclude", 200, reason="chip under the stylus")
+    found = of(shop, characteristic="named")
+    assert (found["readings"], found["excluded"], found["probe_faults"]) == (60, [61], [62])
+    assert found["sigma_overall"] < 0.0015
+
+
+def test_readings_far_from_all_others_are_named_counted_and_kept_out_of_the_picture(shop: Shop) -> None:
+    shop.add("far", mode="measure_only", tool_memory=0)
+    push(shop, [*quiet(120), 250.0, *quiet(30, seed=2), -180.0], "far")
+    found = of(shop, characteristic="far")
+    assert (found["far"], found["readings"], found["outside"]) == ([121, 152], 152, 2)
+    assert found["ppk"]["value"] < 0.3
+    assert any("Readings 121, 152 lie far from all others (up to +250.0 µm)" in each for each in found["cautions"])
+    figure = shop.call("GET", "/characteristics/far/figures/capability?last=all")
+    low, high = figure["layout"]["xaxis"]["range"]
+    assert -20 < low < high < 20
+    assert sum(figure["data"][0]["y"]) == 150
+    words = [each["text"] for each in figure["layout"]["annotations"]]
+    assert "◂ 1 reading beyond: −180.0 µm  1 reading beyond: +250.0 µm ▸" in words
+
+
+def test_every_part_is_judged_by_the_tolerance_in_force(shop: Shop) -> None:
+    shop.add("changed", mode="measure_only", tool_memory=0)
+    push(shop, [6.0, -6.0, 7.0] * 10, "changed")
+    shop.call(
+        "PATCH",
+        "/characteristics/changed",
+        parameters={"target": 40.0, "tolerance_width": 0.01, "averaging_limit": None},
+        reason="new drawing",
+    )
+    push(shop, [6.0, *quiet(29)], "changed")
+    found = of(shop, characteristic="changed")
+    assert [(each["half"], each["readings"]) for each in found["versions"]] == [(0.008, 30), (0.005, 30)]
+    assert found["upper_limit"] == 0.005
+    assert found["outside"] == 1, "only the one that was judged by the narrow tolerance"
+    assert any("tolerance changed" in each for each in found["cautions"])
+
+
+def test_a_compensated_process_three_ways(shop: Shop) -> None:
+    """Wear 0.2 µm a part, scatter 0.5 µm, corrected at once: without corrections the tool runs out of its tolerance."""
+    rng, offset, known = Random(3), 0.0, 0
+    for part in range(300):
+        answer = shop.read(round(0.2 * part + rng.gauss(0, 0.5) + 1000 * offset, 4), correction_in_effect=known)
+        if answer["correction"]:
+            offset += answer["correction"]["amount"]
+            known = answer["correction"]["number"]
+    found = of(shop)
+    without = found["without"]
+    assert found["compensated"]
+    assert without["readings"] == 300
+    assert without["lives"] == 1
+    assert without["standard_deviation"] * 1000 == pytest.approx(300 * 0.2 / 12**0.5, rel=0.03)
+    assert without["scatter"] * 1000 == pytest.approx(0.5, rel=0.12)
+    assert without["ideal"]["value"] == pytest.approx(8 / 1.5, rel=0.12)
+    assert without["gain"] > 10
+    assert without["price"] > 1.2
+    assert without["ppk"]["value"] < 0 < found["ppk"]["value"] < without["ideal"]["value"]
+    assert found["quote"] != "cpk" or found["stable"]
+
+
+def test_the_model_in_time_and_which_number_it_allows(shop: Shop) -> None:
+    shop.add("drifting", mode="measure_only", tool_memory=0)
+    push(shop, [value + 0.02 * place for place, value in enumerate(quiet(250))], "drifting")
+    found = of(shop, characteristic="drifting")
+    assert (found["in_time"]["model"], found["in_time"]["location"], found["stable"]) == ("C3", "systematic", False)
+    assert found["quote"] in {"ppk", "percentile"}
+    shop.add("steady", mode="measure_only", tool_memory=0)
+    push(shop, quiet(250, seed=5), "steady")
+    found = of(shop, characteristic="steady")
+    assert (found["in_time"]["model"], found["stable"], found["quote"]) == ("A1", True, "cpk")
+    assert "Cp and Cpk may be quoted" in found["in_time"]["means"]
+
+    # Heavy tails: the mean and the scatter hold, yet a rule fires more often than chance explains. The model says no other
+    # than the verdict of stability and the index named to be quoted.
+    shop.add("tails", mode="measure_only", tool_memory=0)
+    rng = Random(2)
+    push(shop, [round(rng.choice((-1, 1)) * rng.expovariate(1 / 0.6), 3) for _ in range(250)], "tails")
+    found = of(shop, characteristic="tails")
+    assert (found["in_time"]["model"], found["stable"], found["quote"]) == ("A2", False, "percentile")
+    # Two questions, two names: the run rules speak against it, the model in time does not; the caution says which.
+    assert (found["in_control"], found["constant_in_time"]) == (False, True)
+    assert found["stability"].startswith("Not in control")
+    assert "the process is not in control (run rules). Ppk" in found["cautions"][0]
+    assert "quote Ppk by percentiles, not Cp and Cpk" in found["in_time"]["means"]
+    page = shop.admin.get("/characteristics/tails/capability?last=all").text
+    assert found["in_time"]["means"] in page
+    report = shop.admin.get("/characteristics/tails/report?section=capability&last=all").text
+    assert found["in_time"]["means"] in report
+
+
+def test_which_readings(shop: Shop) -> None:
+    shop.add("chosen", mode="measure_only", tool_memory=0)
+    push(shop, quiet(80), "chosen")
+    assert of(shop, "last=30", "chosen")["first_sequence"] == 51
+    assert of(shop, "", "chosen")["readings"] == 80
+    assert of(shop, "from=2001-01-01T00:00:00Z&to=2001-01-02T00:00:00Z", "chosen")["readings"] == 0
+    for wrong in ("last=0", "last=-3", "side=left", "confidence=1", "confidence=nan", "last=x", "from=yesterday"):
+        of(shop, wrong, "chosen", 422)
+    of(shop, "from=2026-01-02T00:00:00Z&to=2026-01-01T00:00:00Z", "chosen", 422)
+    of(shop, "last=999999999999999999", "chosen")
+    shop.call("GET", "/characteristics/nobody/capability", 404)
+
+
+@pytest.mark.parametrize("picture", ["histogram", "probability"])
+def test_figures_have_limits_and_every_reading(shop: Shop, picture: str) -> None:
+    key = f"drawn-{picture}"
+    shop.add(key, mode="measure_only", tool_memory=0)
+    path = f"/characteristics/{key}/figures/capability?picture={picture}"
+    assert shop.call("GET", path)["data"] == []
+    push(shop, quiet(200), key)
+    figure = shop.call("GET", path)
+    assert [shape["x0"] for shape in figure["layout"]["shapes"]][:2] == [-8.0, 8.0]
+    (drawn, *_lines) = figure["data"]
+    assert (sum(drawn["y"]) if picture == "histogram" else len(drawn["x"])) == 200
+
+
+def verdict_for_overview(server: Server, key: str) -> Verdict:
+    with server.database.begin() as session:
+        standing = characteristic_named(session, key)
+        return verdicts_by_characteristic(session, standing.machine.id)[standing.characteristic.id]
+
+
+def judge(server: Server, key: str) -> None:
+    """Run the periodic job on this characteristic."""
+    with server.database.begin() as session:
+        here = characteristic_named(session, key)
+        JOB.do(session, Unit(f"characteristic/{key}", (key,), here.machine.id, here.characteristic.id))
+
+
+@pytest.mark.parametrize("stored", [False, True])
+@pytest.mark.parametrize(("shape", "quote"), [("quiet", "cpk"), ("jump", "percentile"), ("few", "none")])
+def test_overview_and_page_say_the_same(server: Server, shop: Shop, shape: str, quote: str, stored: bool) -> None:
+    key = f"same-{shape}-{int(stored)}"
+    shop.add(key, mode="measure_only", tool_memory=0)
+    push(shop, {"quiet": quiet(200), "jump": [*([7.9] * 30), *quiet(200, seed=9)], "few": quiet(5)}[shape], key)
+    if stored:
+        judge(server, key)
+    told, found = of(shop, "", key), verdict_for_overview(server, key).of
+    assert (found.quote, told["quote"], found.readings) == (quote, quote, told["readings"])
+    if quote == "none":
+        assert (found.value, found.why) == (None, "too_few_readings")
+    else:
+        assert (found.value, found.low) == (told["quoted"]["value"], told["quoted"]["low"])
+        assert told["quoted"]["window"].startswith(f"{found.readings} readings, {found.first} to {found.last}; ")
+
+
+def test_the_overview_keeps_the_last_verdict_that_could_be_quoted(server: Server, shop: Shop) -> None:
+    shop.add("broke", mode="measure_only", tool_memory=0)
+    push(shop, [*quiet(120, seed=9), 250.0], "broke")  # an edge broke: one part lies far off
+    told = of(shop, "", "broke")
+    assert (told["quote"], told["quoted"], told["why_none"]) == ("none", None, "a reading lies far from all others")
+    assert told["cautions"][0] == "Do not report an index: a reading lies far from all others."
+    found = verdict_for_overview(server, "broke")
+    assert (found.of.readings, found.of.last, found.now) == (120, 120, "far_off")
+    assert found.of.value is not None
+    assert found.of.value > 0.5, "not that of the broken edge"
+    assert found.of.last_at is not None
+
+
+def test_it_is_kept_whatever_the_reason_and_until_the_tolerance_changes(server: Server, shop: Shop) -> None:
+    shop.add("kept", mode="measure_only", tool_memory=0)
+    push(shop, quiet(60), "kept")
+    judge(server, "kept")
+    first = verdict_for_overview(server, "kept")
+    push(shop, [0.0] * 100, "kept")  # the probe's cable is loose: more than half of the readings are equal
+    for stored in (False, True):
+        if stored:
+            judge(server, "kept")
+        found = verdict_for_overview(server, "kept")
+        assert (found.of.value, found.of.last, found.now) == (first.of.value, 60, "unresolved")
+    assert "since then: readings too coarse" in Person(server, "viewer").open(f"/overview?machine={shop.machine}")
+    shop.call("PATCH", "/characteristics/kept", parameters={"tolerance_width": 0.03}, reason="drawing B")
+    push(shop, [0.0], "kept")
+    for stored in (False, True):
+        if stored:
+            judge(server, "kept")
+        found = verdict_for_overview(server, "kept")
+        assert (found.of.value, found.of.why, found.now) == (None, "unresolved", None), "that was another tolerance"
+
+
+def test_a_stored_verdict_is_shown_only_as_long_as_it_may_be(server: Server, shop: Shop) -> None:
+    shop.add("aging", mode="measure_only", tool_memory=0)
+    push(shop, quiet(100), "aging")
+    judge(server, "aging")
+
+    def waits() -> bool:
+        with server.database.begin() as session:
+            return ("aging",) in [unit.key for unit in JOB.due(session)]
+
+    assert not waits()
+    push(shop, quiet(2, seed=3), "aging")
+    assert (verdict_for_overview(server, "aging").of.last, waits()) == (100, False), (
+        "two of a hundred change nothing yet"
+    )
+    push(shop, quiet(1, seed=4), "aging")
+    assert (verdict_for_overview(server, "aging").of.last, waits()) == (100, True)
+    push(shop, quiet(2, seed=5), "aging")
+    assert verdict_for_overview(server, "aging").of.last == 105, "worked out on the spot"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(verdict_queries, "MOST_ON_THE_SPOT", 0)
+        assert verdict_for_overview(server, "aging").of.last == 100, "of too many at once what is stored, with its date"
+        with server.database.begin() as session:
+            never = verdicts_by_characteristic(session)[
+                characteristic_named(session, shop.characteristic).characteristic.id
+            ]
+        assert (never.of.value, never.of.why) == (None, "not_yet")
+    judge(server, "aging")
+    assert not waits()
+    shop.call("POST", "/readings/aging/7/exclude", reason="chip under the stylus")
+    assert (verdict_for_overview(server, "aging").of.readings, waits()) == (104, True)
+
+
+def test_the_period_is_typed_as_people_write_it_and_stays_if_it_is_wrong(server: Server, shop: Shop) -> None:
+    push(shop, quiet(40))
+    viewer, path = Person(server, "viewer"), f"/characteristics/{shop.characteristic}/capability"
+    page = viewer.open(f"{path}?from=2020-01-01+06:00&to=2020-01-02&timezone=Europe/Belgrade")
+    assert "20 are missing" in page
+    assert 'value="2020-01-01 06:00"' in page
+    for wrong in (
+        "from=yesterday",
+        "from=2026-02-01&to=2026-01-01",
+        "to=2026-13-01",
+        "timezone=Mars/Base&from=2026-01-01",
+        "from=0001-01-01&timezone=Europe/Belgrade",
+    ):
+        page = viewer.open(f"{path}?{wrong}", 422)
+        assert "The period was not understood" in page
+        assert f'value="{wrong.partition("=")[2].partition("&")[0]}"' in page
+    viewer.open(f"{path}?last=0", 422)
+
+
+def test_the_page_greys_what_must_not_be_quoted(server: Server, shop: Shop) -> None:
+    shop.add("greyed", mode="measure_only", tool_memory=0)
+    push(shop, [value + 0.02 * place for place, value in enumerate(quiet(250))], "greyed")
+    page = Person(server, "viewer").open("/characteristics/greyed/capability")
+    assert "Do not report Cp and Cpk" in page
+    assert page.count("do not report") >= 2
+    assert "No gauge study yet" in page

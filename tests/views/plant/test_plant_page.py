@@ -1,0 +1,198 @@
+"""The plant's page: empty, full, live, and never a stale green."""
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+from sqlalchemy import event
+
+from app.core.state import State
+from app.views.characteristic import state_queries as queries
+from tests.conftest import RunServer, Server
+from tests.shop import PARAMETERS, Person, Shop
+
+XSS = """<b>"Кључ" d'Ø</b>"""
+
+
+@pytest.fixture
+def shop(server: Any) -> Shop:
+    return Shop(server)
+
+
+@pytest.fixture(scope="module")
+def viewer(server: Server) -> Person:
+    return Person(server, "viewer")
+
+
+def line(page: Page, shop: Shop) -> Any:
+    return page.locator(f"#c-{shop.characteristic}")
+
+
+class TestWithoutScripts:
+    def test_what_one_characteristic_shows(self, shop: Shop, viewer: Person) -> None:
+        shop.read(6.1)
+        text = viewer.open(f"/plant/{shop.machine}")
+        assert '+6.1<span class="unit">µm' in text
+        assert "Correcting" in text
+        assert 'class="band-picture' in text
+        assert 'class="sparkline"' in text
+        assert f"/characteristics/{shop.characteristic}" in text
+
+    @pytest.mark.parametrize(
+        ("deviation", "words"),
+        [(12.0, "Oversize"), (-12.0, "Undersize"), (350.0, "Tool worn"), (1200.0, "Probe fault"), (0.4, "In band")],
+    )
+    def test_the_state_in_words(self, shop: Shop, viewer: Person, deviation: float, words: str) -> None:
+        shop.read(deviation)
+        assert f"<span>{words}</span>" in viewer.open(f"/plant/{shop.machine}")
+
+    @pytest.mark.parametrize(("action", "said"), [("false_reading", "excluded"), ("noted", "In band")])
+    def test_a_reading_that_was_no_size_makes_no_part_oversize(
+        self, shop: Shop, viewer: Person, action: str, said: str
+    ) -> None:
+        shop.read(0.4)
+        shop.acknowledge(shop.read(1200.0)["alarms"][0]["id"], action)
+        for path in (f"/plant/{shop.machine}", f"/characteristics/{shop.characteristic}"):
+            text = viewer.open(path)
+            assert "<span>In band</span>" in text
+            assert "<span>Oversize</span>" not in text
+            assert said in text
+
+    def test_a_machine_without_characteristics_says_what_to_do(self, shop: Shop, viewer: Person) -> None:
+        shop.call("POST", "/machines", 201, key=f"{shop.machine}-new", name="New", control="other")
+        assert "Nothing is measured on this machine yet" in viewer.open(f"/plant/{shop.machine}-new")
+        assert "There is no machine" in viewer.open("/plant/nowhere", 404)
+
+    def test_of_very_many_those_that_run_by_themselves_are_folded(self, shop: Shop, viewer: Person) -> None:
+        calm = f"{shop.characteristic}-calm"
+        shop.add(calm, tool_memory=4)
+        shop.read(0.1, calm)
+        shop.read(12.0)
+        text = viewer.open(f"/plant/{shop.machine}?show=short")
+        assert f'id="c-{shop.characteristic}"' in text
+        assert f'id="c-{calm}"' not in text
+        assert f'<a href="/plant/{shop.machine}">' in text
+        assert "1 characteristic is OK" in text
+        assert f'id="c-{calm}"' in viewer.open(f"/plant/{shop.machine}")
+
+    def test_only_those_that_need_someone(self, shop: Shop, viewer: Person) -> None:
+        shop.add(f"{shop.characteristic}-calm", tool_memory=4)
+        shop.read(0.1, f"{shop.characteristic}-calm")
+        shop.read(12.0)
+        text = viewer.open(f"/plant/{shop.machine}?show=attention")
+        assert f'id="c-{shop.characteristic}"' in text
+        assert f'id="c-{shop.characteristic}-calm"' not in text
+
+    def test_names_are_text(self, shop: Shop, viewer: Person) -> None:
+        body: dict[str, Any] = {"key": f"{shop.characteristic}-x", "machine": shop.machine, "name": XSS, "part": XSS}
+        shop.call("POST", "/characteristics", 201, **body, parameters=PARAMETERS)
+        text = viewer.open(f"/plant/{shop.machine}")
+        assert XSS not in text
+        assert "&lt;b&gt;&#34;Кључ&#34; d&#39;Ø&lt;/b&gt;" in text
+
+    def test_nobody_sees_it_without_signing_in(self, server: Server) -> None:
+        assert server.client().get("/").headers["location"].startswith("/sign-in")
+
+
+def test_the_number_of_questions_does_not_grow_with_the_plant(shop: Shop, server: Server) -> None:
+    def questions() -> int:
+        asked: list[str] = []
+        engine = server.database.engine
+
+        def note(_connection: Any, _cursor: Any, statement: str, *_more: Any) -> None:
+            asked.append(statement)
+
+        event.listen(engine, "before_cursor_execute", note)
+        with server.database.begin() as session:
+            queries.plant(session)
+        event.remove(engine, "before_cursor_execute", note)
+        return len(asked)
+
+    before = questions()
+    for number in range(12):
+        shop.add(f"{shop.characteristic}-{number}", tool_memory=number + 1, average_memory=number + 1)
+        shop.read(3.0, f"{shop.characteristic}-{number}")
+    assert questions() == before <= 6
+
+
+class TestLive:
+    def test_a_reading_changes_the_line_and_the_counts(self, shop: Shop, viewer: Person, page: Page) -> None:
+        viewer.sign_in(page)
+        page.goto("/")
+        expect(line(page, shop)).to_contain_text("No readings yet")
+        needed = int(page.locator(".plant-count strong").first.inner_text())
+        page.evaluate("window.untouched = true")
+        shop.read(12.0)
+        expect(line(page, shop)).to_contain_text("Oversize")
+        expect(line(page, shop)).to_contain_text("+12.0")
+        expect(line(page, shop)).to_contain_text("1 alarm")
+        expect(page.locator(".plant-count strong").first).to_have_text(str(needed + 1))
+        assert page.evaluate("window.untouched")
+
+    def test_a_new_characteristic_appears(self, shop: Shop, viewer: Person, page: Page) -> None:
+        viewer.sign_in(page)
+        page.goto("/")
+        expect(line(page, shop)).to_be_visible()
+        shop.add(f"{shop.characteristic}-late", tool_memory=9)
+        expect(page.locator(f"#c-{shop.characteristic}-late")).to_be_visible()
+
+    def test_by_keyboard_to_the_characteristic(self, shop: Shop, viewer: Person, page: Page) -> None:
+        viewer.sign_in(page)
+        page.goto(f"/plant/{shop.machine}")
+        link = line(page, shop).get_by_role("link").first
+        link.focus()
+        page.keyboard.press("Enter")
+        page.wait_for_url(f"**/characteristics/{shop.characteristic}")
+
+    def test_a_calm_state_grows_old_while_the_page_is_open(self, shop: Shop, viewer: Person, page: Page) -> None:
+        shop.read(0.2)
+        viewer.sign_in(page)
+        page.clock.install()
+        page.goto(f"/plant/{shop.machine}")
+        expect(line(page, shop)).to_contain_text("In band")
+        page.clock.fast_forward("16:00")
+        expect(line(page, shop).get_by_text("Old data")).to_be_visible()
+        expect(line(page, shop).get_by_text("In band")).to_be_hidden()
+
+
+@pytest.fixture
+def alone(run_server: RunServer) -> Iterator[Server]:
+    with run_server() as running:
+        yield running
+
+
+def test_an_empty_plant_leads_to_set_up(alone: Server) -> None:
+    text = Person(alone, "viewer").open("/")
+    assert "No machine is set up yet" in text
+    assert "/setup/machines/new" in text
+
+
+class TestWithoutConnection:
+    @pytest.fixture
+    def server(self, alone: Server) -> Server:
+        return alone
+
+    def test_no_state_is_shown_as_if_it_were_true(
+        self, shop: Shop, server: Server, page: Page, complaints: list[str]
+    ) -> None:
+        shop.read(0.2)
+        Person(server, "viewer").sign_in(page)
+        page.goto("/")
+        expect(line(page, shop).get_by_text("In band")).to_be_visible()
+        server.kill()
+        expect(page.locator("live-status")).to_contain_text("No connection")
+        expect(line(page, shop).get_by_text("In band")).to_be_hidden()
+        expect(line(page, shop).get_by_text("Old data")).to_be_visible()
+        server.restart()
+        expect(page.locator("live-status")).to_have_text("live", timeout=20_000)
+        expect(line(page, shop).get_by_text("In band")).to_be_visible()
+        time.sleep(0.1)
+        complaints.clear()  # the browser notes every attempt that failed
+
+
+def test_every_state_has_words() -> None:
+    from app.views.characteristic.wording import state_word
+
+    assert all(state_word(state) for state in State)

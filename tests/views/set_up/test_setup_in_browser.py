@@ -1,0 +1,117 @@
+"""Set-up in a real browser: the zone diagram draws while one types, by mouse-free hands."""
+
+import re
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.shop import Shop
+
+pytestmark = pytest.mark.browser
+PASSWORD = "correct horse battery"
+
+
+@pytest.fixture(scope="module")
+def shop(server: Any) -> Shop:
+    server.person("Eva", "engineer", PASSWORD)
+    return Shop(server)
+
+
+@pytest.fixture
+def engineer(page: Page, shop: Shop) -> Page:
+    page.goto("/sign-in?next=/setup/characteristics")
+    expect(page.locator("[name=name]")).to_be_focused()
+    page.keyboard.type("Eva")
+    page.keyboard.press("Tab")
+    page.keyboard.type(PASSWORD)
+    page.keyboard.press("Enter")
+    page.wait_for_url(re.compile(r"^http://[^/]+/setup/characteristics$"))
+    return page
+
+
+def limit(page: Page, name: str, side: int = 1) -> str:
+    words = page.locator(f'[data-limit="{name}"][data-side="{side}"] .deviation').text_content()
+    assert words is not None
+    return words.replace("\xa0", " ")
+
+
+def test_the_diagram_follows_the_typing(engineer: Page, shop: Shop) -> None:
+    page = engineer
+    page.goto("/setup/characteristics/new")
+    page.fill("[name=nominal]", "40")
+    page.fill("[name=upper_deviation]", "0")
+    page.fill("[name=lower_deviation]", "−0,016")
+    assert page.locator('[data-size="target"]').text_content() == "39.9920 mm"
+    assert limit(page, "tolerance") == "+8 µm"
+    assert limit(page, "tolerance", -1) == "−8 µm"
+    assert limit(page, "averaging_limit") == "+5.333 µm", "a third of the tolerance while the field is empty"
+    page.fill("[name=averaging_limit]", "0.0053")
+    page.fill("[name=zero_range]", "0.001")
+    assert (limit(page, "averaging_limit"), limit(page, "zero_range", -1)) == ("+5.3 µm", "−1 µm")
+    page.fill("[name=wear_limit]", "0.3")
+    page.fill("[name=confidence_limit]", "1")
+    assert (limit(page, "wear_limit"), limit(page, "confidence_limit")) == ("+300 µm", "+1 mm")
+    assert page.locator('[data-um="zero_range"]').text_content() == "1\xa0µm"
+    assert page.locator(".limit.wrong").count() == 0
+
+
+def test_a_refused_order_is_told_at_once_in_the_words_of_the_server(
+    engineer: Page, shop: Shop, complaints: list[str]
+) -> None:
+    page = engineer
+    page.goto(f"/setup/characteristics/{shop.characteristic}")
+    page.fill("[name=averaging_limit]", "0.009")
+    told = page.locator('.field[data-field="averaging_limit"] .error')
+    expect(told).to_have_count(1)
+    sentence = told.text_content()
+    assert sentence == (
+        "R34 averaging limit 0.0090 mm must not be larger than R35/2 = 0.0080 mm; lower it, or leave it empty for a third "
+        "of the tolerance"
+    )
+    assert page.locator("[name=averaging_limit]").get_attribute("aria-invalid") == "true"
+    assert page.locator('.limit.wrong[data-limit="averaging_limit"]').count() == 2
+    page.fill("[name=reason]", "to see it refused")
+    page.get_by_role("button", name="Save").click()
+    expect(told).to_have_count(1)
+    assert (told.text_content() or "").strip() == sentence, "the server says the same"
+    assert page.input_value("[name=reason]") == "to see it refused"
+    complaints[:] = [words for words in complaints if "422" not in words]
+    page.fill("[name=averaging_limit]", "0.006")
+    expect(told).to_have_count(0)
+    page.get_by_role("button", name="Save").click()
+    page.wait_for_url("**?done=changed")
+    expect(page.locator("#versions")).to_contain_text("to see it refused")
+    assert shop.call("GET", f"/characteristics/{shop.characteristic}")["parameters"]["averaging_limit"] == 0.006
+
+
+def test_a_machine_and_its_key_by_keyboard_alone(engineer: Page, shop: Shop) -> None:
+    page = engineer
+    page.goto("/setup/machines/new")
+    expect(page.locator("[name=key]")).to_be_focused()
+    page.keyboard.type("by-keyboard")
+    page.keyboard.press("Tab")
+    page.keyboard.type("By keyboard")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/setup/machines/by-keyboard?done=added")
+    page.locator("#f-key-name").focus()
+    page.keyboard.type("cell PC")
+    page.keyboard.press("Enter")
+    expect(page.locator(".secret")).to_contain_text("inband_")
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (800, 1280), (1920, 1080)])
+def test_nothing_hangs_over_the_edge(engineer: Page, shop: Shop, width: int, height: int) -> None:
+    page = engineer
+    page.set_viewport_size({"width": width, "height": height})
+    for path in (
+        "/setup/characteristics",
+        "/setup/characteristics/new",
+        f"/setup/characteristics/{shop.characteristic}",
+        "/setup/machines",
+        f"/setup/machines/{shop.machine}",
+        "/setup/audit",
+        "/account",
+    ):
+        page.goto(path)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width, path

@@ -1,0 +1,138 @@
+"""Times on a page, on a chart, in a sentence and in a file are of one zone, the plant's, and it is named."""
+
+import csv
+import io
+import os
+import re
+from collections.abc import Iterator
+from typing import Any
+from zoneinfo import ZoneInfo
+
+import openpyxl
+import pytest
+from playwright.sync_api import Page
+
+from app.language.times import in_zone
+from app.loop.readings import exporting
+from app.loop.readings import queries as readings
+from tests.conftest import RunServer, Server
+from tests.shop import Person, Shop
+
+# 02:30 is there twice in Berlin that night.
+NIGHT = ("2026-10-25T00:30:00Z", "2026-10-25T01:30:00Z", "2026-10-25T02:30:00Z")
+
+
+@pytest.fixture(scope="module")
+def server(run_server: RunServer) -> Iterator[Server]:
+    """A plant in Berlin."""
+    os.environ["INBAND_TIMEZONE"] = "Europe/Berlin"
+    try:
+        with run_server(workers=1) as running:
+            yield running
+    finally:
+        del os.environ["INBAND_TIMEZONE"]
+
+
+@pytest.fixture(scope="module")
+def shop(server: Server) -> Shop:
+    made = Shop(server)
+    for number, at in enumerate(NIGHT):
+        made.read(0.1 + number, measured_at=at)
+    return made
+
+
+def path(shop: Shop, more: str = "") -> str:
+    return f"/api/v1/characteristics/{shop.characteristic}{more}"
+
+
+def test_pages_write_the_plants_time_and_name_its_zone(shop: Shop, server: Server) -> None:
+    page = Person(server, "viewer").open(f"/characteristics/{shop.characteristic}")
+    assert "Times of Europe/Berlin" in page
+    for text in ("25 Oct 2026 02:30:00 UTC+02:00<", "25 Oct 2026 02:30:00 UTC+01:00<", "25 Oct 2026 03:30:00<"):
+        assert text in page
+    assert "UTC<" not in page
+
+
+def test_charts_have_the_same_time_in_tooltip_and_on_the_axis(shop: Shop) -> None:
+    zones = shop.admin.get(path(shop, "/figures/zones")).json()
+    texts = next(trace for trace in zones["data"] if trace.get("meta") == "readings")["text"]
+    assert texts[2].endswith("2026-10-25 03:30:00 Europe/Berlin")
+    assert texts[1].endswith("2026-10-25 02:30:00 UTC+01:00 Europe/Berlin")
+    over_time = shop.admin.get(path(shop, "/figures/run")).json()
+    (run,) = [trace for trace in over_time["data"] if trace.get("meta") == "run"]
+    assert run["x"] == ["2026-10-25T02:30:00+02:00", "2026-10-25T02:30:00+01:00", "2026-10-25T03:30:00+01:00"]
+    assert over_time["layout"]["xaxis"]["title"]["text"] == "Europe/Berlin"
+
+
+def test_json_keeps_rfc_3339(shop: Shop) -> None:
+    assert shop.call("GET", f"/readings/{shop.characteristic}/3")["measured_at"] == "2026-10-25T02:30:00Z"
+
+
+def test_reports_in_all_renderings(shop: Shop, server: Server) -> None:
+    page = Person(server, "viewer").open(f"/characteristics/{shop.characteristic}/report?last=all")
+    assert "times are those of Europe/Berlin" in page
+    assert len(re.findall(r"report\.(?:pdf|xlsx|csv|json)\?[^\"]*timezone=Europe%2FBerlin", page)) >= 3
+    rows = list(csv.DictReader(io.StringIO(shop.admin.get(path(shop, "/report.csv")).text.removeprefix("\ufeff"))))
+    measured = [row["value"] for row in rows if (row["section"], row["key"]) == ("decisions", "measured_at")]
+    assert measured == ["2026-10-25T03:30:00+01:00", "2026-10-25T02:30:00+01:00", "2026-10-25T02:30:00+02:00"]
+    book = openpyxl.load_workbook(io.BytesIO(shop.admin.get(path(shop, "/report.xlsx")).content))
+    cells = [str(cell.value) for sheet in book for line in sheet.iter_rows() for cell in line]
+    assert "Measured at, Europe/Berlin" in cells
+    assert "2026-10-25 02:30:00 UTC+02:00" in cells
+    assert "2026-10-25 03:30:00" in cells
+    assert shop.admin.get(path(shop, "/report.json")).json()["timezone"] == "Europe/Berlin"
+
+
+def test_exports_have_local_time_with_its_offset(shop: Shop) -> None:
+    with shop.server.database.begin() as session, in_zone(ZoneInfo("Asia/Kathmandu")):
+        entry = readings.entry_of(session, shop.characteristic)
+        assert entry is not None
+        file = io.StringIO()
+        exporting.write_csv(exporting.rows(session, entry), file)
+    assert [row["measured_at"] for row in csv.DictReader(io.StringIO(file.getvalue()))] == [
+        "2026-10-25T06:15:00+05:45",
+        "2026-10-25T07:15:00+05:45",
+        "2026-10-25T08:15:00+05:45",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "count"),
+    [
+        ("2026-10-25 02:30", "2026-10-25 02:30", 2),  # an end that is there twice means the later one
+        ("2026-10-25 03:00", "2026-10-25 04:00", 1),
+        ("2026-10-25T00:30Z", "2026-10-25T00:30Z", 1),
+    ],
+)
+def test_periods_are_typed_in_plant_time(shop: Shop, server: Server, begin: str, end: str, count: int) -> None:
+    viewer = Person(server, "viewer")
+    query = f"from={begin}&to={end}".replace(" ", "+")
+    report = viewer.open(f"/characteristics/{shop.characteristic}/report?{query}&section=decisions")
+    assert len(set(re.findall(r"2026-10-25 0\d:30:00(?: UTC\+0\d:00)?</td>", report))) == count
+    assert "The period was not understood" not in viewer.open(
+        f"/characteristics/{shop.characteristic}/capability?{query}"
+    )
+
+
+@pytest.mark.parametrize("where", ["report", "capability", "what-if"])
+def test_an_hour_that_is_missing_is_refused(shop: Shop, server: Server, where: str) -> None:
+    page = Person(server, "engineer").open(f"/characteristics/{shop.characteristic}/{where}?from=2026-03-29+02:30", 422)
+    assert 'value="2026-03-29 02:30"' in page
+
+
+def test_who_was_first_is_told_in_plant_time(shop: Shop) -> None:
+    shop.call("POST", f"/readings/{shop.characteristic}/1/exclude", reason="chip")
+    problem: Any = shop.call("POST", f"/readings/{shop.characteristic}/1/exclude", 409, reason="chip")
+    assert re.search(r"on \d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+0[12]:00:", problem["detail"])
+
+
+def test_a_browser_elsewhere_shows_the_plants_time_too(shop: Shop, server: Server, browser: Any) -> None:
+    context = browser.new_context(base_url=server.url, timezone_id="America/New_York", locale="en-GB")
+    page: Page = context.new_page()
+    Person(server, "viewer").sign_in(page)
+    page.goto(f"/characteristics/{shop.characteristic}?scale=time")
+    page.wait_for_selector("plotly-chart.zones .xtick")
+    assert "25 Oct 2026 03:30:00" in page.locator("main").inner_text()
+    ticks = page.locator("plotly-chart.zones .xtick").all_text_contents()
+    assert any(re.match(r"0[23]:", tick) for tick in ticks), ticks
+    context.close()

@@ -1,0 +1,152 @@
+"""Strangers at the door: heads without end, requests that never arrive, more connections than files."""
+
+import asyncio
+import json
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any
+
+import httpx
+import pytest
+import uvicorn
+
+from app.web import protocol
+from app.web.protocol import MOST_HEAD, ServerProtocol
+
+PATIENCE = 0.8  # seconds; `ServerProtocol` has more
+
+
+class Impatient(ServerProtocol):
+    head_patience = PATIENCE
+    body_patience = PATIENCE
+
+
+async def application(scope: dict[str, Any], receive: Any, send: Any) -> None:
+    """Answers with the number of bytes it was sent; `/slow` waits until somebody says so."""
+    body, more = b"", True
+    while more:
+        message = await receive()
+        if message["type"] == "http.disconnect":
+            return
+        body, more = body + message.get("body", b""), message.get("more_body", False)
+    if scope["path"] == "/slow":
+        await asyncio.sleep(3 * PATIENCE)
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+    await send({"type": "http.response.body", "body": str(len(body)).encode()})
+
+
+@pytest.fixture(scope="module")
+def port() -> Iterator[int]:
+    config = uvicorn.Config(application, http=Impatient, ws="none", lifespan="off", log_level="critical")
+    server = uvicorn.Server(config)
+    with socket.socket() as listening:
+        listening.bind(("127.0.0.1", 0))
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
+        thread.start()
+        while not server.started:
+            time.sleep(0.01)
+        yield listening.getsockname()[1]
+        server.should_exit = True
+        thread.join()
+
+
+def connected(port: int) -> socket.socket:
+    client = socket.create_connection(("127.0.0.1", port))
+    client.settimeout(20)
+    return client
+
+
+def heard(client: socket.socket) -> bytes:
+    """All that the server says until it closes."""
+    parts = []
+    with suppress(ConnectionResetError):
+        while part := client.recv(65_536):
+            parts.append(part)
+    return b"".join(parts)
+
+
+def problem(answer: bytes) -> dict[str, Any]:
+    head, _, body = answer.partition(b"\r\n\r\n")
+    assert b"application/problem+json" in head
+    found: dict[str, Any] = json.loads(body)
+    assert str(found["status"]).encode() in head.split(b"\r\n")[0]
+    return found
+
+
+@pytest.mark.parametrize("pieces", [1, 40])
+def test_a_head_without_end_is_refused(port: int, pieces: int) -> None:
+    with connected(port) as client:
+        client.sendall(b"GET / HTTP/1.1\r\nHost: x\r\nLong: ")
+        for _ in range(pieces):
+            client.sendall(b"a" * (4 * MOST_HEAD // pieces))
+            time.sleep(0.001)
+        client.sendall(b"\r\n\r\n")
+        assert problem(heard(client))["status"] == 431
+
+
+def test_a_head_of_the_usual_size_is_served(port: int) -> None:
+    answer = httpx.post(f"http://127.0.0.1:{port}/", headers={"Long": "a" * (MOST_HEAD // 2)}, content=b"x" * 300_000)
+    assert answer.text == "300000"
+
+
+def test_whoever_says_nothing_is_let_go(port: int) -> None:
+    with connected(port) as client:
+        assert heard(client) == b""
+
+
+def test_a_head_that_does_not_arrive_is_answered(port: int) -> None:
+    with connected(port) as client:
+        for part in (b"GET / HTTP/1.1\r\n", b"Host: x\r\n"):
+            client.sendall(part)
+        assert problem(heard(client))["status"] == 408
+
+
+def test_a_second_request_has_as_much_time_as_the_first(port: int) -> None:
+    with connected(port) as client:
+        client.sendall(b"GET / HTTP/1.1\r\nHost: x\r\n\r\n")
+        assert client.recv(65_536).endswith(b"0\r\n\r\n")
+        client.sendall(b"GET / HTTP/1.1\r\n")
+        assert problem(heard(client))["status"] == 408
+
+
+def test_a_body_that_falls_silent_is_let_go(port: int) -> None:
+    with connected(port) as client:
+        client.sendall(b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 10\r\n\r\n12345")
+        assert heard(client) == b""
+
+
+def test_a_slow_body_and_a_slow_answer_are_waited_for(port: int) -> None:
+    with connected(port) as client:
+        client.sendall(b"POST /slow HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: 8\r\n\r\n")
+        for _ in range(8):
+            time.sleep(PATIENCE / 4)
+            client.sendall(b"x")
+        assert heard(client).partition(b"\r\n\r\n")[2] == b"1\r\n8\r\n0\r\n\r\n"
+
+
+class TestMoreConnectionsThanFiles:
+    @pytest.fixture(autouse=True)
+    def few(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(protocol, "most_connections", lambda: 3)
+        monkeypatch.setattr(Impatient, "head_patience", 30.0)  # they are not let go by themselves
+
+    def test_the_silent_make_room(self, port: int) -> None:
+        silent = [connected(port) for _ in range(6)]
+        assert httpx.get(f"http://127.0.0.1:{port}/").text == "0"
+        assert heard(silent[0]) == b""
+        for client in silent:
+            client.close()
+
+    def test_where_all_are_served_a_new_one_is_told_to_come_back(self, port: int) -> None:
+        busy = [connected(port) for _ in range(3)]
+        for client in busy:
+            client.sendall(b"GET /slow HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+        time.sleep(PATIENCE / 2)
+        refused = httpx.get(f"http://127.0.0.1:{port}/")
+        assert (refused.status_code, refused.headers["retry-after"]) == (503, "5")
+        for client in busy:
+            assert heard(client).startswith(b"HTTP/1.1 200")
+            client.close()
