@@ -1,8 +1,8 @@
 """Common parts of all JSON routes: strict bodies, and every error described in the OpenAPI document."""
 
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Path, Query
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -18,10 +18,22 @@ from app.errors import (
     TooLarge,
     TooManyRequests,
 )
+from app.web.fields import Slug
 from app.web.json_bodies import JsonRoute
 from app.web.problems import PROBLEM_JSON
+from app.web.theme import ThemeName
 
 BASE = "/api/v1"
+MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
+CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
+MachineFilter = Annotated[Slug | None, Query(description="Only of this machine.", examples=["mill-1"])]
+Theme = Annotated[ThemeName, Query(description="For a light or a dark page.")]
+FIGURE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "A Plotly figure: `data` and `layout`",
+        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
+    }
+}
 
 
 class WrongField(BaseModel):
@@ -85,6 +97,11 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
 def plain(example: str) -> dict[int | str, dict[str, object]]:
     """Description of an answer in plain text."""
     return {200: {"description": "The text", "content": {"text/plain": {"example": example}}}}
+
+
+def sent_again(model: type[BaseModel]) -> dict[int | str, dict[str, Any]]:
+    """Description of the answer to a key that was sent before."""
+    return {200: {"model": model, "description": "It was sent before with the same key; nothing happened now."}}
 
 
 def _operation_id(route: APIRoute) -> str:

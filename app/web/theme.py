@@ -106,11 +106,6 @@ def palette(theme: ThemeName) -> Palette:
     return PALETTES[theme]
 
 
-def theme_from(name: str | None) -> ThemeName:
-    """The theme that a query asks for; light if it asks for none that we have."""
-    return "dark" if name == "dark" else "light"
-
-
 def layout(theme: ThemeName, **more: Any) -> dict[str, Any]:
     """The layout that every chart begins with."""
     colours = palette(theme)

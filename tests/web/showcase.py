@@ -23,7 +23,6 @@ from app.views.characteristic import glance
 from app.web.problem import problem_page
 from app.web.security import SecurityHeaders
 from app.web.templates import assets, environment, page
-from app.web.theme import theme_from
 
 LIMITS = SimpleNamespace(
     zero_range=0.001, averaging_limit=0.0053, tolerance_width=0.016, wear_limit=0.3, confidence_limit=1.0
@@ -145,7 +144,7 @@ def showcase(stage: Stage | None = None) -> Starlette:
         common: dict[str, Any] = {
             "limits": LIMITS,
             "scale": query.get("scale", "zones"),
-            "theme": theme_from(query.get("theme")),
+            "theme": "dark" if query.get("theme") == "dark" else "light",
             "sizes": charts.SizeAxis(39.992),
             "width": int(query.get("width", 1240)),
         }

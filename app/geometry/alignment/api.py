@@ -1,6 +1,6 @@
 """JSON routes: alignments, pallets composed with parts."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import Path, Query, Request, Response
 
@@ -11,19 +11,16 @@ from app.geometry.alignment.answers import AlignmentOut, alignment_out
 from app.geometry.alignment.schemas import AlignmentIn, PalletIn, RecomputeIn
 from app.loop.machines.queries import machine_named
 from app.loop.readings import actions as readings
-from app.web.api import api_router, problems
+from app.web.api import MachineFilter, api_router, problems, sent_again
 from app.web.deps import SessionDep
-from app.web.fields import Cursor, Limit, Page, Slug, page_of
+from app.web.fields import Cursor, Limit, Page, page_of
 from app.web.warnings import AcknowledgeIn
 
 router = api_router("alignments")
 Number = Annotated[int, Path(description="Number of the alignment.", examples=[7])]
-AGAIN: dict[int | str, dict[str, Any]] = {
-    200: {"model": AlignmentOut, "description": "It was sent before with the same key; nothing happened now."}
-}
 
 
-@router.post("/alignments", status_code=201, responses=problems(404, 409) | AGAIN)
+@router.post("/alignments", status_code=201, responses=problems(404, 409) | sent_again(AlignmentOut))
 def align(
     request: Request, session: SessionDep, caller: AnyCaller, body: AlignmentIn, response: Response
 ) -> AlignmentOut:
@@ -44,7 +41,7 @@ def align(
     return alignment_out(session, queries.alignment(session, created.alignment.id))
 
 
-@router.post("/alignments/pallets", status_code=201, responses=problems(404, 409) | AGAIN)
+@router.post("/alignments/pallets", status_code=201, responses=problems(404, 409) | sent_again(AlignmentOut))
 def compose_pallet(session: SessionDep, caller: AnyCaller, body: PalletIn, response: Response) -> AlignmentOut:
     """Compose the error of a pallet with that of a part on it: where the part lies on the machine."""
     caller.must_somewhere("operator")
@@ -57,7 +54,7 @@ def compose_pallet(session: SessionDep, caller: AnyCaller, body: PalletIn, respo
 def list_alignments(
     session: SessionDep,
     caller: AnyCaller,
-    machine: Annotated[Slug | None, Query(description="Only of this machine.", examples=["mill-1"])] = None,
+    machine: MachineFilter = None,
     after: Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")] = 0,
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[AlignmentOut]:

@@ -15,26 +15,22 @@ from app.geometry.alignment.tables import Alignment
 from app.language.i18n import _
 from app.loop.machines.queries import machine_named, machine_of
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
-from app.web.api import api_router, plain, problems
+from app.web.api import FIGURE, MachineKey, Theme, api_router, plain, problems
 from app.web.deps import SessionDep
 from app.web.downloads import download
 from app.web.fields import Control
-from app.web.theme import ThemeName, theme_from
+from app.web.theme import ThemeName
 
 router = api_router("alignments")
 Number = Annotated[int, Path(description="Number of the alignment.", examples=[7])]
-Theme = Annotated[str | None, Query(description="`light` or `dark`", max_length=20)]
-FIGURE: dict[int | str, dict[str, Any]] = {
-    200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}
-}
 # Where a set-up that was composed has no touches of its own: a cube of 100 mm shows how it lies.
 CUBE = [figures.DrawnPoint(at, at, 0.0) for at in ([50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0])]
 
 
 @router.get("/alignments/{number}/figure", responses=problems(404) | FIGURE)
-def alignment_figure(session: SessionDep, caller: AnyCaller, number: Number, theme: Theme = None) -> dict[str, Any]:
+def alignment_figure(session: SessionDep, caller: AnyCaller, number: Number, theme: Theme = "light") -> dict[str, Any]:
     """The part as it should lie and as it does as a Plotly figure, with its touches; displacements enlarged."""
-    return _drawn(session, queries.alignment(session, number, caller.only_machine), theme_from(theme))
+    return _drawn(session, queries.alignment(session, number, caller.only_machine), theme)
 
 
 def _drawn(session: Session, alignment: Alignment, theme: ThemeName) -> dict[str, Any]:
@@ -89,12 +85,12 @@ def write_alignment(
 def alignment_trend_figure(
     session: SessionDep,
     caller: AnyCaller,
-    machine: Annotated[str, Path(description="The key of the machine.", examples=["mill-1"])],
+    machine: MachineKey,
     name: Annotated[
         str,
         Query(description="The name that alignments were given.", min_length=1, max_length=200, examples=["pallet 4"]),
     ],
-    theme: Theme = None,
+    theme: Theme = "light",
 ) -> dict[str, Any]:
     """Shifts and turns of what was aligned under one name over time, as a Plotly figure."""
     machine_row = machine_named(session, machine)
@@ -112,5 +108,5 @@ def alignment_trend_figure(
             )
             for row in rows
         ],
-        theme=theme_from(theme),
+        theme=theme,
     )

@@ -13,14 +13,12 @@ from app.geometry.geometric_form.queries import FormRow
 from app.geometry.geometric_form.schemas import FormIn, RecomputeIn
 from app.language.i18n import _
 from app.loop.machines.queries import machine_keys_by_id, machine_named
-from app.web.api import api_router, problems
+from app.web.api import FIGURE, MachineFilter, MachineKey, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
 from app.web.fields import Cursor, Limit, Page, Slug, page_of
-from app.web.theme import theme_from
 
 router = api_router("forms")
 Number = Annotated[int, Path(description="Number of the measurement.", examples=[17])]
-Theme = Annotated[str | None, Query(description="`light` or `dark`", max_length=20)]
 KindName = Literal[
     "roundness",
     "straightness",
@@ -31,15 +29,9 @@ KindName = Literal[
     "parallelism",
     "perpendicularity",
 ]
-FIGURE: dict[int | str, dict[str, Any]] = {
-    200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}
-}
-AGAIN: dict[int | str, dict[str, Any]] = {
-    200: {"model": FormOut, "description": "It was sent before with the same key; nothing happened now."}
-}
 
 
-@router.post("/forms", status_code=201, responses=problems(404, 409) | AGAIN)
+@router.post("/forms", status_code=201, responses=problems(404, 409) | sent_again(FormOut))
 def measure_form(request: Request, session: SessionDep, caller: AnyCaller, body: FormIn, response: Response) -> FormOut:
     """Evaluate form or position of a feature from its touches.
 
@@ -61,7 +53,7 @@ def measure_form(request: Request, session: SessionDep, caller: AnyCaller, body:
 def list_forms(
     session: SessionDep,
     caller: AnyCaller,
-    machine: Annotated[Slug | None, Query(description="Only of this machine.")] = None,
+    machine: MachineFilter = None,
     feature: Annotated[Slug | None, Query(description="Only of this feature.")] = None,
     kind: Annotated[KindName | None, Query(description="Only of this kind.")] = None,
     after: Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")] = 0,
@@ -101,7 +93,7 @@ def form_figure(
     caller: AnyCaller,
     number: Number,
     section: Annotated[int, Query(ge=1, le=1000, description="Which section, for the picture of one.")] = 1,
-    theme: Theme = None,
+    theme: Theme = "light",
 ) -> dict[str, Any]:
     """The picture as a Plotly figure: section round, axis, map of a surface, or profile; deviations exaggerated."""
     row = _seen(session, caller, number)
@@ -112,7 +104,7 @@ def form_figure(
         evaluation.result,
         measurement.tolerance,
         section=section,
-        theme=theme_from(theme),
+        theme=theme,
     )
 
 
@@ -120,10 +112,10 @@ def form_figure(
 def form_trend_figure(
     session: SessionDep,
     caller: AnyCaller,
-    machine: Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])],
+    machine: MachineKey,
     feature: Annotated[Slug, Path(description="The key of the feature.", examples=["bore-d50-axis"])],
     kind: Annotated[KindName | None, Query(description="Only of this kind.")] = None,
-    theme: Theme = None,
+    theme: Theme = "light",
 ) -> dict[str, Any]:
     """The deviations of a feature over time as a Plotly figure, with tolerance and uncertainty."""
     machine_row = machine_named(session, machine)
@@ -148,7 +140,7 @@ def form_trend_figure(
             )
             for row in rows
         ],
-        theme=theme_from(theme),
+        theme=theme,
     )
 
 

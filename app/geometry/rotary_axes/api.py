@@ -24,32 +24,23 @@ from app.geometry.rotary_axes.schemas import EnterIn, PlanIn, RestoreIn, RunIn
 from app.language.i18n import _
 from app.loop.machines.queries import machine_named
 from app.loop.readings import actions as readings
-from app.web.api import api_router, problems
+from app.web.api import FIGURE, MachineKey, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
 from app.web.fields import Cursor, Limit, Page, ReasonIn, SerialCursor, Text200, page_of
-from app.web.theme import theme_from
 
 router = api_router("kinematics")
-MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
 RunNumber = Annotated[int, Path(description="Number of the run.", examples=[118])]
 Version = Annotated[int, Path(description="Version of the kinematics.", examples=[3])]
 After = Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")]
 SerialAfter = Annotated[SerialCursor, Query(description="Cursor: the `next` of the page before.")]
-Theme = Annotated[str | None, Query(description="`light` or `dark`", max_length=20)]
 Other = Annotated[int, Query(alias="with", ge=1, le=2**63 - 1, description="Number of the other run.", examples=[97])]
 HeadName = Annotated[str, StringConstraints(strip_whitespace=True, max_length=64, pattern=r"^[^\x00-\x1f]*$")]
-FIGURE: dict[int | str, dict[str, Any]] = {
-    200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}
-}
-AGAIN: dict[int | str, dict[str, Any]] = {
-    200: {"model": RunOut, "description": "It was sent before with the same key; nothing happened now."}
-}
 
 
 # --- runs
 
 
-@router.post("/kinematics/runs", status_code=201, responses=problems(404, 409) | AGAIN)
+@router.post("/kinematics/runs", status_code=201, responses=problems(404, 409) | sent_again(RunOut))
 def take_kinematics_run(
     request: Request, session: SessionDep, caller: AnyCaller, body: RunIn, response: Response
 ) -> RunOut:
@@ -167,13 +158,13 @@ def compare_kinematics_runs(session: SessionDep, caller: AnyCaller, run: RunNumb
 
 @router.get("/kinematics/runs/{run}/comparison-figure", responses=problems(404) | FIGURE)
 def kinematics_comparison_figure(
-    session: SessionDep, caller: AnyCaller, run: RunNumber, other: Other, theme: Theme = None
+    session: SessionDep, caller: AnyCaller, run: RunNumber, other: Other, theme: Theme = "light"
 ) -> dict[str, Any]:
     """The same as one picture: an arrow from then to now for every position error, and what to enter."""
     _run(session, caller, run)
     before, after = queries.two_runs(session, run, other)
     entered = run_history.to_enter(after)
-    return figures.comparison(run_history.changes(before, after), entered, theme=theme_from(theme))
+    return figures.comparison(run_history.changes(before, after), entered, theme=theme)
 
 
 @router.get("/kinematics/runs/{run}/figure", responses=problems(404) | FIGURE)
@@ -183,7 +174,7 @@ def kinematics_run_figure(
     run: RunNumber,
     axis: Annotated[Literal["A", "B", "C"], Query(description="The axis.", examples=["C"])],
     letter: Annotated[Literal["X", "Y", "Z"], Query(description="The direction of the deviation.", examples=["Y"])],
-    theme: Theme = None,
+    theme: Theme = "light",
 ) -> dict[str, Any]:
     """The deviation in one direction against the angle of the axis (EYC: Y against C), measured and optimised."""
     row = _run(session, caller, run)
@@ -191,7 +182,7 @@ def kinematics_run_figure(
     if result is None:
         wrong = _("run {run} did not measure axis {axis}").format(run=run, axis=axis)
         raise Invalid(f"axis: {wrong}.", errors=[FieldError("axis", wrong)])
-    return figures.diagram(result, letter, theme=theme_from(theme), height=figures.greatest(result))
+    return figures.diagram(result, letter, theme=theme, height=figures.greatest(result))
 
 
 # --- machines
@@ -228,7 +219,7 @@ def kinematics_drift_figure(
     machine: MachineKey,
     value: Annotated[str, Query(max_length=20, description="EX0C, Q146, backlash.C …", examples=["EX0C"])],
     head: Annotated[HeadName, Query(description="With this head.")] = "",
-    theme: Theme = None,
+    theme: Theme = "light",
 ) -> dict[str, Any]:
     """A value over the runs with its limit, what has been entered, and the trend."""
     machine_row = machine_named(session, machine)
@@ -238,7 +229,7 @@ def kinematics_drift_figure(
         raise Invalid(f"value: {wrong}.", errors=[FieldError("value", wrong)])
     limits = queries.plan(session, machine_row.id).limits
     course = drift(value, run_history.measured(session, machine_row, head), limits.get(value))
-    return figures.course(course, theme=theme_from(theme))
+    return figures.course(course, theme=theme)
 
 
 @router.get("/machines/{machine}/kinematics/backups", responses=problems(404))

@@ -23,29 +23,19 @@ from app.geometry.work_zero.schemas import FixtureIn, RecomputeIn, ZeroIn
 from app.loop.machines.queries import machine_named, machine_of
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
 from app.loop.readings import actions as readings
-from app.web.api import api_router, plain, problems
+from app.web.api import FIGURE, MachineFilter, MachineKey, Theme, api_router, plain, problems, sent_again
 from app.web.deps import SessionDep
 from app.web.downloads import download
 from app.web.fields import Control, Cursor, Limit, Page, Slug, page_of
-from app.web.theme import theme_from
 from app.web.warnings import AcknowledgeIn
 
 router = api_router("work zeros")
-MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["mill-1"])]
 FixtureKey = Annotated[str, Path(description="The fixture, as work zeros name it.", examples=["vice-left"])]
 Number = Annotated[int, Path(description="Number of the work zero.", examples=[12])]
-MachineFilter = Annotated[Slug | None, Query(description="Only of this machine.", examples=["mill-1"])]
 FixtureFilter = Annotated[Slug | None, Query(description="Only of this fixture.", examples=["vice-left"])]
-Theme = Annotated[str | None, Query(description="`light` or `dark`", max_length=20)]
-FIGURE: dict[int | str, dict[str, Any]] = {
-    200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}
-}
-AGAIN: dict[int | str, dict[str, Any]] = {
-    200: {"model": ZeroOut, "description": "It was sent before with the same key; nothing happened now."}
-}
 
 
-@router.post("/work-zeros", status_code=201, responses=problems(404, 409) | AGAIN)
+@router.post("/work-zeros", status_code=201, responses=problems(404, 409) | sent_again(ZeroOut))
 def find_work_zero(
     request: Request, session: SessionDep, caller: AnyCaller, body: ZeroIn, response: Response
 ) -> ZeroOut:
@@ -114,7 +104,7 @@ def fixture_figure(
     caller: AnyCaller,
     machine: MachineKey,
     fixture: FixtureKey,
-    theme: Theme = None,
+    theme: Theme = "light",
     limit: Annotated[Limit, Query()] = 200,
 ) -> dict[str, Any]:
     """The shift of a fixture over its last zeros as a Plotly figure."""
@@ -131,7 +121,7 @@ def fixture_figure(
         )
         for comparison in queries.history(session, machine_row, row.key, limit=limit)
     ]
-    return figures.shift_figure(marks, row.settings.warning, row.settings.alarm, theme=theme_from(theme))
+    return figures.shift_figure(marks, row.settings.warning, row.settings.alarm, theme=theme)
 
 
 @router.get("/work-zeros/{number}", responses=problems(404))

@@ -21,26 +21,17 @@ from app.loop.calibration.answers import (
 from app.loop.calibration.queries import Place
 from app.loop.calibration.schemas import GaugeIn, PairIn, PlanIn, RingIn, SuggestionAcceptIn
 from app.loop.machines.queries import machine_named
-from app.web.api import api_router, problems
+from app.web.api import FIGURE, MachineKey, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
 from app.web.fields import Cursor, Limit, Page, ReasonIn, SerialCursor, page_of
-from app.web.theme import theme_from
 
 router = api_router("calibration")
-MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
 R10 = Annotated[int, Path(description="Tool memory location R10 of the probe.", examples=[32])]
 R11 = Annotated[int, Path(description="Average memory location R11.", examples=[5])]
 Number = Annotated[int, Path(description="Number of the calibration; counts per machine.", examples=[17])]
 PairId = Annotated[int, Path(description="Number of the pair.", examples=[31])]
 After = Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")]
 SerialAfter = Annotated[SerialCursor, Query(description="Cursor: the `next` of the page before.")]
-Theme = Annotated[str | None, Query(description="`light` or `dark`", max_length=20)]
-FIGURE: dict[int | str, dict[str, Any]] = {
-    200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}
-}
-AGAIN: dict[int | str, dict[str, Any]] = {
-    200: {"model": CalibrationOut, "description": "It was sent before with the same key; nothing happened now."}
-}
 
 
 # --- calibrations
@@ -52,7 +43,9 @@ def list_calibration_places(session: SessionDep) -> Page[PlaceOut]:
     return Page(items=[place_out(row) for row in places.places(session)])
 
 
-@router.post("/machines/{machine}/calibrations", status_code=201, responses=problems(404, 409) | AGAIN)
+@router.post(
+    "/machines/{machine}/calibrations", status_code=201, responses=problems(404, 409) | sent_again(CalibrationOut)
+)
 def calibrate_gauge(
     session: SessionDep, caller: AnyCaller, machine: MachineKey, given: GaugeIn, response: Response
 ) -> CalibrationOut:
@@ -68,7 +61,9 @@ def calibrate_gauge(
     return calibration_out(stored.row, machine_row.key)
 
 
-@router.post("/machines/{machine}/calibrations/ring", status_code=201, responses=problems(404, 409) | AGAIN)
+@router.post(
+    "/machines/{machine}/calibrations/ring", status_code=201, responses=problems(404, 409) | sent_again(CalibrationOut)
+)
 def calibrate_ring(
     session: SessionDep, caller: AnyCaller, machine: MachineKey, given: RingIn, response: Response
 ) -> CalibrationOut:
@@ -227,7 +222,7 @@ def calibration_figure(
     caller: AnyCaller,
     machine: MachineKey,
     location: R11,
-    theme: Theme = None,
+    theme: Theme = "light",
     limit: Annotated[Limit, Query()] = 200,
 ) -> dict[str, Any]:
     """The history of a location as a Plotly figure: differences, empirical value, limits R33 and R34."""
@@ -241,7 +236,7 @@ def calibration_figure(
         [mark_of(row) for row in reversed(rows)],
         sorted((change.since, change.value) for change in changes),
         value,
-        theme=theme_from(theme),
+        theme=theme,
     )
 
 
@@ -251,7 +246,7 @@ def ring_figure(
     caller: AnyCaller,
     machine: MachineKey,
     tool: R10,
-    theme: Theme = None,
+    theme: Theme = "light",
     limit: Annotated[Limit, Query()] = 200,
 ) -> dict[str, Any]:
     """The history of a probe in the ring as a Plotly figure: how far it stood beside the spindle, and the diameters."""
@@ -260,4 +255,4 @@ def ring_figure(
     place = Place("tool", tool)
     queries.value_of(session, machine_row, place)
     rows = queries.calibrations(session, machine_row, place, newest_first=True, limit=limit)
-    return figures.ring_figure([mark_of(row) for row in reversed(rows)], theme=theme_from(theme))
+    return figures.ring_figure([mark_of(row) for row in reversed(rows)], theme=theme)

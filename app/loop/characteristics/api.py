@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import Path, Query, Response
+from fastapi import Query, Response
 
 from app.access.deps import AnyCaller, Engineer
 from app.loop.characteristics import actions, queries
@@ -15,12 +15,11 @@ from app.loop.characteristics.schemas import (
     version_out,
 )
 from app.loop.machines import queries as machines
-from app.web.api import api_router, problems
+from app.web.api import CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_SERIAL, KeyCursor, Limit, Page, page_of
 
 router = api_router("characteristics")
-CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 
 
 @router.post("/characteristics", status_code=201, responses=problems(409))

@@ -2,18 +2,17 @@
 
 from typing import Annotated
 
-from fastapi import Path, Response
+from fastapi import Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.access.deps import AnyCaller
 from app.loop.faults import actions
 from app.loop.faults.alarm_kinds import Fault
-from app.web.api import api_router, problems
+from app.web.api import MachineKey, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import Body, Text200
 
 router = api_router("machines")
-MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
 
 
 class FaultIn(Body):

@@ -2,17 +2,16 @@
 
 from typing import Annotated
 
-from fastapi import Path, Query, Response
+from fastapi import Query, Response
 
 from app.access.deps import AnyCaller, Engineer
 from app.loop.machines import actions, queries
 from app.loop.machines.schemas import MachineChange, MachineIn, MachineOut
-from app.web.api import api_router, problems
+from app.web.api import MachineKey, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import KeyCursor, Limit, Page, page_of
 
 router = api_router("machines")
-MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
 
 
 @router.post("/machines", status_code=201, responses=problems(409))

@@ -9,12 +9,11 @@ from app.access.keys import add_key
 from app.access.schemas import KeyOut, MachineKeyIn, NewKeyOut, key_out
 from app.loop.machines import keys
 from app.loop.machines import queries as machines
-from app.web.api import api_router, problems
+from app.web.api import MachineKey, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_SERIAL, Limit, Page, SerialCursor, page_of
 
 router = api_router("keys")
-MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
 KeyId = Annotated[int, Path(ge=1, le=LARGEST_SERIAL, description="The number of the key.")]
 
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from fastapi import Path, Query, Response
+from fastapi import Query, Response
 from fastapi.responses import PlainTextResponse
 
 from app.access.deps import AnyCaller, require
@@ -11,12 +11,11 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.machines.queries import machine_named
 from app.loop.programs import queries
 from app.loop.programs.schemas import ProgramIn, ProgramRead, program_read
-from app.web.api import api_router, plain, problems
+from app.web.api import CharacteristicKey, api_router, plain, problems
 from app.web.deps import SessionDep
 from app.web.downloads import download
 
 router = api_router("programs")
-CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 MEASURING = (
     "L15 (MEASURING SUBPROGRAM)\n(INBAND CHARACTERISTIC=shaft-d40)\n(INBAND FACTOR=-1)\nN5 R10=3 R11=5 R24=0 R25=0 …\n"
 )

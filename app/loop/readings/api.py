@@ -23,7 +23,7 @@ from app.loop.readings.writer.batch import store_batch
 from app.loop.readings.writer.columnar import ColumnarReadings, Outcome
 from app.loop.readings.writer.group_commit import Writer
 from app.loop.readings.writer.pending import Stored, Verdict
-from app.web.api import BASE, api_router, problems
+from app.web.api import BASE, CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import Body, Limit, Page, Reason, page_of
 
@@ -44,7 +44,6 @@ _BODY = {"schema": _schema}
 # Bodies are read by our own strict decoder, so these routes do not use the JSON route class of the others.
 push = APIRouter(prefix=BASE, tags=["readings"], generate_unique_id_function=lambda route: route.name)
 router = api_router("readings")
-CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 Sequence = Annotated[int, Path(ge=1, le=2**63 - 1, description="Number of the reading: 1, 2, 3 … without gaps.")]
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 from datetime import datetime
 from typing import Annotated
 
-from fastapi import Path, Query
+from fastapi import Query
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.access.deps import AnyCaller
@@ -12,7 +12,7 @@ from app.errors import FieldError, Invalid
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import queries
-from app.web.api import api_router, problems
+from app.web.api import CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, Moment
 
@@ -85,7 +85,7 @@ class StatisticsOut(BaseModel):
 def get_statistics(
     session: SessionDep,
     caller: AnyCaller,
-    characteristic: Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])],
+    characteristic: CharacteristicKey,
     start: Annotated[
         Moment | None, Query(alias="from", description="Measured at this moment or later.", examples=[None])
     ] = None,

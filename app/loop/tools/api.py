@@ -30,13 +30,11 @@ from app.loop.tools.schemas import (
     tool_out,
     tool_set,
 )
-from app.web.api import api_router, problems
+from app.web.api import FIGURE, MachineKey, Theme, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import Limit, Page, SerialCursor, page_of
-from app.web.theme import theme_from
 
 router = api_router("offsets")
-MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
 R10 = Annotated[int, Path(description="Tool memory location R10, 1 to what the machine has.", examples=[3])]
 R11 = Annotated[int, Path(description="Average memory location R11, 1 to what the machine has.", examples=[5])]
 Number = Annotated[int, Path(description="Number of the correction; counts per machine.", examples=[18])]
@@ -98,16 +96,13 @@ def change_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, too
     return tool_set(queries.tools(session, machine_row, only=tool)[0], machine_row.key, done.superseded)
 
 
-@router.get(
-    "/machines/{machine}/tools/{tool}/figure",
-    responses=problems(404) | {200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}},
-)
+@router.get("/machines/{machine}/tools/{tool}/figure", responses=problems(404) | FIGURE)
 def tool_figure(
     session: SessionDep,
     caller: AnyCaller,
     machine: MachineKey,
     tool: R10,
-    theme: Annotated[str | None, Query(description="`light` or `dark`", max_length=20)] = None,
+    theme: Theme = "light",
     limit: Annotated[Limit, Query()] = 500,
 ) -> dict[str, Any]:
     """The history of the offset as a Plotly figure: `{"data", "layout"}`."""
@@ -116,7 +111,7 @@ def tool_figure(
     queries.tool(session, machine_row, tool)
     steps = reversed(queries.offset_history(session, machine_row, tool, limit=limit))
     changes = [OffsetChange(step.event.at, step.event.offset_after, step.kind, wording.step(step)) for step in steps]
-    return offset_figure(changes, theme=theme_from(theme))
+    return offset_figure(changes, theme=theme)
 
 
 # --- average memory

@@ -1,22 +1,19 @@
 """JSON routes: what is in a location of the tool memory, the lives of its edges, its sister tool."""
 
-from typing import Annotated, Any
-
-from fastapi import Query
+from typing import Any
 
 from app.access.deps import AnyCaller, Operator
 from app.loop.machines.queries import machine_named
 from app.loop.tools import queries
-from app.loop.tools.api import R10, MachineKey
+from app.loop.tools.api import R10
 from app.loop.tools.edge_schemas import LivesOut, SisterIn, SwitchedOut, ToolSettings, lives_out
 from app.loop.tools.edges import describe_tool
 from app.loop.tools.figures import LifeBar, lives_figure
 from app.loop.tools.lives import lives
 from app.loop.tools.schemas import ToolOut, tool_out
 from app.loop.tools.sisters import switch_to_sister
-from app.web.api import api_router, problems
+from app.web.api import FIGURE, MachineKey, Theme, api_router, problems
 from app.web.deps import SessionDep
-from app.web.theme import theme_from
 
 router = api_router("offsets")
 
@@ -37,16 +34,9 @@ def tool_lives(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool
     return lives_out(lives(session, machine_row, tool), machine_row.key)
 
 
-@router.get(
-    "/machines/{machine}/tools/{tool}/lives/figure",
-    responses=problems(404) | {200: {"content": {"application/json": {"example": {"data": [], "layout": {}}}}}},
-)
+@router.get("/machines/{machine}/tools/{tool}/lives/figure", responses=problems(404) | FIGURE)
 def tool_lives_figure(
-    session: SessionDep,
-    caller: AnyCaller,
-    machine: MachineKey,
-    tool: R10,
-    theme: Annotated[str | None, Query(description="`light` or `dark`", max_length=20)] = None,
+    session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, theme: Theme = "light"
 ) -> dict[str, Any]:
     """Parts cut and corrections summed per edge as a Plotly figure: `{"data", "layout"}`."""
     machine_row = machine_named(session, machine)
@@ -58,7 +48,7 @@ def tool_lives_figure(
         usual=known.usual,
         planned_parts=known.tool.planned_parts,
         planned_total=known.tool.planned_total,
-        theme=theme_from(theme),
+        theme=theme,
     )
 
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import Path, Query
+from fastapi import Query
 from fastapi.responses import PlainTextResponse
 
 from app.access.deps import AnyCaller
@@ -11,11 +11,10 @@ from app.core.programs.corrections import Form, PendingCorrection, steps, write
 from app.loop.machines.queries import machine_named
 from app.loop.tools import fetching
 from app.loop.tools.text_schemas import ConfirmedIn, ConfirmedOut, FetchedIn, FetchedOut, fetched_out
-from app.web.api import api_router, plain, problems
+from app.web.api import MachineKey, api_router, plain, problems
 from app.web.deps import SessionDep
 
 router = api_router("programs")
-MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
 CORRECTIONS = write(Form.TURNING, "lathe-1", steps([PendingCorrection(18, 3, -0.0061, Axis.X)], {3: -0.0081}, 17, 17))
 
 

@@ -1,9 +1,9 @@
 """JSON routes: the capability of a characteristic, and its figures."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
-from fastapi import Path, Query, Response
+from fastapi import Query, Response
 
 from app.access.deps import AnyCaller
 from app.core.spc.refusal import Refused
@@ -12,18 +12,10 @@ from app.quality.capability.figures import CapabilityChart, histogram, probabili
 from app.quality.capability.queries import Study
 from app.quality.capability.request import StudyRequestDep, study_of
 from app.quality.capability.schemas import CapabilityOut, capability_out
-from app.web.api import api_router, problems
+from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, problems
 from app.web.deps import SessionDep
-from app.web.theme import ThemeName
 
 router = api_router("statistics")
-FIGURE: dict[int | str, dict[str, Any]] = {
-    200: {
-        "description": "A Plotly figure: `data` and `layout`",
-        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
-    }
-}
-CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 
 
 def drawn(study: Study) -> CapabilityChart:
@@ -65,7 +57,7 @@ def get_capability_figure(
     picture: Annotated[
         Literal["histogram", "probability"], Query(description="Histogram with fitted curve, or probability plot.")
     ] = "histogram",
-    theme: Annotated[ThemeName, Query(description="For a light or a dark page.")] = "light",
+    theme: Theme = "light",
 ) -> Response:
     """The histogram with its fitted curve and the limits, or the normal probability plot."""
     standing = characteristics.characteristic_named(session, characteristic)

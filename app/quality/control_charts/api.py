@@ -29,15 +29,13 @@ from app.quality.control_charts.schemas import (
 )
 from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import Marks
-from app.web.api import api_router, problems
+from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, problems, sent_again
 from app.web.choice import Chosen
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Limit, Page, page_of
-from app.web.theme import ThemeName
 
 router = api_router("control charts")
 
-CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 Version = Annotated[
     int, Path(ge=1, le=LARGEST_SERIAL, description="Version of the baseline; counts per characteristic.", examples=[3])
 ]
@@ -48,17 +46,7 @@ Judge = Annotated[
 Kind = Annotated[
     Chart | None, Query(description="Which chart; individuals or X-bar, whichever the baseline is for, if left out.")
 ]
-Theme = Annotated[ThemeName, Query(description="For a light or a dark page.")]
 Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
-FIGURE: dict[int | str, dict[str, Any]] = {
-    200: {
-        "description": "A Plotly figure: `data` and `layout`",
-        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
-    }
-}
-AGAIN: dict[int | str, dict[str, Any]] = {
-    200: {"model": BaselineOut, "description": "It was sent before with the same key; nothing happened now."}
-}
 
 
 def _standing(session: SessionDep, caller: AnyCaller, key: str) -> Standing:
@@ -99,7 +87,11 @@ def list_baselines(
     return page_of(listed, limit, lambda row: row.version)
 
 
-@router.post("/characteristics/{characteristic}/baselines", status_code=201, responses=problems(404, 409) | AGAIN)
+@router.post(
+    "/characteristics/{characteristic}/baselines",
+    status_code=201,
+    responses=problems(404, 409) | sent_again(BaselineOut),
+)
 def freeze_baseline(
     session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, given: BaselineIn, response: Response
 ) -> BaselineOut:

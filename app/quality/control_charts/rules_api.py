@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import Path, Query
+from fastapi import Query
 
 from app.access.deps import AnyCaller, Engineer
 from app.loop.characteristics import queries as characteristics
@@ -11,13 +11,11 @@ from app.quality.control_charts import rules_queries
 from app.quality.control_charts.queries import baseline_in_force
 from app.quality.control_charts.rules_actions import set_rules
 from app.quality.control_charts.rules_schemas import PreviewOut, RulesIn, RulesOut
-from app.web.api import api_router, problems
+from app.web.api import CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID
 
 router = api_router("control charts")
-
-CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 
 
 def _standing(session: SessionDep, caller: AnyCaller, key: str) -> Standing:

@@ -1,6 +1,6 @@
 """JSON routes: gauge studies."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 from fastapi import Path, Query, Response
@@ -12,26 +12,16 @@ from app.quality.gauge_studies import actions, queries
 from app.quality.gauge_studies.answers import StudyOut, study_out
 from app.quality.gauge_studies.figures import figure_of
 from app.quality.gauge_studies.schemas import CorrectionIn, FromReadingsIn, StudyIn
-from app.web.api import api_router, problems
+from app.web.api import FIGURE, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, Limit, Page, page_of
-from app.web.theme import ThemeName
 
 router = api_router("gauges")
 Number = Annotated[int, Path(description="Number of the study.", examples=[7])]
 Revision = Annotated[int | None, Query(ge=1, description="Of this revision; of the newest if not said.")]
-AGAIN: dict[int | str, dict[str, Any]] = {
-    200: {"model": StudyOut, "description": "It was sent before with the same key; nothing happened now."}
-}
-FIGURE: dict[int | str, dict[str, Any]] = {
-    200: {
-        "description": "A Plotly figure: `data` and `layout`",
-        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
-    }
-}
 
 
-@router.post("/gauge-studies", status_code=201, responses=problems(404, 409) | AGAIN)
+@router.post("/gauge-studies", status_code=201, responses=problems(404, 409) | sent_again(StudyOut))
 def add_gauge_study(session: SessionDep, caller: AnyCaller, given: StudyIn, response: Response) -> StudyOut:
     """Keep a gauge study with all its values, and answer what it says."""
     machine = machine_named(session, given.machine)
@@ -41,7 +31,7 @@ def add_gauge_study(session: SessionDep, caller: AnyCaller, given: StudyIn, resp
     return study_out(result.row, queries.advice(session, result.row))
 
 
-@router.post("/gauge-studies/from-readings", status_code=201, responses=problems(404, 409) | AGAIN)
+@router.post("/gauge-studies/from-readings", status_code=201, responses=problems(404, 409) | sent_again(StudyOut))
 def take_gauge_study(session: SessionDep, caller: AnyCaller, given: FromReadingsIn, response: Response) -> StudyOut:
     """Make a gauge study of stored readings: one part probed again and again, or the repeats of each touch.
 
@@ -105,7 +95,7 @@ def get_gauge_figure(
         Query(description="The values themselves; of gauge R&R also its components, by part and by operator."),
     ] = "values",
     revision: Revision = None,
-    theme: Annotated[ThemeName, Query(description="For a light or a dark page.")] = "light",
+    theme: Theme = "light",
 ) -> Response:
     """Draw the results of the study as a chart."""
     row = queries.study(session, study, revision)

@@ -1,9 +1,9 @@
 """JSON routes: the wear of a characteristic in numbers, and its curve."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
-from fastapi import Path, Query, Response
+from fastapi import Query, Response
 
 from app.access.deps import AnyCaller
 from app.loop.characteristics import queries as characteristics
@@ -12,20 +12,11 @@ from app.quality.wear import queries
 from app.quality.wear.chart import chart_of
 from app.quality.wear.figures import wear_figure
 from app.quality.wear.schemas import WearOut
-from app.web.api import api_router, problems
+from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID
-from app.web.theme import ThemeName
 
 router = api_router("wear")
-
-CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
-FIGURE: dict[int | str, dict[str, Any]] = {
-    200: {
-        "description": "A Plotly figure: `data` and `layout`",
-        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
-    }
-}
 
 
 @router.get("/characteristics/{characteristic}/wear", responses=problems(404))
@@ -61,7 +52,7 @@ def get_wear_figure(
             description="The last so many readings, `all`, or `tool`: since the tool was changed.",
         ),
     ] = None,
-    theme: Annotated[ThemeName, Query(description="For a light or a dark page.")] = "light",
+    theme: Theme = "light",
     width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")] = 1240,
 ) -> Response:
     """The wear curve with its line, what the corrections took out of it, and the forecast to the limits that are near."""

@@ -1,6 +1,6 @@
 """JSON routes: what if, as numbers, map and figure; proposals of changes and what becomes of them."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 from fastapi import Depends, Path, Query, Response
@@ -21,26 +21,18 @@ from app.quality.what_if.schemas import (
     WhatIfIn,
     WhatIfOut,
 )
-from app.web.api import api_router, problems
+from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, Limit, Moment, Page, page_of
-from app.web.theme import ThemeName
 
 router = api_router("what-if")
 
-CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 Number = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the proposal.", examples=[1])]
 Status = Annotated[
     Literal["open", "outdated", "approved", "rejected", "withdrawn"] | None,
     Query(description="Only those with this status."),
 ]
 Before = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="Cursor: the `next` of the page before.")]
-FIGURE: dict[int | str, dict[str, Any]] = {
-    200: {
-        "description": "A Plotly figure: `data` and `layout`",
-        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
-    }
-}
 
 
 @router.post(
@@ -106,7 +98,7 @@ def get_what_if_figure(
     caller: AnyCaller,
     characteristic: CharacteristicKey,
     asked: Annotated[WhatIfIn, Depends(asked_for)],
-    theme: Annotated[ThemeName, Query(description="For a light or a dark page.")] = "light",
+    theme: Theme = "light",
     width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")] = 1240,
 ) -> Response:
     """Deviations with today's and the other settings, and what each loop had taken out by its corrections."""

@@ -1,9 +1,9 @@
 """JSON routes: the figures of a characteristic, as Plotly takes them."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
-from fastapi import Path, Query, Response
+from fastapi import Query, Response
 
 from app.access.deps import AnyCaller
 from app.core.variants import yielded_by
@@ -14,23 +14,14 @@ from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.views.characteristic.chart import chart_of, results_of, run_of
 from app.views.characteristic.figures import counting_edges, histogram_figure, result_figure, run_figure, zone_chart
-from app.web.api import api_router, problems
+from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, problems
 from app.web.choice import Choice, Chosen
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID
-from app.web.theme import ThemeName
 
 router = api_router("characteristics")
 
-FIGURE: dict[int | str, dict[str, Any]] = {
-    200: {
-        "description": "A Plotly figure: `data` and `layout`",
-        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
-    }
-}
 ResultName = Literal["run_out", "out_of_roundness", "taper", "repeat_range", "repeat_deviation"]
-CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
-Theme = Annotated[ThemeName, Query(description="For a light or a dark page.")]
 Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
 
 

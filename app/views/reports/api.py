@@ -16,14 +16,13 @@ from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
 from app.views.reports import queries
 from app.views.reports.request import EVERYTHING, ReportRequest, SectionName, section_names
-from app.web.api import api_router, problems
+from app.web.api import CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
 from app.web.downloads import download
 from app.web.fields import Moment
 
 router = api_router("reports")
 
-CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 FILE: dict[int | str, dict[str, Any]] = {
     200: {
         "description": "The report as a file",

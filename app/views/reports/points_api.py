@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import Path, Query, Response
+from fastapi import Query, Response
 
 from app.access.deps import AnyCaller
 from app.core.spc.shewhart import Chart
@@ -16,7 +16,7 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import queries as statistics
 from app.quality.control_charts import charts, queries
 from app.quality.control_charts.charts import View
-from app.web.api import api_router, problems
+from app.web.api import CharacteristicKey, api_router, problems
 from app.web.choice import Chosen
 from app.web.deps import SessionDep
 from app.web.downloads import download
@@ -54,7 +54,7 @@ FILE: dict[int | str, dict[str, Any]] = {
 def get_control_points(
     session: SessionDep,
     caller: AnyCaller,
-    characteristic: Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])],
+    characteristic: CharacteristicKey,
     choice: Chosen,
     chart: Annotated[
         Chart | None,

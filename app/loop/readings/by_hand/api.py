@@ -13,12 +13,11 @@ from app.loop.readings.by_hand.actions import HandResult
 from app.loop.readings.by_hand.schemas import HandMeasurementIn, HandMeasurementOut
 from app.loop.readings.by_hand.wording import as_json
 from app.loop.readings.records import Entry
-from app.web.api import api_router, problems
+from app.web.api import CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, Cursor, Limit, Page, page_of
 
 router = api_router("readings")
-CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 Sequence = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the reading: 1, 2, 3 … without gaps.")]
 
 
