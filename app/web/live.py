@@ -105,8 +105,9 @@ class Live:
                 await asyncio.sleep(LOOK)
 
     async def _end_those_without_access(self, conn: AsyncConnection[Any]) -> None:
-        granted = await self._still_granted(conn, set(self._clients.values()))
-        for client, access in self._clients.items():
+        listening = dict(self._clients)  # who opens a page while the database answers was not asked about
+        granted = await self._still_granted(conn, set(listening.values()))
+        for client, access in listening.items():
             if access not in granted:
                 while not client.empty():  # what waits is not told any more
                     client.get_nowait()

@@ -1,9 +1,10 @@
 """Live events over SSE, on a real server: what is told, to whom, and that nothing is missed."""
 
+import asyncio
 import json
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,9 +18,11 @@ import pytest
 from app.access import actions as people
 from app.access.sign_in import sign_out
 from app.db import migrate
+from app.db.connections import Connections
 from app.db.embedded import EmbeddedServer
+from app.db.engine import Database
 from app.loop.machines import keys
-from app.web.live import HEARTBEAT, MOST_MISSED
+from app.web.live import HEARTBEAT, MOST_MISSED, Access, Live
 from tests.conftest import RunServer, Server
 from tests.shop import Shop
 
@@ -100,11 +103,6 @@ def listening(client: httpx.Client, last_event_id: int | str | None = None, **qu
         yield listener
 
 
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 def test_a_reading_is_told_with_what_it_led_to(shop: Shop) -> None:
     with listening(shop.admin) as listener:
         shop.read(350.0)
@@ -121,6 +119,33 @@ def test_a_reading_is_told_with_what_it_led_to(shop: Shop) -> None:
         shop.correction(1, "applied")
         assert {listener.next().kind, listener.next().kind} == {"correction", "tool"}
         assert listener.quiet()
+
+
+def test_a_page_opened_during_the_check_of_accesses_stays_open(database: Database) -> None:
+    first, second = Access(None, 1, "viewer"), Access(None, 2, "viewer")
+
+    async def check() -> None:
+        opened: asyncio.Queue[AsyncIterator[bytes]] = asyncio.Queue()
+
+        async def still_granted(_conn: object, accesses: Collection[Access]) -> Collection[Access]:
+            if len(accesses) == 1:  # the second page is opened while the database looks after the first
+                page = live.stream(second, None)
+                await anext(page)
+                opened.put_nowait(page)
+            return accesses
+
+        live = Live(Connections(database.dsn), still_granted)
+        live.start()
+        try:
+            open_page = live.stream(first, None)
+            await anext(open_page)
+            page = await asyncio.wait_for(opened.get(), 30)
+            assert b"event: hello" in await anext(page)
+            assert b"event: heartbeat" in await anext(page)
+        finally:
+            await live.stop()
+
+    asyncio.run(check())
 
 
 def test_what_people_set_up_is_told(shop: Shop) -> None:
