@@ -33,6 +33,7 @@ from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
 from app.settings import HOUSE
 from tests.forked import Forked
+from tests.shop import Person, Shop
 
 for name in [name for name in os.environ if name.startswith(("INBAND_", "PG"))]:
     del os.environ[name]  # no test may meet a real installation
@@ -338,6 +339,27 @@ def server(run_server: RunServer) -> Iterator[Server]:
     """A server for the tests of one file, on a database of its own."""
     with run_server() as running:
         yield running
+
+
+@pytest.fixture
+def shop(server: Server) -> Shop:
+    """A machine and a characteristic of this test alone; a file with hundreds of tests may make one for all of them."""
+    return Shop(server)
+
+
+@pytest.fixture(scope="module")
+def operator(server: Server) -> Person:
+    return Person(server, "operator")
+
+
+@pytest.fixture(scope="module")
+def engineer(server: Server) -> Person:
+    return Person(server, "engineer")
+
+
+@pytest.fixture(scope="module")
+def viewer(server: Server) -> Person:
+    return Person(server, "viewer")
 
 
 # --- the browser

@@ -5,8 +5,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from app.settings import HOUSE
 from tests.conftest import Server
 from tests.shop import Shop
@@ -18,11 +16,6 @@ def inband(*words: object, expect: int = 0) -> subprocess.CompletedProcess[str]:
     done = subprocess.run([sys.executable, "-m", "app", *map(str, words)], cwd=HOUSE, capture_output=True, text=True)
     assert done.returncode == expect, done.stderr
     return done
-
-
-@pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
-    return Shop(server)
 
 
 def test_a_text_is_read_without_any_database(tmp_path: Path) -> None:

@@ -3,21 +3,14 @@
 from datetime import UTC, datetime, timedelta
 
 import httpx
-import pytest
 from sqlalchemy import text
 
 from app.jobs.actions import run_jobs
 from app.quality.control_charts.signals_actions import JOB
 from tests.cli.test_serve import inband
-from tests.conftest import Server
 from tests.quality.control_charts.line import Line
 from tests.quality.control_charts.rows import frozen
 from tests.shop import Shop
-
-
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
 
 
 def broken(shop: Shop, line: Line) -> None:

@@ -2,16 +2,10 @@
 
 from typing import Any
 
-import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from tests.conftest import Server
 from tests.shop import Shop
-
-
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
 
 
 def metrics(server: Server) -> dict[tuple[str, tuple[tuple[str, str], ...]], float]:

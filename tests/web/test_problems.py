@@ -21,11 +21,6 @@ from tests.shop import PARAMETERS, Shop
 JSON = {"Content-Type": "application/json"}
 
 
-@pytest.fixture(scope="module")
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def refused(answer: httpx.Response, status: int) -> dict[str, Any]:
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"

@@ -21,11 +21,6 @@ def server(run_server: RunServer) -> Iterator[Server]:
         yield running
 
 
-@pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 def logged(server: Server, request_id: str) -> list[dict[str, Any]]:
     """The lines that belong to a request."""
     lines = [json.loads(line) for line in server.stderr.read_text().splitlines() if line.startswith("{")]

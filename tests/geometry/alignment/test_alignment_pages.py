@@ -22,16 +22,6 @@ PLACES = [
 FOUND = ("0.012", "0.046", "0.021", "0.104", "-0.205", "0.051")
 
 
-@pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture
-def operator(shop: Shop) -> Person:
-    return Person(shop.server, "operator")
-
-
 def six(machine: str, **more: str) -> dict[str, Any]:
     """The form with the six points typed in."""
     typed: dict[str, Any] = {"machine": machine, "kind": "points", "rows": "6", "found": "deviation"}

@@ -5,20 +5,9 @@ import re
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.conftest import Server
 from tests.shop import Person, Shop
 
 OVAL = "10.01 0\n0 9.99\n-10.01 0\n0 -9.99"
-
-
-@pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture
-def operator(shop: Shop) -> Person:
-    return Person(shop.server, "operator")
 
 
 class TestInABrowser:

@@ -8,12 +8,6 @@ import pytest
 
 from tests.shop import Person, Shop
 
-
-@pytest.fixture(scope="module")
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 C = {"axis": "C", "start": -90.0, "end": 180.0, "points": 4}
 
 

@@ -14,11 +14,6 @@ from tests.geometry.work_zero.bench import POCKET, moved, moved_along, post
 from tests.shop import Shop
 
 
-@pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 class TestFixtures:
     def test_a_shifting_vice_is_seen_and_told(self, server: Server) -> None:
         shop = Shop(server)

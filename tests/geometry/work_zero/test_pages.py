@@ -3,23 +3,11 @@
 import re
 from typing import Any
 
-import pytest
 from playwright.sync_api import Page, expect
 
-from tests.conftest import Server
 from tests.shop import Person, Shop
 
 SLOW = 20_000  # ms, for charts on a busy computer
-
-
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture
-def operator(shop: Shop) -> Person:
-    return Person(shop.server, "operator")
 
 
 def type_pocket(page: Page, shop: Shop, shift: float = 0.0) -> None:

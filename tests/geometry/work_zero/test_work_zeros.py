@@ -18,11 +18,6 @@ from tests.geometry.work_zero.bench import POCKET, moved, post
 from tests.shop import Shop
 
 
-@pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 class TestImplausible:
     def test_far_from_the_zero_of_its_fixture_the_text_stops_until_acknowledged(self, shop: Shop) -> None:
         assert post(shop, fixture="vice-far")["warnings"] == []

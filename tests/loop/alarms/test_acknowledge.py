@@ -9,11 +9,6 @@ import pytest
 from tests.shop import Shop
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def codes(alarm: Any) -> list[str]:
     return [item["code"] for item in alarm["outcome"]]
 

@@ -9,16 +9,6 @@ from playwright.sync_api import Page, expect
 from tests.shop import Person, Shop
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture
-def operator(server: Any) -> Person:
-    return Person(server, "operator")
-
-
 def kinds(text: str) -> list[str]:
     return re.findall(r'class="alarm-kind"[^>]*><a[^>]*>([^<]+)<', text)
 

@@ -31,11 +31,6 @@ RING: dict[str, Any] = {
 }
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def calibrate(shop: Shop, status: int = 201, client: Any = None, **more: Any) -> Any:
     return shop.call("POST", f"/machines/{shop.machine}/calibrations", status, client, **(GAUGE | more))
 

@@ -11,11 +11,6 @@ from tests.loop.calibration.test_calibrations import calibrate, ring
 from tests.shop import Shop
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def plan(shop: Shop, what: str = "averages/5", **body: Any) -> Any:
     return shop.call("PUT", f"/machines/{shop.machine}/{what}/calibration-plan", **body)
 

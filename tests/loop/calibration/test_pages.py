@@ -25,16 +25,6 @@ GAUGE: dict[str, Any] = {
 }
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture
-def operator(server: Any) -> Person:
-    return Person(server, "operator")
-
-
 def place(shop: Shop) -> str:
     return f"/calibration/{shop.machine}/averages/5"
 

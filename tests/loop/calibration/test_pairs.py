@@ -10,11 +10,6 @@ from tests.shop import Shop
 DIFFERENCES = (0.0021, 0.0030, 0.0024, 0.0028, 0.0027)
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def path(shop: Shop, what: str = "pairs") -> str:
     return f"/machines/{shop.machine}/averages/5/{what}"
 

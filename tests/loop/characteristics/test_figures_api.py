@@ -7,11 +7,6 @@ import pytest
 from tests.shop import Shop
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def figure(shop: Shop, name: str, status: int = 200, **query: Any) -> Any:
     answer = shop.admin.get(f"/api/v1/characteristics/{shop.characteristic}/figures/{name}", params=query)
     assert answer.status_code == status, answer.text

@@ -7,26 +7,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.conftest import Server
 from tests.shop import PARAMETERS, Person, Shop
 
 PLOT = "document.querySelector('plotly-chart.zones .plot')"
 XSS = """<b>"Кључ" d'Ø</b>"""
-
-
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture(scope="module")
-def operator(server: Server) -> Person:
-    return Person(server, "operator")
-
-
-@pytest.fixture(scope="module")
-def viewer(server: Server) -> Person:
-    return Person(server, "viewer")
 
 
 def eventually(page: Page, condition: str, seconds: float = 10) -> None:

@@ -85,11 +85,6 @@ class TestFigures:
         assert 'class="touch"' in touches_picture(bore(R25=2), [40.0, 40.0])
 
 
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 def touched(shop: Shop, name: str, *values: float) -> Any:
     return shop.call("POST", "/readings", 201, characteristic=name, touches=[[value] for value in values])
 

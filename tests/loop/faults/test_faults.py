@@ -2,14 +2,7 @@
 
 from typing import Any
 
-import pytest
-
 from tests.shop import Person, Shop
-
-
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
 
 
 def report(shop: Shop, status: int = 201, **fault: Any) -> Any:

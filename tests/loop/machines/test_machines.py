@@ -10,11 +10,6 @@ from tests.shop import PARAMETERS, Shop
 SERBIAN = "Струг „Морава” бр. 1 – 'А' \"Б\"; DROP TABLE machine;--"
 
 
-@pytest.fixture(scope="module")
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def test_a_machine_comes_with_its_memories(shop: Shop) -> None:
     made = shop.call("POST", "/machines", 201, key="mill-7", name=SERBIAN, control="heidenhain")
     assert {name: made[name] for name in ("key", "name", "control")} == {

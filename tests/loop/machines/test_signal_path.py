@@ -8,11 +8,6 @@ from tests.conftest import Server
 from tests.shop import Person, Shop
 
 
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 def test_a_machine_is_wired_directly_until_somebody_says_otherwise(shop: Shop) -> None:
     machine = shop.call("GET", f"/machines/{shop.machine}")
     assert (machine["signal_path"], machine["signal_delay"], machine["probing_feed"]) == ("direct", 0.25, 150.0)

@@ -12,11 +12,6 @@ from tests.core.programs.controls import Fanuc, Sinumerik
 from tests.shop import Shop
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def text_of(shop: Shop, status: int = 200, **query: str) -> httpx.Response:
     answer = shop.admin.get(f"/api/v1/machines/{shop.machine}/corrections/program", params=query)
     assert answer.status_code == status, answer.text

@@ -21,21 +21,6 @@ N30 M17
 """
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture(scope="module")
-def engineer(server: Any) -> Person:
-    return Person(server, "engineer")
-
-
-@pytest.fixture(scope="module")
-def operator(server: Any) -> Person:
-    return Person(server, "operator")
-
-
 def hidden_fields(text: str) -> dict[str, str]:
     return dict(re.findall(r'<input type="hidden" name="(?!csrf)(\w+)" value="([^"]*)">', text))
 

@@ -21,11 +21,6 @@ N30 M17
 BORE = "#505=40. (NOMINAL)\n#506=0.025\n#507=0.\nG65 P9011 A3.\n#510=40.012\n#511=40.013\n#512=40.011"
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def read(shop: Shop, text: str, **more: Any) -> Any:
     return shop.call("POST", "/programs/read", 200, text=text, **more)
 

@@ -21,11 +21,6 @@ from tests.shop import PARAMETERS, Shop
 NDJSON = {"Content-Type": "application/x-ndjson"}
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def batch(shop: Shop, readings: list[Any], client: httpx.Client | None = None, **query: Any) -> httpx.Response:
     return (client or shop.machine_client).post("/api/v1/readings/batch", json=readings, params=query)
 

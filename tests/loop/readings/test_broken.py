@@ -25,11 +25,6 @@ from tests.shop import PARAMETERS, Shop
 WRITERS = "FROM pg_stat_activity WHERE application_name = 'inband-readings' AND datname = current_database()"
 
 
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 def crew(shop: Shop, server: Server) -> list[Sender]:
     """Machines that send until they are told to stop: two characteristics on one tool, and one on a tool of its own."""
     shared, alone = f"{shop.characteristic}-s", f"{shop.characteristic}-a"

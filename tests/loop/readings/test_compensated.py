@@ -4,14 +4,8 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import psycopg
-import pytest
 
 from tests.shop import Shop
-
-
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
 
 
 def kept(shop: Shop) -> list[tuple[float | None, list[int] | None]]:

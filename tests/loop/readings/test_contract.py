@@ -12,11 +12,6 @@ from tests.shop import PARAMETERS, Shop
 AT = "2026-11-21T08:15:02.120+01:00"
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def refused(shop: Shop, status: int, client: httpx.Client | None = None, **body: Any) -> dict[str, Any]:
     """A reading that must be refused and leave no trace."""
     before = counts(shop.server.database.dsn)

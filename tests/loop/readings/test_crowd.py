@@ -22,11 +22,6 @@ from tests.shop import PARAMETERS, Shop
 
 
 @pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture
 def parameters() -> Parameters:
     return read(PARAMETERS)[0]
 

@@ -7,11 +7,6 @@ import pytest
 from tests.shop import Shop
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def test_it_stops_the_machine_and_says_why(shop: Shop) -> None:
     shop.read(3.0)
     answer = shop.read(3.0, first_move_triggered=True, key="n999")

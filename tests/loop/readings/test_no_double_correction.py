@@ -16,11 +16,6 @@ from tests.loop.readings.record import history, must_hold, must_replay
 from tests.shop import PARAMETERS, Shop
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 class Lathe:
     """Cuts with its own offset; what lies between cutting and measuring is the pipeline."""
 

@@ -12,11 +12,6 @@ MEAN = 3.0
 SQUARES = 4 + 1 + 36 + 9 + 36  # about the mean
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def statistics(shop: Shop, query: str = "", status: int = 200) -> Any:
     return shop.call("GET", f"/characteristics/{shop.characteristic}/statistics{query}", status)
 

@@ -10,11 +10,6 @@ import pytest
 from tests.shop import Shop
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def pending(shop: Shop) -> int:
     number: int = shop.read(6.0)["correction"]["number"]
     return number

@@ -20,11 +20,6 @@ SETTINGS: dict[str, Any] = {
 }
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def path(shop: Shop, more: str = "", number: int = 3) -> str:
     return f"/machines/{shop.machine}/tools/{number}{more}"
 

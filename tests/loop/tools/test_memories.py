@@ -9,11 +9,6 @@ from app.loop.tools.figures import OffsetChange, offset_figure
 from tests.shop import Shop
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
 def path(shop: Shop, number: int | str = 3) -> str:
     return f"/machines/{shop.machine}/tools/{number}"
 

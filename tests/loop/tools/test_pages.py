@@ -9,16 +9,6 @@ from playwright.sync_api import Page, expect
 from tests.shop import Person, Shop
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture
-def operator(server: Any) -> Person:
-    return Person(server, "operator")
-
-
 def page_of(shop: Shop) -> str:
     return f"/machines/{shop.machine}/tools"
 

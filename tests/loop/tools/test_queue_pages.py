@@ -8,16 +8,6 @@ from playwright.sync_api import Page, expect
 from tests.shop import Person, Shop
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture
-def operator(server: Any) -> Person:
-    return Person(server, "operator")
-
-
 def awaiting(shop: Shop, *micrometres: float) -> list[int]:
     key = f"{shop.characteristic}-a"
     shop.add(key, mode="approval", tool_memory=4, average_memory=6)

@@ -20,11 +20,6 @@ from tests.shop import Shop
 
 
 @pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture
 def database(server: Any) -> Database:
     """The server's own, to go the rounds by hand."""
     made: Database = server.database

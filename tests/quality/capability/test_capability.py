@@ -14,11 +14,6 @@ from tests.conftest import Server
 from tests.shop import Person, Shop
 
 
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 def push(shop: Shop, values: list[float], characteristic: str | None = None) -> None:
     """Readings that deviate by so many µm, at once."""
     body = [

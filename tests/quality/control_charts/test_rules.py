@@ -17,11 +17,6 @@ from tests.quality.control_charts.line import Line
 from tests.shop import Person, Shop
 
 
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 def get(line: Line, more: str = "") -> Any:
     return line.shop.call("GET", f"/characteristics/{line.key}/rules{more}")
 

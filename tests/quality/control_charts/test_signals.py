@@ -12,11 +12,6 @@ from tests.quality.control_charts.line import Line
 from tests.shop import Person, Shop
 
 
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 def test_by_default_points_beyond_the_limits_are_kept_and_nobody_is_alarmed(shop: Shop) -> None:
     line = Line(shop)
     line.push([0.0, 6.5, 6.5, 0.0, -7.0])

@@ -10,11 +10,6 @@ from tests.quality.gauge_studies.test_studies import refused, send, single
 from tests.shop import Person, Shop
 
 
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 def take(shop: Shop, first: int, through: int, status: int = 201, **more: Any) -> Any:
     given: dict[str, Any] = {
         "kind": "type_one",

@@ -11,21 +11,6 @@ from tests.quality.gauge_studies.test_studies import aiag, send, single
 from tests.shop import Person, Shop
 
 
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture
-def operator(server: Server) -> Person:
-    return Person(server, "operator")
-
-
-@pytest.fixture
-def engineer(server: Server) -> Person:
-    return Person(server, "engineer")
-
-
 def form(shop: Shop, kind: str, **fields: str) -> dict[str, str]:
     begun = {"kind": kind, "machine": shop.machine, "characteristic": shop.characteristic, "gauge": "Probe T8"}
     return begun | {"do": "store", "reference": "40", "tolerance": "0,016"} | fields

@@ -16,11 +16,6 @@ CASES = json.loads((FOLDER / "gauge.json").read_text())
 Rows = list[dict[str, Any]]
 
 
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 def aiag(scale: float = 1.0, offset: float = 0.0) -> Rows:
     """Ten parts, three appraisers, three trials, as the manual prints them."""
     lines = CASES[0]["given"]["readings"]

@@ -10,13 +10,7 @@ from app.jobs.actions import run_jobs
 from app.loop.tables.characteristics import Characteristic
 from app.quality.wear.actions import JOB
 from app.quality.wear.tables import Outlook
-from tests.conftest import Server
 from tests.shop import Shop
-
-
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
 
 
 def shift(

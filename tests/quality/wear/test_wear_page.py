@@ -1,6 +1,5 @@
 """The wear curve, the verdict on the loop and the forecast on the pages."""
 
-import pytest
 from playwright.sync_api import Page, expect
 
 from app.jobs.actions import run_jobs
@@ -8,11 +7,6 @@ from app.quality.wear.actions import JOB
 from tests.conftest import Server
 from tests.quality.wear.test_wear_api import nervous, shift
 from tests.shop import Person, Shop
-
-
-@pytest.fixture
-def shop(server: Server) -> Shop:
-    return Shop(server)
 
 
 def go(shop: Shop) -> None:

@@ -16,16 +16,6 @@ from tests.shop import PARAMETERS, Person, Shop
 XSS = """<b>"Кључ" d'Ø</b>"""
 
 
-@pytest.fixture
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture(scope="module")
-def viewer(server: Server) -> Person:
-    return Person(server, "viewer")
-
-
 def line(page: Page, shop: Shop) -> Any:
     return page.locator(f"#c-{shop.characteristic}")
 

@@ -28,16 +28,10 @@ from app.files.documents.content import (
 from app.files.documents.files import file_of
 from app.files.documents.files.fonts import MISSING
 from app.views.characteristic.figures import histogram_counts, histogram_figure
-from tests.conftest import Server
 from tests.shop import Person, Shop
 from tests.views.reports.story import facts, file, pushed, report, scatter
 
 SERBIAN = "Ležište Ø40 – čađavo ŠĐČĆŽ, Лежиште Њ Џ Ђ"
-
-
-@pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
-    return Shop(server)
 
 
 def pdf(content: bytes) -> tuple[int, str]:

@@ -56,11 +56,6 @@ class Browser:
 
 
 @pytest.fixture(scope="module")
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture(scope="module")
 def engineer(server: Any) -> Browser:
     server.person("Eva", "engineer", PASSWORD)
     return Browser(server, "Eva")
