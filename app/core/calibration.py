@@ -21,7 +21,7 @@ from math import fsum
 from typing import NamedTuple
 
 from app.core.decision.limits import nanometres, reaches, within
-from app.core.decision.step import DECIMALS, average_of
+from app.core.decision.step import average_of, rounded
 from app.core.plausibility import inch_warnings
 from app.core.probing import TouchError
 from app.core.warning import CodedWarning
@@ -102,18 +102,18 @@ def calibrate(gauge: Gauge, touches: Sequence[float], *, empirical_value: float,
     """
     if not touches:
         raise TouchError("repeats", point=1, expected=1, got=0)
-    measured = _round(fsum(touches) / len(touches))
-    difference = _round(measured - gauge.size)
-    deviation = _round(difference - empirical_value)
+    measured = rounded(fsum(touches) / len(touches))
+    difference = rounded(measured - gauge.size)
+    deviation = rounded(difference - empirical_value)
     size, zero = nanometres(deviation), nanometres(gauge.zero_range)
 
     def result(
         outcome: Outcome, after: float = average, change: float | None = None, repeat: int | None = None
     ) -> Calibration:
-        proposed = None if change is None else _round(empirical_value + change)
-        spread = _round(max(touches) - min(touches))
+        proposed = None if change is None else rounded(empirical_value + change)
+        spread = rounded(max(touches) - min(touches))
         return Calibration(
-            outcome, gauge.size, measured, difference, deviation, average, _round(after), spread, proposed, repeat
+            outcome, gauge.size, measured, difference, deviation, average, rounded(after), spread, proposed, repeat
         )
 
     for repeat, touch in enumerate(touches, start=1):
@@ -141,7 +141,7 @@ def gauge_in_inches(size: float, touches: Sequence[float], known: Sequence[float
     >>> [each.field for each in gauge_in_inches(1.5748, [1.5749], [40.0])]
     ['gauge_size', 'touches']
     """
-    measured = _round(fsum(touches) / len(touches))
+    measured = rounded(fsum(touches) / len(touches))
     return inch_warnings(
         [("gauge_size", size, expected) for expected in (measured, *known)]
         + [("touches", measured, expected) for expected in (size, *known)]
@@ -187,7 +187,7 @@ def diameter(ring: Ring, section: Section) -> float:
     >>> diameter(Ring(29.99, 30.01, 6.0), Section(24.012, -23.988))
     30.0
     """
-    return _round((abs(section.plus - section.minus) + 2 * ring.radius_term) / 2)
+    return rounded((abs(section.plus - section.minus) + 2 * ring.radius_term) / 2)
 
 
 def centre(ring: Ring, sections: Sequence[Section], *, blocked: bool = False) -> Centring:
@@ -212,7 +212,7 @@ def centre(ring: Ring, sections: Sequence[Section], *, blocked: bool = False) ->
         raise TouchError("points", point=min(len(sections), SECTIONS) + 1, expected=SECTIONS, got=len(sections))
     plus = fsum(section.plus for section in sections) / SECTIONS
     minus = fsum(section.minus for section in sections) / SECTIONS
-    return Centring(Outcome.CENTRED, diameters, _round((plus + minus) / 2))
+    return Centring(Outcome.CENTRED, diameters, rounded((plus + minus) / 2))
 
 
 def ring_in_inches(
@@ -230,14 +230,10 @@ def ring_in_inches(
     """
     sizes = [("nominal", nominal, known_size) for known_size in known]
     if sections:
-        travel = _round(fsum(abs(section.plus - section.minus) for section in sections) / (2 * len(sections)))
+        travel = rounded(fsum(abs(section.plus - section.minus) for section in sections) / (2 * len(sections)))
         sizes += [
             ("nominal", nominal, travel + radius_term),
             ("radius_term", radius_term, nominal - travel),
             ("sections", travel, nominal - radius_term),
         ]
-    return inch_warnings((field, size, _round(expected)) for field, size, expected in sizes)
-
-
-def _round(length: float) -> float:
-    return round(length, DECIMALS) + 0.0
+    return inch_warnings((field, size, rounded(expected)) for field, size, expected in sizes)

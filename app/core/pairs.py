@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from app.core.decision.limits import nanometres
-from app.core.decision.step import DECIMALS
+from app.core.decision.step import DECIMALS, rounded
 from app.core.spc.resolution import resolution_of
 
 FEWEST = 5
@@ -59,26 +59,26 @@ def compare(differences: Sequence[float], *, empirical_value: float, confidence:
         return Comparison(0, confidence, None, None, None, None, None, missing, None)
     mean = float(np.mean(differences))
     if count == 1:
-        return Comparison(1, confidence, _round(mean), None, None, None, None, missing, None)
+        return Comparison(1, confidence, rounded(mean), None, None, None, None, missing, None)
     deviation = float(np.std(differences, ddof=1))
     resolution = resolution_of(np.round(differences, DECIMALS))
     if resolution.distinct == 1:
-        return Comparison(count, confidence, _round(mean), 0.0, None, None, None, missing, None, equal=True)
+        return Comparison(count, confidence, rounded(mean), 0.0, None, None, None, missing, None, equal=True)
     half = float(stdtrit(count - 1, (1 + confidence) / 2)) * deviation / sqrt(count)
     step = resolution.step if resolution.coarse(deviation) and resolution.step / 2 > half else None
     half = max(half, (step or 0.0) / 2)
-    low, high = _round(mean - half), _round(mean + half)
+    low, high = rounded(mean - half), rounded(mean + half)
     agrees = nanometres(low) <= nanometres(empirical_value) <= nanometres(high)
     return Comparison(
         count,
         confidence,
-        _round(mean),
-        _round(deviation),
+        rounded(mean),
+        rounded(deviation),
         low,
         high,
         outlier(differences),
         missing,
-        None if missing or agrees else _round(mean),
+        None if missing or agrees else rounded(mean),
         step=step,
     )
 
@@ -112,7 +112,3 @@ def grubbs_limit(count: int, significance: float = 0.05) -> float:
     """
     t = float(stdtrit(count - 2, 1 - significance / (2 * count)))
     return (count - 1) / sqrt(count) * sqrt(t * t / (count - 2 + t * t))
-
-
-def _round(length: float) -> float:
-    return round(length, DECIMALS) + 0.0

@@ -12,6 +12,7 @@ from math import sqrt
 from statistics import fmean, median
 
 from app.core.decision.limits import nanometres
+from app.core.decision.step import rounded
 from app.core.warning import CodedWarning, Value
 
 INCH = 25.4
@@ -35,7 +36,7 @@ def uncorrected(deviation: float, compensated: float, factor: float) -> float:
     >>> uncorrected(0.002, 0.003, factor=0.5)
     0.008
     """
-    return round(deviation + compensated / factor, 9) + 0.0
+    return rounded(deviation + compensated / factor)
 
 
 def looks_like_inches(value: float, expected: float) -> bool:

@@ -9,7 +9,7 @@ from math import fsum
 from typing import NamedTuple
 
 from app.core.decision.limits import nanometres
-from app.core.decision.step import DECIMALS
+from app.core.decision.step import DECIMALS, rounded
 from app.core.parameters import Axis, Direction, Feature, Parameters, Variant
 
 Touches = Sequence[Sequence[float | None] | None]
@@ -109,8 +109,8 @@ def start_and_end(parameters: Parameters) -> Travel:
         side = forward if parameters.feature is Feature.INSIDE else -forward
     surface = side * parameters.target
     return Travel(
-        round(surface - forward * parameters.window, DECIMALS) + 0.0,
-        round(surface + forward * parameters.window, DECIMALS) + 0.0,
+        rounded(surface - forward * parameters.window),
+        rounded(surface + forward * parameters.window),
     )
 
 

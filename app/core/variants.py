@@ -18,7 +18,7 @@ from math import fsum, sqrt
 from typing import NamedTuple
 
 from app.core.acceptance import sections_outside
-from app.core.decision.step import DECIMALS
+from app.core.decision.step import DECIMALS, rounded
 from app.core.parameters import Parameters, Variant
 from app.core.probing import Touches, points_expected, sections_of
 
@@ -79,8 +79,8 @@ def results_of(
             out_of_roundness = spread
         elif parameters.variant is Variant.ALONG:
             step = fitted_step(points)
-            taper = round(step * (len(points) - 1), DECIMALS) + 0.0
-            slope = round(step / parameters.index, DECIMALS) + 0.0 if parameters.index else None
+            taper = rounded(step * (len(points) - 1))
+            slope = rounded(step / parameters.index) if parameters.index else None
     if parameters.repeats > 1:
         repeats = [[touch for touch in point or () if touch is not None] for point in touches]
         repeat_range = round(max(max(point) - min(point) for point in repeats), DECIMALS)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.core.decision.step import rounded
 from app.core.geometry.circle import fit_circle
 from app.core.geometry.frames import angles_of, frame, from_angles
 from app.core.geometry.points import Floats, points_of
@@ -40,7 +41,7 @@ class Hole(NamedTuple):
         (10.0, 10.0)
         """
         circle = fit_circle(touches)
-        x, y = (round(float(value), 9) + 0.0 for value in circle.centre)
+        x, y = (rounded(float(value)) for value in circle.centre)
         c = circle.cofactors
         size = 2 * circle.radius + (tip if inside else -tip)
         return cls((x, y), size, (float(c[0, 0]), float(c[1, 1]), float(c[0, 1])), tuple(circle.residuals.tolist()))

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.core.decision.step import DECIMALS
+from app.core.decision.step import DECIMALS, rounded
 from app.core.geometry.circle import fit_circle
 from app.core.geometry.edges import (
     Approach,
@@ -122,8 +122,8 @@ def find_zero(
         square = abs(values.get("squareness", 0.0))
         skew = square > 0.05 and square > uncertainty.get("squareness", 0.0)
         zero = Zero(
-            **{name: _rounded(value) for name, value in values.items()},
-            residuals=tuple(_rounded(residual) for residual in residuals),
+            **{name: rounded(float(value)) for name, value in values.items()},
+            residuals=tuple(rounded(float(residual)) for residual in residuals),
             uncertainty=uncertainty,
             notices=tuple(_notices(values, paired=paired, skew=skew)),
         )
@@ -147,7 +147,7 @@ def zero_in_z(height: Height) -> float:
     >>> zero_in_z(Height(-150.25, 0.1, 120.0))
     -270.35
     """
-    return _rounded(height.touched - height.feeler - height.tool_length)
+    return rounded(height.touched - height.feeler - height.tool_length)
 
 
 def four_records(kind: Kind, x1: float, x2: float, y1: float, y2: float) -> list[Touch]:
@@ -196,10 +196,10 @@ def _round_zero(kind: Kind, touches: Sequence[Touch], tip: float, repeatability:
         deviations = COVERAGE * repeatability * np.sqrt(np.diag(circle.cofactors))
         uncertainty = {"x": float(deviations[0]), "y": float(deviations[1]), "diameter": 2 * float(deviations[2])}
     return Zero(
-        x=_rounded(circle.centre[0]),
-        y=_rounded(circle.centre[1]),
-        diameter=_rounded(size),
-        residuals=tuple(_rounded(side * residual) for residual in circle.residuals),
+        x=rounded(float(circle.centre[0])),
+        y=rounded(float(circle.centre[1])),
+        diameter=rounded(float(size)),
+        residuals=tuple(rounded(float(side * residual)) for residual in circle.residuals),
         uncertainty=uncertainty,
         notices=(Notice.ONE_SIDED,) if circle.arc < ONE_SIDED else (),
     )
@@ -259,7 +259,3 @@ def judge_shift(shifts: Sequence[float], warning: float | None, alarm: float | N
     if alarm is not None and size > alarm:
         return Shift.ALARM
     return Shift.WARNING if warning is not None and size > warning else Shift.STEADY
-
-
-def _rounded(value: float) -> float:
-    return round(float(value), DECIMALS) + 0.0

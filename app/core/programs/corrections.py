@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
-from app.core.decision.step import DECIMALS
+from app.core.decision.step import DECIMALS, rounded
 from app.core.parameters import Axis
 from app.core.programs import unit_check
 from app.core.programs.fanuc import pointed
@@ -93,7 +93,7 @@ def steps(wanted: Sequence[PendingCorrection], offsets: dict[int, float], highes
     chain = []
     for correction in wanted:
         before = running[correction.tool]
-        after = running[correction.tool] = round(before + correction.amount, DECIMALS) + 0.0
+        after = running[correction.tool] = rounded(before + correction.amount)
         late = last if correction.number < highest else None
         chain.append(
             OffsetStep(correction.number, correction.tool, correction.axis, correction.amount, before, after, late)

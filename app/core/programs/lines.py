@@ -12,6 +12,7 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from app.core.decision.step import rounded
 from app.core.number_text import number_or_none, plain
 from app.core.parameters import BY_NAME, FIELDS, Field, Kind, Parameters
 
@@ -180,7 +181,7 @@ def in_mm(value: float, inch: bool | None) -> float:
     >>> in_mm(1.5748, True), in_mm(40.0, None)
     (39.99992, 40.0)
     """
-    return round(value * MM_PER_INCH, 9) + 0.0 if inch else value
+    return rounded(value * MM_PER_INCH) if inch else value
 
 
 def says_inch(word: re.Match[str]) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.core.decision.limits import nanometres
+from app.core.decision.step import rounded
 
 Floats = NDArray[np.float64]
 Point = tuple[float, float, float]
@@ -115,5 +116,5 @@ def radius_is_wrong(measured: float, calibrated: float, limit: float | None) -> 
 
 
 def _point(values: Floats) -> Point:
-    x, y, z = (round(float(value), 9) + 0.0 for value in values)
+    x, y, z = (rounded(float(value)) for value in values)
     return x, y, z

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 from sqlalchemy.orm import Session
 
+from app.core.decision.step import rounded
 from app.core.geometry.frames import frame, from_angles
 from app.core.geometry.in_plane import Table, Turned, by_table
 from app.core.programs.frames import FrameText, offset_of, write_frame, write_restored
@@ -228,7 +229,7 @@ def stop_of(session: Session, alignment: Alignment, machine: Machine) -> list[st
 
 
 def _shift(values: Any) -> Shift:
-    a, b, c = (round(float(value), 9) + 0.0 for value in values)
+    a, b, c = (rounded(float(value)) for value in values)
     return Shift(a=a, b=b, c=c)
 
 

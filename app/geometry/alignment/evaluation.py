@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from app.core.decision.step import rounded
 from app.core.geometry import alignment as core
 from app.core.geometry.frames import angles_of, vector_of
 from app.core.geometry.in_plane import Hole, InPlane, two_holes, two_points
@@ -131,7 +132,7 @@ def _holes(inputs: Values, bounds: Bounds) -> Values:
 
 def _plane(fit: InPlane) -> Values:
     return frame_values(fit.motion) | {
-        "off": None if fit.off is None else round(fit.off, 9) + 0.0,
+        "off": None if fit.off is None else rounded(fit.off),
         "uncertainty": fit.uncertainty,
         "solved_for": ["a", "b", "gamma"],
     }

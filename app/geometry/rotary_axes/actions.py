@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session
 from app.access.audit.actions import record as audit
 from app.access.callers import Caller
 from app.core.decision.limits import nanometres
+from app.core.decision.step import rounded
 from app.core.warning import as_stored
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
@@ -195,7 +196,7 @@ def enter(
         _could_be(session, run, at)
     before, version = queries.state_at(session, machine.id, run.head, None)
     entered = to_enter(run.results, offsets=offsets)
-    after = before | {name: round(before.get(name, 0.0) + value, 9) + 0.0 for name, value in entered.items()}
+    after = before | {name: rounded(before.get(name, 0.0) + value) for name, value in entered.items()}
     if version == 0:  # the kinematics that the machine came with has no back-up yet
         words = _("As it was before run {number}").format(number=number)
         _keep(session, machine, KinematicsBackup(head=run.head, reason=words, errors=before), caller, at)

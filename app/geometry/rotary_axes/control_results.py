@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from app.core.decision.step import rounded
 from app.core.programs.lines import written
 from app.core.rotary.axis import AXES, ERRORS, AxisName
 from app.core.rotary.results import MEASURED, OFFSETS, OPTIMISED, SCALARS, STRINGS, Results, read_results
@@ -141,7 +142,7 @@ def _moved(axis_protocol: AxisProtocol) -> tuple[float, float, float] | None:
     if not {"before", "after"} <= set(axis_protocol.vectors):
         return None
     x, y, z = (
-        round(after - before, 9) + 0.0
+        rounded(after - before)
         for before, after in zip(axis_protocol.vectors["before"], axis_protocol.vectors["after"], strict=True)
     )
     return x, y, z

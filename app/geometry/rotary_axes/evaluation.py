@@ -5,6 +5,7 @@ from math import sqrt
 from typing import Any
 
 from app.core.decision.limits import nanometres
+from app.core.decision.step import rounded
 from app.core.rotary.axis import AxisErrors, Estimate, NoAxis, Position, estimate
 from app.core.rotary.results import OFFSETS, read_results
 from app.core.rotary.sphere import FEWEST, NoSphere, Sphere, fit_sphere, radius_is_wrong
@@ -159,7 +160,7 @@ def _of_shift(shift: ShiftIn, body: RunIn, limits: Limits) -> Evaluated:
     centre = (ball.centre if ball else shift.centre) or ()
     if evaluated.outcome != "refused":
         evaluated.results["offsets"] = {
-            letter: round(measured - nominal, 9) + 0.0
+            letter: rounded(measured - nominal)
             for letter, measured, nominal in zip(LETTERS, centre, shift.nominal, strict=True)
         }
     return evaluated
@@ -208,4 +209,4 @@ def _axis(errors: AxisErrors, body: AxisIn, seen: Sequence[Position]) -> dict[st
 
 
 def _mean(values: Sequence[float]) -> float:
-    return round(sum(values) / len(values), 9) + 0.0
+    return rounded(sum(values) / len(values))

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from sqlalchemy import Select, func, select, tuple_
 from sqlalchemy.orm import Session, aliased
 
+from app.core.decision.step import rounded
 from app.core.geometry.work_zero import Shift, judge_shift
 from app.errors import NotFound
 from app.geometry.work_zero.tables import Fixture, WorkZero
@@ -168,7 +169,7 @@ def _against(zero: WorkZero, before: Sequence[WorkZero], settings: Fixture) -> C
         here = getattr(zero, axis)
         there = [value for earlier in before if (value := getattr(earlier, axis)) is not None]
         if here is not None and there and not (len(before) == 1 and before[0].id == zero.id):
-            shifts[axis] = round(here - median(there), 9) + 0.0
+            shifts[axis] = rounded(here - median(there))
     state = judge_shift(list(shifts.values()), settings.warning, settings.alarm)
     return Compared(zero, state, shifts, before[0].id if settings.basis != "median" and before else None)
 

@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 
 from app.access.audit.tables import AuditEntry
 from app.core.decision.limits import nanometres
+from app.core.decision.step import rounded
 from app.core.pairs import Comparison, compare
 from app.core.plausibility import pair_warnings
 from app.core.warning import CodedWarning
@@ -327,7 +328,7 @@ def pairs(
         Pair(
             row,
             key,
-            round(row.machine_value - row.true_value, 9) + 0.0,
+            rounded(row.machine_value - row.true_value),
             row.excluded_at is None and (since is None or row.at > since.at),
             pair_warnings(row.machine_value, row.true_value, sizes),
         )

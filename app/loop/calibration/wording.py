@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from app.core.calibration import Outcome
+from app.core.decision.step import rounded
 from app.core.pairs import Comparison
 from app.core.warning import of_stored
 from app.language.i18n import _, ngettext
@@ -68,7 +69,7 @@ def sentence(record: CalibrationRecord) -> str:
 
 def deviation(record: CalibrationRecord) -> float | None:
     """Measuring error that the empirical value in effect does not compensate, mm."""
-    return None if record.difference is None else round(record.difference - record.value_before, 9) + 0.0
+    return None if record.difference is None else rounded(record.difference - record.value_before)
 
 
 def values_of(record: CalibrationRecord) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 from app.access.audit.actions import record
 from app.access.callers import Caller
 from app.core.decision.limits import Zone
-from app.core.decision.step import DECIMALS
+from app.core.decision.step import rounded
 from app.db.events import publish
 from app.errors import Conflict
 from app.language.i18n import _
@@ -153,7 +153,7 @@ def _set_offset(
     now = datetime.now(UTC)
     before = {"offset": tool.offset, "total": tool.total}
     parts = parts_cut(session, machine.id, number)
-    tool.offset, tool.reset_at = round(offset, DECIMALS) + 0.0, now
+    tool.offset, tool.reset_at = rounded(offset), now
     on_it = (Stream.machine_id == machine.id) & (Stream.tool_memory == number)
     begun: dict[str, Any] = {"level": None, "level_sequence": None}
     if kind == "change":
@@ -204,7 +204,7 @@ def set_empirical_value(
     lock_machines(session, [machine.id])
     memory = queries.average(session, machine, location)
     before = {"empirical_value": memory.empirical_value, "average": memory.average}
-    memory.empirical_value = round(empirical_value, DECIMALS) + 0.0
+    memory.empirical_value = rounded(empirical_value)
     restart_averages(session, machine, [location], datetime.now(UTC))
     session.execute(
         update(Stream)

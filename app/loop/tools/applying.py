@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 
 from app.access.callers import Caller
 from app.core.decision.limits import nanometres
-from app.core.decision.step import DECIMALS
+from app.core.decision.step import DECIMALS, rounded
 from app.db.events import publish
 from app.errors import Conflict
 from app.language.i18n import _
@@ -64,8 +64,8 @@ def mark_applied(
     now = datetime.now(UTC)
     at = min(now, applied_at or now)
     for pending in together:
-        before, tool.offset = tool.offset, round(tool.offset + pending.amount, DECIMALS) + 0.0
-        tool.total = round(tool.total + pending.amount, DECIMALS) + 0.0
+        before, tool.offset = tool.offset, rounded(tool.offset + pending.amount)
+        tool.total = rounded(tool.total + pending.amount)
         pending.status, pending.applied_at, pending.applied_by, pending.offset_after = (
             "applied",
             at,
@@ -113,7 +113,7 @@ def _reported(
     before: the offset before the last of them was applied.
     """
     first, last = confirmed[0], confirmed[-1]
-    tool.offset = round(reported, DECIMALS) + 0.0
+    tool.offset = rounded(reported)
     for applied in confirmed:  # what was reported, so that saying it again is recognised
         applied.offset_after, applied.applied_by = tool.offset, caller.name
     _step(session, machine, tool, last.number, before, tool.offset, at, caller)

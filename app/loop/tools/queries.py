@@ -8,7 +8,7 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.core.decision.limits import nanometres
-from app.core.decision.step import DECIMALS
+from app.core.decision.step import rounded
 from app.core.parameters import MOST_LOCATIONS
 from app.errors import NotFound
 from app.language.i18n import _
@@ -284,7 +284,7 @@ def _expected(session: Session, machine: Machine) -> dict[int, float]:
     }
     after = {}
     for c in open_corrections(session, machine):
-        after[c.number] = round(running[c.tool_memory] + c.amount, DECIMALS) + 0.0
+        after[c.number] = rounded(running[c.tool_memory] + c.amount)
         if c.status == "pending":
             running[c.tool_memory] = after[c.number]
     return after

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.core.decision.step import rounded
 from app.core.hunting import Hunting
 from app.core.wear import Fit, Forecast, Towards
 from app.quality.wear import wording
@@ -162,7 +163,7 @@ class WearOut(BaseModel):
             last_sequence=int(sequence[-1]) if len(sequence) else None,
             tool_memory=standing.parameters.tool_memory,
             changed_at=wear.changed_at,
-            corrections_total=round(wear.total, 9) + 0.0,
+            corrections_total=rounded(wear.total),
             wear_per_part=_per_part(wear.fit),
             forecasts=[
                 _forecast(name, wear.limits[name], forecast)

@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 
 from app.core.decision.limits import FAULT, in_nanometres, nanometres, reaches
 from app.core.decision.loops import Mark, ProcessTrace
-from app.core.decision.step import FIRST_MOVE_TRIGGERED, IMPLAUSIBLE, REJECTED, TOOL_WORN_HELD
+from app.core.decision.step import FIRST_MOVE_TRIGGERED, IMPLAUSIBLE, REJECTED, TOOL_WORN_HELD, rounded
 from app.core.parameters import Parameters
 from app.core.replay import LONGEST_DELAY, Figures, Lane, Policy, parts_of, rebuilt
 from app.core.spc.resolution import resolution_of
@@ -287,7 +287,7 @@ def _trace(
     offset = compensated[begins]
     pending, averages = np.zeros(len(offset)), np.zeros((len(offset), slots))
     if len(compensated):
-        pending[0] = round(-(joined["decided"][0] - joined["deviation"][0]) * joined["factor"][0], 9) + 0.0
+        pending[0] = rounded(-(joined["decided"][0] - joined["deviation"][0]) * joined["factor"][0])
         lanes, first = np.unique(joined["lane"], return_index=True)
         for at in np.argsort(-first):  # of lanes that share a memory the earliest tells what it held
             averages[0, memories[lanes[at]]] = joined["average_before"][first[at]]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from app.core.decision.step import DECIMALS
+from app.core.decision.step import rounded
 from app.core.parameters import Parameters
 from app.loop.alarms.reading_kinds import HOLDING
 from app.loop.characteristics import queries as characteristics
@@ -88,8 +88,8 @@ def _of_machine(session: Session, machine: Machine) -> list[Group]:
     for number, waiting in by_tool.items():
         tool = queries.tool(session, machine, number)
         approvable = [entry.row.correction for entry in waiting if entry.row.correction.status == "awaiting_approval"]
-        total = round(sum(correction.amount for correction in approvable), DECIMALS) + 0.0
-        after = round(tool.offset + pending[number] + total, DECIMALS) + 0.0
+        total = rounded(sum(correction.amount for correction in approvable))
+        after = rounded(tool.offset + pending[number] + total)
         result.append(Group(machine, tool, waiting, [c.number for c in approvable], total, after))
     return result
 

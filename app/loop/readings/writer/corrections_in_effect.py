@@ -10,7 +10,7 @@ from datetime import datetime
 from itertools import islice
 from typing import NamedTuple, overload
 
-from app.core.decision.step import DECIMALS
+from app.core.decision.step import DECIMALS, rounded
 from app.core.parameters import Feature, Parameters
 from app.loop.readings.records import MOST_OUTSTANDING
 from app.loop.readings.schemas import ReadingIn
@@ -98,7 +98,7 @@ def corrections_in_effect(
         compensated = tool.total
         for amount in tally.applied_since:
             compensated -= amount
-        compensated = round(compensated, DECIMALS) + 0.0
+        compensated = rounded(compensated)
     return CorrectionsInEffect(
         previous_tool, FirstNumbers(tally.numbers) if tally.numbers else (), tally.amounts, compensated
     )
