@@ -28,10 +28,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from app.core.compiled import compiled
 from app.core.spc.refusal import Reason, Refused
+from app.core.spc.spread import t_quantile
 from app.core.spc.variation import varies
 
 Floats = NDArray[np.float64]
@@ -105,7 +105,7 @@ def measured_effect(deviation: Floats, compensated: Floats, factor: float, begin
             break
     if line is None or not line.sxx > 0 or line.freedom < 1:
         raise Refused(Reason.NO_VARIATION)
-    half = hypot(MODEL, float(stdtrit(line.freedom, (1 + LEVEL) / 2)) * sqrt(line.variance / line.sxx))
+    half = hypot(MODEL, t_quantile(line.freedom, LEVEL) * sqrt(line.variance / line.sxx))
     return Effect(slope, slope - half, slope + half, len(steps), len(y), float(np.median(steps)), scatter)
 
 

@@ -14,6 +14,7 @@ from scipy.special import stdtrit
 from app.core.decision.limits import nanometres
 from app.core.decision.step import DECIMALS, rounded
 from app.core.spc.resolution import resolution_of
+from app.core.spc.spread import t_quantile
 
 FEWEST = 5
 """Pairs before an empirical value is suggested. With two, t = 12.7 makes the interval useless; with five it is 2.8."""
@@ -64,7 +65,7 @@ def compare(differences: Sequence[float], *, empirical_value: float, confidence:
     resolution = resolution_of(np.round(differences, DECIMALS))
     if resolution.distinct == 1:
         return Comparison(count, confidence, rounded(mean), 0.0, None, None, None, missing, None, equal=True)
-    half = float(stdtrit(count - 1, (1 + confidence) / 2)) * deviation / sqrt(count)
+    half = t_quantile(count - 1, confidence) * deviation / sqrt(count)
     step = resolution.step if resolution.coarse(deviation) and resolution.step / 2 > half else None
     half = max(half, (step or 0.0) / 2)
     low, high = rounded(mean - half), rounded(mean + half)

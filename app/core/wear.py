@@ -33,9 +33,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import fdtrc, stdtrit
+from scipy.special import fdtrc
 
 from app.core.parameters import Parameters
+from app.core.spc.constants import d2
+from app.core.spc.spread import t_quantile, without_steps
 from app.core.spc.variation import varies
 
 Values = NDArray[np.float64]
@@ -92,7 +94,7 @@ class Fit:
     @property
     def quantile(self) -> float:
         """Student's t for `LEVEL`."""
-        return float(stdtrit(max(1.0, self.effective - 2), (1 + LEVEL) / 2))
+        return t_quantile(max(1.0, self.effective - 2), LEVEL)
 
     @property
     def slope_interval(self) -> tuple[float, float]:
@@ -165,11 +167,8 @@ def scatter_of(curve: Values) -> float:
     >>> round(scatter_of(np.array([0.0, 1.128, 0.0, 1.128, 0.0])), 3)
     1.0
     """
-    ranges = np.abs(np.diff(curve))
-    for _pass in range(2):
-        if ranges.size:
-            ranges = ranges[ranges <= 4 * ranges.mean()]
-    return float(ranges.mean() / 1.128379) if ranges.size else 0.0
+    ranges = without_steps(np.abs(np.diff(curve)))
+    return float(ranges.mean()) / d2(2) if ranges.size else 0.0
 
 
 def outliers(curve: Values) -> NDArray[np.bool_]:

@@ -23,8 +23,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
+from app.core.spc.spread import t_quantile
 from app.core.spc.variation import varies
 
 Floats = NDArray[np.float64]
@@ -128,7 +128,7 @@ class AxisErrors:
     def half_width(self, name: str, confidence: float = 0.95) -> float | None:
         """Half of the confidence interval of a position error, by Student's t; None where its deviation is unknown."""
         deviation = self.errors[name].deviation
-        return None if deviation is None else float(stdtrit(self.freedom, (1 + confidence) / 2)) * deviation
+        return None if deviation is None else t_quantile(self.freedom, confidence) * deviation
 
 
 def rotation(axis: AxisName, angle: float) -> Floats:

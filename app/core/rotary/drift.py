@@ -5,8 +5,8 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import stdtrit
 
+from app.core.spc.spread import t_quantile
 from app.core.spc.variation import varies
 
 FEWEST = 3
@@ -61,7 +61,7 @@ def trend(days: Sequence[float], values: Sequence[float], confidence: float = 0.
     if not varies(float(np.abs(left).max()), y):  # too coarse or too few: no interval follows from no scatter
         return None
     freedom = len(t) - 2
-    half = float(stdtrit(freedom, (1 + confidence) / 2)) * sqrt(float(left @ left) / freedom / square)
+    half = t_quantile(freedom, confidence) * sqrt(float(left @ left) / freedom / square)
     return Trend(slope, slope - half, slope + half, len(t))
 
 

@@ -15,6 +15,7 @@ from math import asin, pi, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import stdtrit
 
 from app.core.spc.constants import c4, d2, d3
 from app.core.spc.refusal import Floats, Reason, Refused, checked
@@ -26,6 +27,8 @@ Factor = Callable[[int], float]
 FAR, QUARTILES = 10.0, 1.349
 """Beyond so many sigma a reading is named; the quartiles of a normal distribution lie 1.349 sigma apart."""
 FEWEST_TO_STAND_OUT = 8
+STEP = 4.0
+"""Ranges of neighbours of more than so many mean ranges are steps, not scatter: a new edge, an offset set by hand."""
 
 
 class Estimator(StrEnum):
@@ -112,6 +115,23 @@ def freedom_of_moving_ranges(n: int) -> float:
     variance = 2 - 4 / pi
     covariance = 4 / pi * (sqrt(0.75) - 0.5 * asin(-0.5) - 1)
     return m * m * (4 / pi) / (2 * (m * variance + 2 * (m - 1) * covariance))
+
+
+def without_steps(ranges: Floats) -> Floats:
+    """Ranges of neighbours without those beyond `STEP` times their mean, left out twice."""
+    for _pass in range(2):
+        if ranges.size:
+            ranges = ranges[ranges <= STEP * ranges.mean()]
+    return ranges
+
+
+def t_quantile(freedom: float, confidence: float) -> float:
+    """Student's t of a two-sided interval.
+
+    >>> round(t_quantile(9, 0.95), 3)
+    2.262
+    """
+    return float(stdtrit(freedom, (1 + confidence) / 2))
 
 
 def moving_range(values: ArrayLike) -> Sigma:

@@ -20,12 +20,10 @@ from numpy.typing import NDArray
 from app.core.spc.capability import FEWEST_READINGS, Caution, Index, Limits, capability, spread_index
 from app.core.spc.constants import d2
 from app.core.spc.refusal import Floats, Reason, Refused, checked
-from app.core.spc.spread import Estimator, Sigma, freedom_of_moving_ranges, overall
+from app.core.spc.spread import Estimator, Sigma, freedom_of_moving_ranges, overall, without_steps
 from app.core.spc.variation import varies
 
 Flags = NDArray[np.bool_]
-BEYOND = 4.0
-"""Ranges of more than so many mean ranges are steps, not scatter: a new edge, an offset set by hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +83,7 @@ def scatter(values: Floats, begins: Flags) -> Sigma:
     >>> scatter(values, np.array([True, False, False, True, False])).value.__round__(3)
     1.0
     """
-    ranges = np.abs(np.diff(values))[~begins[1:]]
-    for _pass in range(2):
-        if len(ranges):
-            ranges = ranges[ranges <= BEYOND * ranges.mean()]
+    ranges = without_steps(np.abs(np.diff(values))[~begins[1:]])
     if not len(ranges) or not varies(float(ranges.mean()), values):
         raise Refused(Reason.NO_VARIATION)
     lengths, lives = np.unique(_lengths(begins), return_counts=True)  # a million readings may be thousands of lives

@@ -10,11 +10,11 @@ from math import sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import stdtr, stdtrit
+from scipy.special import stdtr
 
 from app.core.spc.in_time import Test, decompose
 from app.core.spc.refusal import Reason, Refused, checked
-from app.core.spc.spread import mean_of
+from app.core.spc.spread import mean_of, t_quantile
 from app.core.spc.variation import varies
 
 
@@ -86,7 +86,7 @@ class Linearity:
 
     @property
     def _reach(self) -> float:
-        return float(stdtrit(self.readings - 2, (1 + self.confidence) / 2)) * self.s
+        return t_quantile(self.readings - 2, self.confidence) * self.s
 
     def _beyond(self, reference: float) -> float:
         """By how much the square of the line exceeds that of half the band."""

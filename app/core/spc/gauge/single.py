@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from math import sqrt
 
 from numpy.typing import ArrayLike
-from scipy.special import stdtr, stdtrit
+from scipy.special import stdtr
 
 from app.core.spc.refusal import Reason, Refused, checked
 from app.core.spc.resolution import resolution_of
-from app.core.spc.spread import mean_of, overall
+from app.core.spc.spread import mean_of, overall, t_quantile
 from app.core.spc.variation import varies
 
 FEWEST_REPEATS = 10
@@ -52,7 +52,7 @@ def bias(values: ArrayLike, reference: float, *, confidence: float = 0.95, minim
         raise Refused(Reason.NO_VARIATION)
     off = mean_of(x) - reference
     error = sigma / sqrt(len(x))
-    reach = float(stdtrit(len(x) - 1, (1 + confidence) / 2)) * error
+    reach = t_quantile(len(x) - 1, confidence) * error
     return Bias(
         readings=len(x),
         mean=mean_of(x),
