@@ -13,7 +13,9 @@ with S = 0, so with its setting error. Whatever was decided and however late it 
 (`fit`). Its standard error counts positively autocorrelated scatter by the effective number of readings
 n (1 - rho) / (1 + rho), rho the lag-1 autocorrelation of the residuals (Santer et al. 2000, J. Geophys. Res. 105, 7337,
 eq. 6; rho freed of its bias of -(2 + 4 rho)/n after Marriott and Pope 1954, Biometrika 41, 390). It assumes that
-scatter is of one size; an edge that breaks cannot be foretold.
+scatter is of one size; an edge that breaks cannot be foretold. Readings are rounded, so the standard deviation about the line
+is at least that of rounding alone, step / sqrt(12) (GUM, JCGM 100:2008, F.2.2.1), with the smallest distance between two
+different readings as the step (`resolution_of`): readings exactly on a line know its slope no better than that.
 
 *Parts left* to a limit is where that line, continued, reaches it. Its interval has two sources. Fieller's (1954, J. R. Stat.
 Soc. B 16, 175), with the scatter of a single part added, is that of a line that goes on straight. Wear does not: an edge runs
@@ -37,6 +39,7 @@ from scipy.special import fdtrc
 
 from app.core.parameters import Parameters
 from app.core.spc.constants import d2
+from app.core.spc.resolution import resolution_of
 from app.core.spc.spread import t_quantile, without_steps
 from app.core.spc.variation import varies
 
@@ -72,7 +75,7 @@ class Fit:
 
     first, last: sequences it was fitted from, and of the newest reading; count: readings it was fitted to; left_out: outliers
     between them; off: newest readings that a step divides from the line, as when an edge breaks: they are left out too.
-    slope_error, level_error: standard errors. scatter: standard deviation about the line. correlation: rho. effective: how
+    slope_error, level_error: standard errors. scatter: standard deviation about the line, at least that of rounding. correlation: rho. effective: how
     many independent readings it is worth. centre, spread: mean of sequence - last, and sum of squares about it.
     """
 
@@ -209,9 +212,9 @@ def fit(sequence: NDArray[np.int64], curve: Values) -> Fit | None:
     spread = float(((x - centre) ** 2).sum())
     slope = float(((x - centre) * y).sum() / spread) if varies(float(np.ptp(y)), y) else 0.0
     residual = y - y.mean() - slope * (x - centre)
-    rho = _correlation(residual)
+    rho = _correlation(residual) if varies(float(np.ptp(residual)), y) else 0.0
     effective = max(4.0, count * (1 - rho) / (1 + rho))
-    scatter = sqrt(float((residual**2).sum()) / max(1.0, count - 2))
+    scatter = max(sqrt(float((residual**2).sum()) / max(1.0, count - 2)), _rounding(y))
     inflation = count / effective
     return Fit(
         first=int(x[0]) + last,
@@ -408,6 +411,11 @@ def _off(curve: Values) -> int:
     return len(newest) - int(steps[0]) if len(curve) > FEWEST and len(steps) else 0
 
 
+def _rounding(readings: Values) -> float:
+    """Standard deviation that the rounding of the readings causes: their step / sqrt(12); 0 of equal readings, which show no step."""
+    return resolution_of(readings).step / sqrt(12)
+
+
 def _correlation(residual: Values) -> float:
     """Lag-1 autocorrelation of the residuals of a line, freed of its bias, never below 0."""
     squares = float((residual**2).sum())
@@ -439,8 +447,9 @@ def _breaks(x: Values, y: Values) -> bool:
     half = len(x) // 2
     whole = _squares(x, y)
     parts = _squares(x[:half], y[:half]) + _squares(x[half:], y[half:])
+    parts = max(parts, (len(x) - 4) * _rounding(y) ** 2)
     if parts <= 1e-18 * len(x):
-        return whole > 1e-18 * len(x)
+        return False
     rho = _nearby(y)
     f = (whole - parts) / 2 / (parts / (len(x) - 4)) * (1 - rho) / (1 + rho)
     return bool(fdtrc(2, len(x) - 4, f) < BREAK)

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from app.core.wear import (
     FEWEST,
@@ -282,6 +284,45 @@ def test_readings_that_are_all_the_same_are_no_wear() -> None:
     """A hundred times 0.1 has a slope of 1e-19, and a scatter as small."""
     assert not fitted(np.full(100, 0.1)).is_wear
     assert not fitted(np.full(61, -0.0123)).is_wear
+
+
+def test_readings_exactly_on_a_line_know_its_slope_to_their_own_step() -> None:
+    """1 µm more with each of 40 parts: σ of rounding to 1 µm is 1/√12 µm, and the sum of squares of 1 … 40 about its mean 5330."""
+    exact = fitted(np.arange(40) / 1000)
+    assert exact.scatter == pytest.approx(0.001 / np.sqrt(12))
+    assert exact.slope_error == pytest.approx(0.001 / np.sqrt(12 * 5330))
+    low, high = exact.slope_interval
+    assert low < 0.001 < high
+    assert exact.is_wear
+    prediction = forecast(exact, 0.06)
+    assert prediction is not None
+    assert prediction.low < prediction.parts < prediction.high
+
+
+def test_one_step_of_the_rounding_is_no_wear() -> None:
+    """Fifty times one size, then fifty times the next one: rounding explains that, and no two lines without any scatter."""
+    staircase = fitted(np.repeat([0.0, 0.001], 50))
+    assert staircase.count == 100
+    assert staircase.scatter == pytest.approx(0.001 / np.sqrt(12))
+    assert not staircase.is_wear
+
+
+@given(
+    step=st.sampled_from([1e-5, 1e-4, 1e-3, 1e-2]),
+    slope=st.floats(-3, 3),
+    readings=st.lists(st.integers(-2, 2), min_size=FEWEST, max_size=150),
+)
+def test_no_interval_is_narrower_than_rounding_makes_it(step: float, slope: float, readings: list[int]) -> None:
+    x = np.arange(1, len(readings) + 1)
+    rounded = np.round(slope * x + np.array(readings)) * step
+    line = fit(x, rounded)
+    if line is None or line.slope == 0:
+        return
+    kept = rounded[x >= line.first]
+    assert np.ptp(kept) > 0
+    assert line.scatter >= step / np.sqrt(12) * (1 - 1e-6)
+    low, high = line.slope_interval
+    assert high - low >= 2 * 1.9 * step / np.sqrt(12 * line.spread)
 
 
 def test_no_wear_no_number() -> None:

@@ -89,6 +89,8 @@ def wear_sentence(fit: Fit | None) -> str:
     if fit is None:
         return _("Too few readings of this tool yet: a line needs {n}.").format(n=FEWEST)
     low, high = fit.slope_interval
+    if low == high:
+        return _("No wear to be seen: the last {n} readings are all the same.").format(n=fit.count)
     if not fit.is_wear:
         return _("No wear to be seen: between {low} and {high} per part over the last {n} readings.").format(
             low=per_part(low), high=per_part(high), n=fit.count
