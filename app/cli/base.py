@@ -101,12 +101,11 @@ def existing_url(settings: "Settings") -> Iterator[str]:
 
     Raises `InbandError` where there is none, or one of another version.
     """
-    from app.db.migrate import pending
+    from app.db.migrate import head, pending
 
     refuse_nothing_there(settings)
     with reachable(settings) as url:
-        refuse_empty(url)
-        if pending(url):
+        if refuse_empty(url) != head() and pending(url):
             raise InbandError(
                 "This database has the schema of an older Inband.",
                 "Stop the server, make a backup with the Inband that it belongs to, then run `inband migrate`.",
@@ -138,16 +137,18 @@ def refuse_nothing_there(settings: "Settings") -> None:
     )
 
 
-def refuse_empty(url: str) -> None:
-    """Refuse a database in which there is no Inband. Raises `InbandError`."""
+def refuse_empty(url: str) -> str:
+    """Revision of the database; one in which there is no Inband is refused. Raises `InbandError`."""
     from app.db.migrate import current
 
-    if current(url) is None:
+    revision = current(url)
+    if revision is None:
         raise InbandError(
             "There is no Inband in this database.",
             "Look at --data-dir and --database-url; they are to be those of the server. "
             "`inband serve`, `inband migrate` and `inband restore` make a new one.",
         )
+    return revision
 
 
 def _opened(url: str, settings: "Settings") -> Iterator["Database"]:

@@ -10,12 +10,10 @@ from typing import Annotated
 import typer
 
 from app.cli.base import DatabaseUrl, DataDir, cli, existing, say, settings_from
-from app.core.programs.corrections import Form
-from app.core.programs.lines import MOST_CHARACTERS, Verdict
+from app.core.programs.correction_forms import Form
 
 program = typer.Typer(help="Program text of the controls.", no_args_is_help=True)
 cli.add_typer(program, name="program")
-NOT_UNDERSTOOD = Verdict.NOT_UNDERSTOOD.value
 
 
 class Control(StrEnum):
@@ -49,6 +47,7 @@ def read_program(
     ] = None,
 ) -> None:
     """Read a program text: what was not understood to standard error, the parameters as JSON to standard output."""
+    from app.core.programs.lines import MOST_CHARACTERS, Verdict
     from app.loop.programs import queries as programs
     from app.loop.programs import wording
     from app.loop.programs.schemas import program_read
@@ -58,9 +57,11 @@ def read_program(
     examined = programs.check(text, control.value if control else None)
     answer = program_read(examined)
     for line in answer.lines:
-        worth_saying = [note.text for note in line.notes if note.warning or line.verdict == NOT_UNDERSTOOD]
+        worth_saying = [
+            note.text for note in line.notes if note.warning or line.verdict == Verdict.NOT_UNDERSTOOD.value
+        ]
         if worth_saying:
-            style = "bold red" if line.verdict == NOT_UNDERSTOOD else "yellow"
+            style = "bold red" if line.verdict == Verdict.NOT_UNDERSTOOD.value else "yellow"
             words = wording.verdict_word(line.verdict)
             say(f"{line.line}: {line.text.strip()[:120]}\n   {words}: {'; '.join(worth_saying)}", style=style)
     for note in answer.program.notes if answer.program else ():

@@ -10,10 +10,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
+from gettext import NullTranslations, translation
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from babel import Locale, negotiate_locale
-from babel.support import NullTranslations, Translations
+if TYPE_CHECKING:
+    from babel import Locale
 
 LOCALE_DIR = Path(__file__).resolve().parents[2] / "frontend" / "locale"
 DEFAULT_LANGUAGE = "en"
@@ -33,11 +35,13 @@ def catalog(language: str) -> NullTranslations:
     """The sentences of one language; English has none of its own."""
     if language == DEFAULT_LANGUAGE or language not in languages():
         return NullTranslations()
-    return Translations.load(LOCALE_DIR, [language], domain="inband")
+    return translation("inband", LOCALE_DIR, [language])
 
 
 def negotiate(accept_language: str | None) -> str:
     """The best language for an Accept-Language header, in the order the browser gives."""
+    from babel import negotiate_locale
+
     tags = [part.split(";")[0].strip().replace("-", "_") for part in (accept_language or "").split(",")]
     return negotiate_locale([tag for tag in tags if tag], list(languages())) or DEFAULT_LANGUAGE
 
@@ -57,6 +61,8 @@ def current_language() -> str:
 
 
 def current_locale() -> Locale:
+    from babel import Locale  # late: it takes longer to read than everything else that the command line needs of here
+
     return Locale.parse(_language.get())
 
 

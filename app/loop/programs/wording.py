@@ -4,7 +4,7 @@ import re
 from typing import Any
 
 from app.core.parameters import BY_NAME, Kind
-from app.core.programs.corrections import Form
+from app.core.programs.correction_forms import Form
 from app.core.programs.heidenhain import ANGLE, PARAMETERS
 from app.core.programs.lines import MOST_CHARACTERS, Note, ProgramError, ProgramKind, Verdict, written
 from app.language.i18n import _

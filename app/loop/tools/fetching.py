@@ -15,11 +15,10 @@ from sqlalchemy.orm import Session
 from app.access.audit.actions import record
 from app.access.callers import Caller
 from app.core.parameters import Axis
+from app.core.programs.correction_forms import FORMS, Form
 from app.core.programs.corrections import (
-    FORMS,
     LAST_REGISTER,
     MOST_STEPS,
-    Form,
     OffsetStep,
     PendingCorrection,
     steps,

@@ -7,7 +7,8 @@ from fastapi.responses import PlainTextResponse
 
 from app.access.deps import AnyCaller
 from app.core.parameters import Axis
-from app.core.programs.corrections import Form, PendingCorrection, steps, write
+from app.core.programs.correction_forms import Form
+from app.core.programs.corrections import PendingCorrection, steps, write
 from app.loop.machines.queries import machine_named
 from app.loop.tools import fetching
 from app.loop.tools.text_schemas import ConfirmedIn, ConfirmedOut, FetchedIn, FetchedOut, fetched_out

@@ -8,7 +8,8 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Operator, Viewer
-from app.core.programs.corrections import FORMS, MOST_STEPS, Form
+from app.core.programs.correction_forms import FORMS, Form
+from app.core.programs.corrections import MOST_STEPS
 from app.errors import NotFound
 from app.language.i18n import _, ngettext
 from app.loop.machines.queries import machine_named

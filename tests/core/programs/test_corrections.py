@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.parameters import Axis
-from app.core.programs.corrections import FORMS, Form, OffsetStep, PendingCorrection, steps, write
+from app.core.programs.correction_forms import FORMS, Form
+from app.core.programs.corrections import OffsetStep, PendingCorrection, steps, write
 from tests.core.programs.controls import Control, Fanuc, Sinumerik, Stopped
 
 GUARDED = (Form.TURNING, Form.MILLING, Form.WEAR_VARIABLES, Form.WEAR_VARIABLES_2000, Form.G10)

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from app.core.parameters import Axis, Parameters, read
 from app.core.programs import fanuc
-from app.core.programs.corrections import Form, PendingCorrection, steps, write
+from app.core.programs.correction_forms import Form
+from app.core.programs.corrections import PendingCorrection, steps, write
 from app.core.programs.lines import Program, ProgramError, ProgramKind, ProgramText, Verdict
 from tests.core.programs.conftest import parameter_sets
 
