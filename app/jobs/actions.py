@@ -97,7 +97,7 @@ def run_job(database: Database, job: PeriodicJob, stop: Callable[[], bool] = lam
         with database.begin() as session:
             _note_run(session, job.name, time.monotonic() - began, done)
     except Exception as error:
-        raise DatabaseGone from error
+        raise DatabaseGone(f"{job.name}: {_words(error)}") from error
 
 
 def paused_units(session: Session, job: str, units: Sequence[Unit]) -> dict[str, bool]:
@@ -141,8 +141,7 @@ def note_failure(database: Database, job: str, unit: Unit, error: Exception) -> 
                 upsert.returning(JobFailure.failures, JobFailure.retry_at).execution_options(synchronize_session=False)
             ).one()
     except Exception as second:
-        log.warning("periodic job %s interrupted at %s: %s", job, unit.subject or "its list", words)
-        raise DatabaseGone from second
+        raise DatabaseGone(f"{job} at {unit.subject or 'its list'}: {words}") from second
     log.error(
         "periodic job %s failed for %s, %d time(s) in a row, next try at %s: %s",
         job,

@@ -14,6 +14,7 @@ import psycopg
 from psycopg import AsyncConnection
 
 from app.db.engine import Database
+from app.db.outage import Outage
 from app.jobs.actions import DatabaseGone, PeriodicJob, run_job
 
 log = logging.getLogger(__name__)
@@ -31,6 +32,7 @@ class JobRunner:
         self._every = every
         self._closing = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
+        self._outage = Outage(log, "periodic jobs")
 
     def start(self) -> None:
         """Begin; call it on the loop that serves requests."""
@@ -46,8 +48,9 @@ class JobRunner:
         while not self._closing.is_set():
             try:
                 await self._run_while_ours()
+                self._outage.is_over()
             except (psycopg.Error, DatabaseGone) as error:
-                log.warning("periodic jobs interrupted: %s", error.__cause__ or error)
+                self._outage.goes_on(error)
             except Exception:
                 log.exception("unhandled error in the periodic jobs")
             await self._rest()
@@ -60,6 +63,7 @@ class JobRunner:
                     if self._closing.is_set():
                         return
                     await asyncio.to_thread(run_job, self._database, job, self._closing.is_set)
+                self._outage.is_over()
                 await self._rest()
 
     async def _rest(self) -> None:

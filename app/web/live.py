@@ -9,7 +9,6 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Sequence
 from contextlib import suppress
-from time import monotonic
 from typing import Any, NamedTuple
 
 import msgspec
@@ -18,6 +17,7 @@ from psycopg import AsyncConnection
 
 from app.db.connections import Connections
 from app.db.events import CHANNEL
+from app.db.outage import Outage
 
 log = logging.getLogger(__name__)
 
@@ -114,7 +114,7 @@ class Live:
                 client.put_nowait(None)
 
     async def _listen(self) -> None:
-        away_since: float | None = None
+        outage = Outage(log, "live events")
         while True:
             listening = False
             try:
@@ -123,18 +123,14 @@ class Live:
                     listening = True
                     if self._last is None:
                         self._last = await _newest(conn)
-                    if away_since is not None:
-                        log.info("live events go on after an interruption of %.0f s", monotonic() - away_since)
-                        away_since = None
+                    outage.is_over()
                     while True:
                         await self._pass_on(conn)
                         async for _ in conn.notifies(timeout=HEARTBEAT, stop_after=1):
                             pass
                         await self._rest()
             except psycopg.Error as error:
-                if away_since is None:  # once, however long it lasts
-                    away_since = monotonic()
-                    log.warning("live events are interrupted: %s", error)
+                outage.goes_on(error)
                 if not listening:  # the database is away: no page may go on calling itself live
                     self._let_go()
                 await asyncio.sleep(1)

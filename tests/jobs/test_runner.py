@@ -4,7 +4,9 @@ import asyncio
 import logging
 import threading
 import time
+from urllib.parse import urlsplit
 
+import psycopg
 import pytest
 from sqlalchemy import text
 from sqlalchemy.orm import Session
@@ -190,6 +192,41 @@ def test_a_connection_that_breaks_is_made_anew(database: Database, caplog: pytes
 
     with caplog.at_level(logging.WARNING, "app.jobs"):
         run(interrupted())
+
+
+class CountingRunner(JobRunner):
+    """Counts how often it tried to begin."""
+
+    tries = 0
+
+    async def _run_while_ours(self) -> None:
+        self.tries += 1
+        await super()._run_while_ours()
+
+
+def test_an_outage_is_logged_when_it_begins_and_when_it_ends_not_at_each_try(
+    database: Database, caplog: pytest.LogCaptureFixture
+) -> None:
+    name = urlsplit(database.dsn).path[1:]
+    count = Count()
+
+    async def outage() -> None:
+        runner = CountingRunner(database, [count.by("one")], every=0.02)
+        with psycopg.connect(in_database(database.dsn, "postgres"), autocommit=True) as server:
+            server.execute(f'ALTER DATABASE "{name}" ALLOW_CONNECTIONS false')
+            runner.start()
+            await _until(lambda: runner.tries >= 5)
+            assert count.done == []
+            server.execute(f'ALTER DATABASE "{name}" ALLOW_CONNECTIONS true')
+        await _until(lambda: len(count.done) >= 2)
+        await runner.stop()
+
+    with caplog.at_level(logging.INFO, "app.jobs"):
+        run(outage())
+    begin, end = [record.getMessage() for record in caplog.records]
+    assert begin.startswith("periodic jobs are interrupted: ")
+    assert "not currently accepting connections" in begin
+    assert end.startswith("periodic jobs go on after an interruption of ")
 
 
 def test_stopping_waits_for_the_unit_that_is_being_done_and_begins_no_other(database: Database) -> None:

@@ -16,6 +16,7 @@ import psycopg
 from sqlalchemy.exc import DBAPIError, OperationalError
 
 from app.db.engine import Database
+from app.db.outage import Outage
 from app.errors import InbandError
 from app.jobs.actions import DatabaseGone, Unit, end_failure, note_failure, paused_units
 from app.language.i18n import _, speaking
@@ -42,6 +43,7 @@ class ReportWorker:
         self._closing = threading.Event()
         self._wake = threading.Event()
         self._thread: threading.Thread | None = None
+        self._outage = Outage(log, "reports")
 
     def start(self) -> None:
         """Begin to look for something to do."""
@@ -63,8 +65,9 @@ class ReportWorker:
         while not self._closing.is_set():
             try:
                 self._look()
+                self._outage.is_over()
             except (psycopg.Error, OperationalError, DatabaseGone) as error:
-                log.warning("making reports is interrupted: %s", error.__cause__ or error)
+                self._outage.goes_on(error)
             except Exception:
                 log.exception("unhandled error in making reports")
             self._wake.wait(self._every)
