@@ -3,6 +3,7 @@
 from app.language.i18n import _
 from app.language.numbers import um, um_limit
 from app.loop.alarms.kinds import AlarmKind, register
+from app.loop.readings.wording import first_move_sentence
 from app.loop.tables.alarms import Alarm
 
 
@@ -66,9 +67,7 @@ TOOL_WORN = register(
 
 def _probe_fault(alarm: Alarm) -> str:
     if alarm.data.get("first_move_triggered"):
-        return _(
-            "The first move of the probe triggered: there is no bore, or a chip, or the wrong part. Compensation is paused."
-        )
+        return f"{first_move_sentence(alarm.data.get('feature'))} {_('Compensation is paused.')}"
     return _deviation(
         alarm,
         _(

@@ -5,7 +5,7 @@ from typing import Any
 
 from app.core.decision.limits import Zone, nanometres, within_tolerance
 from app.core.decision.step import Code, average_of
-from app.core.parameters import Parameters
+from app.core.parameters import Feature, Parameters
 from app.core.plausibility import looks_like_inches
 from app.core.probing import TouchError
 from app.language.i18n import _
@@ -97,6 +97,21 @@ _WORDED: dict[str, Callable[[Record, Parameters], float | int | None]] = {
 }
 
 
+def first_move_sentence(feature: str | None) -> str:
+    """Sentence on a probe that triggered on its first move; alarms from before the feature was kept with them have none."""
+    match feature:
+        case Feature.OUTSIDE:
+            return _(
+                "The first move of the probe triggered beside the part: a chip, a clamp or the wrong part is in its way."
+            )
+        case Feature.TOOL:
+            return _(
+                "The first move of the probe triggered before it came to the tool: a chip or the wrong tool is in its way."
+            )
+        case _:
+            return _("The first move of the probe triggered: there is no bore here, or a chip, or the wrong part.")
+
+
 def _sentence(record: Record, parameters: Parameters) -> str:
     values = _Values(record, parameters)
     match record.code:
@@ -129,10 +144,8 @@ def _sentence(record: Record, parameters: Parameters) -> str:
                 "The machine is told to stop, and compensation pauses until the alarm is acknowledged."
             )
         case Code.FIRST_MOVE_TRIGGERED:
-            text = _(
-                "The first move of the probe triggered: there is no bore here, or a chip, or the wrong part. "
-                "The machine is told to stop, and compensation pauses until the alarm is acknowledged."
-            )
+            consequence = _("The machine is told to stop, and compensation pauses until the alarm is acknowledged.")
+            text = f"{first_move_sentence(parameters.feature)} {consequence}"
         case Code.PAUSED:
             text = _(
                 "Deviation %(deviation)s: compensation is paused by alarm %(alarm)s. Stored and judged, nothing is corrected."

@@ -1,4 +1,4 @@
-"""A probe that triggers on its first move: there is no bore, and the reading stops the machine whatever its value."""
+"""A probe that triggers on its first move, where there should have been air: the reading stops the machine whatever its value."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ def test_it_stops_the_machine_and_says_why(shop: Shop) -> None:
     answer = shop.read(3.0, first_move_triggered=True, key="n999")
     assert (answer["zone"], answer["action"], answer["correction"]) == ("probe_fault", "stop", None)
     assert answer["reason"]["code"] == "first_move_triggered"
-    assert "no bore" in answer["reason"]["text"]
+    assert "no bore" not in answer["reason"]["text"], "a shaft is measured from outside"
     assert answer["average_after"] == answer["average_before"]
     (alarm,) = shop.alarms()
     assert alarm["kind"] == "probe_fault"
@@ -22,6 +22,20 @@ def test_it_stops_the_machine_and_says_why(shop: Shop) -> None:
         "POST", "/readings", characteristic=shop.characteristic, measured=40.003, first_move_triggered=True, key="n999"
     )
     assert again["sequence"] == answer["sequence"]
+
+
+@pytest.mark.parametrize(
+    ("feature", "words"),
+    [("inside", "there is no bore here"), ("outside", "triggered beside the part"), ("tool", "came to the tool")],
+)
+def test_reason_and_alarm_speak_of_what_is_measured(shop: Shop, feature: str, words: str) -> None:
+    key = f"{feature}-{shop.machine}"
+    shop.add(key, feature=feature, mode="measure_only" if feature == "tool" else "automatic")
+    answer = shop.read(3.0, key, first_move_triggered=True)
+    assert words in answer["reason"]["text"]
+    (alarm,) = shop.alarms()
+    assert words in alarm["text"]
+    assert alarm["text"].endswith("Compensation is paused.")
 
 
 def test_among_many_quiet_ones_only_it_stops(shop: Shop) -> None:

@@ -265,7 +265,7 @@ def _signal(
         "limit": parameters.tolerance_width / 2 if limit is None else limit,
     }
     if decision.code is Code.FIRST_MOVE_TRIGGERED:
-        active.data["first_move_triggered"] = True
+        active.data |= {"first_move_triggered": True, "feature": parameters.feature.value}
     if signal is ReadingAlarm.ACCEPTANCE and results is not None:
         active.data |= {
             "m": parameters.accept_m,
