@@ -2,12 +2,15 @@
 
 Where the control can be asked, it is asked for the unit in force:
 
-- Sinumerik: G group 13, ``$P_GG[13]``, 1 for G70 and 3 for G700; and ``$MN_SCALING_SYSTEM_IS_METRIC`` (MD 10240), because
-  G70 and G71 do not touch tool offsets and settable work offsets, which are in the basic system (programming manual
-  fundamentals, "Inch or metric dimensions"; list of G functions, group 13).
-- Fanuc: modal group 6, ``#4006``, 20 for G20; lathes with G code system C have 70 for G70 (custom macro manual, system
-  variables #4001 to #4030 of modal information).
+- Sinumerik: G group 13, ``$P_GG[13]``, 1 for G70 and 2 for G71 (Vericut's description of the 840D); and
+  ``$MN_SCALING_SYSTEM_IS_METRIC`` (MD 10240), because G70 and G71 do not touch tool offsets and settable work offsets, which
+  are in the basic system (Siemens, 802D sl programming 6FC5398-3CP10, 8.2.3; basic functions 6FC5397-0BP40, 7.3).
+- Fanuc: ``#4006``, for the number of a modal group is added to 4000, and group 06 holds G20 and G21 (M. Lynch, Modern Machine
+  Shop, "Taking advantage of G code grouping").
 - Heidenhain: ``Q113``, 1 where the highest program of a nesting is in inch (user's manual, preassigned Q parameters).
+
+Two numbers rest on the manuals' order alone, no public source that could be read states them: 3 for G700 on a Sinumerik, and
+70 for G70 of lathes with Fanuc's G code system C. They are to be tried on the control first (docs/how-to/program-text.md).
 
 The older Sinumerik of L92 and L93, ``G10`` without user macros, and lists cannot be asked: a comment says the unit.
 """
