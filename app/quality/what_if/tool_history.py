@@ -28,6 +28,7 @@ from app.loop.characteristics.queries import Standing
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import History, Window
 from app.loop.tables.tools import ToolEvent
+from app.quality.control_charts import queries as control_charts
 
 LARGEST = 1_000_000  # readings in one replay
 MOST_FOLLOWED = 2_000  # corrections that tell of the delay by the offset
@@ -69,7 +70,7 @@ class ToolHistory:
     then: each version as it was in force. unknown: readings left out. others: characteristics that correct the same tool.
     delays: parts between a correction and its effect; None where no correction has taken effect.
     compensated: of every reading of `trace`, mm of offset; factors: what its characteristic turns mm of size into mm of offset by.
-    of_tool: corrections of the tool, those of the others included.
+    of_tool: corrections of the tool, those of the others included. baseline: version of the one in force, if it is one of deviations.
     """
 
     standing: Standing
@@ -86,6 +87,7 @@ class ToolHistory:
     unknown: int
     others: list[str]
     delays: Delays | None
+    baseline: int | None
 
     @property
     def delay(self) -> int | None:
@@ -253,7 +255,13 @@ def _joined(
         unknown=unknown,
         others=[owner.characteristic.key for owner, _history in histories[1:]],
         delays=_delays(joined, trace.part),
+        baseline=_baseline(session, standing),
     )
+
+
+def _baseline(session: Session, standing: Standing) -> int | None:
+    baseline = control_charts.baseline_in_force(session, standing.characteristic)
+    return baseline.version if baseline is not None and baseline.quantity == "deviation" else None
 
 
 def _version(session: Session, standing: Standing, version: int) -> Parameters:

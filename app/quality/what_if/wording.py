@@ -173,6 +173,13 @@ def cautions(past: ToolHistory) -> list[str]:
                 "offset. The simulation uses one delay for all of them, so some parts differ."
             ).format(low=past.delays.low, high=past.delays.high)
         )
+    if past.baseline is not None:
+        cautions.append(
+            _(
+                "Whether a process is in control is judged here by limits of the readings of each column, simulated ones too; "
+                "the page of capability judges by the frozen baseline {version}. So Cpk may be quoted there and Ppk here, or the other way round."
+            ).format(version=past.baseline)
+        )
     return cautions
 
 

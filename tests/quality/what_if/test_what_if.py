@@ -9,6 +9,7 @@ import pytest
 
 from app.quality.what_if.tool_history import Delays, _delays
 from tests.conftest import Server
+from tests.quality.control_charts.rows import frozen
 from tests.quality.what_if.loop import cut, scatter
 from tests.shop import Person, Shop
 
@@ -347,6 +348,16 @@ def test_corrections_that_waited_unequally_long_are_told(server: Server, shop: S
     assert not [
         each for each in ask(shop)["cautions"] if "delay of corrections varied" in each
     ]  # there all waited for one part
+
+
+def test_why_another_index_may_be_quoted_than_on_the_page_of_capability_is_told(server: Server) -> None:
+    """There control is judged by the frozen baseline, here by limits of the readings themselves."""
+    own = Shop(server)
+    cut(own, scatter(60))
+    assert "frozen baseline" not in " ".join(ask(own)["cautions"])
+    frozen(own, 1, 60)
+    (caution,) = [text for text in ask(own)["cautions"] if "frozen baseline" in text]
+    assert "judges by the frozen baseline 1" in caution
 
 
 def test_the_figure_draws_both_courses(shop: Shop) -> None:
