@@ -60,15 +60,19 @@ class ServerProtocol(HttpToolsProtocol):
     """Protocol that `inband serve` runs for each connection.
 
     A head that is too long is answered 431, one that does not arrive within ``head_patience`` seconds 408, and a body that
-    falls silent for ``body_patience`` seconds as well. Where there are more connections than files are left for, the one
+    falls silent for ``body_patience`` seconds, or comes in slower than ``body_rate`` bytes a second beyond these, is not waited
+    for either. Where there are more connections than files are left for, the one
     that has been silent longest makes room; if none is silent, the new one is answered 503.
     """
 
     head_patience = 10.0
     body_patience = 30.0
+    body_rate = 1000.0
 
     waits_for: Literal["head", "body", "answer", "nothing"] = "head"
     _head_bytes = 0
+    _body_bytes = 0
+    _body_since = 0.0
     heard_at = 0.0
     _timer: asyncio.TimerHandle | None = None
 
@@ -101,6 +105,8 @@ class ServerProtocol(HttpToolsProtocol):
             if self._head_bytes > MOST_HEAD:
                 self.send_400_response("")
                 return
+        else:
+            self._body_bytes += len(data)
         if self._timer is None:
             patience = self.head_patience if self.waits_for == "head" else self.body_patience
             self._timer = self.loop.call_later(patience, self._give_up)
@@ -117,6 +123,7 @@ class ServerProtocol(HttpToolsProtocol):
         if self._head_bytes > MOST_HEAD:
             raise TooLarge
         self.waits_for = "body"
+        self._body_bytes, self._body_since = 0, self.loop.time()
         super().on_headers_complete()
 
     def on_message_complete(self) -> None:
@@ -149,8 +156,12 @@ class ServerProtocol(HttpToolsProtocol):
             return
         if self.waits_for == "body":
             flow: FlowControl = self.flow
-            left = self.heard_at + self.body_patience - self.loop.time()
-            if left > 0 or flow.read_paused:  # it has sent something since, or we are the ones who do not read
+            now = self.loop.time()
+            if flow.read_paused:  # we are the ones who do not read
+                self._body_bytes, self._body_since = 0, now
+            in_all = self._body_since + self._body_bytes / self.body_rate
+            left = min(self.heard_at, in_all) + self.body_patience - now
+            if left > 0 or flow.read_paused:
                 self._timer = self.loop.call_later(max(left, 1.0), self._give_up)
                 return
         if self.waits_for == "head" and not self._head_bytes:

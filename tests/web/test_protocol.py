@@ -22,6 +22,7 @@ PATIENCE = 0.8  # seconds; `ServerProtocol` has more
 class Impatient(ServerProtocol):
     head_patience = PATIENCE
     body_patience = PATIENCE
+    body_rate = 2.0
 
 
 async def application(scope: dict[str, Any], receive: Any, send: Any) -> None:
@@ -125,6 +126,17 @@ def test_a_slow_body_and_a_slow_answer_are_waited_for(port: int) -> None:
             time.sleep(PATIENCE / 4)
             client.sendall(b"x")
         assert heard(client).partition(b"\r\n\r\n")[2] == b"1\r\n8\r\n0\r\n\r\n"
+
+
+def test_a_body_that_drips_in_is_let_go(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is never silent, and would hold its connection for hours."""
+    monkeypatch.setattr(Impatient, "body_rate", 1000.0)
+    with connected(port) as client, pytest.raises(ConnectionError):
+        client.sendall(b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 100000\r\n\r\n")
+        until = time.monotonic() + 20
+        while time.monotonic() < until:
+            time.sleep(PATIENCE / 20)
+            client.sendall(b"x")
 
 
 class TestMoreConnectionsThanFiles:

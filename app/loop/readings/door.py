@@ -15,7 +15,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.access.callers import Caller
 from app.db.engine import Database
-from app.errors import FieldError, InbandError, NotAllowed, NotFound, NotSignedIn, TooLarge
+from app.errors import FieldError, InbandError, Invalid, NotFound, NotSignedIn, TooLarge
 from app.language.i18n import _
 from app.loop.readings import queries
 from app.loop.readings.answers import answer
@@ -173,7 +173,7 @@ async def _body(receive: Receive) -> bytes:
     while True:
         message = await receive()
         if message["type"] == "http.disconnect":
-            raise NotAllowed(_("The connection was closed before the reading was complete."))
+            raise Invalid(_("The connection was closed before the reading was complete."))
         part = message.get("body", b"")
         size += len(part)
         if size > LARGEST_BODY:
