@@ -1,4 +1,4 @@
-"""The words of statistics: rules, charts, why there is no number, and what a number should not be read without."""
+"""The words of statistics: numbers, rules, charts, why there is no number, and what a number should not be read without."""
 
 from app.core.spc.capability import Caution
 from app.core.spc.gauge.zero_range import Governs
@@ -6,7 +6,41 @@ from app.core.spc.refusal import Reason, Refused
 from app.core.spc.rules import Kind, Rule, RuleName, Run
 from app.core.spc.shewhart import Chart
 from app.core.spc.spread import Estimator
+from app.files.documents.content import Fact, count, deviation, share, width
 from app.language.i18n import _, ngettext
+from app.loop.summaries.queries import Numbers, Rejects
+
+
+def facts(numbers: Numbers, rejects: Rejects | None = None, of_tool: Rejects | None = None) -> list[Fact]:
+    """Count, mean, standard deviation, extremes, parts in tolerance, corrections.
+
+    rejects: with acceptance n of m, of these readings. of_tool: the same of all parts since the tool was changed.
+    """
+    left_out = _("left out of the numbers below") if numbers.probe_faults else ""
+    listed = [
+        Fact("count", _("Readings"), count(numbers.count)),
+        Fact("excluded", _("Excluded"), count(numbers.excluded)),
+        Fact("probe_faults", _("Probe faults"), count(numbers.probe_faults), note=left_out),
+        Fact("mean", _("Mean deviation"), deviation(numbers.mean, 2)),
+        Fact("standard_deviation", _("Standard deviation"), width(numbers.standard_deviation)),
+        Fact("minimum", _("Smallest deviation"), deviation(numbers.minimum)),
+        Fact("maximum", _("Largest deviation"), deviation(numbers.maximum)),
+        Fact("in_tolerance", _("In tolerance"), count(numbers.in_tolerance)),
+        Fact("share_in_tolerance", _("Share in tolerance"), share(numbers.share_in_tolerance)),
+        Fact("outside", _("Out of tolerance"), count(numbers.outside)),
+        Fact("corrections", _("Readings that led to a correction"), count(numbers.corrections)),
+    ]
+    if rejects is not None:
+        parts, sections = ("", "") if of_tool is None else map(_since_change, (of_tool.parts, of_tool.sections))
+        listed += [
+            Fact("rejected", _("Parts rejected"), count(rejects.parts), note=parts),
+            Fact("sections_outside", _("Sections outside"), count(rejects.sections), "#513", sections),
+        ]
+    return listed
+
+
+def _since_change(number: int) -> str:
+    return _("this tool {number}").format(number=number)
 
 
 def chart(kind: Chart) -> str:

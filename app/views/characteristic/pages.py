@@ -19,6 +19,7 @@ from app.core.parameters import BY_NAME
 from app.core.probing import start_and_end
 from app.core.variants import yielded_by
 from app.errors import InbandError
+from app.files.documents.content import Fact
 from app.jobs.queries import failures_of
 from app.jobs.wording import with_job_words
 from app.language.i18n import _
@@ -30,7 +31,8 @@ from app.loop.characteristics.wording import history, in_order, label, result_la
 from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
 from app.loop.summaries import queries as statistics
-from app.loop.summaries.queries import MOST_IN_HISTOGRAM, Numbers, Rejects, Window
+from app.loop.summaries import wording as statistics_wording
+from app.loop.summaries.queries import MOST_IN_HISTOGRAM, Window
 from app.quality.wear import queries as wear
 from app.quality.wear.queries import Wear
 from app.quality.wear.wording import WearWords
@@ -93,19 +95,15 @@ class CharacteristicView:
         return replace(self.window, first=first)
 
     @cached_property
-    def numbers(self) -> Numbers:
-        return statistics.numbers_of(self._session, self.standing.characteristic, self.counted)
-
-    @cached_property
-    def rejects(self) -> tuple[Rejects, Rejects] | None:
-        """With acceptance n of m: parts and sections outside among the shown readings, and since the tool change."""
-        if self.standing.parameters.accept_m == 1:
-            return None
+    def facts(self) -> list[Fact]:
+        """Numbers of the counted readings; with acceptance n of m parts and sections outside too, also of this tool."""
         session, characteristic = self._session, self.standing.characteristic
-        of_tool = statistics.since_tool_change(session, characteristic)
-        return (
-            statistics.rejects_of(session, characteristic, self.counted),
-            statistics.rejects_of(session, characteristic, of_tool),
+        numbers = statistics.numbers_of(session, characteristic, self.counted)
+        if self.standing.parameters.accept_m == 1:
+            return statistics_wording.facts(numbers)
+        windows = self.counted, statistics.since_tool_change(session, characteristic)
+        return statistics_wording.facts(
+            numbers, *(statistics.rejects_of(session, characteristic, window) for window in windows)
         )
 
     @cached_property

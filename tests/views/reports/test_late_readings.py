@@ -54,7 +54,7 @@ def test_the_numbers_of_page_api_and_report_are_those_of_the_period(shop: Shop) 
     page = " ".join(
         unescape(Person(shop.server, "viewer").open(f"/characteristics/{shop.characteristic}?{PERIOD}")).split()
     )
-    for words in (f"{len(MEANT)}</dd>", f"{found['minimum'] * 1000:.1f}", "+6.0"):
+    for words in (f">{len(MEANT)}</span>", f"{found['minimum'] * 1000:.1f}", "+6.0"):
         assert words.replace("-", "\N{MINUS SIGN}") in page, words
     assert "+7.5" not in page.partition("Decisions")[0]
 

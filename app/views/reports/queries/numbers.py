@@ -4,9 +4,10 @@ from functools import partial
 from typing import Any
 
 from app.core.decision.limits import FAULT, Zone
-from app.files.documents.content import Column, Fact, Picture, Section, Table, count, deviation, share, width
+from app.files.documents.content import Column, Fact, Picture, Section, Table, count, deviation
 from app.language.i18n import _, ngettext
 from app.loop.summaries import queries as statistics
+from app.loop.summaries import wording as statistics_wording
 from app.views.characteristic.figures import histogram_counts, histogram_figure
 from app.views.reports.queries.frame import Frame
 from app.web.theme import zone_name
@@ -17,25 +18,10 @@ HISTOGRAM = (380, 400)
 def numbers(frame: Frame) -> Section:
     """Count, mean, standard deviation, extremes, zones, with the histogram."""
     figures = frame.numbers
-    facts = [
-        Fact("count", _("Readings"), count(figures.count)),
-        Fact("excluded", _("Excluded"), count(figures.excluded)),
-        Fact("probe_faults", _("Probe faults"), count(figures.probe_faults)),
-        Fact("mean", _("Mean deviation"), deviation(figures.mean, 2)),
-        Fact("standard_deviation", _("Standard deviation"), width(figures.standard_deviation)),
-        Fact("minimum", _("Smallest deviation"), deviation(figures.minimum)),
-        Fact("maximum", _("Largest deviation"), deviation(figures.maximum)),
-        Fact("in_tolerance", _("In tolerance"), count(figures.in_tolerance)),
-        Fact("share_in_tolerance", _("Share in tolerance"), share(figures.share_in_tolerance)),
-        Fact("outside", _("Out of tolerance"), count(figures.outside)),
-        Fact("corrections", _("Readings that led to a correction"), count(figures.corrections)),
-    ]
+    rejects = None
     if frame.parameters.accept_m > 1:
         rejects = statistics.rejects_of(frame.session, frame.standing.characteristic, frame.window)
-        facts += [
-            Fact("rejected", _("Parts rejected"), count(rejects.parts)),
-            Fact("sections_outside", _("Sections outside"), count(rejects.sections), "#513"),
-        ]
+    facts = statistics_wording.facts(figures, rejects)
     facts += [
         Fact(
             f"zone_{zone.value}",
