@@ -62,6 +62,7 @@ def restore(file: File, data_dir: DataDir = None, database_url: DatabaseUrl = No
 
 def _record(url: str, action: str, file: Path) -> None:
     """Note it in the record of changes; where this cannot be written, say so: the backup is good all the same."""
+    from psycopg import Error
     from sqlalchemy.exc import DBAPIError
 
     from app.access.audit.actions import record
@@ -71,7 +72,7 @@ def _record(url: str, action: str, file: Path) -> None:
     try:
         with database.begin() as session:
             record(session, f"command line ({getpass.getuser()})", action, "database", after={"file": file.name})
-    except DBAPIError:
+    except (DBAPIError, Error):  # of the engine, or of the driver, which writes the entry
         say("It is not in the record of changes: the database is not migrated, or this role may only read.")
     finally:
         database.close()

@@ -26,10 +26,10 @@ LOCK = 7_010_000_833  # any number, the same in every process
 LOCK_PATIENCE = "5s"
 VERSIONS = HOUSE / "migrations" / "versions"
 OTHERS_TURN = "10min"
-SQUASHED = "0063"
-"""Last of the revisions before the first release. Its tables are those of the first schema, so it is stamped as that."""
-CARRIER = "e963582"
-"""The last commit of Inband that carries these revisions one by one."""
+SQUASHED = "0018"
+"""Last of the revisions of the first published program. Its tables are those of the first schema, so it is stamped as that."""
+CARRIER = "ef7d1ef"
+"""The last commit of Inband that carries these revisions, 0001 to `SQUASHED`, one by one."""
 OPTIONS = f"-c timezone=UTC -c lock_timeout={LOCK_PATIENCE}"
 
 
@@ -40,7 +40,7 @@ class MigrationError(Exception):
 def upgrade(url: str) -> list[str]:
     """Run the pending migrations; their names. None of a migration that fails remains.
 
-    A database at `SQUASHED` gets another number of revision and keeps everything else.
+    A database at `SQUASHED` is stamped as the first schema, in one transaction with the migrations after it.
     """
     if current(url) == head():
         return []
@@ -67,6 +67,7 @@ def upgrade(url: str) -> list[str]:
                 if now == SQUASHED:
                     _stamp(connection)
                 command.upgrade(_config(connection), "head")
+                connection.commit()
             except OperationalError as error:
                 if "lock timeout" not in str(error):
                     raise
@@ -169,23 +170,23 @@ def _stamp(connection: Connection) -> None:
 
     revisions = {"first": _scripts().get_base(), "squashed": SQUASHED}
     connection.execute(text("UPDATE alembic_version SET version_num = :first WHERE version_num = :squashed"), revisions)
-    connection.commit()
 
 
 def _pending(connection: Connection) -> list[str]:
     scripts, now = _scripts(), _revision(connection)
     if now == SQUASHED:
-        now = None  # the first schema is still to be stamped
+        now = scripts.get_base()
     if now is not None and now not in {script.revision for script in scripts.walk_revisions()}:
         if re.fullmatch(r"\d{4}", now) and now < SQUASHED:
             raise MigrationError(
-                f"the database is at revision {now}, of the days before the first release; this Inband goes on from the last "
-                f"one of these, {SQUASHED}. Make a backup with the Inband that has served it. Then check out commit {CARRIER} "
-                "of 2026-11-22 and run its `inband migrate` on this database; after that, start this Inband."
+                f"the database is at revision {now}, of the first program while it was made; this Inband goes on from the last "
+                f"one of that, {SQUASHED}. Make a backup with the Inband that has served it. Then check out commit {CARRIER} "
+                f"of 2026-11-22, which carries 0001 to {SQUASHED}, and run its `inband migrate` on this database; after that, "
+                "start this Inband."
             )
         raise MigrationError(
             f"the database is at revision {now}, which this Inband does not know: a newer one has used it. "
             "Run that newer Inband, or restore a backup made before."
         )
     todo = [script for script in scripts.iterate_revisions("head", now or "base") if script.revision != now]
-    return [f"{script.revision} {script.doc}" for script in reversed(todo)]
+    return [f"{script.revision} {script.doc.rstrip('.')}" for script in reversed(todo)]

@@ -1,8 +1,8 @@
 """First schema.
 
 Written as SQL, because a database administrator reads SQL. Tables stand in the order of the rooms of app/__init__.py, from the
-ground up, except that the loop is first: the other rooms refer to its machines and characteristics. It is the outcome of the
-revisions 0001 to 0063 of the days before the first release (app.db.migrate.SQUASHED).
+ground up, except that the loop is first: the other rooms refer to its machines and characteristics. It is the outcome, column
+for column, of the revisions 0001 to 0018 of the first program that was published (app.db.migrate.SQUASHED).
 
 Revision ID: 0100
 Revises:
@@ -17,31 +17,20 @@ branch_labels = None
 depends_on = None
 
 LOOP = """
--- A machine tool; its key is its name in addresses and readings. `type` is `other` until somebody says more:
--- that one warns of nothing.
+-- A machine tool; its key is its name in addresses and readings.
 CREATE TABLE machine (
     id INTEGER GENERATED ALWAYS AS IDENTITY,
     key TEXT NOT NULL,
     name TEXT NOT NULL,
     control TEXT NOT NULL,
-    type TEXT DEFAULT 'other' NOT NULL,
-    tool_locations INTEGER DEFAULT 32 NOT NULL,
-    average_locations INTEGER DEFAULT 20 NOT NULL,
-    corrections_expire_after double precision,
+    created_at timestamptz DEFAULT now() NOT NULL,
     signal_path TEXT DEFAULT 'direct' NOT NULL,
     signal_delay double precision DEFAULT '0.25' NOT NULL,
     signal_jitter double precision,
     probing_feed double precision DEFAULT '150' NOT NULL,
-    plausible_turn double precision DEFAULT 5 NOT NULL,
-    plausible_shift double precision DEFAULT 10 NOT NULL,
-    plausible_axis_turn double precision DEFAULT 1 NOT NULL,
-    plausible_axis_shift double precision DEFAULT 1 NOT NULL,
-    created_at timestamptz DEFAULT now() NOT NULL,
+    corrections_expire_after double precision,
     CONSTRAINT machine_pkey PRIMARY KEY (id),
     CONSTRAINT machine_control_check CHECK (control IN ('sinumerik', 'fanuc', 'heidenhain', 'other')),
-    CONSTRAINT machine_type_check CHECK (type IN ('lathe', 'mill', 'mill_turn', 'grinder', 'other')),
-    CONSTRAINT machine_tool_locations_check CHECK (tool_locations BETWEEN 1 AND 999),
-    CONSTRAINT machine_average_locations_check CHECK (average_locations BETWEEN 1 AND 999),
     CONSTRAINT machine_corrections_expire_after_check CHECK (corrections_expire_after > 0),
     CONSTRAINT machine_signal_path_check CHECK (signal_path IN ('direct', 'plc')),
     CONSTRAINT machine_key_key UNIQUE (key)
@@ -56,18 +45,6 @@ CREATE TABLE machine_state (
     CONSTRAINT machine_state_pkey PRIMARY KEY (machine_id),
     CONSTRAINT machine_state_machine_id_fkey FOREIGN KEY (machine_id) REFERENCES machine (id)
 ) WITH (fillfactor = 50);
-
--- A person has looked at the warnings of a result and takes it as it is.
-CREATE TABLE warning_acknowledgement (
-    machine_id INTEGER NOT NULL,
-    subject TEXT NOT NULL,
-    at timestamptz DEFAULT now() NOT NULL,
-    actor TEXT NOT NULL,
-    reason TEXT NOT NULL,
-    codes JSONB NOT NULL,
-    CONSTRAINT warning_acknowledgement_pkey PRIMARY KEY (machine_id, subject),
-    CONSTRAINT warning_acknowledgement_machine_id_fkey FOREIGN KEY (machine_id) REFERENCES machine (id)
-);
 
 -- A dimension of a part that one machine cuts and measures.
 CREATE TABLE characteristic (
@@ -133,7 +110,6 @@ CREATE TABLE reading (
     decided double precision NOT NULL,
     average_before double precision NOT NULL,
     average_after double precision NOT NULL,
-    compensated double precision,
     measured_at timestamptz NOT NULL,
     received_at timestamptz NOT NULL,
     machined_at timestamptz,
@@ -149,6 +125,7 @@ CREATE TABLE reading (
     part TEXT,
     outstanding INTEGER[],
     alarms BIGINT[],
+    compensated double precision,
     CONSTRAINT reading_pkey PRIMARY KEY (machine_id, characteristic_id, sequence)
 );
 CREATE UNIQUE INDEX reading_key_key ON reading (machine_id, characteristic_id, key) WHERE key IS NOT NULL;
@@ -267,20 +244,20 @@ CREATE TABLE tool (
     number INTEGER NOT NULL,
     "offset" double precision DEFAULT '0' NOT NULL,
     total double precision DEFAULT '0' NOT NULL,
+    changed_at timestamptz,
+    reset_at timestamptz,
+    paused_by BIGINT,
+    parts_kept INTEGER DEFAULT 0 NOT NULL,
     edge TEXT,
     name TEXT,
     kind TEXT,
     planned_parts INTEGER,
     planned_total double precision,
-    parts_kept INTEGER DEFAULT 0 NOT NULL,
     sister INTEGER,
     life_told BOOLEAN DEFAULT false NOT NULL,
-    paused_by BIGINT,
-    changed_at timestamptz,
-    reset_at timestamptz,
     CONSTRAINT tool_pkey PRIMARY KEY (machine_id, number),
-    CONSTRAINT tool_number_check CHECK (number BETWEEN 1 AND 999),
-    CONSTRAINT tool_sister_check CHECK (sister BETWEEN 1 AND 999 AND sister <> number),
+    CONSTRAINT tool_number_check CHECK (number BETWEEN 1 AND 32),
+    CONSTRAINT tool_sister_check CHECK (sister BETWEEN 1 AND 32 AND sister <> number),
     CONSTRAINT tool_machine_id_fkey FOREIGN KEY (machine_id) REFERENCES machine (id)
 );
 
@@ -293,13 +270,13 @@ CREATE TABLE tool_event (
     kind TEXT NOT NULL,
     offset_before double precision NOT NULL,
     offset_after double precision NOT NULL,
-    total double precision,
     correction INTEGER,
     parts INTEGER,
-    edge TEXT,
-    name TEXT,
     actor TEXT NOT NULL,
     reason TEXT,
+    total double precision,
+    edge TEXT,
+    name TEXT,
     CONSTRAINT tool_event_pkey PRIMARY KEY (machine_id, id),
     CONSTRAINT tool_event_kind_check CHECK (kind IN ('change', 'edit', 'correction')),
     CONSTRAINT tool_event_machine_id_fkey FOREIGN KEY (machine_id) REFERENCES machine (id)
@@ -315,7 +292,7 @@ CREATE TABLE average_memory (
     empirical_value double precision DEFAULT '0' NOT NULL,
     updated_at timestamptz,
     CONSTRAINT average_memory_pkey PRIMARY KEY (machine_id, location),
-    CONSTRAINT average_memory_location_check CHECK (location BETWEEN 1 AND 999),
+    CONSTRAINT average_memory_location_check CHECK (location BETWEEN 1 AND 20),
     CONSTRAINT average_memory_machine_id_fkey FOREIGN KEY (machine_id) REFERENCES machine (id)
 ) WITH (fillfactor = 50);
 
@@ -333,13 +310,13 @@ CREATE TABLE correction (
     decided_at timestamptz,
     decided_by TEXT,
     reason TEXT,
-    fetched_at timestamptz,
-    fetched_by TEXT,
-    fetched_as TEXT,
     superseded_by INTEGER,
     applied_at timestamptz,
     applied_by TEXT,
     offset_after double precision,
+    fetched_at timestamptz,
+    fetched_by TEXT,
+    fetched_as TEXT,
     CONSTRAINT correction_pkey PRIMARY KEY (machine_id, number),
     CONSTRAINT correction_status_check
         CHECK (status IN ('held', 'awaiting_approval', 'pending', 'applied', 'rejected', 'superseded')),
@@ -473,7 +450,6 @@ CREATE TABLE browser_session (
     token_hash BYTEA NOT NULL,
     person_id INTEGER NOT NULL,
     csrf TEXT NOT NULL,
-    wrong_passwords INTEGER DEFAULT 0 NOT NULL,
     created_at timestamptz DEFAULT now() NOT NULL,
     expires_at timestamptz NOT NULL,
     CONSTRAINT browser_session_pkey PRIMARY KEY (token_hash),
@@ -502,15 +478,6 @@ CREATE TABLE login_failure (
 );
 CREATE INDEX login_failure_at_idx ON login_failure (at);
 
--- Where somebody has signed in: from there, strangers who guess the password elsewhere keep nobody out.
-CREATE TABLE known_place (
-    person_id INTEGER NOT NULL,
-    place TEXT NOT NULL,
-    last_at timestamptz DEFAULT now() NOT NULL,
-    CONSTRAINT known_place_pkey PRIMARY KEY (person_id, place),
-    CONSTRAINT known_place_person_id_fkey FOREIGN KEY (person_id) REFERENCES person (id)
-);
-
 -- A secret that programs call with: a machine's own, or one with a person's role.
 CREATE TABLE api_key (
     id INTEGER GENERATED ALWAYS AS IDENTITY,
@@ -528,13 +495,11 @@ CREATE TABLE api_key (
 );
 CREATE INDEX api_key_machine_id_idx ON api_key (machine_id);
 
--- The record of changes. Who acts stands as a name, and by number too, because a name can be given again.
+-- The record of changes.
 CREATE TABLE audit_entry (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
     at timestamptz DEFAULT now() NOT NULL,
     actor TEXT NOT NULL,
-    person_id INTEGER,
-    key_id INTEGER,
     action TEXT NOT NULL,
     subject TEXT NOT NULL,
     before JSONB,
@@ -546,32 +511,6 @@ CREATE INDEX audit_entry_subject_idx ON audit_entry (subject, id);
 """
 
 GROUND = """
--- The last run of a periodic job.
-CREATE TABLE job_run (
-    job TEXT NOT NULL,
-    finished_at timestamptz NOT NULL,
-    seconds double precision NOT NULL,
-    units INTEGER NOT NULL,
-    CONSTRAINT job_run_pkey PRIMARY KEY (job)
-) WITH (fillfactor = 50);
-
--- A unit of work that fails: since when, how often in a row, why, and when it is tried again.
-CREATE TABLE job_failure (
-    job TEXT NOT NULL,
-    subject TEXT NOT NULL,
-    machine_id INTEGER,
-    characteristic_id INTEGER,
-    failures INTEGER DEFAULT 1 NOT NULL,
-    error TEXT NOT NULL,
-    first_at timestamptz DEFAULT now() NOT NULL,
-    last_at timestamptz DEFAULT now() NOT NULL,
-    retry_at timestamptz NOT NULL,
-    CONSTRAINT job_failure_pkey PRIMARY KEY (job, subject),
-    CONSTRAINT job_failure_machine_id_characteristic_id_fkey FOREIGN KEY (machine_id, characteristic_id)
-        REFERENCES characteristic (machine_id, id)
-);
-CREATE INDEX job_failure_characteristic_idx ON job_failure (machine_id, characteristic_id);
-
 -- What changed, in the order of the commits. Kept for some hours, so that a client can resume.
 CREATE TABLE event (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
@@ -778,8 +717,7 @@ CREATE UNIQUE INDEX alignment_key_key ON alignment (machine_id, key) WHERE key I
 """
 
 QUALITY = """
--- The limit that a characteristic comes to first, in how many parts, and how forecasts of earlier edges came out. A note,
--- made anew at any time.
+-- The limit that a characteristic comes to first, and in how many parts. A note, made anew at any time.
 CREATE TABLE outlook (
     machine_id INTEGER NOT NULL,
     characteristic_id INTEGER NOT NULL,
@@ -791,11 +729,6 @@ CREATE TABLE outlook (
     parts_low double precision,
     parts_high double precision,
     hunting TEXT NOT NULL,
-    record_of BIGINT,
-    lives INTEGER,
-    tested INTEGER,
-    held INTEGER,
-    widening double precision,
     CONSTRAINT outlook_pkey PRIMARY KEY (machine_id, characteristic_id),
     CONSTRAINT outlook_machine_id_characteristic_id_fkey FOREIGN KEY (machine_id, characteristic_id)
         REFERENCES characteristic (machine_id, id)
@@ -916,34 +849,6 @@ CREATE UNIQUE INDEX signal_run_key
     ON signal (machine_id, characteristic_id, baseline_version, chart, rule, side, first_sequence);
 CREATE INDEX signal_open_idx ON signal (machine_id, characteristic_id, id) WHERE explained_at IS NULL AND withdrawn_at IS NULL;
 
--- The index of a characteristic that may be quoted, as a periodic job worked it out: the last that could be, and, where the
--- newest readings carry none, the reason. A note, made anew at any time.
-CREATE TABLE capability_verdict (
-    machine_id INTEGER NOT NULL,
-    characteristic_id INTEGER NOT NULL,
-    quotable BOOLEAN NOT NULL,
-    at timestamptz DEFAULT now() NOT NULL,
-    newest BIGINT NOT NULL,
-    parameters_version INTEGER NOT NULL,
-    baseline INTEGER,
-    excluded INTEGER NOT NULL,
-    half double precision NOT NULL,
-    readings INTEGER NOT NULL,
-    first BIGINT,
-    last BIGINT,
-    first_at timestamptz,
-    last_at timestamptz,
-    quote TEXT NOT NULL,
-    value double precision,
-    low double precision,
-    high double precision,
-    preliminary BOOLEAN NOT NULL,
-    why TEXT,
-    CONSTRAINT capability_verdict_pkey PRIMARY KEY (machine_id, characteristic_id, quotable),
-    CONSTRAINT capability_verdict_machine_id_characteristic_id_fkey FOREIGN KEY (machine_id, characteristic_id)
-        REFERENCES characteristic (machine_id, id)
-) WITH (fillfactor = 70);
-
 -- One study of one gauge on one machine; the values lie in its revisions.
 CREATE TABLE gauge_study (
     machine_id INTEGER NOT NULL,
@@ -1007,8 +912,6 @@ VIEWS = """
 CREATE TABLE report_job (
     id INTEGER GENERATED ALWAYS AS IDENTITY,
     asked_by TEXT NOT NULL,
-    person_id INTEGER,
-    key_id INTEGER,
     asked_at timestamptz DEFAULT now() NOT NULL,
     request JSONB NOT NULL,
     state TEXT DEFAULT 'queued' NOT NULL,
@@ -1050,34 +953,19 @@ CREATE TABLE report_file (
 );
 """
 
-# Whoever owns the database can still drop the triggers below; nobody alters a fact by accident or through Inband. A statement
-# that names a protected column is refused before it touches a row, so that inserts and ordinary updates pay nothing.
+# Whoever owns the database can still drop the triggers below; nobody alters these rows by accident or through Inband.
 REFUSE = """
 CREATE FUNCTION refuse_change() RETURNS trigger LANGUAGE plpgsql AS $$
 BEGIN
     RAISE EXCEPTION 'the table % is append-only', TG_TABLE_NAME;
 END
 $$;
-CREATE FUNCTION refuse_loss() RETURNS trigger LANGUAGE plpgsql AS $$
-BEGIN
-    RAISE EXCEPTION '% of the table % is refused: what it says is a fact', TG_OP, TG_TABLE_NAME;
-END
-$$;
 """
-# Records, measurements and results stay as they were written; a correction or recomputation is another row.
+# Records and results stay as they were written; a correction or recomputation is another row.
 APPEND_ONLY = (
     "audit_entry",
-    "warning_acknowledgement",
-    "parameters_version",
-    "reading",
-    "reading_touches",
-    "reading_results",
-    "hand_measurement",
-    "exclusion",
-    "tool_event",
     "calibration",
     "calibration_acceptance",
-    "reading_summary",
     "kinematics_run",
     "kinematics_decision",
     "kinematics_backup",
@@ -1085,41 +973,9 @@ APPEND_ONLY = (
     "form_evaluation",
     "work_zero",
     "alignment",
-    "rule_set",
     "gauge_study",
     "gauge_study_revision",
 )
-# Rows with a life: the columns that never change once they are written. None of these rows is ever deleted.
-FIXED = {
-    "machine": "id, key, created_at",
-    "characteristic": "machine_id, id, key, unit, created_at",
-    "person": "id, name, created_at",
-    "api_key": "id, secret_hash, name, role, machine_id, created_at",
-    "correction": "machine_id, number, characteristic_id, sequence, tool_memory, size_error, amount, created_at",
-    "alarm": "machine_id, id, kind, characteristic_id, tool_memory, raised_at",
-    "signal": "machine_id, id, characteristic_id, chart, rule, side, baseline_version, at",
-    "parameter_proposal": "id, machine_id, characteristic_id, from_version, changes, evidence, reason, proposed_at, proposed_by",
-    "paired_reading": "machine_id, id, location, at, actor, key, machine_value, true_value, instrument, characteristic_id, sequence",
-    "result_reading": "machine_id, characteristic_id, key, measured, measured_at, part, asked_at",
-    "baseline": (
-        "machine_id, characteristic_id, version, key, chart, quantity, grouping, group_size, group_pause, ewma_lambda,"
-        " ewma_width, ewma_exact, cusum_k, cusum_h, cusum_headstart, average_span, first_sequence, last_sequence, excluded,"
-        " centre, sigma, estimator, freedom, readings, groups, factor, slope, slope_error, settle, signals, normal_p, repeats,"
-        " parameters_version, at, actor, reason"
-    ),
-}
-# The end of a row's life is not taken back.
-CLOSED = {
-    "correction": "OLD.status IN ('applied', 'rejected', 'superseded') AND NEW.status <> OLD.status",
-    "alarm": "OLD.acknowledged_at IS NOT NULL",
-    "parameter_proposal": "OLD.status <> 'open'",
-    "paired_reading": "OLD.excluded_at IS NOT NULL",
-    "baseline": "OLD.retired_at IS NOT NULL",
-    "api_key": "OLD.revoked_at IS NOT NULL",
-    "result_reading": "OLD.sequence IS NOT NULL OR OLD.refused IS NOT NULL",
-}
-# The running state of a machine moves, but it does not go away.
-KEPT = ("machine_state", "stream", "tool", "average_memory")
 
 
 def upgrade() -> None:
@@ -1129,21 +985,6 @@ def upgrade() -> None:
         op.execute(
             f"CREATE TRIGGER append_only BEFORE UPDATE OR DELETE OR TRUNCATE ON {table}"
             " FOR EACH STATEMENT EXECUTE FUNCTION refuse_change()"
-        )
-    for table, columns in FIXED.items():
-        op.execute(
-            f"CREATE TRIGGER facts_stay BEFORE DELETE OR TRUNCATE OR UPDATE OF {columns} ON {table}"
-            " FOR EACH STATEMENT EXECUTE FUNCTION refuse_loss()"
-        )
-    for table, closed in CLOSED.items():
-        op.execute(
-            f"CREATE TRIGGER closed_stays BEFORE UPDATE ON {table} FOR EACH ROW WHEN ({closed})"
-            " EXECUTE FUNCTION refuse_loss()"
-        )
-    for table in KEPT:
-        op.execute(
-            f"CREATE TRIGGER facts_stay BEFORE DELETE OR TRUNCATE ON {table}"
-            " FOR EACH STATEMENT EXECUTE FUNCTION refuse_loss()"
         )
 
 

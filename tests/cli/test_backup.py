@@ -13,6 +13,7 @@ import pytest
 from app.db import migrate
 from app.settings import HOUSE
 from tests.conftest import NewDatabase, Server, drop_database, in_database
+from tests.db.first_program import make_first_program
 from tests.shop import Shop
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -55,22 +56,21 @@ def test_a_backup_of_a_running_server_comes_back_whole(
         drop_database(empty)
 
 
-def test_a_backup_of_the_last_revision_before_the_squash_comes_back_at_the_head(
+def test_a_backup_of_the_first_program_is_made_and_comes_back_at_the_head(
     new_database: NewDatabase, inband: Run, tmp_path: Path
 ) -> None:
     file, old, empty = tmp_path / "inband.dump", new_database(), new_database()
-    with psycopg.connect(old, autocommit=True) as connection:
-        connection.execute("INSERT INTO machine (key, name, control) VALUES ('lathe-1', 'Lathe 1', 'fanuc')")
-        connection.execute("UPDATE alembic_version SET version_num = %s", [migrate.SQUASHED])
-        machines = connection.execute("SELECT * FROM machine").fetchall()
+    make_first_program(old)
     with psycopg.connect(empty, autocommit=True) as connection:
         connection.execute("DROP SCHEMA public CASCADE")
         connection.execute("CREATE SCHEMA public")
-    inband("backup", file, "--database-url", old)
+    assert "not in the record of changes" in inband("backup", file, "--database-url", old).stderr
+    assert migrate.current(old) == migrate.SQUASHED
     inband("restore", file, "--database-url", empty)
     assert migrate.current(empty) == migrate.head()
-    with psycopg.connect(empty) as connection:
-        assert connection.execute("SELECT * FROM machine").fetchall() == machines
+    readings = "SELECT sequence, measured, correction FROM reading ORDER BY sequence"
+    with psycopg.connect(old) as before, psycopg.connect(empty) as after:
+        assert after.execute(readings).fetchall() == before.execute(readings).fetchall() != []
 
 
 def test_a_backup_replaces_no_file(server: Server, inband: Run, tmp_path: Path) -> None:

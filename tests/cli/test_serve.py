@@ -19,6 +19,7 @@ from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from app.settings import HOUSE
 from tests.conftest import NewDatabase, RunServer, Server, free_port, in_database, wait_ready
+from tests.db.first_program import make_first_program
 
 
 def inband(*arguments: str, typed: str = "", **environment: str) -> subprocess.CompletedProcess[str]:
@@ -214,8 +215,7 @@ def test_a_database_without_inband_is_refused_and_stays_empty(postgres: str) -> 
 def test_an_older_schema_is_not_brought_up_to_date_by_the_way(new_database: NewDatabase) -> None:
     """A server of that age may be running on it."""
     url = new_database()
-    with psycopg.connect(url, autocommit=True) as connection:
-        connection.execute("UPDATE alembic_version SET version_num = %s", [migrate.SQUASHED])
+    make_first_program(url)
     done = inband("key", "add", "--role", "viewer", "--database-url", url)
     assert (done.returncode, done.stdout) == (1, "")
     assert "inband migrate" in done.stderr
@@ -224,15 +224,15 @@ def test_an_older_schema_is_not_brought_up_to_date_by_the_way(new_database: NewD
     assert (done.returncode, migrate.current(url)) == (0, migrate.head())
 
 
-def test_a_schema_from_before_the_squash_is_refused_with_the_way_on(new_database: NewDatabase) -> None:
+def test_an_early_schema_is_refused_with_the_way_on(new_database: NewDatabase) -> None:
     url = new_database()
     with psycopg.connect(url, autocommit=True) as connection:
-        connection.execute("UPDATE alembic_version SET version_num = '0021'")
+        connection.execute("UPDATE alembic_version SET version_num = '0012'")
     for command in (["serve", "--port", str(free_port())], ["key", "add", "--role", "viewer"], ["check"], ["migrate"]):
         done = inband(*command, "--database-url", url)
         assert done.returncode == 1
         assert f"check out commit {migrate.CARRIER}" in " ".join(done.stderr.split())
-    assert migrate.current(url) == "0021"
+    assert migrate.current(url) == "0012"
 
 
 def test_a_newer_schema_is_left_alone(new_database: NewDatabase) -> None:

@@ -1,11 +1,15 @@
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import psycopg
 import pytest
+from sqlalchemy.exc import DBAPIError
 
 from app.db import migrate
 from app.db.migrate import MigrationError
-from tests.conftest import NewDatabase, in_database
+from tests.conftest import NewDatabase, RunServer, drop_database, in_database
+from tests.db.first_program import ADMIN_KEY, ANA, MACHINE_KEY, make_first_program, move
 
 
 @pytest.fixture
@@ -29,36 +33,150 @@ def test_an_empty_database_is_brought_to_the_head(empty: str) -> None:
     assert migrate.pending(empty) == migrate.upgrade(empty) == []
 
 
-def test_a_database_of_the_last_revision_before_the_squash_is_stamped_and_keeps_its_rows(
-    new_database: NewDatabase,
-) -> None:
+Rows = dict[str, list[dict[str, Any]]]
+ADDED: dict[str, dict[str, Any]] = {
+    "machine": {
+        "type": "other",
+        "tool_locations": 32,
+        "average_locations": 20,
+        "plausible_turn": 5,
+        "plausible_shift": 10,
+        "plausible_axis_turn": 1,
+        "plausible_axis_shift": 1,
+    },
+    "audit_entry": {"person_id": None, "key_id": None},
+    "report_job": {"person_id": None, "key_id": None},
+    "outlook": dict.fromkeys(("record_of", "lives", "tested", "held", "widening")),
+}
+"""Values that rows of the first program get in the columns that it did not have."""
+ADDED_TABLES = {"warning_acknowledgement", "known_place", "job_run", "job_failure", "capability_verdict"}
+
+
+@pytest.fixture
+def first_program(new_database: NewDatabase) -> Iterator[str]:
     url = new_database()
-    tables = "SELECT * FROM machine", "SELECT * FROM machine_state", "SELECT * FROM alarm"
+    make_first_program(url)
+    yield url
+    drop_database(url)
+
+
+def rows_of(url: str) -> Rows:
+    """Every row of every table as JSON; of outlooks without the reading they were made of, for they are made anew."""
     with psycopg.connect(url) as connection:
-        connection.execute("INSERT INTO machine (key, name, control) VALUES ('lathe-1', 'Lathe 1', 'fanuc')")
-        connection.execute("INSERT INTO machine_state (machine_id) SELECT id FROM machine")
-        connection.execute("INSERT INTO alarm (machine_id, tool_memory, kind) SELECT id, 3, 'tool_life' FROM machine")
-        connection.execute("UPDATE alembic_version SET version_num = %s", [migrate.SQUASHED])
-        before = [connection.execute(table).fetchall() for table in tables]
-    todo = migrate.pending(url)
-    assert migrate.current(url) == migrate.SQUASHED, "whoever asks changes nothing"
+        tables = connection.execute("SELECT tablename FROM pg_tables WHERE schemaname = 'public'").fetchall()
+        rows = {
+            table: [row for (row,) in connection.execute(f"SELECT to_jsonb(t) - 'tableoid' FROM {table} t ORDER BY t")]  # noqa: S608
+            for (table,) in tables
+            if table != "alembic_version"
+        }
+    for outlook in rows["outlook"]:
+        del outlook["sequence"]
+    return rows
+
+
+def test_a_database_of_the_first_program_is_brought_to_the_head_with_its_rows(first_program: str) -> None:
+    before, todo = rows_of(first_program), migrate.pending(first_program)
+    assert {table for table, rows in before.items() if rows} >= {
+        "machine", "characteristic", "reading", "correction", "alarm", "audit_entry", "person", "api_key", "calibration",
+        "gauge_study_revision", "work_zero", "alignment", "kinematics_run", "form_evaluation", "baseline", "outlook",
+    }  # fmt: skip
+    assert migrate.current(first_program) == migrate.SQUASHED, "whoever asks changes nothing"
     with ThreadPoolExecutor(4) as pool:
-        done = list(pool.map(migrate.upgrade, [url] * 4))
+        done = list(pool.map(migrate.upgrade, [first_program] * 4))
     assert sorted(done) == [[], [], [], todo]
-    assert todo
-    assert migrate.current(url) == migrate.head()
-    with psycopg.connect(url) as connection:
-        assert [connection.execute(table).fetchall() for table in tables] == before
-    assert migrate.differences(url) == []
+    assert todo == ["0101 After the review"]
+    assert migrate.current(first_program) == migrate.head()
+    assert migrate.differences(first_program) == []
+    after = rows_of(first_program)
+    assert {table: after.pop(table) for table in ADDED_TABLES} == {table: [] for table in ADDED_TABLES}
+    assert after == {table: [row | ADDED.get(table, {}) for row in rows] for table, rows in before.items()}
 
 
-def test_a_database_of_an_earlier_revision_before_the_squash_is_left_alone(new_database: NewDatabase) -> None:
+def test_the_first_program_gets_its_database_back(first_program: str, new_database: NewDatabase) -> None:
+    before = rows_of(first_program)
+    migrate.upgrade(first_program)
+    move(first_program, "0100")
+    assert rows_of(first_program) == before
+    with psycopg.connect(first_program) as connection:  # as it was free to do
+        connection.execute("UPDATE reading SET part = 'SN-1' WHERE sequence = 1")
+        connection.rollback()
+    assert migrate.upgrade(first_program)
+    assert migrate.differences(first_program) == []
+    with (
+        psycopg.connect(first_program) as connection,
+        pytest.raises(psycopg.errors.RaiseException, match="append-only"),
+    ):
+        connection.execute("UPDATE reading SET part = 'SN-1' WHERE sequence = 1")
+
+
+def test_an_answer_that_the_first_program_does_not_know_becomes_noted(first_program: str) -> None:
+    migrate.upgrade(first_program)
+    acknowledge = "UPDATE alarm SET acknowledged_at = now(), action = 'measured_by_hand' WHERE acknowledged_at IS NULL"
+    with psycopg.connect(first_program, autocommit=True) as connection:
+        assert connection.execute(acknowledge).rowcount
+    move(first_program, "0100")
+    assert {row["action"] for row in rows_of(first_program)["alarm"]} == {"tool_replaced", "noted"}
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        "INSERT INTO tool (machine_id, number) VALUES (1, 33)",
+        "INSERT INTO average_memory (machine_id, location) VALUES (1, 21)",
+        """INSERT INTO parameters_version (machine_id, characteristic_id, version, parameters, created_by)
+            SELECT 1, 1, 99, parameters || '{"feature": "tool"}', 'Ana' FROM parameters_version WHERE version = 1""",
+    ],
+)
+def test_what_the_first_program_cannot_serve_is_not_given_back_to_it(first_program: str, use: str) -> None:
+    migrate.upgrade(first_program)
+    with psycopg.connect(first_program, autocommit=True) as connection:
+        connection.execute(use)
+    before = rows_of(first_program)
+    with pytest.raises(DBAPIError, match="cannot serve"):
+        move(first_program, "0100")
+    assert (rows_of(first_program), migrate.current(first_program)) == (before, migrate.head())
+
+
+def test_a_table_in_use_leaves_the_first_program_its_database(first_program: str) -> None:
+    with psycopg.connect(first_program) as busy:
+        busy.execute("LOCK TABLE audit_entry")
+        with pytest.raises(MigrationError, match="left as it was"):
+            migrate.upgrade(first_program)
+    assert migrate.current(first_program) == migrate.SQUASHED
+    assert migrate.upgrade(first_program)
+
+
+def test_a_server_goes_on_where_the_first_program_stopped(first_program: str, run_server: RunServer) -> None:
+    with run_server(first_program) as server:
+        machine, admin = server.client(MACHINE_KEY), server.client(ADMIN_KEY)
+        seen = {"action": "false_reading", "comment": "Chip on the stylus"}
+        assert admin.post("/api/v1/alarms/4/acknowledge", json=seen).status_code == 200
+        answer = machine.post("/api/v1/readings", json={"characteristic": "shaft-d40", "measured": 40.007}).json()
+        assert (answer["sequence"], answer["correction"]["number"]) == (29, 7)
+        for path in (
+            "audit", "alarms", "readings?characteristic=shaft-d40", "characteristics/shaft-d40/wear", "gauge-studies/2",
+            "characteristics/shaft-d40/capability", "characteristics/shaft-d40/baselines", "work-zeros/1", "alignments/1",
+            "forms/1", "kinematics/runs/1", "machines/lathe-1/calibrations", "machines/lathe-1/averages/5/pairs", "reports",
+        ):  # fmt: skip
+            got = admin.get(f"/api/v1/{path}")
+            assert got.status_code == 200, f"{path}: {got.text}"
+        ana = server.client()
+        ana.follow_redirects = True
+        assert ana.post("/sign-in", data=ANA).status_code == 200
+        for page in (
+            "/", "/overview", "/alarms/2", "/characteristics/shaft-d40", "/characteristics/shaft-d40/report", "/gauges/2",
+            "/work-zeros/1", "/alignments/1", "/forms/1", "/kinematics/runs/1", "/reports", "/setup/audit",
+        ):  # fmt: skip
+            assert ana.get(page).status_code == 200, page
+
+
+def test_a_database_of_an_earlier_revision_is_left_alone(new_database: NewDatabase) -> None:
     url = new_database()
     with psycopg.connect(url, autocommit=True) as connection:
-        connection.execute("UPDATE alembic_version SET version_num = '0030'")
-    with pytest.raises(MigrationError, match=rf"revision 0030.*goes on from.*{migrate.SQUASHED}.*{migrate.CARRIER}"):
+        connection.execute("UPDATE alembic_version SET version_num = '0017'")
+    with pytest.raises(MigrationError, match=rf"revision 0017.*goes on from.*{migrate.SQUASHED}.*{migrate.CARRIER}"):
         migrate.upgrade(url)
-    assert migrate.current(url) == "0030"
+    assert migrate.current(url) == "0017"
 
 
 def test_of_processes_that_start_together_one_migrates(empty: str) -> None:
