@@ -1,6 +1,6 @@
 # make run     the demonstration plant at http://127.0.0.1:8000; ARGS="--past 42" for six weeks behind it
 # make test    lint, then every test on a real PostgreSQL and in a real browser; ARGS="-k name" for some of them
-# make lint    style, types, lengths, and the walls between the rooms
+# make lint    style, types, lengths, templates, and the walls between the rooms
 # make bench   the benchmarks; each prints ratios
 # make messages  collect what can be translated into frontend/locale/inband.pot
 # make clean   remove what make has made; no data
@@ -28,6 +28,7 @@ lint: $(VENV)/installed-dev
 	@$(BIN)/ruff format --check --quiet
 	@$(BIN)/mypy --no-error-summary
 	@$(BIN)/python -m tests.style
+	@$(BIN)/djlint --lint --quiet frontend/templates > $(VENV)/djlint.txt || { cat $(VENV)/djlint.txt; exit 1; }
 	@$(BIN)/lint-imports > $(VENV)/lint-imports.txt || { cat $(VENV)/lint-imports.txt; exit 1; }
 
 bench: $(VENV)/installed-dev
