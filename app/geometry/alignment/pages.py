@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from functools import partial
 from secrets import token_hex
 from typing import Annotated
-from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
@@ -25,6 +24,7 @@ from app.loop.readings import actions as readings
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import parsed
+from app.web.paging import address, part_of
 from app.web.templates import page
 from app.web.warnings import AcknowledgeIn
 
@@ -38,7 +38,7 @@ Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
 
 def history_url(machine: str, name: str) -> str:
     """The page of what was aligned under one name."""
-    return f"/alignments/history?{urlencode({'machine': machine, 'name': name})}"
+    return address("/alignments/history", machine=machine, name=name)
 
 
 @router.get("/alignments", dependencies=[require("viewer")])
@@ -47,17 +47,14 @@ def overview(request: Request, session: SessionDep, machine: Word = None, before
     chosen = machine_named(session, machine) if machine else None
     only = chosen.id if chosen else None
     rows = queries.alignments(session, only, before=before, newest_first=True, limit=ON_PAGE + 1)
-    here = f"/alignments?machine={chosen.key}" if chosen else "/alignments?"
     return page(
         request,
         "alignment/overview.html",
         set_ups=queries.set_ups(session, only) if before is None else [],
-        rows=rows[:ON_PAGE],
+        part=part_of(rows, ON_PAGE, before, lambda row: row.id, partial(address, "/alignments", machine=machine)),
         keys=machines.machine_keys_by_id(session),
         machine=chosen,
         machines=machines.machines(session),
-        older=f"{here}&before={rows[ON_PAGE - 1].id}" if len(rows) > ON_PAGE else None,
-        newest=here if before is not None else None,
         history=history_url,
         wording=wording,
     )
@@ -80,7 +77,7 @@ def history_page(request: Request, session: SessionDep, machine: Annotated[str, 
         name=name,
         rows=rows[::-1],
         pushed={row.id: queries.pushed(session, row) for row in rows[-ON_PAGE:]},
-        figure=f"/api/v1/machines/{machine_row.key}/alignments/figure?{urlencode({'name': name})}",
+        figure=address(f"/api/v1/machines/{machine_row.key}/alignments/figure", name=name),
         wording=wording,
     )
 

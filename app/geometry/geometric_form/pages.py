@@ -1,8 +1,8 @@
 """Pages: every feature whose form was measured, the trend of one, a new measurement, one measurement."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any
-from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
@@ -21,6 +21,7 @@ from app.loop.warnings.wording import sentence
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed
+from app.web.paging import address, part_of
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -66,7 +67,7 @@ def overview(request: Request, session: SessionDep) -> Response:
 
 def trend_url(machine: str, feature: str, kind: str, **query: Any) -> str:
     """The page of a feature."""
-    return f"/forms/features/{machine}/{feature}?{urlencode({'kind': kind} | query)}"
+    return address(f"/forms/features/{machine}/{feature}", kind=kind, **query)
 
 
 @router.get("/forms/features/{machine}/{feature}", dependencies=[require("viewer")])
@@ -86,19 +87,16 @@ def feature_page(
             _("Forms lists every feature."),
         )
     shown_kind = kind or rows[0].measurement.kind if rows else kind or ""
-    older = None
-    if len(rows) > ON_PAGE:
-        older = trend_url(machine, feature, shown_kind, before=rows[ON_PAGE - 1].measurement.id)
+    link = partial(trend_url, machine, feature, shown_kind)
+    part = part_of(rows, ON_PAGE, before, lambda row: row.measurement.id, link)
     return page(
         request,
         "geometric_form/feature.html",
         machine=machine_row,
         feature=feature,
         kind=shown_kind,
-        rows=rows[:ON_PAGE],
-        became=queries.became(session, rows[:ON_PAGE]),
-        older=older,
-        newest=trend_url(machine, feature, shown_kind) if before else None,
+        part=part,
+        became=queries.became(session, part.rows),
         wording=wording,
     )
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
@@ -23,6 +24,7 @@ from app.loop.machines.queries import machine_named
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed, words
+from app.web.paging import address, part_of
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -37,9 +39,7 @@ def overview(request: Request, session: SessionDep, after: Annotated[str, Query(
     return page(
         request,
         "rotary_axes/overview.html",
-        rows=rows[:ON_PAGE],
-        more=rows[ON_PAGE - 1].machine.key if len(rows) > ON_PAGE else None,
-        after=after,
+        part=part_of(rows, ON_PAGE, after, lambda row: row.machine.key, partial(address, "/kinematics"), "after"),
         **COMMON,
     )
 

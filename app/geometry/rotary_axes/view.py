@@ -1,8 +1,8 @@
 """The page of a machine and that of a run, as they answer when looked at and when something could not be done."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
-from urllib.parse import urlencode
 
 from fastapi import Request, Response
 from sqlalchemy.orm import Session
@@ -14,6 +14,7 @@ from app.geometry.rotary_axes.answers import parameters_of
 from app.geometry.rotary_axes.queries import RunRow
 from app.geometry.rotary_axes.result_values import UNITS, errors_of
 from app.loop.machines.queries import machine_named
+from app.web.paging import address, part_of
 from app.web.templates import page
 
 ON_PAGE = 25
@@ -21,13 +22,12 @@ ON_PAGE = 25
 
 def machine_url(machine: str, **query: Any) -> str:
     """The page of a machine."""
-    parameters = {name: value for name, value in query.items() if value is not None}
-    return f"/kinematics/machines/{machine}" + (f"?{urlencode(parameters)}" if parameters else "")
+    return address(f"/kinematics/machines/{machine}", **query)
 
 
 def compare_url(run: int, other: int) -> str:
     """Two runs in one picture."""
-    return f"/kinematics/compare?{urlencode({'run': run, 'with': other})}"
+    return address("/kinematics/compare", **{"run": run, "with": other})
 
 
 COMMON: dict[str, Any] = {
@@ -85,9 +85,7 @@ def shown_machine(
         drifts=drifts,
         value=value,
         chosen=next((item for item in drifts if item.name == value), None),
-        runs=runs[:ON_PAGE],
-        older=machine_url(machine, head=head, before=runs[ON_PAGE - 1].run.id) if len(runs) > ON_PAGE else None,
-        newest=machine_url(machine, head=head) if before else None,
+        part=part_of(runs, ON_PAGE, before, lambda item: item.run.id, partial(machine_url, machine, head=head)),
         backups=list(reversed(versions)),
         in_effect={item.version for item in current.values()},
         same={item.version for item in versions if queries.alike(item.errors, current[item.head].errors)},

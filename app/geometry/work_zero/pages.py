@@ -24,6 +24,7 @@ from app.loop.readings import actions as readings
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import parsed
+from app.web.paging import address, part_of
 from app.web.templates import page
 from app.web.warnings import AcknowledgeIn
 
@@ -40,17 +41,14 @@ def overview(request: Request, session: SessionDep, machine: Word = None, before
     chosen = machine_named(session, machine) if machine else None
     only = chosen.id if chosen else None
     rows = queries.work_zeros(session, only, before=before, newest_first=True, limit=ON_PAGE + 1)
-    here = f"/work-zeros?machine={chosen.key}" if chosen else "/work-zeros?"
     return page(
         request,
         "work_zero/overview.html",
         fixtures=queries.fixtures(session, only) if before is None else [],
-        zeros=rows[:ON_PAGE],
+        part=part_of(rows, ON_PAGE, before, lambda row: row.id, partial(address, "/work-zeros", machine=machine)),
         keys=machines.machine_keys_by_id(session),
         machine=chosen,
         machines=machines.machines(session),
-        older=f"{here}&before={rows[ON_PAGE - 1].id}" if len(rows) > ON_PAGE else None,
-        newest=here if before is not None else None,
         wording=wording,
     )
 
@@ -255,9 +253,7 @@ def _fixture(
         status=error.status if error else 200,
         row=row,
         here=here,
-        zeros=comparisons[:ON_PAGE],
-        older=f"{here}?before={comparisons[ON_PAGE - 1].zero.id}" if len(comparisons) > ON_PAGE else None,
-        newest=here if before is not None else None,
+        part=part_of(comparisons, ON_PAGE, before, lambda each: each.zero.id, partial(address, here)),
         form=filled | dict(form or {}),
         errors=form_reader.at_fields(error) if error else {},
         error=error,

@@ -1,8 +1,8 @@
 """Pages: the operator's board, one alarm, the history. Everything works as plain links and posts; scripts only save a page load."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any
-from urllib.parse import urlencode
+from functools import partial
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from starlette.responses import RedirectResponse
@@ -18,6 +18,7 @@ from app.loop.machines import queries as machines
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, length, parsed, words
+from app.web.paging import address, part_of
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -25,12 +26,6 @@ MOST_ON_BOARD = 100
 ON_HISTORY_PAGE = 50
 MachineFilter = Annotated[str | None, Query(max_length=64)]
 Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
-
-
-def address(path: str, **query: Any) -> str:
-    """A path with those of the query that are given."""
-    parameters = {name: value for name, value in query.items() if value not in {None, ""}}
-    return f"{path}?{urlencode(parameters)}" if parameters else path
 
 
 @router.get("/alarms", dependencies=[require("viewer")])
@@ -75,17 +70,13 @@ def history(request: Request, session: SessionDep, machine: MachineFilter = None
     rows = queries.history(
         session, machine_id=machine_row.id if machine_row else None, before=before, limit=ON_HISTORY_PAGE + 1
     )
-    more = len(rows) > ON_HISTORY_PAGE
-    rows = rows[:ON_HISTORY_PAGE]
-    here = {"machine": machine}
+    link = partial(address, "/alarms/history", machine=machine)
     return page(
         request,
         "alarms/history.html",
-        rows=rows,
+        part=part_of(rows, ON_HISTORY_PAGE, before, lambda row: row.alarm.id, link),
         machines=[(row.key, row.name) for row in machines.machines(session)],
         machine=machine_row,
-        older=address("/alarms/history", **here, before=rows[-1].alarm.id) if more else None,
-        newest=address("/alarms/history", **here) if before else None,
         wording=wording,
         outcomes=outcomes,
         address=address,

@@ -1,8 +1,8 @@
 """Pages: every place that is calibrated, one place with its history and forms, and the second touch before a value is set."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any
-from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
@@ -18,6 +18,7 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named
 from app.loop.warnings.wording import sentence
+from app.web import paging
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed, words
@@ -33,11 +34,7 @@ Word = Annotated[str | None, Query(max_length=40)]
 def address(machine: str, place: Place, **query: Any) -> str:
     """The page of a place."""
     folder = "averages" if place.memory == "average" else "probes"
-    parameters = {name: value for name, value in query.items() if value is not None}
-    return f"/calibration/{machine}/{folder}/{place.location}" + (f"?{urlencode(parameters)}" if parameters else "")
-
-
-ON_PAGE = 25  # machines
+    return paging.address(f"/calibration/{machine}/{folder}/{place.location}", **query)
 
 
 @router.get("/calibration", dependencies=[require("viewer")])
@@ -49,9 +46,10 @@ def overview(
 ) -> Response:
     """Machines and places: what was found last, and when the next calibration is places."""
     every = machines.machines(session)
-    on_page = [machine_named(session, machine)] if machine else every[after : after + ON_PAGE]
-    rows = places.places(session, on_page)
-    groups = [(machine, [row for row in rows if row.machine.id == machine.id]) for machine in on_page]
+    chosen = [machine_named(session, machine)] if machine else every
+    part = paging.slice_of(chosen, ON_PAGE, 0 if machine else after, partial(paging.address, "/calibration"))
+    rows = places.places(session, part.rows)
+    groups = [(machine, [row for row in rows if row.machine.id == machine.id]) for machine in part.rows]
     return page(
         request,
         "calibration/overview.html",
@@ -59,7 +57,7 @@ def overview(
         machines=every,
         machine=machine,
         after=after,
-        on_page=ON_PAGE,
+        part=part,
         most_locations=MOST_LOCATIONS,
         wording=wording,
         address=address,
@@ -117,7 +115,6 @@ def _place(
     row = places.place_row(session, machine_row, place, value)
     average = place.memory == "average"
     history = queries.calibrations(session, machine_row, place, before=before, newest_first=True, limit=ON_PAGE + 1)
-    older = address(machine, place, before=history[ON_PAGE - 1].record.number) if len(history) > ON_PAGE else None
     return page(
         request,
         "calibration/place.html" if average else "calibration/probe.html",
@@ -125,9 +122,9 @@ def _place(
         machine=machine_row,
         place=place,
         row=row,
-        history=history[:ON_PAGE],
-        older=older,
-        newest=address(machine, place) if before else None,
+        history=paging.part_of(
+            history, ON_PAGE, before, lambda item: item.record.number, partial(address, machine, place)
+        ),
         origin=queries.origin(session, machine_row, place.location) if average else None,
         suggestion=queries.suggestion(session, machine_row, place.location) if average else None,
         form=form_reader.filled_in(row, _limits(session, row)) | dict(form or {}),

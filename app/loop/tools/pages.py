@@ -1,8 +1,8 @@
 """Pages: tool memory and average memory of a machine, the corrections that wait, and what people do to them."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any
-from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
@@ -23,6 +23,7 @@ from app.loop.tools.schemas import AppliedIn, DecisionIn, EmpiricalValueIn, Tool
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, length, parsed, words
+from app.web.paging import address, part_of
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -35,8 +36,7 @@ Word = Annotated[str | None, Query(max_length=40)]
 
 def memory_address(machine: str, **query: Any) -> str:
     """The page of a machine's memories."""
-    parameters = {name: value for name, value in query.items() if value is not None}
-    return f"/machines/{machine}/tools" + (f"?{urlencode(parameters)}" if parameters else "")
+    return address(f"/machines/{machine}/tools", **query)
 
 
 @router.get("/tools", dependencies=[require("viewer")])
@@ -76,11 +76,13 @@ def memories(
         tools=tools,
         averages=queries.averages(session, machine_row),
         chosen=chosen,
-        steps=steps[:STEPS_ON_PAGE],
-        older=memory_address(machine_row.key, tool=chosen.tool.number, before=steps[STEPS_ON_PAGE - 1].event.id)
-        if len(steps) > STEPS_ON_PAGE
-        else None,
-        newest=memory_address(machine_row.key, tool=chosen.tool.number) if before else None,
+        steps=part_of(
+            steps,
+            STEPS_ON_PAGE,
+            before,
+            lambda step: step.event.id,
+            partial(memory_address, machine_row.key, tool=chosen.tool.number),
+        ),
         # Parts that come again show the tool of the first time: which one most likely matters changes by the second.
         here=memory_address(machine_row.key, tool=chosen.tool.number, before=before),
         done=confirmation.done(done, n) if done and n else None,
@@ -176,7 +178,7 @@ def decide(
     except Invalid as error:
         return _correction(request, session, caller, machine, number, verb, form.get("from"), form, error)
     if form.get("from") == FROM_QUEUE:
-        return RedirectResponse(f"{QUEUE}?{urlencode({'at': machine, 'n': number, **outcome})}", 303)
+        return RedirectResponse(address(QUEUE, at=machine, n=number, **outcome), 303)
     return RedirectResponse(memory_address(machine, tool=correction.tool_memory, n=number, **outcome), 303)
 
 

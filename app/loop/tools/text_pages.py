@@ -2,7 +2,6 @@
 
 from hashlib import sha256
 from typing import Annotated
-from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 from starlette.responses import RedirectResponse
@@ -17,6 +16,7 @@ from app.loop.programs import wording
 from app.loop.tools import fetching
 from app.loop.tools.confirmation import Question
 from app.loop.tools.text_api import corrections_file
+from app.web import paging
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_SERIAL
 from app.web.templates import page
@@ -27,7 +27,7 @@ Count = Annotated[int, Query(ge=0, le=LARGEST_SERIAL)]
 
 def address(machine: str, **query: str | int) -> str:
     """The page of a machine's corrections as text."""
-    return f"/machines/{machine}/corrections/program" + (f"?{urlencode(query)}" if query else "")
+    return paging.address(f"/machines/{machine}/corrections/program", **query)
 
 
 @router.get("/machines/{machine}/corrections/program")

@@ -1,6 +1,7 @@
 """Pages: the signals of a characteristic, and one of them with its chart, where an engineer says what it was."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
@@ -24,6 +25,7 @@ from app.quality.proof import wording as proof_wording
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed
+from app.web.paging import address, part_of
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -43,21 +45,15 @@ def signals_page(
     rows = signals_queries.signals(
         session, characteristic=standing.characteristic, state=state, before=before, limit=ON_PAGE + 1
     )
-
-    def link(which: str, older: int | None = None) -> str:
-        query = {"state": which} | ({} if older is None else {"before": older})
-        return f"/characteristics/{characteristic}/signals?{urlencode(query)}"
-
+    link = partial(address, f"/characteristics/{characteristic}/signals")
     return page(
         request,
         "control_charts/signals_page.html",
         characteristic=standing.characteristic,
         machine=standing.machine,
-        rows=rows[:ON_PAGE],
-        more=len(rows) > ON_PAGE,
+        part=part_of(rows, ON_PAGE, before, lambda row: row.signal.id, partial(link, state=state)),
         counts=signals_queries.counts(session, standing.characteristic),
         state=state,
-        before=before,
         link=link,
         words=words,
         **_proof(),

@@ -1,6 +1,7 @@
 """Pages: the list of gauge studies, a new one, one of them, and one put right."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
@@ -24,6 +25,7 @@ from app.quality.proof import wording as proof_wording
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed
+from app.web.paging import address, part_of
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -58,9 +60,13 @@ def list_page(
     return page(
         request,
         "gauge_studies/list.html",
-        rows=rows[:ON_PAGE],
-        older=rows[ON_PAGE - 1].study.id if len(rows) > ON_PAGE else None,
-        before=before,
+        part=part_of(
+            rows,
+            ON_PAGE,
+            before,
+            lambda row: row.study.id,
+            partial(address, "/gauges", machine=machine or None, characteristic=characteristic or None),
+        ),
         machine=chosen,
         standing=standing,
         about=queries.latest_advice(session, standing) if standing else None,

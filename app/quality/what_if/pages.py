@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
@@ -24,6 +25,7 @@ from app.quality.what_if.schemas import DecisionIn, ProposalIn
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed
+from app.web.paging import address, part_of
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -154,15 +156,12 @@ def proposals_page(
     """Proposals, newest first: those that wait, or all."""
     chosen = status if status in proposals.STATUSES else "all" if status == "all" else "open"
     rows = proposals.proposals(session, status=None if chosen == "all" else chosen, before=before, limit=ON_PAGE + 1)
-    older = f"/proposals?status={chosen}&before={rows[ON_PAGE - 1].proposal.id}" if len(rows) > ON_PAGE else None
     return page(
         request,
         "what_if/proposals.html",
-        rows=rows[:ON_PAGE],
+        part=part_of(rows, ON_PAGE, before, lambda row: row.proposal.id, partial(address, "/proposals", status=chosen)),
         chosen=chosen,
         statuses=[*proposals.STATUSES, "all"],
-        older=older,
-        newest=f"/proposals?status={chosen}" if before else None,
         wording=wording,
         changes=wording.proposed,
     )

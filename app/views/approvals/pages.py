@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from typing import Annotated, Any
-from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
@@ -21,6 +20,7 @@ from app.views.characteristic.glance import band_picture
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed, words
+from app.web.paging import address
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -31,8 +31,7 @@ Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
 
 def queue_address(machine: str | None = None, **query: Any) -> str:
     """The queue, of one machine or of all."""
-    parameters = {name: value for name, value in {"machine": machine, **query}.items() if value is not None}
-    return "/corrections" + (f"?{urlencode(parameters)}" if parameters else "")
+    return address("/corrections", machine=machine, **query)
 
 
 @router.get("/corrections", dependencies=[require("viewer")])

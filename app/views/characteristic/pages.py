@@ -47,6 +47,7 @@ from app.web.choice import Choice, Chosen
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID, Reason
 from app.web.forms import by_field
+from app.web.paging import part_of
 from app.web.templates import page
 from app.web.validation import checked
 
@@ -173,7 +174,9 @@ def characteristic_page(
         choice=choice,
         scale=scale,
         before=before,
-        page_size=DECISIONS_ON_PAGE,
+        decisions_of=lambda rows: part_of(
+            rows, DECISIONS_ON_PAGE, before, lambda row: row.sequence, lambda **at: f"{link(**at)}#decisions"
+        ),
         most=MOST_IN_HISTOGRAM,
         link=link,
         chart_url=f"/api/v1{path}/figures/{figure}?{urlencode(chart_query)}",

@@ -2,7 +2,6 @@
 
 from datetime import UTC, datetime
 from typing import Annotated
-from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 
@@ -18,6 +17,7 @@ from app.views.overview import queries, wording
 from app.views.overview.queries import By
 from app.views.overview.ranking import CAPABLE
 from app.web.deps import SessionDep
+from app.web.paging import address, slice_of
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False, dependencies=[require("viewer")])
@@ -39,17 +39,15 @@ def overview_page(
     def link(**changes: object) -> str:
         """This page with something else chosen."""
         chosen = {"machine": machine or None, "by": by.value if by is not By.ATTENTION else None} | changes
-        query = {name: value for name, value in chosen.items() if value}
-        return f"/overview?{urlencode(query)}" if query else "/overview"
+        return address("/overview", **chosen)
 
     return page(
         request,
         "overview/overview.html",
-        ranked=ranked[after : after + ON_PAGE],
+        part=slice_of(ranked, ON_PAGE, after, link),
         total=len(ranked),
         need=sum(1 for entry in ranked if entry.inputs.reasons),
         after=after,
-        on_page=ON_PAGE,
         by=by.value,
         machine=machine or "",
         machines=machines.machines(session),

@@ -1,8 +1,8 @@
 """Set-up page: the record of changes."""
 
 import json
+from functools import partial
 from typing import Any
-from urllib.parse import urlencode
 
 from fastapi import APIRouter, Request, Response
 
@@ -11,6 +11,7 @@ from app.access.deps import Engineer
 from app.views.set_up.frame import setup_page
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID
+from app.web.paging import address, part_of
 
 router = APIRouter()
 SHOWN = 100
@@ -23,20 +24,22 @@ def audit_page(
     subject, actor = subject.strip()[:200], actor.strip()[:200]
     cursor = int(before) if before.isascii() and before.isdigit() and int(before) <= LARGEST_ID else None
     entries = queries.entries(session, subject=subject, actor=actor, before=cursor, limit=SHOWN + 1)
-    query = {name: value for name, value in (("subject", subject), ("actor", actor)) if value}
-    older = None
-    if len(entries) > SHOWN:
-        older = "/setup/audit?" + urlencode(query | {"before": entries[SHOWN - 1].id})
+    part = part_of(
+        entries,
+        SHOWN,
+        cursor,
+        lambda entry: entry.id,
+        partial(address, "/setup/audit", subject=subject or None, actor=actor or None),
+    )
     return setup_page(
         request,
         "audit.html",
         caller,
         "audit",
-        entries=[(entry, changes(entry.before, entry.after)) for entry in entries[:SHOWN]],
+        entries=[(entry, changes(entry.before, entry.after)) for entry in part.rows],
         subject=subject,
         actor=actor,
-        older=older,
-        newest=f"/setup/audit?{urlencode(query)}" if cursor else None,
+        part=part,
     )
 
 

@@ -1,8 +1,9 @@
 """Set-up pages: characteristics and their parameters."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
-from urllib.parse import quote, urlencode
+from urllib.parse import quote
 
 from fastapi import APIRouter, Request, Response
 from sqlalchemy.orm import Session
@@ -24,6 +25,7 @@ from app.views.set_up import parameter_form
 from app.views.set_up.frame import setup_page
 from app.web.deps import FormDep, SessionDep
 from app.web.forms import by_field, parsed
+from app.web.paging import address, part_of
 
 router = APIRouter()
 ON_PAGE = 200
@@ -36,24 +38,17 @@ def characteristics_page(
 ) -> Response:
     chosen = machines.find_machine(session, machine)
     rows = queries.characteristics(session, machine_id=chosen.id if chosen else None, after=after, limit=ON_PAGE + 1)
-    more = rows[ON_PAGE - 1].characteristic.key if len(rows) > ON_PAGE else None
+    link = partial(address, "/setup/characteristics", machine=chosen.key if chosen else None)
     return setup_page(
         request,
         "characteristics.html",
         caller,
         "characteristics",
-        rows=rows[:ON_PAGE],
-        older=_page_of(chosen.key if chosen else None, more) if more else None,
-        newest=_page_of(chosen.key if chosen else None, None) if after else None,
+        part=part_of(rows, ON_PAGE, after, lambda standing: standing.characteristic.key, link, "after"),
         machines=machines.machines(session, limit=100_000),
         machine=chosen,
         mode_words=lambda mode: parameter_form.choice("mode", mode.value),
     )
-
-
-def _page_of(machine: str | None, after: str | None) -> str:
-    query = urlencode({name: value for name, value in (("machine", machine), ("after", after)) if value})
-    return "/setup/characteristics" + (f"?{query}" if query else "")
 
 
 @router.get("/setup/characteristics/new")

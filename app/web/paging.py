@@ -1,0 +1,49 @@
+"""Long lists, a part at a time: addresses of pages, and of the parts beside the one that is shown."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+from urllib.parse import urlencode
+
+Row = TypeVar("Row")
+
+
+def address(path: str, **query: Any) -> str:
+    """A path with those of the query that are given.
+
+    >>> address("/alarms", machine="lathe-1", before=None)
+    '/alarms?machine=lathe-1'
+    """
+    given = {name: value for name, value in query.items() if value is not None}
+    return f"{path}?{urlencode(given)}" if given else path
+
+
+@dataclass(frozen=True)
+class Part(Generic[Row]):
+    """Rows that a page shows of a list. on, back: addresses of the next part, and of the first or the one before."""
+
+    rows: list[Row]
+    on: str | None
+    back: str | None
+
+
+def part_of(
+    rows: Sequence[Row],
+    limit: int,
+    at: int | str | None,
+    cursor: Callable[[Row], int | str],
+    link: Callable[..., str],
+    name: str = "before",
+) -> Part[Row]:
+    """At most `limit` of rows that were read from the cursor `at` on: one more than that where the list goes on.
+
+    link: makes the address of a part from its cursor, given by that name.
+    """
+    shown = list(rows[:limit])
+    return Part(shown, link(**{name: cursor(shown[-1])}) if len(rows) > limit else None, link() if at else None)
+
+
+def slice_of(rows: Sequence[Row], limit: int, after: int, link: Callable[..., str]) -> Part[Row]:
+    """At most `limit` of all the rows, those that come after so many."""
+    on = link(after=after + limit) if after + limit < len(rows) else None
+    return Part(list(rows[after : after + limit]), on, link(after=max(after - limit, 0) or None) if after else None)
