@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 from functools import partial
 
 from fastapi import APIRouter, FastAPI
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.types import ASGIApp
 
 from app.access import api as people
@@ -180,6 +181,15 @@ JOBS: tuple[PeriodicJob, ...] = (
 )
 
 
+NOT_COMPRESSED = (
+    "text/event-stream",  # each event leaves at once
+    "application/pdf",
+    "application/zip",
+    "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
+    "image/png",
+)
+
+
 def keep_for_good() -> None:
     """Exempt all present objects from garbage collection, during which everybody waits.
 
@@ -256,6 +266,7 @@ def create_app(settings: Settings | None = None, ending: Callable[[], None] = la
     }
     add_problem_handlers(app, recognise)
     app.add_middleware(BodyLimit)
+    app.add_middleware(GZipMiddleware, minimum_size=1024, compresslevel=5, exclude_content_types=NOT_COMPRESSED)
     for router in ROUTERS:
         app.include_router(router)
     app.openapi = partial(document, app, readings.SCHEMAS)  # type: ignore[method-assign]

@@ -7,7 +7,9 @@ keys may use asks for `AnyCaller` and then says ``caller.must_at(machine.id, "op
 """
 
 import secrets
+from base64 import urlsafe_b64decode, urlsafe_b64encode
 from contextlib import suppress
+from operator import xor
 from typing import Annotated, Any
 
 from fastapi import Depends, Request
@@ -76,7 +78,7 @@ async def get_caller(request: Request, session: SessionDep) -> Caller:
 def _remember(request: Request, browser: SignedIn) -> None:
     """Keep for the frame of the page to whom it is shown, and the numbers of its navigation."""
     request.state.person, request.state.waiting = browser.caller, browser.waiting
-    request.state.csrf = browser.caller.csrf
+    request.state.csrf = masked(browser.caller.csrf)
 
 
 async def recognise(request: Request) -> None:
@@ -101,13 +103,33 @@ async def _check_token(request: Request, expected: str) -> None:
     if token is None and _is_form(request):
         field = (await request.form()).get("csrf")
         token = field if isinstance(field, str) else None
-    if token is None or not secrets.compare_digest(token.encode(errors="replace"), expected.encode()):
+    if token is None or not secrets.compare_digest(_unmasked(token), expected.encode()):
         raise NotAllowed(
             _(
                 "The form did not carry the token of your session, so another site may have sent it. Nothing was changed."
             ),
             _("Load the page again and repeat what you did."),
         )
+
+
+def masked(token: str) -> str:
+    """A session's token as a page has it: other letters each time.
+
+    Pages are compressed and repeat what an address says; of the same letters in each the length would tell, guess by guess
+    (BREACH, https://breachattack.com).
+    """
+    pad = secrets.token_bytes(len(token))
+    return urlsafe_b64encode(pad + bytes(map(xor, pad, token.encode()))).decode()
+
+
+def _unmasked(token: str) -> bytes:
+    """The session's token of a masked one; of anything else some bytes that are no token."""
+    try:
+        pad_and_token = urlsafe_b64decode(token)
+    except ValueError:
+        return b""
+    half = len(pad_and_token) // 2
+    return bytes(map(xor, pad_and_token[:half], pad_and_token[half:]))
 
 
 def _is_form(request: Request) -> bool:
