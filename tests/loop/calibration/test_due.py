@@ -8,7 +8,7 @@ import pytest
 from app.jobs.actions import run_jobs
 from app.loop.calibration.jobs import JOB, overdue
 from tests.loop.calibration.test_calibrations import calibrate, ring
-from tests.shop import Shop
+from tests.shop import Person, Shop
 
 
 def plan(shop: Shop, what: str = "averages/5", **body: Any) -> Any:
@@ -112,6 +112,10 @@ def test_a_probe_is_due_by_whatever_its_machine_measures(shop: Shop) -> None:
     shop.read(0.1)
     assert go_round(shop) == 1
     assert "R10 = 32" in shop.alarms()[0]["text"]
+    operator = Person(shop.server, "operator")
+    address = f"/calibration/{shop.machine}/probes/32"
+    assert f'href="{address}"' in operator.open(f"/alarms?machine={shop.machine}")
+    assert "R10 = 32" in operator.open(address)
     ring(shop)
     assert shop.alarms() == []
 

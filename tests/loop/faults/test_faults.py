@@ -20,6 +20,7 @@ def test_a_fault_is_an_alarm_until_the_machine_says_that_it_is_over(shop: Shop, 
     assert alarms[first["alarm"]]["text"].endswith("battery of the probe is low. “Probe battery low”")
     page = Person(server, "operator").open(f"/alarms?machine={shop.machine}")
     assert "battery of the probe is low" in page
+    assert f"/calibration/{shop.machine}" not in page, "a fault is about no place of calibration"
     assert report(shop, 200, kind="battery_low", active=False)["alarm"] == first["alarm"]
     ended = shop.call("GET", f"/alarms/{first['alarm']}")
     assert (ended["state"], ended["outcome"][0]["code"]) == ("acknowledged", "fault_over")
