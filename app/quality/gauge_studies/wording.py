@@ -83,6 +83,12 @@ def verdicts(found: Evaluation, tolerance: float | None) -> list[Verdict]:
 
 def _type_one(found: TypeOne) -> list[Verdict]:
     verdicts = []
+    limit = _("at least {limit} (VDA 5); {n} values, {share} of the tolerance against {spread} s").format(
+        limit=LEAST_CG,
+        n=found.bias.readings,
+        share=f"{100 * found.share:g}\N{NO-BREAK SPACE}%",
+        spread=f"{found.spread:g}",
+    )
     for name, value in (("Cg", found.cg), ("Cgk", found.cgk)):
         good = value >= LEAST_CG and found.resolved
         verdicts.append(
@@ -91,7 +97,7 @@ def _type_one(found: TypeOne) -> list[Verdict]:
                 f"{value:.2f}".replace("-", "\N{MINUS SIGN}"),
                 _("capable") if good else _("not capable"),
                 "steady" if good else "attention",
-                _("at least {limit} (VDA 5)").format(limit=LEAST_CG),
+                limit,
             )
         )
     verdicts.append(_bias(found.bias))

@@ -121,7 +121,9 @@ def _cell(made: Map, at: int, cell: Cell, level: int | None, href: str, *, today
         )
         if holds
     ]
-    title = f"{named}: {', '.join(lines)}" + (f" ({', '.join(marks)})" if marks else "")
+    sequence = made.past.history["sequence"]
+    window = _("of {n} readings, {first} to {last}").format(n=cell.figures.inner, first=sequence[0], last=sequence[-1])
+    title = f"{named}: {', '.join(lines)}, {window}" + (f" ({', '.join(marks)})" if marks else "")
     text = wording.cell(cell.figures, made.criterion)
     return CellView(href, text, title, level, inside, best, calmest, today, chosen, "")
 

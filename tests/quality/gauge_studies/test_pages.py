@@ -49,6 +49,9 @@ class TestTyped:
         assert study["rows"][0]["values"][:4] == [40.0, 40.0001, 40.0002, 40.0]
         assert study["type_one"]["tolerance"] == 0.016
         assert "Advice for R33" in page
+        limit = "at least 1.33 (VDA 5); 30 values, 20\N{NO-BREAK SPACE}% of the tolerance against 6 s"
+        assert [verdict["limit"] for verdict in study["verdicts"][:2]] == [limit, limit]
+        assert limit in operator.open(f"/gauges?characteristic={shop.characteristic}")
 
     def test_what_is_wrong_is_named_and_what_was_typed_stays(self, shop: Shop, operator: Person) -> None:
         cells = {"c_0_0": "40,1", "c_0_1": "forty", "c_0_2": "40,2", "name_0": "Šipka “1”", "c_0_4": "40,3"}

@@ -1,5 +1,6 @@
 """The life of a proposed change: by programs, by people without scripts, and as a story in a browser."""
 
+import re
 import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -199,6 +200,7 @@ def test_from_the_map_to_a_new_version(shop: Shop, server: Server, page: Page) -
 
     cell = page.locator("setting-map td a[title^='k 2, R33 ±2']").first
     title = cell.get_attribute("title") or ""
+    assert re.search(r" of \d+ readings, \d+ to \d+", title)
     cell.click()
     expect(page.locator("a[data-chosen]")).to_have_attribute("title", title)
     page.get_by_label("Reason").fill(WHY)
