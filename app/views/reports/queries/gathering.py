@@ -6,6 +6,7 @@ from zoneinfo import ZoneInfo
 
 from sqlalchemy.orm import Session
 
+from app.core.decision.step import rounded
 from app.errors import InbandError
 from app.files.documents.content import Fact, Report, Section, count, deviation, moment, size, width, words
 from app.language.i18n import _
@@ -116,8 +117,8 @@ def _head(frame: Frame) -> list[Fact]:
     half = parameters.tolerance_width / 2
     facts += [
         Fact("target", _("Target"), size(parameters.target), "R32"),
-        Fact("upper_limit", _("Upper limit"), size(parameters.target + half)),
-        Fact("lower_limit", _("Lower limit"), size(parameters.target - half)),
+        Fact("upper_limit", _("Upper limit"), size(rounded(parameters.target + half))),
+        Fact("lower_limit", _("Lower limit"), size(rounded(parameters.target - half))),
         Fact("tolerance_width", _("Tolerance width"), width(parameters.tolerance_width, 1), "R35"),
     ]
     if frame.ends is not None:
