@@ -28,7 +28,7 @@ def facts(numbers: Numbers, rejects: Rejects | None = None, of_tool: Rejects | N
         Fact("in_tolerance", _("In tolerance"), count(numbers.in_tolerance)),
         Fact("share_in_tolerance", _("Share in tolerance"), share(numbers.share_in_tolerance)),
         Fact("outside", _("Out of tolerance"), count(numbers.outside)),
-        Fact("corrections", _("Readings that led to a correction"), count(numbers.corrections)),
+        Fact("corrections", _("Corrections"), count(numbers.corrections)),
     ]
     if rejects is not None:
         parts, sections = ("", "") if of_tool is None else map(_since_change, (of_tool.parts, of_tool.sections))
