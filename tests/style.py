@@ -4,7 +4,7 @@ import ast
 import sys
 from pathlib import Path
 
-LONGEST_FUNCTION = 106  # lines, from `def` to the end, docstring included
+LONGEST_FUNCTION = 99  # lines, from `def` to the end, docstring included
 LONGEST_FILE = 543
 QUESTIONS = {"What", "Whether", "How", "Which", "Who", "Whose", "Where", "When", "Why"}
 APP = Path(__file__).resolve().parents[1] / "app"

@@ -195,6 +195,16 @@ class TestLabels:
         assert words.count("correction of current deviation") == 4
         assert words.count("“oversize”") == words.count("“undersize”") == 1
 
+    @pytest.mark.parametrize("scale", ["zones", "true"])
+    def test_a_phone_has_names_and_values_and_most_of_its_width_for_the_readings(self, scale: Any) -> None:
+        steps = [Step(1, 7, -0.001, "applied")]
+        layout = zone_chart([point(1, 0.0)], SHAFT, steps=steps, scale=scale, width=360)["layout"]
+        assert layout["margin"]["l"] + layout["margin"]["r"] < 360 / 2
+        words = [note["text"] for note in layout["annotations"] if note.get("x") == 1]
+        assert "<b>R35/2  +8\u00a0µm</b>" in words
+        assert "<b>Σ −1.0\u00a0µm</b>" in words
+        assert max(map(len, words)) < len("<b>R35/2 = R37  +8.1234\u00a0µm</b>")
+
     def test_oversize_is_above(self) -> None:
         notes = {note["text"]: note["y"] for note in zone_chart([], SHAFT)["layout"]["annotations"]}
         assert next(y for text, y in notes.items() if "“oversize”" in text) == 3.5

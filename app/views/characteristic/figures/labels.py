@@ -96,14 +96,19 @@ def _line(y: float, colour: str, width: float, dash: str) -> dict[str, Any]:
     }
 
 
-def limit_labels(limits: HasLimits, ruler: Scale, colours: Palette, size: int) -> list[dict[str, Any]]:
-    """At the right: on each limit its name, value and title; in each band what happens there."""
+def limit_labels(
+    limits: HasLimits, ruler: Scale, colours: Palette, size: int, *, brief: bool = False
+) -> list[dict[str, Any]]:
+    """At the right: on each limit its name, value and title; in each band what happens there.
+
+    brief: names and values of the limits only.
+    """
     all_bands = bands(limits)
     height = 2 * ruler.extent
     middle = [] if isinstance(ruler, ZoneScale) else [_("target")]
     if all_bands[0].limits:  # R33 = 0 lies on the target: one label for both sides
         middle.append(f"{' = '.join(all_bands[0].limits)}  0{NO_BREAK_SPACE}µm")
-    title = f"  {limit_title(all_bands[0].limits[-1], limits)}" if all_bands[0].limits else ""
+    title = f"  {limit_title(all_bands[0].limits[-1], limits)}" if all_bands[0].limits and not brief else ""
     notes: list[dict[str, Any]] = [
         _note(0, f"<b>{' = '.join(middle)}</b>{title}" if middle else "", colours.quiet, size)
     ]
@@ -116,12 +121,14 @@ def limit_labels(limits: HasLimits, ruler: Scale, colours: Palette, size: int) -
                 place = max(lower, written + LEAST_DISTANCE * height)
                 written = place
                 names = " = ".join(band.limits)
-                title = limit_title(band.limits[-1], limits)
+                title = "" if brief else f"  {limit_title(band.limits[-1], limits)}"
                 ink = colours.ink if strong else colours.quiet
                 notes.append(
-                    _note(sign * place, f"<b>{names}  {_signed_limit(sign * band.lower)}</b>  {title}", ink, size)
+                    _note(sign * place, f"<b>{names}  {_signed_limit(sign * band.lower)}</b>{title}", ink, size)
                 )
             elif band.limits and band.lower:
+                continue
+            if brief:
                 continue
             upper = ruler.extent if band.upper is None else _edge(band.upper, ruler)
             room = (upper - max(lower, written)) / height

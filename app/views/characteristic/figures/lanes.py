@@ -160,9 +160,18 @@ def event_lane(
 
 
 def offset_lane(
-    steps: Sequence[Step], marks: Sequence[Mark], span: tuple[float, float], total_before: float, colours: Palette
+    steps: Sequence[Step],
+    marks: Sequence[Mark],
+    span: tuple[float, float],
+    total_before: float,
+    colours: Palette,
+    *,
+    brief: bool = False,
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """The sum of the corrections since the tool was changed as steps; each correction a mark by its status."""
+    """The sum of the corrections since the tool was changed as steps; each correction a mark by its status.
+
+    brief: beside it the sum alone, without the newest correction.
+    """
     events: list[tuple[int, int, Step | None]] = [(step.sequence, 1, step) for step in steps]
     events += [(mark.sequence, 0, None) for mark in marks if mark.kind == TOOL_CHANGE]
     total = total_before
@@ -224,6 +233,9 @@ def offset_lane(
     notes: list[dict[str, Any]] = []
     if at:
         newest, value = at[-1]
+        words = _("correction {n}: {amount}, {status}").format(
+            n=newest.number, amount=um(newest.amount), status=status_word(newest.status)
+        )
         notes.append(
             {
                 "xref": "paper",
@@ -235,10 +247,7 @@ def offset_lane(
                 "yanchor": "middle",
                 "align": "left",
                 "showarrow": False,
-                "text": f"<b>Σ {um(value / 1000)}</b><br>"
-                + _("correction {n}: {amount}, {status}").format(
-                    n=newest.number, amount=um(newest.amount), status=status_word(newest.status)
-                ),
+                "text": f"<b>Σ {um(value / 1000)}</b>" + ("" if brief else f"<br>{words}"),
                 "font": {"size": 12, "color": colour},
             }
         )

@@ -29,6 +29,7 @@ from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, layout, legend, pale
 __all__ = ["Block", "Mark", "Point", "Step", "zone_chart"]
 
 WIDE = 1500  # pixels from which on there is room for a larger font
+NARROW = 640  # pixels below which there is room for the name and value of a limit only
 WORD = 70  # pixels that a value in the chart takes
 EVENTS, READINGS, OFFSETS = [0.915, 1.0], [0.18, 0.91], [0.0, 0.14]  # of the height, from the bottom
 
@@ -82,7 +83,7 @@ def zone_chart(
         ends = [end for block in blocks for end in (block.minimum, block.maximum)]
         ruler = TrueScale.of(limits, [*(point.deviation for point in points), *ends])
     # Room at the right for the longest words in the font of any system (Liberation Sans and 5 % more).
-    font_size, left, right = (14, 104, 342) if width >= WIDE else (12, 92, 292)
+    font_size, left, right = (14, 104, 342) if width >= WIDE else (12, 92, 292) if width >= NARROW else (12, 64, 104)
     first = min([block.first for block in blocks] + [point.sequence for point in points], default=1)
     last = max([block.last for block in blocks] + [point.sequence for point in points], default=first + 9)
     room = max((last - first) * 0.02, 0.6)
@@ -97,9 +98,10 @@ def zone_chart(
     ]
     pixels = max(width - left - right, 200)
     events, event_notes, event_lines = event_lane(marks, span, pixels, colours)
-    offsets, offset_notes = offset_lane(steps, marks, span, total_before, colours)
+    brief = width < NARROW
+    offsets, offset_notes = offset_lane(steps, marks, span, total_before, colours, brief=brief)
     notes = [
-        *limit_labels(limits, ruler, colours, font_size),
+        *limit_labels(limits, ruler, colours, font_size, brief=brief),
         *event_notes,
         *offset_notes,
         *_beyond(points, ruler, span, pixels, colours),
@@ -107,7 +109,6 @@ def zone_chart(
     if not points and not blocks:
         traces.append(_invisible(first))
         notes.append(_no_readings(colours))
-    ticks, words = size_ticks(limits, ruler, None if sizes is None else sizes.target)
     return {
         "data": [*traces, *events, *offsets],
         "layout": layout(
@@ -125,21 +126,7 @@ def zone_chart(
                 "showline": True,
                 **({"dtick": 1} if last - first <= 12 else {"nticks": 9}),
             },
-            yaxis={
-                "domain": READINGS,
-                "range": [-ruler.extent, ruler.extent],
-                "fixedrange": True,
-                "showgrid": False,
-                "tickmode": "array",
-                "tickvals": ticks,
-                "ticktext": words,
-                "tickfont": {"size": font_size, "color": colours.quiet},
-                "title": {
-                    "text": _("Deviation") if sizes is None else sizes.title,
-                    "font": {"size": 12, "color": colours.quiet},
-                    "standoff": 4,
-                },
-            },
+            yaxis=_size_axis(limits, ruler, sizes, colours, font_size, brief=brief),
             yaxis2=_lane(EVENTS, [-1, 1], colours, showticklabels=False),
             yaxis3=_lane(
                 OFFSETS,
@@ -151,11 +138,33 @@ def zone_chart(
                 showgrid=True,
                 zeroline=True,
                 zerolinecolor=colours.faint,
-                title={"text": _("Σ correction, µm"), "font": {"size": 12, "color": colours.quiet}, "standoff": 4},
+                title={
+                    "text": "" if brief else _("Σ correction, µm"),
+                    "font": {"size": 12, "color": colours.quiet},
+                    "standoff": 4,
+                },
             ),
             shapes=[*band_shapes(limits, ruler, colours), *limit_lines(limits, ruler, colours), *event_lines],
             annotations=notes,
         ),
+    }
+
+
+def _size_axis(
+    limits: HasLimits, ruler: Scale, sizes: SizeAxis | None, colours: Palette, font_size: int, *, brief: bool
+) -> dict[str, Any]:
+    ticks, words = size_ticks(limits, ruler, None if sizes is None else sizes.target)
+    title = _("Deviation") if sizes is None else sizes.title
+    return {
+        "domain": READINGS,
+        "range": [-ruler.extent, ruler.extent],
+        "fixedrange": True,
+        "showgrid": False,
+        "tickmode": "array",
+        "tickvals": ticks,
+        "ticktext": words,
+        "tickfont": {"size": font_size, "color": colours.quiet},
+        "title": {"text": "" if brief else title, "font": {"size": 12, "color": colours.quiet}, "standoff": 4},
     }
 
 
