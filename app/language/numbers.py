@@ -31,26 +31,60 @@ def signed(value: float | None, decimals: int = 1) -> str:
     return f"{MINUS if rounded < 0 else '+'}{abs(rounded):.{decimals}f}"
 
 
+def fixed(value: float | None, decimals: int) -> str:
+    """A number with so many decimals, and a sign only where it is negative.
+
+    >>> fixed(-6.096, 2), fixed(-0.0001, 2), fixed(None, 2)
+    ('−6.10', '0.00', '–')
+    """
+    if value is None:
+        return NOTHING
+    return f"{MINUS if round(value, decimals) < 0 else ''}{abs(value):.{decimals}f}"
+
+
+def short(value: float | None, digits: int = 6) -> str:
+    """A number with no more digits than it needs.
+
+    >>> short(5.30), short(-400.0), short(None)
+    ('5.3', '−400', '–')
+    """
+    if value is None:
+        return NOTHING
+    return f"{MINUS if value < 0 else ''}{abs(value):.{digits}g}"
+
+
 def um(deviation_mm: float | None, decimals: int = 1) -> str:
     r"""A deviation in µm with its sign.
 
     >>> um(0.0061), um(-0.3, 0), um(None)
     ('+6.1\xa0µm', '−300\xa0µm', '–')
     """
-    if deviation_mm is None:
-        return NOTHING
-    return f"{signed(deviation_mm * 1000, decimals)}{NO_BREAK_SPACE}µm"
+    return NOTHING if deviation_mm is None else f"{in_um(deviation_mm, decimals)}{NO_BREAK_SPACE}µm"
 
 
-def um_limit(limit_mm: float) -> str:
-    r"""A limit in µm, both sides at once and no more decimals than it needs, in mm from 1 mm on.
+def in_um(deviation_mm: float | None, decimals: int = 1) -> str:
+    """The same without its unit, which the head of a column names."""
+    return signed(None if deviation_mm is None else deviation_mm * 1000, decimals)
+
+
+def plain_um(length_mm: float | None, decimals: int = 1) -> str:
+    r"""A length in µm that has no sign: a scatter, a width.
+
+    >>> plain_um(0.0134), plain_um(None)
+    ('13.4\xa0µm', '–')
+    """
+    return NOTHING if length_mm is None else f"{fixed(length_mm * 1000, decimals)}{NO_BREAK_SPACE}µm"
+
+
+def um_limit(limit_mm: float, sign: str = PLUS_MINUS, digits: int = 6) -> str:
+    r"""A limit in µm, both sides at once and no more digits than it needs, in mm from 1 mm on.
 
     >>> um_limit(0.0053), um_limit(0.3), um_limit(1.0)
     ('±5.3\xa0µm', '±300\xa0µm', '±1\xa0mm')
     """
     if limit_mm >= 1:
-        return f"{PLUS_MINUS}{limit_mm:.6g}{NO_BREAK_SPACE}mm"
-    return f"{PLUS_MINUS}{limit_mm * 1000:.6g}{NO_BREAK_SPACE}µm"
+        return f"{sign}{limit_mm:.{digits}g}{NO_BREAK_SPACE}mm"
+    return f"{sign}{limit_mm * 1000:.{digits}g}{NO_BREAK_SPACE}µm"
 
 
 def mm(size_mm: float | None, decimals: int = 4) -> str:
@@ -59,9 +93,34 @@ def mm(size_mm: float | None, decimals: int = 4) -> str:
     >>> mm(39.9981)
     '39.9981\xa0mm'
     """
-    if size_mm is None:
-        return NOTHING
-    return f"{MINUS if round(size_mm, decimals) < 0 else ''}{abs(size_mm):.{decimals}f}{NO_BREAK_SPACE}mm"
+    return NOTHING if size_mm is None else f"{fixed(size_mm, decimals)}{NO_BREAK_SPACE}mm"
+
+
+def percent(share: float | None, decimals: int = 0) -> str:
+    r"""A share of 1 in per cent.
+
+    >>> percent(0.956), percent(0.0314, 1)
+    ('96\xa0%', '3.1\xa0%')
+    """
+    return NOTHING if share is None else f"{fixed(share * 100, decimals)}{NO_BREAK_SPACE}%"
+
+
+def as_typed(value: float | None, decimals: int = 9) -> str:
+    """A number as one would type it into a field.
+
+    >>> as_typed(0.00530), as_typed(199.852), as_typed(2.0), as_typed(None)
+    ('0.0053', '199.852', '2', '')
+    """
+    return "" if value is None else f"{value:.{decimals}f}".rstrip("0").rstrip(".")
+
+
+def typed_length(length_mm: float) -> str:
+    """A length as one would type it, with at least four decimals and none hidden.
+
+    >>> typed_length(0.009), typed_length(0.0053333)
+    ('0.0090', '0.0053333')
+    """
+    return f"{length_mm:.9f}".rstrip("0").ljust(len(f"{length_mm:.4f}"), "0")
 
 
 def when(moment: datetime | None, style: str = "seconds") -> Markup:

@@ -10,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 from app.core.parameters import LARGEST_LENGTH
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
+from app.language.numbers import as_typed
 
 LENGTHS = {"tip", "tip_radius", "feeler"}  # whose limit is nearer than that of other lengths
 _KIND = re.compile(r"constrained-\w+|literal\[.*\]")  # how pydantic names one of the kinds that a field may be of
@@ -120,7 +121,7 @@ def _with_values(kind: str, context: Mapping[str, Any]) -> str | None:
 
 def _plain(value: Any) -> Any:
     """A limit as people write it: 0 and 0.000001, neither 0.0 nor 1e-06."""
-    return f"{value:.9f}".rstrip("0").rstrip(".") if isinstance(value, float) else value
+    return as_typed(value) if isinstance(value, float) else value
 
 
 def checked(kind: Any, value: Any, field: str) -> Any:

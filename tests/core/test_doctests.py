@@ -1,4 +1,4 @@
-"""The examples in the core's docstrings run and answer as printed."""
+"""The examples in the docstrings of the core, and of what writes numbers and addresses, run and answer as printed."""
 
 import doctest
 import importlib
@@ -11,7 +11,7 @@ import app.core
 MODULES = sorted(module.name for module in pkgutil.walk_packages(app.core.__path__, "app.core."))
 
 
-@pytest.mark.parametrize("name", ["app.core", *MODULES])
+@pytest.mark.parametrize("name", ["app.core", *MODULES, "app.language.numbers", "app.web.paging"])
 def test_examples_answer_as_printed(name: str) -> None:
     failed, _tried = doctest.testmod(importlib.import_module(name))
     assert failed == 0

@@ -7,7 +7,7 @@ from typing import Any
 
 from app.core.geometry.layout import Loose, NotLaidOut
 from app.language.i18n import _, ngettext
-from app.language.numbers import MINUS
+from app.language.numbers import MINUS, short
 
 GOOD, WEAK = 10.0, 100.0  # conditions
 WORTH_A_TOUCH = 1.05  # by less, a touch more makes nothing more certain that anybody would see
@@ -49,12 +49,12 @@ def direction(normal: Sequence[float]) -> str:
     for axis, name in enumerate("XYZ"):
         if abs(normal[axis]) > 0.9995:
             return ("+" if normal[axis] > 0 else MINUS) + name
-    return "(" + ", ".join(f"{value:.3g}".replace("-", MINUS) for value in normal) + ")"
+    return "(" + ", ".join(short(value, 3) for value in normal) + ")"
 
 
 def place(point: Sequence[float]) -> str:
     """A point."""
-    return "(" + ", ".join(f"{value:.4g}".replace("-", MINUS) for value in point) + ")"
+    return "(" + ", ".join(short(value, 4) for value in point) + ")"
 
 
 def motion(weakest: Sequence[float]) -> str:

@@ -8,7 +8,7 @@ from app.core.geometry.points import Degenerate, Reason
 from app.core.geometry.relations import DatumRefused
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
-from app.language.numbers import MINUS, NO_BREAK_SPACE, um
+from app.language.numbers import NO_BREAK_SPACE, fixed, um
 
 
 def kind_word(kind: str) -> str:
@@ -170,7 +170,7 @@ def coordinate(value: float) -> str:
     >>> coordinate(-6.096)
     '−6.096'
     """
-    return f"{MINUS if round(value, 3) < 0 else ''}{abs(value):.3f}"
+    return fixed(value, 3)
 
 
 def flatness_in_words(points: list[list[float]], residuals: list[float]) -> str:

@@ -27,7 +27,7 @@ from app.geometry.rotary_axes.figures import LETTERS, diagram, greatest
 from app.geometry.rotary_axes.queries import RunRow
 from app.geometry.rotary_axes.run_history import in_order, surer
 from app.language.i18n import _, ngettext
-from app.language.numbers import MINUS
+from app.language.numbers import short
 from app.language.times import MINUTES, plant_zone, written
 
 SETTINGS = {
@@ -128,7 +128,7 @@ def _axis(axis: Mapping[str, Any], *, confirmed: bool) -> tuple[Section, ...]:
         Fact(
             "angles",
             _("Axis positions"),
-            words(", ".join(f"{angle:g}°".replace("-", MINUS) for angle in axis["angles"])),
+            words(", ".join(f"{short(angle)}°" for angle in axis["angles"])),
         ),
         Fact("scatter_before", _("Standard deviation, measured"), width(axis["scatter_before"])),
         Fact("scatter_after", _("Standard deviation, optimised"), width(axis["scatter_after"])),

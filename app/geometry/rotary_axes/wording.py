@@ -13,7 +13,7 @@ from app.core.warning import CodedWarning
 from app.files.formats.rotary_protocol import Unread
 from app.geometry.rotary_axes.result_values import AXIS_OF, UNITS
 from app.language.i18n import _
-from app.language.numbers import MINUS, NO_BREAK_SPACE, NOTHING, mm, signed, um, um_limit
+from app.language.numbers import NO_BREAK_SPACE, NOTHING, mm, plain_um, short, signed, um, um_limit
 from app.language.times import in_sentence
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def entered(name: str, value: float | None) -> str:
 def plainly(name: str, value: float | None) -> str:
     """The same, without a sign where a value has none: scatter, greatest deviation, mean error."""
     if name in MEASURED or name in OPTIMISED or name.partition(".")[0] in ("greatest", "mean_error"):
-        return um_plain(value)
+        return plain_um(value)
     return written(name, value)
 
 
@@ -202,7 +202,7 @@ def sentence(run: KinematicsRun | Evaluated) -> str:
     axes = run.results.get("axes") or []
     parts = [
         _("{axis}: scatter {before} → {after}").format(
-            axis=axis["axis"], before=um_plain(axis["scatter_before"]), after=um_plain(axis["scatter_after"])
+            axis=axis["axis"], before=plain_um(axis["scatter_before"]), after=plain_um(axis["scatter_after"])
         )
         for axis in axes
         if axis["scatter_before"] is not None
@@ -226,17 +226,8 @@ def warning(warned: CodedWarning) -> str:
         "scatter_large": _("{name} = {value}: implausibly large scatter; {limit} is plausible."),
     }[warned.code]
     unit = "°" if UNITS.get(name) == "°" else "mm"
-    value_words = f"{value:.8g}".replace("-", MINUS) + f"{NO_BREAK_SPACE}{unit}"
+    value_words = f"{short(value, 8)}{NO_BREAK_SPACE}{unit}"
     return text.format(name=name, value=value_words, limit=limit(name, float(warned.values["limit"])))  # type: ignore[arg-type]
-
-
-def um_plain(length: float | None) -> str:
-    r"""A scatter or range in µm: no sign, it has none.
-
-    >>> um_plain(0.0134)
-    '13.4\xa0µm'
-    """
-    return NOTHING if length is None else f"{length * 1000:.1f}{NO_BREAK_SPACE}µm".replace("-", MINUS)
 
 
 def status_word(status: str) -> str:

@@ -9,7 +9,7 @@ from app.core.geometry.edges import Problem, Unfit
 from app.core.geometry.points import Degenerate, Reason
 from app.core.geometry.work_zero import MOST_TURNED, Notice, Shift
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, signed, um
+from app.language.numbers import fixed, mm, signed, um
 
 MICROMETRES_UP_TO = 10.0  # mm
 
@@ -63,10 +63,10 @@ def value_word(name: str) -> str:
 def size(zero: Any) -> str:
     """Diameter, or length × width; what is not known is a dash."""
     if zero.diameter is not None:
-        return f"⌀{mm(zero.diameter, 3)[:-3]}"
+        return f"⌀{fixed(zero.diameter, 3)}"
     if zero.length is None and zero.width is None:
         return "\N{EN DASH}"
-    return " × ".join("\N{EN DASH}" if length is None else mm(length, 3)[:-3] for length in (zero.length, zero.width))
+    return " × ".join("\N{EN DASH}" if length is None else fixed(length, 3) for length in (zero.length, zero.width))
 
 
 def numbers(at: Sequence[int]) -> str:

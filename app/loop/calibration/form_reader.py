@@ -7,6 +7,7 @@ from typing import Any
 from app.core.calibration import SECTIONS
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
+from app.language.numbers import as_typed
 from app.loop.calibration.places import PlaceRow
 from app.web.forms import by_field, length, whole
 
@@ -102,15 +103,6 @@ def plan(form: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def written(number: float | None) -> str:
-    """A number as one would type it.
-
-    >>> written(0.00530), written(199.852), written(2.0), written(None)
-    ('0.0053', '199.852', '2', '')
-    """
-    return "" if number is None else f"{number:.9f}".rstrip("0").rstrip(".")
-
-
 def filled_in(row: PlaceRow, limits: Mapping[str, float]) -> dict[str, str]:
     """Initial values of the forms: the last calibration of this place, else the limits of a characteristic that uses it.
 
@@ -121,12 +113,12 @@ def filled_in(row: PlaceRow, limits: Mapping[str, float]) -> dict[str, str]:
         settings = dict(row.last.record.settings) | {"gauge_size": row.last.record.size}
     names = (*NUMBERS, *RING_NUMBERS) if settings else LENGTHS
     values = settings or limits
-    begun = {name: written(values[name]) for name in names if values.get(name) is not None}
+    begun = {name: as_typed(values[name]) for name in names if values.get(name) is not None}
     begun |= {name: str(settings[name]) for name in KEPT if settings.get(name) is not None}
     if row.plan is not None:
         begun |= {
-            "due_parts": written(row.plan.due_parts),
-            "due_days": written(row.plan.due_days),
+            "due_parts": as_typed(row.plan.due_parts),
+            "due_days": as_typed(row.plan.due_days),
             "acceptance": row.plan.acceptance,
         }
     return {"weighting_factor": "1", "path_factor": "1", "acceptance": "accept"} | begun

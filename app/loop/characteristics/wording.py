@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 from app.core.parameters import BY_NAME, Field, Kind, Problem, Variant
 from app.errors import FieldError
 from app.language.i18n import _
+from app.language.numbers import typed_length
 from app.web.warnings import WarningOut
 
 
@@ -130,8 +131,7 @@ def millimetres(value: float) -> str:
     >>> millimetres(0.009), millimetres(0.0053333)
     ('0.0090 mm', '0.0053333 mm')
     """
-    whole, _point, decimals = f"{value:.9f}".partition(".")
-    return f"{whole}.{decimals.rstrip('0').ljust(4, '0')} mm"
+    return f"{typed_length(value)} mm"
 
 
 def named(name: str) -> str:

@@ -7,7 +7,7 @@ from typing import cast
 
 from app.errors import NotFound
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, um
+from app.language.numbers import mm, typed_length, um
 from app.loop.tables.tools import Tool
 from app.loop.tools import wording
 from app.loop.tools.actions import Verb
@@ -30,11 +30,6 @@ class Question:
     number_hint: str = ""
     number_needed: bool = False
     hidden: dict[str, str] = field(default_factory=dict)
-
-
-def plain(length: float) -> str:
-    """A length as one would type it: `-0.0061`."""
-    return f"{length:.9f}".rstrip("0").ljust(len(f"{length:.4f}"), "0")
 
 
 def offered(status: str) -> list[str]:
@@ -75,7 +70,7 @@ def about_correction(row: CorrectionRow, verb: str, counting_on: list[int], came
                 number="offset_after",
                 number_label=_("Offset the control shows"),
                 number_r=f"R10 = {c.tool_memory}",
-                number_hint="" if row.expected is None else plain(row.expected),
+                number_hint="" if row.expected is None else typed_length(row.expected),
             )
         case "approve":
             return Question(
@@ -151,7 +146,7 @@ def about_tool(row: ToolRow, machine: str, what: str) -> Question:
                 number="offset",
                 number_label=_("Offset"),
                 number_r=f"R10 = {number}",
-                number_value=plain(row.tool.offset),
+                number_value=typed_length(row.tool.offset),
                 number_needed=True,
             )
         case "change":
@@ -209,7 +204,7 @@ def about_average(row: AverageRow, machine: str) -> Question:
         number="empirical_value",
         number_label=_("Empirical value"),
         number_r=f"R11 = {memory.location}",
-        number_value=plain(memory.empirical_value),
+        number_value=typed_length(memory.empirical_value),
         number_needed=True,
     )
 

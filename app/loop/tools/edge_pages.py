@@ -10,6 +10,7 @@ from starlette.responses import RedirectResponse
 from app.access.deps import Operator, require
 from app.errors import Invalid
 from app.language.i18n import _
+from app.language.numbers import as_typed
 from app.loop.machines.queries import machine_named
 from app.loop.tools import confirmation, queries, wording
 from app.loop.tools.edge_schemas import ToolSettings
@@ -108,4 +109,4 @@ def _typed(row: queries.ToolRow) -> dict[str, str]:
     """The form as it would have been typed."""
     typed = {name: "" if getattr(row.tool, name) is None else str(getattr(row.tool, name)) for name in FIELDS}
     total = row.tool.planned_total
-    return typed | {"planned_total": "" if total is None else f"{total * 1000:.6f}".rstrip("0").rstrip(".")}
+    return typed | {"planned_total": "" if total is None else as_typed(total * 1000, 6)}

@@ -7,7 +7,7 @@ from app.core.spc.quoting import WhyNot
 from app.core.spc.refusal import Reason, Refused
 from app.core.spc.stability import Fired, Stability
 from app.language.i18n import _, ngettext
-from app.language.numbers import signed
+from app.language.numbers import fixed, signed
 from app.loop.summaries import wording as statistics
 from app.quality.capability.queries import Study
 
@@ -79,7 +79,7 @@ def window_of(study: Study) -> str:
 
 def index(value: float | None) -> str:
     """An index with the digits it deserves."""
-    return "–" if value is None else f"{value:.2f}".replace("-", "\N{MINUS SIGN}")
+    return fixed(value, 2)
 
 
 def between(found: Index | None) -> str:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
+from app.language.numbers import as_typed
 from app.quality.gauge_studies import table_reader
 from app.quality.gauge_studies.table_reader import Unreadable, number
 from app.web.forms import length
@@ -114,7 +115,7 @@ def pasted_grid(kind: str, form: Mapping[str, str]) -> tuple[dict[str, str], Gri
         single = [value for row in _numbers(body, first, 1) for value in row if value is not None]
         lines = -(-len(single) // PER_LINE)
         grid = shape(kind, typed | {"lines": str(lines)})
-        texts = [written(value) for value in single] + [""] * (lines * PER_LINE - len(single))
+        texts = [as_typed(value) for value in single] + [""] * (lines * PER_LINE - len(single))
         cells = [texts[at : at + PER_LINE] for at in range(0, len(texts), PER_LINE)]
         return typed | {"lines": str(lines), "table": ""}, grid._replace(cells=cells)
     columns = max(map(len, body))
@@ -128,7 +129,7 @@ def pasted_grid(kind: str, form: Mapping[str, str]) -> tuple[dict[str, str], Gri
         raise _wrong("table", words.format(columns=width, n=len(operators)))
     typed |= {"lines": str(len(body)), "trials": str(width // max(1, len(operators))), "table": ""}
     grid = shape(kind, typed)
-    cells = [[written(value) for value in row] + [""] * (width - len(row)) for row in values]
+    cells = [[as_typed(value) for value in row] + [""] * (width - len(row)) for row in values]
     return typed, grid._replace(names=names or grid.names, cells=cells)
 
 
@@ -218,14 +219,14 @@ def heading(grid: Grid, column: int) -> str:
 def grid_of(kind: str, rows: Sequence[Mapping[str, Any]]) -> tuple[dict[str, str], Grid]:
     """The grid, and the fields of its shape, that a stored study fills."""
     if kind in {"type_one", "bias"}:
-        texts = [written(value) for value in rows[0]["values"]]
+        texts = [as_typed(value) for value in rows[0]["values"]]
         lines = -(-len(texts) // PER_LINE)
         texts += [""] * (lines * PER_LINE - len(texts))
         cells = [texts[at : at + PER_LINE] for at in range(0, len(texts), PER_LINE)]
         return {"lines": str(lines)}, Grid([""] * lines, [], PER_LINE, cells)
     trials = max(len(row["values"]) for row in rows)
     if kind == "linearity":
-        names = [written(row["reference"]) for row in rows]
+        names = [as_typed(row["reference"]) for row in rows]
         cells = [_filled(row["values"], trials) for row in rows]
         return {"lines": str(len(rows)), "trials": str(trials)}, Grid(names, [], trials, cells)
     names = list(dict.fromkeys(str(row["part"]) for row in rows))
@@ -237,7 +238,7 @@ def grid_of(kind: str, rows: Sequence[Mapping[str, Any]]) -> tuple[dict[str, str
 
 
 def _filled(values: Sequence[float], trials: int) -> list[str]:
-    return [written(value) for value in values] + [""] * (trials - len(values))
+    return [as_typed(value) for value in values] + [""] * (trials - len(values))
 
 
 def even(grid: Grid) -> Grid:
@@ -255,19 +256,10 @@ def settings_of(form: Mapping[str, str]) -> dict[str, Any]:
 def typed_settings(settings: Mapping[str, Any]) -> dict[str, str]:
     """The settings as they would have been typed."""
     return {
-        name: written(value) if isinstance(value, float) else str(value)
+        name: as_typed(value) if isinstance(value, float) else str(value)
         for name in SETTINGS
         if (value := settings.get(name)) is not None
     }
-
-
-def written(value: float | None) -> str:
-    """A number as one would type it.
-
-    >>> written(40.00120), written(None)
-    ('40.0012', '')
-    """
-    return "" if value is None else f"{value:.9f}".rstrip("0").rstrip(".")
 
 
 def _wrong(field: str, message: str) -> Invalid:

@@ -12,6 +12,7 @@ from app.access.deps import Engineer, Operator, Viewer
 from app.core.spc.refusal import Refused
 from app.errors import Conflict, FieldError, InbandError, Invalid, NotFound
 from app.language.i18n import _
+from app.language.numbers import as_typed
 from app.loop.characteristics import queries as characteristics
 from app.loop.machines import queries as machines
 from app.loop.warnings.wording import sentence
@@ -96,8 +97,8 @@ def new_page(
     if characteristic:
         standing = characteristics.characteristic_named(session, characteristic)
         p = standing.parameters
-        typed |= {"machine": standing.machine.key, "tolerance": form_reader.written(p.tolerance_width)}
-        typed |= {"reference": form_reader.written(p.target)} if kind in {"type_one", "bias"} else {}
+        typed |= {"machine": standing.machine.key, "tolerance": as_typed(p.tolerance_width)}
+        typed |= {"reference": as_typed(p.target)} if kind in {"type_one", "bias"} else {}
     return _form(request, session, kind, typed, form_reader.shape(kind, typed))
 
 

@@ -10,7 +10,7 @@ from app.core.spc.gauge.linearity import Linearity
 from app.core.spc.gauge.single import Bias, TypeOne
 from app.core.spc.refusal import Refused
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, signed
+from app.language.numbers import fixed, plain_um, signed
 from app.loop.summaries import wording as statistics
 from app.quality.capability import wording as capabilities
 from app.quality.gauge_studies.evaluation import Evaluation
@@ -51,11 +51,6 @@ def kinds() -> list[tuple[str, str, str, str]]:
     ]  # fmt: skip
 
 
-def um(length: float, decimals: int = 2) -> str:
-    """A standard deviation or a width in µm, without sign."""
-    return f"{length * 1000:.{decimals}f}\N{NO-BREAK SPACE}µm"
-
-
 def share(value: float) -> str:
     """A percentage."""
     return "–" if isnan(value) else f"{value:.1f}\N{NARROW NO-BREAK SPACE}%"
@@ -94,7 +89,7 @@ def _type_one(found: TypeOne) -> list[Verdict]:
         verdicts.append(
             Verdict(
                 name,
-                f"{value:.2f}".replace("-", "\N{MINUS SIGN}"),
+                fixed(value, 2),
                 _("capable") if good else _("not capable"),
                 "steady" if good else "attention",
                 limit,
@@ -249,29 +244,29 @@ def advice(found: Advice) -> list[str]:
     """Steps that lead to the suggestion."""
     s = found.suggestion
     steps = [
-        _("One value repeats with {sigma} (one standard deviation).").format(sigma=um(found.repeatability, 3))
+        _("One value repeats with {sigma} (one standard deviation).").format(sigma=plain_um(found.repeatability, 3))
         if found.repeats == 1
         else _("One touch repeats with {sigma}; the mean of R27 = {n} touches with {mean}.").format(
-            sigma=um(found.repeatability, 3), n=found.repeats, mean=um(s.touching, 3)
+            sigma=plain_um(found.repeatability, 3), n=found.repeats, mean=plain_um(s.touching, 3)
         )
     ]
     if s.floor:
         steps.append(
             _("The error of the signal path is up to {floor}, which adds {sigma}; R33 is never below it.").format(
-                floor=um(s.floor, 3), sigma=um(s.signal_path, 3)
+                floor=plain_um(s.floor, 3), sigma=plain_um(s.signal_path, 3)
             )
         )
     if s.process is not None:
         steps.append(
             _("From part to part the last {n} readings scatter by {sigma}, wear and corrections taken out.").format(
-                n=found.looked_back, sigma=um(s.process, 3)
+                n=found.looked_back, sigma=plain_um(s.process, 3)
             )
         )
     else:
         steps.append(_("Too few readings yet for the scatter from part to part: R33 may have to be larger."))
     steps.append(
         _("Three of {sigma} hold 99.73 % of what chance does: {governs} decides.").format(
-            sigma=um(s.sigma, 3), governs=statistics.governs(s.governs)
+            sigma=plain_um(s.sigma, 3), governs=statistics.governs(s.governs)
         )
     )
     p = found.standing.parameters
@@ -282,7 +277,7 @@ def advice(found: Advice) -> list[str]:
         steps.append(
             _(
                 "With k = {k} chance moves the running average by {sigma} only: a smaller R33 may do, a replay shows it."
-            ).format(k=f"{p.weighting_factor:g}", sigma=um(averaged, 3))
+            ).format(k=f"{p.weighting_factor:g}", sigma=plain_um(averaged, 3))
         )
     if s.fits is False:
         steps.append(_("That is not below R34: reduce the scatter of the probe or the process first, or raise R34."))
@@ -303,7 +298,7 @@ def compared(found: Advice) -> str:
 
 def reason(number: int, found: Advice) -> str:
     """Default reason in the parameter form; the engineer may change it."""
-    return _("Gauge study {n}: repeatability {sigma}").format(n=number, sigma=um(found.repeatability, 3))
+    return _("Gauge study {n}: repeatability {sigma}").format(n=number, sigma=plain_um(found.repeatability, 3))
 
 
 def taken_from(source: Mapping[str, Any], characteristic: str | None) -> str:
@@ -349,4 +344,4 @@ def values(count: int) -> str:
 
 def size(value: float) -> str:
     """A value as it was entered, with four decimals at least."""
-    return mm(value, 4 if round(value, 4) == round(value, 7) else 6)[:-3]
+    return fixed(value, 4 if round(value, 4) == round(value, 7) else 6)

@@ -8,7 +8,7 @@ from app.core.hunting import GOAL, Hunting, LoopVerdict, Remedy
 from app.core.parameters import Parameters
 from app.core.wear import FEWEST, Fit, Forecast, Record, Towards
 from app.language.i18n import _, ngettext
-from app.language.numbers import NO_BREAK_SPACE, signed
+from app.language.numbers import NO_BREAK_SPACE, percent, plain_um, signed
 
 FAR = 10_000  # parts: further ahead nobody plans, and nothing goes on as it is
 
@@ -102,7 +102,9 @@ def wear_sentence(fit: Fit | None) -> str:
 
 def fit_note(fit: Fit) -> str:
     """Assumptions behind the numbers."""
-    sentences = [_("Scatter about the line {scatter} (one standard deviation).").format(scatter=_um(fit.scatter, 2))]
+    sentences = [
+        _("Scatter about the line {scatter} (one standard deviation).").format(scatter=plain_um(fit.scatter, 2))
+    ]
     if fit.correlation >= 0.05:
         sentences.append(
             _("Neighbours scatter alike ({rho}): the {n} readings count as {effective}.").format(
@@ -167,8 +169,8 @@ def hunting_sentence(data: Mapping[str, Any]) -> str:
         "n": data["readings"],
         "corrections": data["corrections"],
         "reversals": data["reversals"],
-        "size": _um(data["mean_size"], 1),
-        "scatter": _um(data["scatter"], 2),
+        "size": plain_um(data["mean_size"], 1),
+        "scatter": plain_um(data["scatter"], 2),
         "alone": _share(data["expected_corrections"]),
         "back": _share(data["expected_reversals"]),
         "excess": _share(data["excess"]),
@@ -205,12 +207,12 @@ def remedy_sentence(data: Mapping[str, Any], settings: Mapping[str, Any]) -> str
         return ""
     remedy = Remedy(**data["remedy"])
     values = {
-        "r33": _um(settings["zero_range"], 1),
-        "new_r33": _um(remedy.zero_range, 1),
+        "r33": plain_um(settings["zero_range"], 1),
+        "new_r33": plain_um(remedy.zero_range, 1),
         "k": f"{settings['weighting_factor']:g}",
         "new_k": f"{remedy.weighting_factor or 0:g}",
-        "r34": _um(settings["averaging_limit"], 1),
-        "new_r34": _um(remedy.averaging_limit, 1),
+        "r34": plain_um(settings["averaging_limit"], 1),
+        "new_r34": plain_um(remedy.averaging_limit, 1),
         "goal": _share(GOAL),
     }
     if remedy.averaging_limit is not None:
@@ -231,7 +233,7 @@ def remedy_sentence(data: Mapping[str, Any], settings: Mapping[str, Any]) -> str
     text = (text + _(" scatter alone would correct no more than {goal} of the readings.")).format(**values)
     if remedy.floor and remedy.zero_range == remedy.floor:
         text += " " + _("R33 is not below {floor}, the uncertainty of the probe's signal path.").format(
-            floor=_um(remedy.floor, 1)
+            floor=plain_um(remedy.floor, 1)
         )
     # The remedy is worked out for scatter alone. A loop that corrects less lets wear and warming up pass as well.
     return f"{text} " + _(
@@ -240,14 +242,8 @@ def remedy_sentence(data: Mapping[str, Any], settings: Mapping[str, Any]) -> str
     )
 
 
-def _um(length: float | None, decimals: int) -> str:
-    return "–" if length is None else f"{length * 1000:.{decimals}f}{NO_BREAK_SPACE}µm"
-
-
 def _share(share: float | None) -> str:
-    if share is None:
-        return "–"
-    return f"{share * 100:.1f}{NO_BREAK_SPACE}%" if share < 0.095 else f"{share * 100:.0f}{NO_BREAK_SPACE}%"
+    return percent(share, 1 if share is not None and share < 0.095 else 0)
 
 
 class WearWords:

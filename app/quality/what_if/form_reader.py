@@ -7,10 +7,10 @@ from urllib.parse import urlencode
 from app.core.parameters import Parameters
 from app.files.formats import cell_values
 from app.language.i18n import _
+from app.language.numbers import short
 from app.language.times import plant_zone
 from app.quality.what_if.queries import USUAL
 from app.quality.what_if.schemas import MapIn, WhatIfIn
-from app.quality.what_if.wording import short_um
 from app.web.forms import length, parsed
 
 FIELDS = ("k", "r33", "r34", "factor", "delay", "effect", "last", "from", "to", "goal")
@@ -132,8 +132,8 @@ def placeholders(today: Parameters, delay: int | None) -> dict[str, str]:
     """Current values, for empty fields."""
     return {
         "k": f"{today.weighting_factor:.6g}",
-        "r33": short_um(today.zero_range),
-        "r34": short_um(today.averaging_limit),
+        "r33": short(today.zero_range * 1000),
+        "r34": short(today.averaging_limit * 1000),
         "factor": f"{today.factor:.6g}",
         "delay": str(delay or 0),
     }

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from app.core.policy_map import Criterion, value_of
 from app.language.i18n import _
+from app.language.numbers import short
 from app.quality.what_if import form_reader, map_axes, wording
 from app.quality.what_if.queries import Cell, Map, Simulation
 
@@ -67,7 +68,7 @@ def view_of(made: Map, answer: Simulation, typed: Mapping[str, str], key: str) -
     ]
     cells = [cell._replace(edges=_edges(made.region.inside, at, wide)) for at, cell in enumerate(cells)]
     return MapView(
-        [wording.short_um(r33) for r33 in made.zero_ranges],
+        [short(r33 * 1000) for r33 in made.zero_ranges],
         [
             (f"{k:.6g}", cells[row * wide : (row + 1) * wide])
             for row, k in reversed(list(enumerate(made.weighting_factors)))
@@ -154,8 +155,8 @@ def _region(made: Map) -> str:
                 readings=made.today.inner,
                 low_k=f"{min(ks):.6g}",
                 high_k=f"{max(ks):.6g}",
-                low=wording.short_um(min(r33s)),
-                high=wording.short_um(max(r33s)),
+                low=short(min(r33s) * 1000),
+                high=short(max(r33s) * 1000),
             )
         )
     if made.region.calmest != made.region.best:

@@ -13,6 +13,7 @@ from app.access.deps import Caller, Operator, Viewer, require
 from app.core.policy_map import Criterion
 from app.errors import Conflict, InbandError, Invalid, TooManyRequests
 from app.language.i18n import _
+from app.language.numbers import short
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import Standing
 from app.quality.proof import queries as proof
@@ -97,8 +98,8 @@ def _what_if(
         criterion=criterion,
         averaging_limits=[
             (
-                wording.short_um(r34),
-                form_reader.address(key, typed, r34=wording.short_um(r34)) + "#map",
+                short(r34 * 1000),
+                form_reader.address(key, typed, r34=short(r34 * 1000)) + "#map",
                 _same(r34, answer),
             )
             for r34 in map_axes.averaging_limits(standing.parameters)

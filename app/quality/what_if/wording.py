@@ -11,7 +11,7 @@ from app.core.policy_map import Criterion, room, value_of
 from app.core.replay import Figures
 from app.core.spc.refusal import Reason, Refused
 from app.language.i18n import _, ngettext
-from app.language.numbers import NO_BREAK_SPACE, NOTHING, signed, um
+from app.language.numbers import NO_BREAK_SPACE, NOTHING, percent, plain_um, short, signed, um
 from app.loop.characteristics.wording import label
 from app.quality.capability import wording as capability
 from app.quality.capability.wording import named
@@ -21,24 +21,6 @@ if TYPE_CHECKING:
     from app.quality.what_if.proposals import ProposalRow
     from app.quality.what_if.queries import Likeness
     from app.quality.what_if.tool_history import ToolHistory
-
-
-def plain_um(length: float | None, decimals: int = 1) -> str:
-    r"""A length without sign in µm.
-
-    >>> plain_um(0.0011), plain_um(None)
-    ('1.1\xa0µm', '–')
-    """
-    return NOTHING if length is None else f"{length * 1000:.{decimals}f}{NO_BREAK_SPACE}µm"
-
-
-def short_um(length: float) -> str:
-    """A limit in µm with no more decimals than it needs, without its unit.
-
-    >>> short_um(0.0053), short_um(0.004)
-    ('5.3', '4')
-    """
-    return f"{length * 1000:.6g}"
 
 
 def likeness(found: Likeness) -> str:
@@ -61,15 +43,6 @@ def likeness(found: Likeness) -> str:
             off=plain_um(found.off, 2), same=percent(found.same)
         )
     )
-
-
-def percent(share: float | None) -> str:
-    r"""A share of 1 in whole per cent.
-
-    >>> percent(0.956)
-    '96\xa0%'
-    """
-    return NOTHING if share is None else f"{100 * share:.0f}{NO_BREAK_SPACE}%"
 
 
 def assumed(share: float, delay: int) -> str:
@@ -255,7 +228,7 @@ def setting(name: str, value: float) -> str:
     ('±2.4\xa0µm', '2.5')
     """
     if name in {"zero_range", "averaging_limit"}:
-        return f"±{short_um(value)}{NO_BREAK_SPACE}µm"
+        return f"±{short(value * 1000)}{NO_BREAK_SPACE}µm"
     return f"{value:+.6g}".replace("-", "−") if name == "factor" else f"{value:.6g}"
 
 

@@ -224,6 +224,6 @@ def _form(typed: Mapping[str, str], errors: Mapping[str, str]) -> dict[str, Any]
         "factors": parameter_form.factor_choices(),
         "diagram": parameter_form.diagram(typed),
         "sentences": parameter_form.sentences(),
-        "short": parameter_form.short,
+        "short": parameter_form.short_limit,
         "micrometres": lambda name: parameter_form.micrometres(name, typed.get(name, "")),
     }

@@ -10,6 +10,7 @@ from app.core.number_text import number_or_none, plain
 from app.core.parameters import BY_NAME, FIELDS, Field, Kind, mean_nominal
 from app.core.programs.lines import written
 from app.language.i18n import _
+from app.language.numbers import short, um_limit
 from app.loop.characteristics.wording import choice, explanation, label, order_sentence
 
 __all__ = ["choice", "diagram", "parameters_from", "sentences", "typed_defaults", "typed_from", "typed_partly"]
@@ -201,10 +202,9 @@ def micrometres(name: str, text: str) -> str:
     if value is None:
         return ""
     sign = "" if name not in DRAWING else "\N{MINUS SIGN}" if value < 0 else "+"
-    return f"{sign}{abs(value) * 1000:.6g}\N{NO-BREAK SPACE}µm"
+    return f"{sign}{short(abs(value) * 1000)}\N{NO-BREAK SPACE}µm"
 
 
-def short(limit: float) -> str:
+def short_limit(limit: float) -> str:
     """A limit as the diagram says it: four digits, in mm from 1 mm on."""
-    size = abs(limit)
-    return f"{size:.4g}\N{NO-BREAK SPACE}mm" if size >= 1 else f"{size * 1000:.4g}\N{NO-BREAK SPACE}µm"
+    return um_limit(abs(limit), "", 4)

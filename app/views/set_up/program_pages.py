@@ -125,7 +125,7 @@ def _page(
         longest=MOST_CHARACTERS,
         diagram=parameter_form.diagram(parameter_form.typed_partly(parameters)) if judging else None,
         sentences=[],
-        short=parameter_form.short,
+        short=parameter_form.short_limit,
     )
 
 

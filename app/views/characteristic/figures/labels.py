@@ -6,7 +6,7 @@ from typing import Any
 
 from app.core.decision.limits import HasLimits
 from app.language.i18n import _
-from app.language.numbers import MINUS, NO_BREAK_SPACE, NOTHING
+from app.language.numbers import MINUS, NO_BREAK_SPACE, NOTHING, um_limit
 from app.views.characteristic.figures.scale import Band, Scale, ZoneScale, bands
 from app.web.theme import Palette
 
@@ -161,11 +161,7 @@ def _note(y: float, text: str, colour: str, size: int) -> dict[str, Any]:
 
 
 def _signed_limit(deviation: float) -> str:
-    sign = MINUS if deviation < 0 else "+"
-    size = abs(deviation)
-    if size >= 1:
-        return f"{sign}{size:.6g}{NO_BREAK_SPACE}mm"
-    return f"{sign}{size * 1000:.6g}{NO_BREAK_SPACE}µm"
+    return um_limit(abs(deviation), MINUS if deviation < 0 else "+")
 
 
 def size_ticks(limits: HasLimits, ruler: Scale, centre: float | None) -> tuple[list[float], list[str]]:
