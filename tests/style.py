@@ -1,4 +1,7 @@
-"""Style of `app/` that no linter knows: lengths that may only shrink, and summaries that are no questions. For `make lint`."""
+"""Style that no linter knows: lengths of `app/` that may only shrink, summaries that are no questions, width of templates.
+
+For `make lint`.
+"""
 
 import ast
 import sys
@@ -7,7 +10,9 @@ from pathlib import Path
 LONGEST_FUNCTION = 99  # lines, from `def` to the end, docstring included
 LONGEST_FILE = 543
 QUESTIONS = {"What", "Whether", "How", "Which", "Who", "Whose", "Where", "When", "Why"}
+WIDEST_TEMPLATE = 160  # columns
 APP = Path(__file__).resolve().parents[1] / "app"
+TEMPLATES = APP.parent / "frontend" / "templates"
 
 
 def main() -> int:
@@ -41,6 +46,14 @@ def main() -> int:
                         f"{place}: a summary is no question ({words[0]} …): name the thing, or say what it does.\n"
                     )
                     status = 1
+    for template in TEMPLATES.rglob("*.html"):
+        for number, line in enumerate(template.read_text(encoding="utf-8").splitlines(), 1):
+            if len(line) > WIDEST_TEMPLATE:
+                place = f"{template.relative_to(APP.parent)}:{number}"
+                sys.stderr.write(
+                    f"{place}: {len(line)} columns; no line of a template is wider than {WIDEST_TEMPLATE}.\n"
+                )
+                status = 1
     return status
 
 

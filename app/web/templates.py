@@ -21,6 +21,7 @@ from app.errors import InbandError
 from app.language import i18n, numbers, times
 from app.web import states, theme
 from app.web.assets import Assets
+from app.web.paging import address
 from app.web.request_log import note_reason
 
 TEMPLATE_DIR = Path(__file__).resolve().parents[2] / "frontend" / "templates"
@@ -59,6 +60,7 @@ def environment() -> Environment:
         ago=numbers.ago,
     )
     env.globals.update(
+        address=address,
         asset=assets().url,
         assets=assets(),
         theme=theme,
