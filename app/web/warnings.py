@@ -41,7 +41,7 @@ def warnings_out(warnings: Iterable[CodedWarning], sentence: Callable[[CodedWarn
     return [WarningOut(code=warning.code, text=sentence(warning), field=warning.field) for warning in warnings]
 
 
-class AcknowledgeIn(Body):
+class WarningsAcknowledgeIn(Body):
     """Reason for accepting a result that may be wrong."""
 
     model_config = ConfigDict(json_schema_extra={"example": {"reason": "the fixture stands at 30 degrees on purpose"}})

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.files.documents.content import Fact, Report, Section, Value
 
 
-class ValueOut(BaseModel):
+class ReportValueOut(BaseModel):
     """One value: the plain number or text, its unit, and the words of the page."""
 
     value: float | int | str | None = Field(description="A number in `unit`; moments in RFC 3339; else the text.")
@@ -15,13 +15,13 @@ class ValueOut(BaseModel):
     text: str
 
     @classmethod
-    def of(cls, value: Value, report: Report) -> "ValueOut":
+    def of(cls, value: Value, report: Report) -> "ReportValueOut":
         """As the report words it."""
         plain = value.value if value.number is None else value.number
         return cls(value=plain, unit=value.unit, text=report.words(value))
 
 
-class FactOut(ValueOut):
+class FactOut(ReportValueOut):
     """A value with its name and R number; `low` and `high` are the ends of its confidence interval."""
 
     key: str
@@ -35,7 +35,7 @@ class FactOut(ValueOut):
     def of_fact(cls, fact: Fact, report: Report) -> "FactOut":
         """With everything that stands beside it."""
         return cls(
-            **ValueOut.of(fact.value, report).model_dump(),
+            **ReportValueOut.of(fact.value, report).model_dump(),
             key=fact.key,
             name=fact.name,
             code=fact.code,
@@ -52,11 +52,11 @@ class ColumnOut(BaseModel):
     name: str
 
 
-class TableOut(BaseModel):
+class ReportTableOut(BaseModel):
     """Rows of values, one for each column; `more` rows are left out, the oldest."""
 
     columns: list[ColumnOut]
-    rows: list[list[ValueOut]]
+    rows: list[list[ReportValueOut]]
     more: int
 
 
@@ -68,7 +68,7 @@ class SectionOut(BaseModel):
     sentences: list[str]
     warnings: list[str] = Field(description="What the numbers should not be read without.")
     facts: list[FactOut]
-    table: TableOut | None
+    table: ReportTableOut | None
     charts: list[str] = Field(description="Which charts stand here on the page and in the PDF.")
 
     @classmethod
@@ -83,9 +83,9 @@ class SectionOut(BaseModel):
             facts=[FactOut.of_fact(fact, report) for fact in section.facts],
             table=None
             if table is None
-            else TableOut(
+            else ReportTableOut(
                 columns=[ColumnOut(key=column.key, name=column.name) for column in table.columns],
-                rows=[[ValueOut.of(value, report) for value in row] for row in table.rows],
+                rows=[[ReportValueOut.of(value, report) for value in row] for row in table.rows],
                 more=table.more,
             ),
             charts=[picture.key for picture in section.pictures],

@@ -18,7 +18,7 @@ from app.errors import Conflict, FieldError, Invalid
 from app.geometry.alignment import queries
 from app.geometry.alignment.evaluation import NEEDS, Values, frame_values, middle_of, solved, warnings_of
 from app.geometry.alignment.queries import subject_of
-from app.geometry.alignment.schemas import AlignmentIn, PalletIn, RecomputeIn
+from app.geometry.alignment.schemas import AlignmentIn, AlignmentRecomputeIn, PalletIn
 from app.geometry.alignment.tables import Alignment
 from app.language.i18n import _
 from app.loop.machines.queries import lock_machines
@@ -27,7 +27,7 @@ from app.loop.readings import queries as reading_queries
 from app.loop.tables.machines import Machine
 from app.loop.warnings import actions as warned
 from app.loop.warnings.queries import acknowledgement, bounds_of
-from app.web.warnings import AcknowledgeIn
+from app.web.warnings import WarningsAcknowledgeIn
 
 ASKED_ONCE = {"machine", "kind", "method", "name", "part", "key", "aligned_at", "characteristics"}
 
@@ -176,13 +176,13 @@ def warned_of(session: Session, alignment: Alignment) -> bool:
     return bool(warnings_of(alignment, machine)) and acknowledgement(session, machine.id, subject_of(alignment)) is None
 
 
-def acknowledge(session: Session, alignment: Alignment, body: AcknowledgeIn, caller: Caller) -> None:
+def acknowledge(session: Session, alignment: Alignment, body: WarningsAcknowledgeIn, caller: Caller) -> None:
     """Take an alignment as it is, although there are warnings. Raises `Conflict`."""
     machine = session.get_one(Machine, alignment.machine_id)
     warned.acknowledge(session, machine, subject_of(alignment), warnings_of(alignment, machine), body.reason, caller)
 
 
-def recompute(session: Session, alignment: Alignment, body: RecomputeIn, caller: Caller) -> Alignment:
+def recompute(session: Session, alignment: Alignment, body: AlignmentRecomputeIn, caller: Caller) -> Alignment:
     """The same touches once more; a new alignment, and the first one stays on record. Raises `Invalid`."""
     machine = session.get_one(Machine, alignment.machine_id)
     lock_machines(session, [machine.id])

@@ -108,7 +108,7 @@ class Advice(BaseModel):
     text: Annotated[str, Field(description="For people.")]
 
 
-class TableOut(BaseModel):
+class RotaryTableOut(BaseModel):
     """Command for a rotary table."""
 
     axis: str
@@ -159,7 +159,7 @@ class AlignmentOut(BaseModel):
         Field(description="How far small angles would have put a touch from where the exact solution does."),
     ]
     off: Annotated[float | None, Field(description="Of two holes: distance found less nominal distance.")]
-    table: TableOut | None
+    table: RotaryTableOut | None
     warnings: Warnings
     acknowledged: Acknowledged
     program: Annotated[
@@ -245,7 +245,7 @@ def alignment_out(session: Session, alignment: Alignment) -> AlignmentOut:
     table = None
     if (turned := turned_table(alignment)) is not None:
         left = FrameText("", turned.motion).angles
-        table = TableOut(
+        table = RotaryTableOut(
             axis=inputs["table"]["axis"],
             turn=round(turned.turn, 10),
             position=round(turned.position, 10),

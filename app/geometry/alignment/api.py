@@ -8,13 +8,13 @@ from app.access.deps import AnyCaller, Operator
 from app.db.engine import Database
 from app.geometry.alignment import actions, queries
 from app.geometry.alignment.answers import AlignmentOut, alignment_out
-from app.geometry.alignment.schemas import AlignmentIn, PalletIn, RecomputeIn
+from app.geometry.alignment.schemas import AlignmentIn, AlignmentRecomputeIn, PalletIn
 from app.loop.machines.queries import machine_named
 from app.loop.readings import actions as readings
 from app.web.api import MachineFilter, api_router, problems, sent_again
 from app.web.deps import SessionDep
 from app.web.fields import Cursor, Limit, Page, page_of
-from app.web.warnings import AcknowledgeIn
+from app.web.warnings import WarningsAcknowledgeIn
 
 router = api_router("alignments")
 Number = Annotated[int, Path(description="Number of the alignment.", examples=[7])]
@@ -75,7 +75,9 @@ def get_alignment(session: SessionDep, caller: AnyCaller, number: Number) -> Ali
 
 
 @router.post("/alignments/{number}/acknowledge", responses=problems(404, 409))
-def acknowledge_alignment(session: SessionDep, caller: Operator, number: Number, body: AcknowledgeIn) -> AlignmentOut:
+def acknowledge_alignment(
+    session: SessionDep, caller: Operator, number: Number, body: WarningsAcknowledgeIn
+) -> AlignmentOut:
     """Take it as it is, although there are warnings: from now on its program text runs. Who, when and why is kept.
 
     409 where there is no warning, or somebody was first.
@@ -86,6 +88,8 @@ def acknowledge_alignment(session: SessionDep, caller: Operator, number: Number,
 
 
 @router.post("/alignments/{number}/recompute", status_code=201, responses=problems(404, 409))
-def recompute_alignment(session: SessionDep, caller: Operator, number: Number, body: RecomputeIn) -> AlignmentOut:
+def recompute_alignment(
+    session: SessionDep, caller: Operator, number: Number, body: AlignmentRecomputeIn
+) -> AlignmentOut:
     """Compute the same touches once more, by another method or without some of them; the result is another alignment."""
     return alignment_out(session, actions.recompute(session, queries.alignment(session, number), body, caller))

@@ -14,7 +14,7 @@ from app.db.engine import Database
 from app.errors import Conflict, FieldError, InbandError, Invalid, NotFound
 from app.geometry.alignment import actions, form_reader, queries, wording
 from app.geometry.alignment.answers import alignment_out, program_of, stop_of
-from app.geometry.alignment.schemas import AlignmentIn, PalletIn, RecomputeIn
+from app.geometry.alignment.schemas import AlignmentIn, AlignmentRecomputeIn, PalletIn
 from app.geometry.alignment.tables import Alignment
 from app.language.i18n import _
 from app.loop.machines import queries as machines
@@ -26,7 +26,7 @@ from app.web.fields import LARGEST_ID
 from app.web.forms import parsed
 from app.web.paging import address, part_of
 from app.web.templates import page
-from app.web.warnings import AcknowledgeIn
+from app.web.warnings import WarningsAcknowledgeIn
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 25
@@ -256,7 +256,9 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
     alignment = queries.alignment(session, number)
     try:
         with session.begin_nested():
-            actions.acknowledge(session, alignment, parsed(AcknowledgeIn, {"reason": form.get("reason", "")}), caller)
+            actions.acknowledge(
+                session, alignment, parsed(WarningsAcknowledgeIn, {"reason": form.get("reason", "")}), caller
+            )
     except (Invalid, Conflict) as error:
         return _alignment(request, session, caller, alignment, unacknowledged=error)
     return RedirectResponse(f"/alignments/{number}", 303)
@@ -268,7 +270,9 @@ def recompute(request: Request, session: SessionDep, caller: Operator, number: i
     alignment = queries.alignment(session, number)
     try:
         with session.begin_nested():
-            recomputed = actions.recompute(session, alignment, parsed(RecomputeIn, form_reader.again(form)), caller)
+            recomputed = actions.recompute(
+                session, alignment, parsed(AlignmentRecomputeIn, form_reader.again(form)), caller
+            )
     except (Invalid, Conflict) as error:
         return _alignment(request, session, caller, alignment, form, error)
     return RedirectResponse(f"/alignments/{recomputed.id}", 303)

@@ -65,7 +65,7 @@ ALIGNMENT: dict[str, JsonValue] = {
 }
 
 
-class TouchIn(Body):
+class AlignmentPointIn(Body):
     """Nominal place of a face, its normal, and the probed point or its deviation along the normal."""
 
     nominal: Annotated[Vector, Field(description="Nominal point in the part's coordinates.")]
@@ -94,7 +94,7 @@ class TouchIn(Body):
         return value
 
     @model_validator(mode="after")
-    def _one_finding(self) -> "TouchIn":
+    def _one_finding(self) -> "AlignmentPointIn":
         if (self.deviation is None) == (self.measured is None):
             raise PydanticCustomError("finding", _("say deviation or measured, one of them"))
         return self
@@ -152,7 +152,9 @@ class AlignmentIn(Body):
     ] = "points"
     name: Annotated[Text200 | None, Field(description="What was aligned: part, pallet, set-up.")] = None
     part: Annotated[Text200 | None, Field(max_length=128, description="Serial number.")] = None
-    touches: Annotated[list[TouchIn] | None, Field(max_length=MOST_TOUCHES, description="Of the kind `points`.")] = None
+    touches: Annotated[
+        list[AlignmentPointIn] | None, Field(max_length=MOST_TOUCHES, description="Of the kind `points`.")
+    ] = None
     tip: Annotated[
         float,
         Field(
@@ -222,7 +224,7 @@ class PalletIn(Body):
     key: Key | None = None
 
 
-class RecomputeIn(Body):
+class AlignmentRecomputeIn(Body):
     """The same touches once more: by another method, or without some of them. The first result stays on record."""
 
     model_config = ConfigDict(

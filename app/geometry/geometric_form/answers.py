@@ -51,7 +51,7 @@ FORM_OUT: dict[str, JsonValue] = {
 }
 
 
-class VerdictOut(BaseModel):
+class FormVerdictOut(BaseModel):
     """Verdict on the tolerance. sure: the limit lies outside the uncertainty, which is known."""
 
     code: Annotated[str, Field(description="good, good_unsure, bad_unsure or bad.")]
@@ -60,7 +60,7 @@ class VerdictOut(BaseModel):
     text: Annotated[str, Field(description="For people.")]
 
 
-class ValueOut(BaseModel):
+class FormDeviationOut(BaseModel):
     """A deviation by one method; uncertainty: expanded, k = 2, where it can be told."""
 
     method: Annotated[
@@ -111,8 +111,8 @@ class FormOut(BaseModel):
     value: Annotated[float, Field(description="The deviation by that method.")]
     uncertainty: Annotated[float | None, Field(description="Expanded, k = 2; from the probe's repeatability.")]
     tolerance: float | None
-    verdict: VerdictOut | None
-    values: list[ValueOut]
+    verdict: FormVerdictOut | None
+    values: list[FormDeviationOut]
     suspects: list[SuspectOut]
     warnings: Warnings
     tested: Annotated[bool, Field(description="There were touches enough to tell a bad one.")]
@@ -139,7 +139,7 @@ def form_out(row: FormRow, reading: ResultReading | None = None) -> FormOut:
     result = evaluation.result
     verdict = None
     if evaluation.verdict is not None:
-        verdict = VerdictOut(
+        verdict = FormVerdictOut(
             code=evaluation.verdict,
             good=evaluation.verdict.startswith("good"),
             sure=evaluation.uncertainty is not None and not evaluation.verdict.endswith("unsure"),
@@ -155,7 +155,7 @@ def form_out(row: FormRow, reading: ResultReading | None = None) -> FormOut:
         uncertainty=evaluation.uncertainty,
         tolerance=measurement.tolerance,
         verdict=verdict,
-        values=[ValueOut(**value) for value in result["values"]],
+        values=[FormDeviationOut(**value) for value in result["values"]],
         suspects=[SuspectOut(**suspect, text=wording.suspicion(suspect)) for suspect in result["suspects"]],
         warnings=warnings_out(warnings_of(measurement.kind, measurement.given, result, row.plausible_shift), sentence),
         tested=result["tested"],

@@ -10,7 +10,7 @@ from app.errors import NotFound
 from app.geometry.geometric_form import actions, figures, queries, wording
 from app.geometry.geometric_form.answers import FormOut, form_out
 from app.geometry.geometric_form.queries import FormRow
-from app.geometry.geometric_form.schemas import FormIn, RecomputeIn
+from app.geometry.geometric_form.schemas import FormIn, FormRecomputeIn
 from app.language.i18n import _
 from app.loop.machines.queries import machine_keys_by_id, machine_named
 from app.web.api import FIGURE, MachineFilter, MachineKey, Theme, api_router, problems, sent_again
@@ -79,7 +79,7 @@ def get_form_measurement(session: SessionDep, caller: AnyCaller, number: Number)
 
 
 @router.post("/forms/{number}/recompute", status_code=201, responses=problems(404))
-def recompute_form(session: SessionDep, caller: AnyCaller, number: Number, body: RecomputeIn) -> FormOut:
+def recompute_form(session: SessionDep, caller: AnyCaller, number: Number, body: FormRecomputeIn) -> FormOut:
     """Evaluate the stored touches anew by the present code; what was found before stays on record."""
     caller.must_somewhere("operator")
     row = queries.form(session, number)

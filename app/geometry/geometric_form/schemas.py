@@ -47,7 +47,7 @@ FORM: dict[str, JsonValue] = {
 }
 
 
-class SectionIn(Body):
+class FormSectionIn(Body):
     """One section of a bore or shaft: its touches, or its centre as the control says it."""
 
     height: Annotated[Length | None, Field(description="Z at which it was taken.")] = None
@@ -71,7 +71,7 @@ class SectionIn(Body):
 class TouchedIn(Body):
     """Probed points of a datum: a bore or shaft in sections, or a surface in points."""
 
-    sections: Annotated[list[SectionIn], Field(default_factory=list, max_length=MOST_SECTIONS)]
+    sections: Annotated[list[FormSectionIn], Field(default_factory=list, max_length=MOST_SECTIONS)]
     points: Annotated[list[Point], Field(default_factory=list, max_length=MOST_TOUCHES)]
 
 
@@ -103,7 +103,7 @@ class FormIn(Body):
         ),
     ] = None
     sections: Annotated[
-        list[SectionIn], Field(default_factory=list, max_length=MOST_SECTIONS, description="Of a bore or shaft.")
+        list[FormSectionIn], Field(default_factory=list, max_length=MOST_SECTIONS, description="Of a bore or shaft.")
     ]
     points: Annotated[
         list[Point],
@@ -194,7 +194,7 @@ class FormIn(Body):
         _depth(self.datum.points, 3, "datum.points")
 
 
-def _touches(sections: Sequence[SectionIn]) -> int:
+def _touches(sections: Sequence[FormSectionIn]) -> int:
     return sum(len(section.touches) or 1 for section in sections)
 
 
@@ -208,7 +208,7 @@ def _depth(points: Sequence[Sequence[float]], coordinates: int, name: str) -> No
         )
 
 
-class RecomputeIn(Body):
+class FormRecomputeIn(Body):
     """Reason for computing again."""
 
     model_config = ConfigDict(json_schema_extra={"example": {"reason": "new version"}})

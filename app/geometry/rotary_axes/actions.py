@@ -22,7 +22,7 @@ from app.geometry.rotary_axes.evaluation import evaluate
 from app.geometry.rotary_axes.outcome import Evaluated, Limits
 from app.geometry.rotary_axes.queries import RunRow
 from app.geometry.rotary_axes.result_values import AXIS_OF, as_reading, errors_of, to_enter, values_of
-from app.geometry.rotary_axes.schemas import PlanIn, RunIn
+from app.geometry.rotary_axes.schemas import KinematicsPlanIn, RunIn
 from app.geometry.rotary_axes.tables import KinematicsBackup, KinematicsDecision, KinematicsPlan, KinematicsRun
 from app.language.i18n import _
 from app.language.times import plant_zone
@@ -297,7 +297,7 @@ def recompute(session: Session, number: int) -> tuple[RunRow, Evaluated]:
     return row, evaluate(body, Limits(**row.run.limits))
 
 
-def set_plan(session: Session, machine: Machine, body: PlanIn, caller: Caller) -> KinematicsPlan:
+def set_plan(session: Session, machine: Machine, body: KinematicsPlanIn, caller: Caller) -> KinematicsPlan:
     """Set the limits of a machine's runs. Raises `Invalid` for a characteristic that this machine has not."""
     lock_machines(session, [machine.id])
     reading_queries.entries_for_results(session, machine.id, body.characteristics)

@@ -151,7 +151,7 @@ class AxisOut(BaseModel):
     noise: Annotated[float | None, Field(description="Standard deviation of one coordinate of a centre.")]
 
 
-class ReasonOut(BaseModel):
+class RunReasonOut(BaseModel):
     """Reason for the outcome."""
 
     code: Annotated[str, Field(description="measured, max_modification, max_dev_cal_ball.")]
@@ -186,7 +186,7 @@ class RunOut(BaseModel):
             "warnings; confirmed; measured; entered on the control."
         ),
     ]
-    reason: ReasonOut
+    reason: RunReasonOut
     measured_at: datetime
     received_at: datetime
     by: str
@@ -221,7 +221,7 @@ def run_out(row: RunRow) -> RunOut:
         head=run.head or None,
         **{name: said_of(run).get(name) for name in ("program", "tool", "kinematics", "mode")},
         status=row.status,  # type: ignore[arg-type] # `RunRow.status` makes no others
-        reason=ReasonOut(code=run.reason["code"], text=wording.sentence(run)),
+        reason=RunReasonOut(code=run.reason["code"], text=wording.sentence(run)),
         measured_at=run.measured_at,
         received_at=run.received_at,
         by=run.actor,

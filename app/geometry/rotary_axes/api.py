@@ -20,7 +20,7 @@ from app.geometry.rotary_axes.drift_answers import (
     machine_state,
 )
 from app.geometry.rotary_axes.result_values import UNITS
-from app.geometry.rotary_axes.schemas import EnterIn, PlanIn, RestoreIn, RunIn
+from app.geometry.rotary_axes.schemas import EnterIn, KinematicsPlanIn, RestoreIn, RunIn
 from app.language.i18n import _
 from app.loop.machines.queries import machine_named
 from app.loop.readings import actions as readings
@@ -202,7 +202,9 @@ def get_kinematics(
 
 
 @router.put("/machines/{machine}/kinematics", responses=problems(404))
-def plan_kinematics(session: SessionDep, caller: Engineer, machine: MachineKey, body: PlanIn) -> MachineKinematicsOut:
+def plan_kinematics(
+    session: SessionDep, caller: Engineer, machine: MachineKey, body: KinematicsPlanIn
+) -> MachineKinematicsOut:
     """Set maxModification, maxDevCalBall, the ball, limits of the drift, and which values become readings.
 
     A value beyond its limit raises the alarm `kinematics_drift`; the next run inside it ends it.

@@ -17,7 +17,7 @@ from app.files.documents.drawing import drawing_of, svg
 from app.files.documents.files import MEDIA_TYPES
 from app.geometry.rotary_axes import actions, confirmation, form_reader, queries, run_history
 from app.geometry.rotary_axes.protocol import protocol_of
-from app.geometry.rotary_axes.schemas import EnterIn, PlanIn
+from app.geometry.rotary_axes.schemas import EnterIn, KinematicsPlanIn
 from app.geometry.rotary_axes.view import COMMON, ON_PAGE, machine_url, others_of, shown_machine, shown_run
 from app.language.i18n import _
 from app.loop.machines.queries import machine_named
@@ -67,7 +67,7 @@ def plan(request: Request, session: SessionDep, caller: Engineer, machine: str, 
     machine_row = machine_named(session, machine)
     try:
         with session.begin_nested():
-            actions.set_plan(session, machine_row, parsed(PlanIn, form_reader.plan(form)), caller)
+            actions.set_plan(session, machine_row, parsed(KinematicsPlanIn, form_reader.plan(form)), caller)
     except Invalid as error:
         return shown_machine(request, session, caller, machine, form=form, error=error)
     return RedirectResponse(machine_url(machine_row.key, done="plan"), 303)

@@ -230,7 +230,7 @@ class RestoreIn(Body):
     ] = None
 
 
-class PlanIn(Body):
+class KinematicsPlanIn(Body):
     """Limits of a machine's runs; what is left out is not limited."""
 
     model_config = ConfigDict(

@@ -18,7 +18,7 @@ from app.errors import Conflict, FieldError, Invalid
 from app.geometry.work_zero import queries, wording
 from app.geometry.work_zero.alarm_kinds import SHIFTED
 from app.geometry.work_zero.evaluation import evaluated, warnings_in, warnings_of
-from app.geometry.work_zero.schemas import FixtureIn, RecomputeIn, ZeroIn
+from app.geometry.work_zero.schemas import FixtureIn, ZeroIn, ZeroRecomputeIn
 from app.geometry.work_zero.tables import Fixture, WorkZero
 from app.language.i18n import _
 from app.loop.alarms import actions as alarms
@@ -27,7 +27,7 @@ from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
 from app.loop.tables.machines import Machine
 from app.loop.warnings import actions as warned
-from app.web.warnings import AcknowledgeIn
+from app.web.warnings import WarningsAcknowledgeIn
 
 ASKED_ONCE = {"machine", "key", "touched_at", "fixture", "part", "work_offset", "kind", "characteristics"}
 RESULTS = ("x", "y", "z", "diameter", "length", "width")
@@ -72,7 +72,7 @@ def find(session: Session, machine: Machine, body: ZeroIn, caller: Caller) -> Cr
     return Created(_keep(session, machine, zero, body.characteristics, caller))
 
 
-def acknowledge(session: Session, zero: WorkZero, body: AcknowledgeIn, caller: Caller) -> None:
+def acknowledge(session: Session, zero: WorkZero, body: WarningsAcknowledgeIn, caller: Caller) -> None:
     """Take a work zero as it is, although there are warnings. Raises `Conflict`."""
     machine = session.get_one(Machine, zero.machine_id)
     warned.acknowledge(session, machine, queries.subject_of(zero), warnings_of(zero, machine), body.reason, caller)
@@ -101,7 +101,7 @@ def _sent_before(
     )
 
 
-def recompute(session: Session, zero: WorkZero, body: RecomputeIn, caller: Caller) -> WorkZero:
+def recompute(session: Session, zero: WorkZero, body: ZeroRecomputeIn, caller: Caller) -> WorkZero:
     """The same touches once more; a new zero that stands in place of this one in the history of its fixture."""
     machine = session.get_one(Machine, zero.machine_id)
     lock_machines(session, [machine.id])

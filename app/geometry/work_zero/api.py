@@ -19,7 +19,7 @@ from app.geometry.work_zero.answers import (
     zeros_out,
 )
 from app.geometry.work_zero.figures import Mark
-from app.geometry.work_zero.schemas import FixtureIn, RecomputeIn, ZeroIn
+from app.geometry.work_zero.schemas import FixtureIn, ZeroIn, ZeroRecomputeIn
 from app.loop.machines.queries import machine_named, machine_of
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
 from app.loop.readings import actions as readings
@@ -27,7 +27,7 @@ from app.web.api import FIGURE, MachineFilter, MachineKey, Theme, api_router, pl
 from app.web.deps import SessionDep
 from app.web.downloads import download
 from app.web.fields import Control, Cursor, Limit, Page, Slug, page_of
-from app.web.warnings import AcknowledgeIn
+from app.web.warnings import WarningsAcknowledgeIn
 
 router = api_router("work zeros")
 FixtureKey = Annotated[str, Path(description="The fixture, as work zeros name it.", examples=["vice-left"])]
@@ -158,7 +158,9 @@ def write_work_zero(
 
 
 @router.post("/work-zeros/{number}/acknowledge", responses=problems(404, 409))
-def acknowledge_work_zero(session: SessionDep, caller: Operator, number: Number, body: AcknowledgeIn) -> ZeroOut:
+def acknowledge_work_zero(
+    session: SessionDep, caller: Operator, number: Number, body: WarningsAcknowledgeIn
+) -> ZeroOut:
     """Take it as it is, although there are warnings: from now on its program text runs. Who, when and why is kept.
 
     409 where there is no warning, or somebody was first.
@@ -169,7 +171,7 @@ def acknowledge_work_zero(session: SessionDep, caller: Operator, number: Number,
 
 
 @router.post("/work-zeros/{number}/recompute", status_code=201, responses=problems(404, 409))
-def recompute_work_zero(session: SessionDep, caller: Operator, number: Number, body: RecomputeIn) -> ZeroOut:
+def recompute_work_zero(session: SessionDep, caller: Operator, number: Number, body: ZeroRecomputeIn) -> ZeroOut:
     """Compute the same touches once more, with another tip or without some of them; the result is another work zero.
 
     It stands in place of this one in the history of its fixture; readings that were made of this one stay as they are.

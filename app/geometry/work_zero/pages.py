@@ -15,7 +15,7 @@ from app.errors import Conflict, FieldError, InbandError, Invalid, NotFound
 from app.geometry.work_zero import actions, form_reader, pictures, queries, wording
 from app.geometry.work_zero.answers import program_of, stop_of, zero_out
 from app.geometry.work_zero.evaluation import touches_of
-from app.geometry.work_zero.schemas import FixtureIn, RecomputeIn, ZeroIn
+from app.geometry.work_zero.schemas import FixtureIn, ZeroIn, ZeroRecomputeIn
 from app.geometry.work_zero.tables import WorkZero
 from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named, machine_of
@@ -26,7 +26,7 @@ from app.web.fields import LARGEST_ID
 from app.web.forms import parsed
 from app.web.paging import address, part_of
 from app.web.templates import page
-from app.web.warnings import AcknowledgeIn
+from app.web.warnings import WarningsAcknowledgeIn
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 25
@@ -199,7 +199,9 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
     zero = queries.work_zero(session, number)
     try:
         with session.begin_nested():
-            actions.acknowledge(session, zero, parsed(AcknowledgeIn, {"reason": form.get("reason", "")}), caller)
+            actions.acknowledge(
+                session, zero, parsed(WarningsAcknowledgeIn, {"reason": form.get("reason", "")}), caller
+            )
     except (Invalid, Conflict) as error:
         return _zero(request, session, caller, zero, unacknowledged=error)
     return RedirectResponse(f"/work-zeros/{number}", 303)
@@ -211,7 +213,7 @@ def recompute(request: Request, session: SessionDep, caller: Operator, number: i
     zero = queries.work_zero(session, number)
     try:
         with session.begin_nested():
-            recomputed = actions.recompute(session, zero, parsed(RecomputeIn, form_reader.again(form)), caller)
+            recomputed = actions.recompute(session, zero, parsed(ZeroRecomputeIn, form_reader.again(form)), caller)
     except (Invalid, Conflict) as error:
         return _zero(request, session, caller, zero, form, error)
     return RedirectResponse(f"/work-zeros/{recomputed.id}", 303)

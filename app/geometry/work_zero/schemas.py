@@ -64,7 +64,7 @@ ZERO: dict[str, JsonValue] = {
 }
 
 
-class TouchIn(Body):
+class EdgePointIn(Body):
     """Position of the tip's centre. The coordinate across the approach may be missing where nothing is turned."""
 
     x: Annotated[Length | None, Field(description="X of the machine.")] = None
@@ -97,7 +97,7 @@ class ZeroIn(Body):
     ] = None
     part: Annotated[Text200 | None, Field(max_length=128, description="Serial number of the part.")] = None
     tip: Annotated[Tip, Field(description="Diameter of the tip; 0 where positions are of the surface.")]
-    touches: Annotated[list[TouchIn] | None, Field(max_length=MOST_TOUCHES, description="2 to 4, or more.")] = None
+    touches: Annotated[list[EdgePointIn] | None, Field(max_length=MOST_TOUCHES, description="2 to 4, or more.")] = None
     records: Annotated[
         list[Length] | None,
         Field(
@@ -141,7 +141,7 @@ class ZeroIn(Body):
         return fields
 
 
-class RecomputeIn(Body):
+class ZeroRecomputeIn(Body):
     """The same touches once more: with another tip, or without some of them. The first result stays on record."""
 
     model_config = ConfigDict(json_schema_extra={"example": {"tip": 5.998, "reason": "the tip was calibrated since"}})

@@ -8,7 +8,7 @@ from app.access.deps import AnyCaller, Operator
 from app.loop.alarm_response import acknowledging, queries
 from app.loop.alarm_response.by_hand import ByHand
 from app.loop.alarm_response.queries import State
-from app.loop.alarm_response.schemas import AcknowledgeIn, AlarmOut, alarm_out
+from app.loop.alarm_response.schemas import AlarmAcknowledgeIn, AlarmOut, alarm_out
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.machines.queries import machine_named
 from app.web.api import api_router, problems
@@ -60,7 +60,7 @@ def get_alarm(session: SessionDep, caller: AnyCaller, alarm: Number) -> AlarmOut
 
 
 @router.post("/alarms/{alarm}/acknowledge", responses=problems(404, 409))
-def acknowledge_alarm(session: SessionDep, caller: Operator, alarm: Number, given: AcknowledgeIn) -> AlarmOut:
+def acknowledge_alarm(session: SessionDep, caller: Operator, alarm: Number, given: AlarmAcknowledgeIn) -> AlarmOut:
     """Say what the alarm was; what follows from that follows at once and stands in `outcome`.
 
     - `tool_replaced`: open corrections of the tool are superseded, its averages and its life begin again, with `offset`

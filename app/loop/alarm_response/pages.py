@@ -13,7 +13,7 @@ from app.loop.alarm_response import acknowledging, queries, wording
 from app.loop.alarm_response.by_hand import ByHand
 from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
-from app.loop.alarm_response.schemas import AcknowledgeIn
+from app.loop.alarm_response.schemas import AlarmAcknowledgeIn
 from app.loop.machines import queries as machines
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
@@ -131,7 +131,7 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
         if form.get("true") in {"reported", "expected"}:
             offset = queries.alarm(session, number).alarm.data.get(form["true"])
         acknowledgement = parsed(
-            AcknowledgeIn,
+            AlarmAcknowledgeIn,
             {
                 "action": form.get("action"),
                 "comment": words(form, "comment"),

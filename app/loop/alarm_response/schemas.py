@@ -54,7 +54,7 @@ ACKNOWLEDGED = ALARM | {
 }
 
 
-class AcknowledgeIn(Body):
+class AlarmAcknowledgeIn(Body):
     """Acknowledgement of an alarm: the action taken and a comment."""
 
     model_config = ConfigDict(

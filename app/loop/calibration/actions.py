@@ -27,7 +27,7 @@ from app.loop.alarms import actions as alarms
 from app.loop.calibration import queries, wording
 from app.loop.calibration.alarm_kinds import OVERDUE, REFUSED
 from app.loop.calibration.queries import CalibrationRow, Place
-from app.loop.calibration.schemas import GaugeIn, PlanIn, RingIn
+from app.loop.calibration.schemas import CalibrationPlanIn, GaugeIn, RingIn
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.calibration import CalibrationAcceptance, CalibrationPlan, CalibrationRecord
 from app.loop.tables.machines import Machine
@@ -300,7 +300,9 @@ def news(machine: Machine, made: CalibrationRecord) -> dict[str, Any]:
 # --- plan
 
 
-def set_plan(session: Session, machine: Machine, place: Place, given: PlanIn, caller: Caller) -> CalibrationPlan:
+def set_plan(
+    session: Session, machine: Machine, place: Place, given: CalibrationPlanIn, caller: Caller
+) -> CalibrationPlan:
     """Plan how often to calibrate this place, and if its results are applied automatically. Raises `NotFound`."""
     lock_machines(session, [machine.id])
     queries.value_of(session, machine, place)

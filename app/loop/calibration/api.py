@@ -19,7 +19,7 @@ from app.loop.calibration.answers import (
     suggestion_out,
 )
 from app.loop.calibration.queries import Place
-from app.loop.calibration.schemas import GaugeIn, PairIn, PlanIn, RingIn, SuggestionAcceptIn
+from app.loop.calibration.schemas import CalibrationPlanIn, GaugeIn, PairIn, RingIn, SuggestionAcceptIn
 from app.loop.machines.queries import machine_named
 from app.web.api import FIGURE, MachineKey, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
@@ -193,7 +193,7 @@ def accept_suggestion(
 
 @router.put("/machines/{machine}/averages/{location}/calibration-plan", responses=problems(404))
 def plan_calibration(
-    session: SessionDep, caller: Engineer, machine: MachineKey, location: R11, given: PlanIn
+    session: SessionDep, caller: Engineer, machine: MachineKey, location: R11, given: CalibrationPlanIn
 ) -> PlaceOut:
     """Plan how often to calibrate the probe for this location, and if the results are applied automatically.
 
@@ -204,13 +204,13 @@ def plan_calibration(
 
 @router.put("/machines/{machine}/tools/{tool}/calibration-plan", responses=problems(404))
 def plan_ring_calibration(
-    session: SessionDep, caller: Engineer, machine: MachineKey, tool: R10, given: PlanIn
+    session: SessionDep, caller: Engineer, machine: MachineKey, tool: R10, given: CalibrationPlanIn
 ) -> PlaceOut:
     """The same for the offset of a probe, which is calibrated in a ring."""
     return _planned(session, caller, machine, Place("tool", tool), given)
 
 
-def _planned(session: SessionDep, caller: Caller, machine: str, place: Place, given: PlanIn) -> PlaceOut:
+def _planned(session: SessionDep, caller: Caller, machine: str, place: Place, given: CalibrationPlanIn) -> PlaceOut:
     machine_row = machine_named(session, machine)
     actions.set_plan(session, machine_row, place, given, caller)
     return place_out(places.place_row(session, machine_row, place, queries.value_of(session, machine_row, place)))

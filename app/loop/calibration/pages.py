@@ -13,7 +13,7 @@ from app.core.parameters import MOST_LOCATIONS
 from app.errors import Conflict, FieldError, Invalid, NotFound
 from app.loop.calibration import actions, confirmation, form_reader, pairs, places, queries, wording
 from app.loop.calibration.queries import Place
-from app.loop.calibration.schemas import GaugeIn, PairIn, PlanIn, RingIn
+from app.loop.calibration.schemas import CalibrationPlanIn, GaugeIn, PairIn, RingIn
 from app.loop.characteristics import queries as characteristics
 from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named
@@ -165,7 +165,7 @@ def enter(
         with session.begin_nested():
             if verb == "plan":
                 caller.must("engineer")
-                actions.set_plan(session, machine_row, place, parsed(PlanIn, form_reader.plan(form)), caller)
+                actions.set_plan(session, machine_row, place, parsed(CalibrationPlanIn, form_reader.plan(form)), caller)
             elif verb == "pairs" and place.memory == "average":
                 new_pairs = [parsed(PairIn, pair) for pair in form_reader.pairs(form)]
                 number = _add_pairs(session, machine_row, location, new_pairs, caller)

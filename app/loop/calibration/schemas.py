@@ -144,7 +144,7 @@ class GaugeIn(Body):
         return fields
 
 
-class SectionIn(Body):
+class RingSectionIn(Body):
     """Position of X (#5041) at the trigger, on both sides of one section of the ring."""
 
     plus: Annotated[Length, Field(description="Touched in +X.")]
@@ -170,7 +170,7 @@ class RingIn(Body):
         Field(description="#502: what the tip adds to a position in X; its diameter where X counts in diameters."),
     ]
     sections: Annotated[
-        list[SectionIn],
+        list[RingSectionIn],
         Field(max_length=SECTIONS, description="Three along Z; fewer only if the last one lies outside the limits."),
     ] = Field(default=[])
     first_move_triggered: Annotated[
@@ -227,7 +227,7 @@ class SuggestionAcceptIn(Body):
     reason: Reason
 
 
-class PlanIn(Body):
+class CalibrationPlanIn(Body):
     """Interval of calibration, and automatic or approved application of its results."""
 
     model_config = ConfigDict(json_schema_extra={"example": {"due_parts": 500, "due_days": 7, "acceptance": "accept"}})

@@ -77,7 +77,7 @@ class NoteOut(BaseModel):
     warning: Annotated[bool, Field(description="Whether somebody should look at it.")]
 
 
-class LineOut(BaseModel):
+class ProgramLineOut(BaseModel):
     """A line and what was made of it."""
 
     model_config = ConfigDict(json_schema_extra={"example": LINE})
@@ -142,7 +142,7 @@ class ProgramRead(BaseModel):
     problems: Annotated[list[Remark], Field(description="Why its parameters cannot be used as they are.")]
     warnings: Warnings
     not_understood: Annotated[int, Field(description="How many lines hold something that was not understood.")]
-    lines: list[LineOut]
+    lines: list[ProgramLineOut]
     programs: list[ProgramOut]
 
 
@@ -167,7 +167,9 @@ def program_out(program: Program) -> ProgramOut:
 def program_read(looked: CheckedProgram) -> ProgramRead:
     """A text as it is answered."""
     lines = [
-        LineOut(line=line.number, text=line.text, verdict=line.verdict.value, notes=[note_out(n) for n in line.notes])
+        ProgramLineOut(
+            line=line.number, text=line.text, verdict=line.verdict.value, notes=[note_out(n) for n in line.notes]
+        )
         for line in looked.text.lines
     ]
     return ProgramRead(

@@ -14,8 +14,8 @@ from app.loop.tools.schemas import (
     AppliedIn,
     AverageOut,
     AverageSet,
+    CorrectionDecisionIn,
     CorrectionOut,
-    DecisionIn,
     DecisionsIn,
     EmpiricalValueIn,
     RejectionIn,
@@ -219,7 +219,7 @@ def reject_correction(
 
 @router.post("/corrections/{machine}/{number}/approve", responses=problems(404, 409))
 def approve_correction(
-    session: SessionDep, caller: Operator, machine: MachineKey, number: Number, decision: DecisionIn
+    session: SessionDep, caller: Operator, machine: MachineKey, number: Number, decision: CorrectionDecisionIn
 ) -> CorrectionOut:
     """A person approves a correction that awaits it; the machine may apply it then."""
     machine_row = machine_named(session, machine)
@@ -242,7 +242,7 @@ def approve_corrections(
 
 @router.post("/corrections/{machine}/{number}/release", responses=problems(404, 409))
 def release_correction(
-    session: SessionDep, caller: Operator, machine: MachineKey, number: Number, decision: DecisionIn
+    session: SessionDep, caller: Operator, machine: MachineKey, number: Number, decision: CorrectionDecisionIn
 ) -> CorrectionOut:
     """A person releases a held correction; the machine may apply it then. Its alarm stays until it is acknowledged."""
     machine_row = machine_named(session, machine)

@@ -19,7 +19,7 @@ from app.loop.tables.tools import OPEN
 from app.loop.tools import actions, applying, confirmation, queries, sisters, wording
 from app.loop.tools.confirmation import Question
 from app.loop.tools.edge_schemas import SisterIn
-from app.loop.tools.schemas import AppliedIn, DecisionIn, EmpiricalValueIn, ToolChange, ToolEdit
+from app.loop.tools.schemas import AppliedIn, CorrectionDecisionIn, EmpiricalValueIn, ToolChange, ToolEdit
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, length, parsed, words
@@ -164,7 +164,7 @@ def decide(
             applied = parsed(AppliedIn, {"offset_after": length(form.get("offset_after"))})
             applying.mark_applied(session, machine_row, number, caller, offset_after=applied.offset_after)
         else:
-            decision = parsed(DecisionIn, {"reason": words(form, "reason")})
+            decision = parsed(CorrectionDecisionIn, {"reason": words(form, "reason")})
             warned = form.get("although_fetched") == "true"
             actions.decide(
                 session, machine_row, number, confirmation.verb(verb), decision.reason, caller, although_fetched=warned

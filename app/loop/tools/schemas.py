@@ -84,7 +84,7 @@ class AppliedIn(Body):
     applied_at: Annotated[LatelyOrNow | None, Field(description="When; if left out, now.")] = None
 
 
-class DecisionIn(Body):
+class CorrectionDecisionIn(Body):
     """Approval, release or rejection of a correction, with a reason."""
 
     model_config = ConfigDict(json_schema_extra={"example": {"reason": "insert looked at, still good"}})
@@ -104,7 +104,7 @@ class DecisionsIn(Body):
     reason: Reason
 
 
-class RejectionIn(DecisionIn):
+class RejectionIn(CorrectionDecisionIn):
     """Rejection of a correction, with a reason."""
 
     model_config = ConfigDict(

@@ -68,7 +68,7 @@ class LinearityOut(BaseModel):
     acceptable: bool = Field(description="holds_zero, and neither slope, intercept nor lack of fit is significant.")
 
 
-class LineOut(BaseModel):
+class VarianceLineOut(BaseModel):
     """A line of the table of variance; f and p_value are null where nothing is tested."""
 
     source: str
@@ -99,10 +99,10 @@ class CrossedOut(BaseModel):
     ndc: int = Field(description="Number of distinct categories.")
     pooled: bool = Field(description="The interaction is counted as repeatability (p above 0.25).")
     zeroed: list[str] = Field(description="Components whose estimated variance was negative and counts as 0.")
-    table: list[LineOut] = Field(description="Of the analysis of variance; empty for average and range.")
+    table: list[VarianceLineOut] = Field(description="Of the analysis of variance; empty for average and range.")
 
 
-class VerdictOut(BaseModel):
+class GaugeVerdictOut(BaseModel):
     """A number beside its published limit."""
 
     name: str
@@ -177,7 +177,7 @@ class StudyOut(BaseModel):
     linearity: LinearityOut | None
     grr: list[CrossedOut] = Field(description="By analysis of variance, and by average and range.")
     values_left_out: int = Field(description="Of cells longer than the shortest, with `unbalanced` = `fewest`.")
-    verdicts: list[VerdictOut]
+    verdicts: list[GaugeVerdictOut]
     zero_range: AdviceOut | None = Field(description="null where it serves no characteristic.")
     taken_from: str | None = Field(description="Readings that it was taken from, and the empirical value taken off.")
     caution: str | None = Field(description="Where the empirical value changed inside the study.")
@@ -207,7 +207,7 @@ def study_out(row: StudyRow, advice: Advice | Refused | None) -> StudyOut:
         grr=_crossed(evaluation, row.tolerance),
         values_left_out=evaluation.cut,
         verdicts=[
-            VerdictOut(name=verdict.name, value=verdict.value, verdict=verdict.word, limit=verdict.limit)
+            GaugeVerdictOut(name=verdict.name, value=verdict.value, verdict=verdict.word, limit=verdict.limit)
             for verdict in wording.verdicts(evaluation, row.tolerance)
         ],
         zero_range=AdviceOut(
@@ -276,7 +276,7 @@ def _crossed(found: Evaluation, tolerance: float | None) -> list[CrossedOut]:
             pooled=study.pooled,
             zeroed=["reproducibility" if name == "appraiser" else name for name in study.zeroed],
             table=[
-                LineOut(
+                VarianceLineOut(
                     source=line.source,
                     freedom=line.freedom,
                     squares=line.squares,

@@ -13,9 +13,9 @@ from app.quality.what_if.chart import chart_of
 from app.quality.what_if.figures import course_figure
 from app.quality.what_if.schemas import (
     LARGEST_LENGTH,
-    DecisionIn,
     MapIn,
     MapOut,
+    ProposalDecisionIn,
     ProposalIn,
     ProposalOut,
     WhatIfIn,
@@ -156,18 +156,24 @@ def get_proposal(session: SessionDep, proposal: Number) -> ProposalOut:
 
 
 @router.post("/proposals/{proposal}/approve", responses=problems(404, 409))
-def approve_proposal(session: SessionDep, caller: Engineer, proposal: Number, decision: DecisionIn) -> ProposalOut:
+def approve_proposal(
+    session: SessionDep, caller: Engineer, proposal: Number, decision: ProposalDecisionIn
+) -> ProposalOut:
     """Put it in force as a new version of the parameters; 409 if they have changed since it was proposed."""
     return ProposalOut.of(actions.approve(session, proposal, decision.reason, caller))
 
 
 @router.post("/proposals/{proposal}/reject", responses=problems(404, 409))
-def reject_proposal(session: SessionDep, caller: Engineer, proposal: Number, decision: DecisionIn) -> ProposalOut:
+def reject_proposal(
+    session: SessionDep, caller: Engineer, proposal: Number, decision: ProposalDecisionIn
+) -> ProposalOut:
     """Say no, and why."""
     return ProposalOut.of(actions.reject(session, proposal, decision.reason, caller))
 
 
 @router.post("/proposals/{proposal}/withdraw", responses=problems(404, 409))
-def withdraw_proposal(session: SessionDep, caller: Operator, proposal: Number, decision: DecisionIn) -> ProposalOut:
+def withdraw_proposal(
+    session: SessionDep, caller: Operator, proposal: Number, decision: ProposalDecisionIn
+) -> ProposalOut:
     """Take back what one has proposed oneself."""
     return ProposalOut.of(actions.withdraw(session, proposal, decision.reason, caller))

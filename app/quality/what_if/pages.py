@@ -22,7 +22,7 @@ from app.quality.what_if import actions, form_reader, map_axes, proposals, simul
 from app.quality.what_if.evidence import effect_of, period_of, quote_of
 from app.quality.what_if.map_view import view_of
 from app.quality.what_if.queries import Map, Simulation
-from app.quality.what_if.schemas import DecisionIn, ProposalIn
+from app.quality.what_if.schemas import ProposalDecisionIn, ProposalIn
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed
@@ -182,7 +182,7 @@ def send_decision(request: Request, session: SessionDep, caller: Operator, numbe
         raise Invalid(_("Say what to do: approve, reject or withdraw."))
     act, becomes = VERBS[verb]
     try:
-        reason = parsed(DecisionIn, {"reason": form.get("reason", "").strip()}).reason
+        reason = parsed(ProposalDecisionIn, {"reason": form.get("reason", "").strip()}).reason
         with session.begin_nested():
             act(session, number, reason, caller)
     except (Invalid, Conflict) as error:

@@ -107,7 +107,7 @@ class ProposalIn(WhatIfIn):
     reason: Reason
 
 
-class DecisionIn(Body):
+class ProposalDecisionIn(Body):
     """Reason why it is approved, rejected or withdrawn."""
 
     model_config = ConfigDict(json_schema_extra={"example": {"reason": "Agreed with the shop floor"}})

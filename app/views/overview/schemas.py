@@ -11,7 +11,7 @@ from app.views.overview import wording
 from app.views.overview.queries import Ranked
 
 
-class ReasonOut(BaseModel):
+class AttentionReasonOut(BaseModel):
     """Reason why attention is needed."""
 
     code: str
@@ -25,7 +25,7 @@ class RankedOut(BaseModel):
     name: str
     machine: str
     state: str
-    reasons: list[ReasonOut] = Field(description="The most urgent first; empty where nobody is needed.")
+    reasons: list[AttentionReasonOut] = Field(description="The most urgent first; empty where nobody is needed.")
     ppk: float | None = Field(
         description="The index that may be quoted of the last 1000 readings, as on the page of capability; `quote` says which one: Cpk, Ppk, or Ppk by percentiles. null where none may."
     )
@@ -107,7 +107,8 @@ class Overview(BaseModel):
                     machine=entry.machine.key,
                     state=entry.inputs.state.value,
                     reasons=[
-                        ReasonOut(code=sentence.reason.code, text=sentence.text) for sentence in wording.reasons(entry)
+                        AttentionReasonOut(code=sentence.reason.code, text=sentence.text)
+                        for sentence in wording.reasons(entry)
                     ],
                     ppk=entry.inputs.ppk,
                     quote=Quote(entry.verdict.of.quote).value,
