@@ -10,6 +10,7 @@ COPY app/__init__.py app/
 RUN pip install -c constraints.txt hatchling editables && pip install --no-build-isolation -c constraints.txt -e .
 COPY migrations migrations
 COPY frontend frontend
+COPY docs/reference/api-examples docs/reference/api-examples
 COPY app app
 
 USER inband

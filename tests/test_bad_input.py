@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import httpx
 import pytest
 
-from app.geometry.rotary_axes.plan_schemas import PLAN
 from app.main import create_app
 from app.settings import Settings
+from app.web.openapi import example_of
 from tests.conftest import Server
 from tests.geometry.rotary_axes.bench import axis
 from tests.loop.readings.record import counts
@@ -235,7 +235,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/alignments/{number}/acknowledge": WHY,
     "POST /api/v1/work-zeros/{number}/acknowledge": WHY,
     "POST /api/v1/kinematics/runs/{run}/acknowledge": WHY,
-    "POST /api/v1/kinematics/measuring-plans": PLAN,
+    "POST /api/v1/kinematics/measuring-plans": example_of("MeasuringPlanIn"),
     "POST /api/v1/machines/{machine}/faults": {"kind": "battery_low", "text": "low", "active": True},
     "POST /api/v1/alignments/{number}/recompute": {"method": "small", "leave_out": []} | WHY,
     "POST /api/v1/kinematics/runs": {

@@ -13,18 +13,7 @@ from app.web.fields import Body, Text200
 class PersonOut(BaseModel):
     """Somebody who signs in."""
 
-    model_config = ConfigDict(
-        from_attributes=True,
-        json_schema_extra={
-            "example": {
-                "id": 2,
-                "name": "Ana",
-                "role": "operator",
-                "created_at": "2026-11-21T07:00:00Z",
-                "disabled_at": None,
-            }
-        },
-    )
+    model_config = ConfigDict(from_attributes=True)
 
     id: int
     name: str
@@ -36,8 +25,6 @@ class PersonOut(BaseModel):
 class PersonChange(Body):
     """Changes of a person; what is left out stays."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"role": "engineer"}})
-
     role: Role | None = None
     disabled: bool | None = None
 
@@ -45,17 +32,11 @@ class PersonChange(Body):
 class InvitationIn(Body):
     """The role that the invited person gets."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"role": "operator"}})
-
     role: Role
 
 
 class InvitationOut(BaseModel):
     """A one-time link, told this once; it works for seven days."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"example": {"role": "operator", "url": "http://127.0.0.1:8000/invitation/Vb0…"}}
-    )
 
     role: Role
     url: str
@@ -64,8 +45,6 @@ class InvitationOut(BaseModel):
 class RoleKeyIn(Body):
     """A key for a program, with a person's role."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"name": "night report", "role": "viewer"}})
-
     name: Text200
     role: Role
 
@@ -73,26 +52,13 @@ class RoleKeyIn(Body):
 class MachineKeyIn(Body):
     """A key for one machine."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"name": "cell PC"}})
-
     name: Annotated[Text200, Field(description="What it is for, so that it can be told from others.")]
 
 
 class KeyOut(BaseModel):
     """A key without its secret."""
 
-    model_config = ConfigDict(
-        from_attributes=True,
-        json_schema_extra={
-            "example": {
-                "id": 7,
-                "name": "cell PC",
-                "role": None,
-                "created_at": "2026-11-21T07:00:00Z",
-                "revoked_at": None,
-            }
-        },
-    )
+    model_config = ConfigDict(from_attributes=True)
 
     id: int
     name: str
@@ -103,10 +69,6 @@ class KeyOut(BaseModel):
 
 class NewKeyOut(BaseModel):
     """A key just made. The secret is told this once and stored nowhere."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"example": {"id": 7, "name": "cell PC", "secret": "inband_3vQ…", "role": None}}
-    )
 
     id: int
     name: str

@@ -120,8 +120,6 @@ class Body(BaseModel):
 class ReasonIn(Body):
     """The reason for a change."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"reason": "stylus replaced"}})
-
     reason: Reason
 
 

@@ -1,19 +1,21 @@
 """The OpenAPI document: what the routes declare, completed so that a program can be written from it alone.
 
 FastAPI describes parameters, bodies and answers. Added here: the schemas of the readings door (msgspec's), who may call,
-every error in the shape it really has, and an example at every place where one is looked for.
+every error in the shape it really has, and an example at every place where one is looked for: those of bodies and answers are
+files, named as their schemas.
 """
 
+import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute, iter_route_contexts
-from pydantic import BaseModel
 
 from app import __version__
 from app.errors import InbandError, Unexpected
+from app.settings import HOUSE
 from app.web.api import BASE, EVERY_ERROR
 from app.web.deps import SESSION_COOKIE
 from app.web.problems import PROBLEM_JSON
@@ -64,6 +66,12 @@ TAGS = {
     "documentation": "This description. It needs no key.",
 }
 OPEN_TAGS = {"health", "documentation"}
+EXAMPLES = HOUSE / "docs" / "reference" / "api-examples"
+
+
+def example_of(schema: str) -> Any:
+    """The example of a body or an answer."""
+    return json.loads((EXAMPLES / f"{schema}.json").read_bytes())
 
 
 def document(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
@@ -106,9 +114,8 @@ def _made(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
     )
     components = openapi["components"]
     components["schemas"] |= schemas
-    for name, example in _examples(BaseModel):
-        if name in components["schemas"]:
-            components["schemas"][name] |= example
+    for file in EXAMPLES.glob("*.json"):
+        components["schemas"][file.stem]["example"] = example_of(file.stem)
     components["securitySchemes"] = {
         "key": {"type": "http", "scheme": "bearer", "description": "The key of a machine, or a key with a role."},
         "session": {
@@ -202,20 +209,9 @@ def _with_examples(openapi: Json, content: Json) -> None:
             media["example"] = example
 
 
-def _examples(base: type[BaseModel]) -> Iterator[tuple[str, Json]]:
-    """The examples of our models as they were written: FastAPI sorts their fields and drops those that are null."""
-    for model in base.__subclasses__():
-        extra = model.model_config.get("json_schema_extra")
-        if model.__module__.startswith("app.") and isinstance(extra, dict):
-            yield model.__name__, {name: extra[name] for name in ("example", "examples") if name in extra}
-        yield from _examples(model)
-
-
 def _example(openapi: Json, schema: Json) -> Any:
     if "example" in schema:
         return schema["example"]
-    if "examples" in schema:
-        return schema["examples"][0]
     properties = schema.get("properties", {})
     if set(properties) == {"items", "next"}:  # one page of a list
         item = _example(openapi, resolve(openapi, properties["items"]["items"]))

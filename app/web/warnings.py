@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from datetime import datetime
 from typing import Annotated, Protocol
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from app.core.warning import CodedWarning
 from app.web.fields import Body, Reason
@@ -12,16 +12,6 @@ from app.web.fields import Body, Reason
 
 class WarningOut(BaseModel):
     """Something that was accepted although it may be wrong."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "code": "turned_far",
-                "text": "The part is turned by 105.4°, and this machine expects 5° at most.",
-                "field": None,
-            }
-        }
-    )
 
     code: Annotated[str, Field(description="A stable name, for programs.")]
     text: Annotated[str, Field(description="The same in words.")]
@@ -43,8 +33,6 @@ def warnings_out(warnings: Iterable[CodedWarning], sentence: Callable[[CodedWarn
 
 class WarningsAcknowledgeIn(Body):
     """Reason for accepting a result that may be wrong."""
-
-    model_config = ConfigDict(json_schema_extra={"example": {"reason": "the fixture stands at 30 degrees on purpose"}})
 
     reason: Reason
 

@@ -12,7 +12,7 @@ import pytest
 from fastapi import FastAPI
 from fastapi.routing import APIRoute, iter_route_contexts
 from playwright.sync_api import Page, expect
-from pydantic import TypeAdapter
+from pydantic import BaseModel, TypeAdapter
 
 from app.loop.readings.answers import ReadingAnswer
 from app.loop.readings.api import BatchCounts
@@ -20,7 +20,7 @@ from app.loop.readings.schemas import ReadingIn
 from app.main import create_app
 from app.settings import Settings
 from app.web.api_docs import _kind, curl, prose
-from app.web.openapi import operations, resolve
+from app.web.openapi import EXAMPLES, example_of, operations, resolve
 from tests.conftest import Server
 
 Json = dict[str, Any]
@@ -88,6 +88,10 @@ class TestComplete:
         for reference in references:
             assert resolve(made, {"$ref": reference})
 
+    def test_every_schema_has_a_name_of_its_own(self, made: Json) -> None:
+        """Two classes of one name would be named by their modules, which is nothing for a program of somebody else."""
+        assert [name for name in made["components"]["schemas"] if "__" in name or name.startswith("app")] == []
+
     def test_every_tag_has_a_sentence_and_every_operation_one_tag(self, made: Json) -> None:
         tags = {tag["name"]: tag["description"] for tag in made["tags"]}
         used = {tag for _m, _p, operation in operations(made) for tag in operation["tags"]}
@@ -144,7 +148,33 @@ class TestComplete:
             assert ("Retry-After" in response.get("headers", {})) is (problem["status"] in {429, 503})
 
 
+def models(base: type[BaseModel] = BaseModel) -> Iterator[type[BaseModel]]:
+    for model in base.__subclasses__():
+        yield model
+        yield from models(model)
+
+
+def shape(value: Any) -> Any:
+    """Names of the fields, all the way down."""
+    if isinstance(value, dict):
+        return {name: shape(inner) for name, inner in value.items()}
+    if isinstance(value, list):
+        return [shape(inner) for inner in value if isinstance(inner, dict | list)] or None
+    return None
+
+
 class TestExamples:
+    @pytest.mark.parametrize("name", sorted(file.stem for file in EXAMPLES.glob("*.json")))
+    def test_a_file_is_what_its_schema_says(self, made: Json, name: str) -> None:
+        assert made["components"]["schemas"][name]["example"] == example_of(name)
+        if name == "ReadingIn":
+            msgspec.convert(example_of(name), ReadingIn)
+            return
+        (model,) = [model for model in models() if (model.__name__, model.__module__[:4]) == (name, "app.")]
+        read = TypeAdapter(model).validate_python(example_of(name))
+        written = TypeAdapter(model).dump_python(read, mode="json", exclude_unset=True, by_alias=True)
+        assert shape(written) == shape(example_of(name))
+
     def test_bodies_are_what_the_routes_take(self, app: FastAPI, made: Json) -> None:
         routes = {route.name: route for route in api_routes(app)}
         checked = 0
@@ -376,6 +406,20 @@ class TestAgainstTheServer:
                 if refused is may or (answer.status_code == 422 and not too_few) or answer.status_code >= 500:
                     wrong.append(f"{role}: {method} {path} answered {answer.status_code}")
         assert wrong == []
+
+    def test_what_is_answered_to_an_example_has_the_fields_of_the_example_of_an_answer(
+        self, shop: Json, made: Json
+    ) -> None:
+        answered = 0
+        for method, path, operation in operations(made):
+            if operation["operationId"] == "events" or operation.get("security") == []:
+                continue
+            answer = send(shop["clients"]["admin"], method, path, operation, number=999_999)
+            if answer.is_success and answer.headers.get("content-type") == "application/json":
+                described = resolve(made, operation["responses"][str(answer.status_code)])
+                assert answer.json().keys() == described["content"]["application/json"]["example"].keys(), path
+                answered += 1
+        assert answered > 40
 
     def test_errors_are_described_where_they_happen(self, server: Server, made: Json) -> None:
         anonymous = server.client()

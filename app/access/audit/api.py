@@ -18,23 +18,7 @@ router = api_router("audit")
 class AuditEntryOut(BaseModel):
     """One change: who, what, from what, to what, and why."""
 
-    model_config = ConfigDict(
-        from_attributes=True,
-        json_schema_extra={
-            "example": {
-                "id": 318,
-                "at": "2026-11-21T08:15:02.120Z",
-                "actor": "Ana",
-                "person_id": 2,
-                "key_id": None,
-                "action": "parameters changed",
-                "subject": "characteristic/shaft-d40",
-                "before": {"zero_range": 0.001},
-                "after": {"zero_range": 0.0015},
-                "why": "scatter of the new probe is larger",
-            }
-        },
-    )
+    model_config = ConfigDict(from_attributes=True)
 
     id: int
     at: datetime

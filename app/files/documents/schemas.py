@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from app.files.documents.content import Fact, Report, Section, Value
 
@@ -94,45 +94,6 @@ class SectionOut(BaseModel):
 
 class ReportOut(BaseModel):
     """Report on a characteristic and a period, with the same content as page, PDF, XLSX and CSV."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "characteristic": "shaft-d40",
-                "name": "Bearing seat Ø40 h6",
-                "machine": "Lathe 1",
-                "part": "shaft-0815",
-                "period": "2026-11-16 06:31:04 – 2026-11-21 16:04:14, readings 476 to 1475",
-                "timezone": "Europe/Belgrade",
-                "made_at": "2026-11-21T15:05:00+00:00",
-                "warnings": [],
-                "head": [],
-                "sections": [
-                    {
-                        "key": "numbers",
-                        "title": "Numbers",
-                        "sentences": [],
-                        "warnings": [],
-                        "facts": [
-                            {
-                                "key": "mean",
-                                "name": "Mean deviation",
-                                "code": "",
-                                "note": "",
-                                "value": 0.83,
-                                "unit": "µm",
-                                "text": "+0.83 µm",
-                                "low": None,
-                                "high": None,
-                            }
-                        ],
-                        "table": None,
-                        "charts": ["histogram"],
-                    }
-                ],
-            }
-        }
-    )
 
     characteristic: str
     name: str

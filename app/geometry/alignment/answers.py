@@ -5,7 +5,7 @@ from datetime import datetime
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, ConfigDict, Field
 from sqlalchemy.orm import Session
 
 from app.core.decision.step import rounded
@@ -14,7 +14,7 @@ from app.core.geometry.in_plane import Table, Turned, by_table
 from app.core.programs.frames import FrameText, offset_of, write_frame, write_restored
 from app.geometry.alignment import queries, wording
 from app.geometry.alignment.evaluation import warnings_of
-from app.geometry.alignment.schemas import SIX, MethodName
+from app.geometry.alignment.schemas import MethodName
 from app.geometry.alignment.tables import Alignment
 from app.loop.tables.machines import Machine
 from app.loop.warnings.queries import acknowledgement
@@ -23,47 +23,6 @@ from app.web.warnings import Acknowledged, Warnings, acknowledged_out, warnings_
 
 Kind = Literal["points", "two_points", "two_holes", "pallet"]
 TEXT = "; INBAND ALIGNMENT 7 FOR MILL-1\n; …\n$P_UIFR[1]=CTRANS(X,-306.06,Y,-154.16,Z,-299.84):CROT(X,0.01,Y,-0.01,Z,-0.118)\nM17\n"
-ANSWER: dict[str, JsonValue] = {
-    "id": 7,
-    "machine": "mill-1",
-    "kind": "points",
-    "method": "exact",
-    "name": "pallet 4",
-    "part": None,
-    "shift": {"a": -0.0506, "b": -0.1453, "c": 0.0097},
-    "angles": {"x": 0.0027, "y": -0.0114, "z": 0.118},
-    "turns": {"lambda": 0.0027, "beta": -0.0114, "gamma": 0.118},
-    "matrix": [[1.0, -0.0021, 0.0, -0.0506], [0.0021, 1.0, 0.0, -0.1453], [0.0, 0.0, 1.0, 0.0097], [0, 0, 0, 1]],
-    "uncertainty": {"a": 0.0061, "b": 0.0055, "c": 0.0047, "lambda": 0.0025, "beta": 0.0017, "gamma": 0.0022},
-    "touches": SIX,
-    "deviations": [0.012, 0.046, 0.021, 0.104, -0.205, 0.051],
-    "residuals": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-    "leverage": [1.0, 1.0, 1.0, 1.0, 1.0, 1.0],
-    "condition": {"value": 1.97, "text": "The points locate the part well (condition 1.97)."},
-    "misfits": [],
-    "weakest": "Least certain: turn about X.",
-    "advice": {
-        "place": [0.0, 0.0, 0.0],
-        "normal": [0.0, 0.0, 1.0],
-        "gain": 1.07,
-        "text": "One more point near (0, 0, 0) on the face +Z makes this 1.1 times as certain.",
-    },
-    "difference": 0.000001,
-    "off": None,
-    "table": None,
-    "warnings": [],
-    "acknowledged": None,
-    "program": TEXT,
-    "readings": [],
-    "pallet": None,
-    "part_on_pallet": None,
-    "given": {"base": [-306.01, -154.25, -299.85], "work_offset": "G54"},
-    "aligned_at": "2026-11-21T06:02:11Z",
-    "received_at": "2026-11-21T06:02:11.131Z",
-    "by": "mill-1",
-    "key": "mill-1:align:812",
-    "recomputed_from": None,
-}
 
 
 class Shift(BaseModel):
@@ -129,8 +88,6 @@ class PushedOut(BaseModel):
 
 class AlignmentOut(BaseModel):
     """Position and rotation of a part, their uncertainty, the probed points, and the program that sets the frame."""
-
-    model_config = ConfigDict(json_schema_extra={"example": ANSWER})
 
     id: int
     machine: str

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, JsonValue, model_validator
+from pydantic import Field, JsonValue, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.core.parameters import LARGEST_LENGTH
@@ -52,17 +52,6 @@ SIX: list[JsonValue] = [
     {"nominal": [170, 0, -15], "normal": "-Y", "deviation": -0.205},
     {"nominal": [0, 60, -15], "normal": "-X", "deviation": 0.051},
 ]
-ALIGNMENT: dict[str, JsonValue] = {
-    "machine": "mill-1",
-    "kind": "points",
-    "name": "pallet 4",
-    "touches": SIX,
-    "method": "exact",
-    "repeatability": 0.002,
-    "work_offset": "G54",
-    "base": [-306.01, -154.25, -299.85],
-    "key": "mill-1:align:812",
-}
 
 
 class AlignmentPointIn(Body):
@@ -143,8 +132,6 @@ class TableIn(Body):
 class AlignmentIn(Body):
     """Touches of a part whose place is to be found."""
 
-    model_config = ConfigDict(json_schema_extra={"example": ALIGNMENT})
-
     machine: Annotated[Slug, Field(description="The key of the machine.")]
     kind: Annotated[
         Literal["points", "two_points", "two_holes"],
@@ -204,17 +191,6 @@ class PoseIn(Body):
 class PalletIn(Body):
     """The error of a pallet and the error of a part on it, the one after the other."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "pallet": 7,
-                "part": 8,
-                "pose": {"shift": [500.0, 300.0, 100.0], "rotation": 90.0},
-                "name": "pallet 4 with part 812",
-            }
-        }
-    )
-
     pallet: Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID, description="The alignment of the pallet.")]
     part: Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID, description="The alignment of the part on it.")]
     pose: Annotated[PoseIn | None, Field(description="If the part was measured in the pallet's own coordinates.")] = (
@@ -226,10 +202,6 @@ class PalletIn(Body):
 
 class AlignmentRecomputeIn(Body):
     """The same touches once more: by another method, or without some of them. The first result stays on record."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"example": {"leave_out": [7], "reason": "touch 7 does not fit the others"}}
-    )
 
     method: Annotated[MethodName | None, Field(description="If left out, as before.")] = None
     repeatability: Repeatability | None = None

@@ -3,52 +3,13 @@
 from datetime import datetime
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, Field
 
 from app.geometry.geometric_form import wording
 from app.geometry.geometric_form.evaluation import warnings_of
 from app.geometry.geometric_form.queries import FormRow, ResultReading
-from app.geometry.geometric_form.schemas import FORM
 from app.loop.warnings.wording import sentence
 from app.web.warnings import Warnings, warnings_out
-
-FORM_OUT: dict[str, JsonValue] = {
-    "id": 17,
-    "machine": "lathe-1",
-    "feature": "bore-d50-axis",
-    "kind": "axis_straightness",
-    "method": "minimum_zone",
-    "value": 0.0113,
-    "uncertainty": 0.0012,
-    "tolerance": 0.005,
-    "verdict": {
-        "code": "bad",
-        "good": False,
-        "sure": True,
-        "text": "11.3 µm ± 1.2 µm is more than the tolerance 5.0 µm.",
-    },
-    "values": [
-        {"method": "minimum_zone", "value": 0.0113, "uncertainty": 0.0012},
-        {"method": "least_squares", "value": 0.0131, "uncertainty": 0.0014},
-        {"method": "printed", "value": 0.0078, "uncertainty": None},
-    ],
-    "suspects": [],
-    "warnings": [],
-    "tested": True,
-    "corrected": None,
-    "details": {"axis": {"point": [0.0, 0.0, 30.0], "direction": [0.0, 0.0, 1.0]}},
-    "given": {"sections": FORM["sections"], "tip_diameter": 6.0, "side": "inside"},
-    "repeatability": 0.0005,
-    "part": "SN-000812",
-    "measured_at": "2026-11-21T08:15:02Z",
-    "received_at": "2026-11-21T08:15:02.131Z",
-    "by": "lathe-1",
-    "key": "lathe-1:form:17",
-    "engine": 1,
-    "evaluation": 1,
-    "evaluated_at": "2026-11-21T08:15:02.131Z",
-    "reading": {"characteristic": "shaft-d40", "sequence": None, "refused": None},
-}
 
 
 class FormVerdictOut(BaseModel):
@@ -100,8 +61,6 @@ class FormReadingOut(BaseModel):
 
 class FormOut(BaseModel):
     """A form measurement with what was found. Lengths in mm."""
-
-    model_config = ConfigDict(json_schema_extra={"example": FORM_OUT})
 
     id: int
     machine: str

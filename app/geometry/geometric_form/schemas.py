@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, JsonValue, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.core.geometry.form import Kind
@@ -25,26 +25,6 @@ OF_POINTS = {Kind.STRAIGHTNESS, Kind.FLATNESS}
 WITH_DATUM = {Kind.COAXIALITY, Kind.PARALLELISM, Kind.PERPENDICULARITY}
 WITH_LENGTH = {Kind.PARALLELISM, Kind.PERPENDICULARITY}
 ONLY_OF = {"datum": WITH_DATUM, "nominal": {Kind.POSITION}, "length": WITH_LENGTH}
-
-FORM: dict[str, JsonValue] = {
-    "machine": "lathe-1",
-    "feature": "bore-d50-axis",
-    "kind": "axis_straightness",
-    "sections": [
-        {"height": 0, "touches": [[-6.096, 24.249], [22.578, 10.784], [12.465, -21.678]]},
-        {"height": 20, "touches": [[23.896, -7.346], [20.88, 13.749], [-23.388, 8.859]]},
-        {"height": 40, "touches": [[5.675, 24.341], [-24.71, -3.748], [23.78, -7.699]]},
-        {"height": 60, "touches": [[-12.55, 21.611], [-6.82, -24.059], [23.699, 7.911]]},
-    ],
-    "tolerance": 0.005,
-    "repeatability": 0.0005,
-    "tip_diameter": 6.0,
-    "side": "inside",
-    "part": "SN-000812",
-    "measured_at": "2026-11-21T08:15:02Z",
-    "characteristic": "shaft-d40",
-    "key": "lathe-1:form:17",
-}
 
 
 class FormSectionIn(Body):
@@ -77,8 +57,6 @@ class TouchedIn(Body):
 
 class FormIn(Body):
     """A form measurement: what was touched, of what kind it is, and what it is held against."""
-
-    model_config = ConfigDict(json_schema_extra={"example": FORM})
 
     machine: Annotated[Slug, Field(description="The key of the machine.")]
     feature: Annotated[Slug, Field(description="A key of yours for what was touched: its measurements make a trend.")]
@@ -210,8 +188,6 @@ def _depth(points: Sequence[Sequence[float]], coordinates: int, name: str) -> No
 
 class FormRecomputeIn(Body):
     """Reason for computing again."""
-
-    model_config = ConfigDict(json_schema_extra={"example": {"reason": "new version"}})
 
     reason: Reason
 

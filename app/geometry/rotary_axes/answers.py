@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, Field
 
 from app.core.rotary.axis import ERRORS, AxisName
 from app.core.rotary.results import MEASURED, OFFSETS, OPTIMISED, STRINGS, write_string
@@ -14,86 +14,6 @@ from app.geometry.rotary_axes.tables import KinematicsRun
 from app.web.warnings import Warnings, warnings_out
 
 Status = Literal["refused", "to_confirm", "confirmed", "measured", "entered"]
-
-AXIS: dict[str, JsonValue] = {
-    "axis": "C",
-    "carries": "table",
-    "errors": {
-        "EX0C": {"value": 0.0123, "deviation": 0.0008},
-        "EY0C": {"value": -0.0081, "deviation": 0.0008},
-        "EA0C": {"value": 0.0021, "deviation": 0.0004},
-        "EB0C": {"value": -0.0013, "deviation": 0.0004},
-    },
-    "backlash": {"value": 0.0021, "deviation": 0.0003},
-    "scatter_before": 0.0134,
-    "scatter_after": 0.0021,
-    "greatest_before": 0.0256,
-    "greatest_after": 0.0034,
-    "mean_error": 0.0019,
-    "angle_error": 0.0008,
-    "radius": 180.0125,
-    "start_angle": -90.0,
-    "end_angle": 180.0,
-    "points": 4,
-    "incidence": 0.0,
-    "angles": [-90.0, 0.0, 90.0, 180.0],
-    "ball": [180.0, 0.0, 40.0],
-    "shift": [
-        {"value": 0.0012, "deviation": 0.0009},
-        {"value": 0.0, "deviation": 0.0009},
-        {"value": 0.0003, "deviation": 0.0009},
-    ],
-    "correction": [0.0123, -0.0081, 0.0],
-    "position_before": [250.0, 0.0, -120.0],
-    "position_after": [250.0123, -0.0081, -120.0],
-    "positions": [
-        {"angle": 90.0, "approach": 1, "measured": [0.0204, -0.0042, 0.0101], "optimised": [0.0003, 0.0011, -0.0006]}
-    ],
-    "arc": 270.0,
-    "condition": 3.1,
-    "freedom": 5,
-    "noise": 0.0014,
-}
-RUN: dict[str, JsonValue] = {
-    "run": 118,
-    "machine": "lathe-1",
-    "form": "centres",
-    "head": None,
-    "program": "TNC:\\nc_prog\\preset_452.h",
-    "tool": "TOUCH_PROBE",
-    "kinematics": "MILL5_AC",
-    "mode": None,
-    "status": "measured",
-    "reason": {"code": "measured", "text": "C: scatter 13.4 µm → 2.1 µm."},
-    "measured_at": "2026-11-21T06:42:10Z",
-    "received_at": "2026-11-21T06:42:11.131Z",
-    "by": "lathe-1",
-    "key": "mill-5:452:118",
-    "axes": [AXIS],
-    "offsets": {"X": 0.0012, "Y": 0.0, "Z": 0.0003},
-    "parameters": {
-        "Q143": 0.0134,
-        "Q146": 0.0021,
-        "Q147": 0.0012,
-        "Q148": 0.0,
-        "Q149": 0.0003,
-        "QS146": "0.01230000 -0.0081000 0.00210000 -0.0013000",
-    },
-    "balls": [{"radius": 12.5003, "deviation": 0.0009, "form": 0.0021}],
-    "not_understood": [],
-    "warnings": [],
-    "limits": {
-        "ball_radius": 12.5,
-        "max_modification": 0.05,
-        "max_modification_angle": None,
-        "max_dev_cal_ball": 0.01,
-    },
-    "overtaken": False,
-    "undone": False,
-    "confirmed": None,
-    "entered": None,
-    "given": {"ball_radius": 12.5},
-}
 
 
 class EstimateOut(BaseModel):
@@ -168,8 +88,6 @@ class DecidedOut(BaseModel):
 
 class RunOut(BaseModel):
     """A run of the preset compensation. Lengths in mm, angles in degrees."""
-
-    model_config = ConfigDict(json_schema_extra={"example": RUN})
 
     run: int
     machine: str
@@ -283,12 +201,6 @@ def parameters_of(row: RunRow) -> dict[str, float | str]:
 
 class RecomputedOut(BaseModel):
     """A run evaluated anew from what was sent. What is on record stays as it is."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {"run": 118, "same": True, "outcome": "measured", "axes": [AXIS], "offsets": {"X": 0.0012}}
-        }
-    )
 
     run: int
     same: Annotated[bool, Field(description="It comes to what is on record.")]

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
 from app.geometry.rotary_axes import queries, run_history, wording
@@ -13,69 +13,9 @@ from app.geometry.rotary_axes.result_values import UNITS
 from app.geometry.rotary_axes.tables import KinematicsBackup, KinematicsPlan
 from app.loop.tables.machines import Machine
 
-BACKUP: dict[str, JsonValue] = {
-    "version": 3,
-    "head": None,
-    "at": "2026-11-21T07:02:11Z",
-    "since": "2026-11-21T06:42:10Z",
-    "by": "ana",
-    "reason": "Monthly check",
-    "errors": {"EX0C": 0.0123, "EY0C": -0.0081, "EA0C": 0.0021, "EB0C": -0.0013},
-    "run": 118,
-    "restores": None,
-}
-DRIFT: dict[str, JsonValue] = {
-    "name": "EX0C",
-    "unit": "mm",
-    "limit": 0.01,
-    "beyond": True,
-    "last": 0.0123,
-    "true": 0.0123,
-    "runs": 5,
-    "slope_per_day": 0.0004,
-    "slope_low": 0.0001,
-    "slope_high": 0.0007,
-    "text": "+0.40 µm a day, with 95 % confidence +0.10 to +0.70: it drifts.",
-}
-CHANGE: dict[str, JsonValue] = {
-    "name": "EX0C",
-    "words": "C is offset in X",
-    "unit": "mm",
-    "before": 0.0041,
-    "after": 0.0123,
-    "difference": 0.0082,
-    "deviation": 0.0011,
-    "moved": True,
-    "enter": 0.0123,
-}
-HEAD: dict[str, JsonValue] = {
-    "head": "Fork 2",
-    "reference": False,
-    "run": 118,
-    "measured_at": "2026-11-21T06:42:10Z",
-    "version": 3,
-    "in_effect": {"EX0C": 0.0041},
-    "changes": [CHANGE],
-}
-STATE: dict[str, JsonValue] = {
-    "machine": "lathe-1",
-    "ball_radius": 12.5,
-    "max_modification": 0.05,
-    "max_modification_angle": 0.01,
-    "max_dev_cal_ball": 0.01,
-    "reference_head": None,
-    "limits": {"EX0C": 0.01},
-    "characteristics": {},
-    "in_effect": {"EX0C": 0.0041, "EY0C": 0.0, "EA0C": 0.0, "EB0C": 0.0},
-    "drift": [DRIFT],
-    "heads": [HEAD],
-}
-
 
 class BackupOut(BaseModel):
     """The kinematics as it was from one moment on. errors: what has been entered so far, by name."""
-
-    model_config = ConfigDict(json_schema_extra={"example": BACKUP})
 
     version: int
     head: str | None
@@ -137,8 +77,6 @@ class HeadOut(BaseModel):
 
 class MachineKinematicsOut(BaseModel):
     """Limits of a machine's runs, the values in effect, and their drift."""
-
-    model_config = ConfigDict(json_schema_extra={"example": STATE})
 
     machine: str
     ball_radius: float | None
@@ -207,17 +145,6 @@ def machine_out(
 
 class ComparisonOut(BaseModel):
     """Changes between two runs, and the values to enter on the control."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "machine": "lathe-1",
-                "before": 97,
-                "after": 118,
-                "changes": [CHANGE],
-            }
-        }
-    )
 
     machine: str
     before: int

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
+from pydantic import BaseModel, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.core.programs.heidenhain import write_plan
@@ -25,8 +25,6 @@ from app.web.warnings import Warnings, warnings_out
 
 Angle = Annotated[float, Field(strict=True, ge=-359.9999, le=359.9999, allow_inf_nan=False)]
 Length = Annotated[float, Field(strict=True, ge=0, le=99_999.9999, allow_inf_nan=False)]
-AXIS: dict[str, JsonValue] = {"axis": "C", "start": -90.0, "end": 180.0, "points": 4}
-PLAN: dict[str, JsonValue] = {"cycle": 452, "ball_radius": 12.5, "feed": "FMAX", "axes": [AXIS]}
 
 
 class AxisPlanIn(Body):
@@ -59,8 +57,6 @@ class AxisPlanIn(Body):
 
 class MeasuringPlanIn(Body):
     """A call of cycle 451 or 452."""
-
-    model_config = ConfigDict(json_schema_extra={"example": PLAN})
 
     cycle: Annotated[Literal[451, 452], Field(description="451 measures the kinematics, 452 compensates the preset.")]
     ball_radius: Annotated[
@@ -115,18 +111,6 @@ class AxisPositionsOut(BaseModel):
 
 class MeasuringPlanOut(BaseModel):
     """A plan as the control runs it. Nothing was stored."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "order": ["C"],
-                "axes": [{"axis": "C", "positions": [-90.0, 0.0, 90.0, 180.0], "arc": 270.0}],
-                "values": {"Q407": 12.5, "Q253": "FMAX"},
-                "warnings": [],
-                "text": "BEGIN PGM INBAND_452 MM\n…",
-            }
-        }
-    )
 
     order: Annotated[list[AxisName], Field(description="The control measures A, then B, then C.")]
     axes: list[AxisPositionsOut]

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, JsonValue, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.core.parameters import LARGEST_LENGTH
@@ -18,27 +18,6 @@ Limit = Annotated[float, Field(strict=True, gt=0, le=LARGEST_LENGTH, allow_inf_n
 Ball = Annotated[float, Field(strict=True, ge=0.0001, le=99.9999, allow_inf_nan=False)]
 Point = Annotated[list[Length], Field(min_length=3, max_length=3, description="X, Y, Z, mm.")]
 MOST_POSITIONS, MOST_TOUCHES, MOST_PROTOCOL = 100, 50, 900_000
-
-C_AXIS: dict[str, JsonValue] = {
-    "axis": "C",
-    "ball": [180.0, 0.0, 40.0],
-    "incidence": 0.0,
-    "positions": [
-        {"angle": -90.0, "centre": [0.0053, -179.9812, 40.0021]},
-        {"angle": 0.0, "centre": [180.0004, 0.0002, 39.9998]},
-        {"angle": 90.0, "centre": [0.0204, 179.9957, 40.0052]},
-        {"angle": 180.0, "centre": [-179.9751, 0.0161, 40.0081]},
-    ],
-}
-RUN: dict[str, JsonValue] = {
-    "machine": "lathe-1",
-    "measured_at": "2026-11-21T06:42:10Z",
-    "key": "mill-5:452:118",
-    "program": "TNC:\\nc_prog\\preset_452.h",
-    "kinematics": "MILL5_AC",
-    "ball_radius": 12.5,
-    "axes": [C_AXIS],
-}
 
 
 def _one_of(model: Any, names: tuple[str, ...]) -> None:
@@ -130,8 +109,6 @@ class ShiftIn(Body):
 class RunIn(Body):
     """A run of cycle 452 in one of four forms: `axes` (touches or centres), `results`, `pasted`, `protocol`."""
 
-    model_config = ConfigDict(json_schema_extra={"example": RUN})
-
     machine: Slug
     measured_at: Annotated[LatelyOrNow | None, Field(description="If left out: as the protocol says, else now.")] = None
     key: Annotated[
@@ -202,8 +179,6 @@ class RunIn(Body):
 class EnterIn(Body):
     """The values of a run have been entered on the control."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"reason": "Monthly check"}})
-
     reason: Reason
     offsets: Annotated[
         bool,
@@ -219,8 +194,6 @@ class EnterIn(Body):
 class RestoreIn(Body):
     """A kinematics is put back."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"reason": "Worse than before", "instead_of": 3}})
-
     reason: Reason
     instead_of: Annotated[
         int | None,
@@ -232,21 +205,6 @@ class RestoreIn(Body):
 
 class KinematicsPlanIn(Body):
     """Limits of a machine's runs; what is left out is not limited."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "ball_radius": 12.5,
-                "max_modification": 0.05,
-                "max_modification_angle": 0.01,
-                "max_dev_cal_ball": 0.01,
-                "reference_head": None,
-                "limits": {"EX0C": 0.01, "EY0C": 0.01, "backlash.C": 0.003},
-                "characteristics": {},
-                "reason": "As in the acceptance of the machine",
-            }
-        }
-    )
 
     ball_radius: Annotated[Ball | None, Field(description="Q407 of the ball that is used here.")] = None
     max_modification: Annotated[

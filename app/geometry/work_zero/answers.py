@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
 from app.core.programs.frames import ZeroText, offset_of, write_restored, write_zero
@@ -21,44 +21,6 @@ from app.web.warnings import Acknowledged, Warnings, acknowledged_out, warnings_
 State = Literal["unknown", "steady", "warning", "alarm"]
 Basis = Literal["first", "median", "frozen"]
 TEXT = "; INBAND WORK ZERO 12 FOR MILL-1: G54\n…\n$P_UIFR[1]=CTRANS(X,-306.01,Y,-154.25,Z,-299.85)\nM17\n"
-SHIFT: dict[str, JsonValue] = {
-    "state": "warning",
-    "shifts": {"x": 0.012, "y": -0.004, "z": 0.0},
-    "total": 0.0126,
-    "reference": 3,
-    "text": "Shifted against work zero 3: X +12.0 µm, Y −4.0 µm, Z +0.0 µm.",
-}
-ANSWER: dict[str, JsonValue] = {
-    "id": 12,
-    "machine": "mill-1",
-    "kind": "pocket",
-    "work_offset": "G54",
-    "fixture": "vice-left",
-    "part": "SN-000812",
-    "x": -306.01,
-    "y": -154.25,
-    "z": -299.85,
-    "rotation": None,
-    "diameter": None,
-    "length": 100.004,
-    "width": 60.008,
-    "squareness": None,
-    "uncertainty": {"x": 0.0014, "y": 0.0014, "length": 0.0028, "width": 0.0028},
-    "touches": [{"x": -353.012, "approach": "-X"}, {"x": -259.008, "approach": "+X"}],
-    "residuals": [0.0, 0.0],
-    "tip": 6.0,
-    "notices": [],
-    "warnings": [],
-    "acknowledged": None,
-    "program": TEXT,
-    "shift": SHIFT,
-    "readings": [{"result": "length", "characteristic": "pocket-l", "sequence": 812, "refused": None}],
-    "touched_at": "2026-11-21T06:02:11Z",
-    "received_at": "2026-11-21T06:02:11.131Z",
-    "by": "mill-1",
-    "key": "mill-1:zero:812",
-    "recomputed_from": None,
-}
 
 
 class Notice(BaseModel):
@@ -97,8 +59,6 @@ class TouchOut(BaseModel):
 
 class ZeroOut(BaseModel):
     """A work zero with its size, its touches, and the text that sets it."""
-
-    model_config = ConfigDict(json_schema_extra={"example": ANSWER})
 
     id: int
     machine: str
@@ -140,23 +100,6 @@ class ZeroOut(BaseModel):
 
 class FixtureOut(BaseModel):
     """A fixture, what it is compared with, and how its last zero stands."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "machine": "mill-1",
-                "fixture": "vice-left",
-                "basis": "frozen",
-                "reference": 3,
-                "warning": 0.01,
-                "alarm": 0.03,
-                "characteristics": {"x": "vice-left-x"},
-                "zeros": 9,
-                "last": 12,
-                "shift": SHIFT,
-            }
-        }
-    )
 
     machine: str
     fixture: str

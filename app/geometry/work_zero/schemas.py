@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, JsonValue, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.core.parameters import LARGEST_LENGTH
@@ -42,27 +42,6 @@ Characteristics = Annotated[
 RECORDS = {"R1": 0, "R2": 1, "R3": 2, "R4": 3, "#501": 0, "#502": 1, "#504": 2, "#505": 3}
 OTHER_NAMES = {"#508": "z_touched", "#2": "feeler"}
 
-ZERO: dict[str, JsonValue] = {
-    "machine": "mill-1",
-    "kind": "pocket",
-    "work_offset": "G54",
-    "fixture": "vice-left",
-    "part": "SN-000812",
-    "tip": 6.0,
-    "touches": [
-        {"x": -353.012, "approach": "-X"},
-        {"x": -259.008, "approach": "+X"},
-        {"y": -181.254, "approach": "-Y"},
-        {"y": -127.246, "approach": "+Y"},
-    ],
-    "z_touched": -201.5,
-    "feeler": 0.1,
-    "tool_length": 98.25,
-    "repeatability": 0.001,
-    "touched_at": "2026-11-21T06:02:11Z",
-    "key": "mill-1:zero:812",
-}
-
 
 class EdgePointIn(Body):
     """Position of the tip's centre. The coordinate across the approach may be missing where nothing is turned."""
@@ -80,8 +59,6 @@ class ZeroIn(Body):
 
     `records` may stand in place of `touches`, or what the printed macros keep: `R1` to `R4`, or `#501`, `#502`, `#504`, `#505`.
     """
-
-    model_config = ConfigDict(json_schema_extra={"example": ZERO})
 
     machine: Annotated[Slug, Field(description="The key of the machine.")]
     kind: Annotated[KindName, Field(description="bore, pocket: the tip is inside; boss, web: outside; corner.")]
@@ -144,8 +121,6 @@ class ZeroIn(Body):
 class ZeroRecomputeIn(Body):
     """The same touches once more: with another tip, or without some of them. The first result stays on record."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"tip": 5.998, "reason": "the tip was calibrated since"}})
-
     tip: Annotated[Tip | None, Field(description="Diameter of the tip; if left out, as before.")] = None
     repeatability: Repeatability | None = None
     leave_out: Annotated[
@@ -157,19 +132,6 @@ class ZeroRecomputeIn(Body):
 
 class FixtureIn(Body):
     """Reference of a fixture's zeros, and the limits of its shift."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "basis": "frozen",
-                "reference": 12,
-                "warning": 0.01,
-                "alarm": 0.03,
-                "characteristics": {"x": "vice-left-x"},
-                "reason": "the vice was aligned anew",
-            }
-        }
-    )
 
     basis: Annotated[
         Literal["first", "median", "frozen"],

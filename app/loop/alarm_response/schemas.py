@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.core.parameters import LARGEST_LENGTH
 from app.loop.alarm_response import outcomes, wording
@@ -11,55 +11,9 @@ from app.loop.alarm_response.queries import AlarmRow
 from app.loop.alarms.kinds import Action
 from app.web.fields import LARGEST_ID, Body, Reason, Text200
 
-ALARM: dict[str, JsonValue] = {
-    "id": 41,
-    "kind": "tool_worn",
-    "state": "active",
-    "machine": "lathe-1",
-    "characteristic": "shaft-d40",
-    "tool_memory": 3,
-    "text": "Deviation +312.0 µm has reached the wear limit ±300 µm: tool 3 is worn or broken.",
-    "what_to_do": "Look at the cutting edge.",
-    "raised_at": "2026-11-21T07:15:02.131Z",
-    "last_at": "2026-11-21T07:19:44.002Z",
-    "count": 2,
-    "sequence": 812,
-    "last_sequence": 813,
-    "held_correction": {"number": 19, "amount": -0.312},
-    "data": {"characteristic": "shaft-d40", "deviation": 0.312, "decided": 0.312, "limit": 0.3},
-    "acknowledged_at": None,
-    "acknowledged_by": None,
-    "action": None,
-    "comment": None,
-    "outcome": None,
-}
-ACKNOWLEDGED = ALARM | {
-    "state": "acknowledged",
-    "held_correction": None,
-    "acknowledged_at": "2026-11-21T07:21:10.500Z",
-    "acknowledged_by": "ana",
-    "action": "tool_replaced",
-    "comment": "New insert",
-    "outcome": [
-        {
-            "code": "tool_restarted",
-            "tool": 3,
-            "offset": 0.0,
-            "parts": 211,
-            "text": "Tool 3 starts a new life with offset 0.0000 mm; the old one cut 211 parts.",
-        },
-        {"code": "corrections_superseded", "numbers": [19], "text": "Correction 19 was dropped."},
-        {"code": "averages_restarted", "locations": [5], "text": "The running average R11 = 5 begins at 0."},
-    ],
-}
-
 
 class AlarmAcknowledgeIn(Body):
     """Acknowledgement of an alarm: the action taken and a comment."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"example": {"action": "tool_replaced", "comment": "New insert", "offset": 0.0}}
-    )
 
     action: Action
     comment: Reason
@@ -117,8 +71,6 @@ class Followed(BaseModel):
 
 class AlarmOut(BaseModel):
     """Something that needs a person, what that person did about it, and what followed."""
-
-    model_config = ConfigDict(json_schema_extra={"examples": [ALARM, ACKNOWLEDGED]})
 
     id: int
     kind: Annotated[str, Field(description="oversize, undersize, tool_worn, probe_fault, acceptance, offset_limit …")]

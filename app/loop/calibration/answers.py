@@ -3,63 +3,18 @@
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, Field
 
 from app.loop.calibration import wording
 from app.loop.calibration.figures import Mark
 from app.loop.calibration.places import PlaceRow
 from app.loop.calibration.queries import CalibrationRow, Pair, Suggestion
-from app.loop.calibration.schemas import GAUGE
 from app.loop.warnings.wording import sentence
 from app.web.warnings import Warnings, warnings_out
 
 Status = Literal["refused", "unchanged", "proposed", "accepted", "overtaken"]
 State = Literal["overdue", "refused", "proposed", "due_soon", "calibrated", "never"]
 ACTIONS = {"refused": "stop", "proposed": "accept"}
-
-CALIBRATION: dict[str, JsonValue] = {
-    "machine": "lathe-1",
-    "number": 17,
-    "kind": "gauge",
-    "average_memory": 5,
-    "tool_memory": 30,
-    "status": "proposed",
-    "action": "accept",
-    "reason": {
-        "code": "averaged_difference",
-        "text": "Measuring error +3.0 µm; +0.0 µm is already compensated, +3.0 µm remains; the average +1.5 µm "
-        "is beyond the zero range ±1 µm: the empirical value becomes +1.5 µm.",
-    },
-    "gauge_size": 199.852,
-    "measured": 199.855,
-    "difference": 0.003,
-    "average": 0.0015,
-    "value_before": 0.0,
-    "proposed": 0.0015,
-    "results": {"R42": 199.852, "R43": 199.855, "R44": 0.003, "R46": 5, "R47": 30, "R49": 0.0015},
-    "touches": GAUGE["touches"],
-    "settings": {"zero_range": 0.001, "averaging_limit": 0.01, "confidence_limit": 1.0, "repeats": 3, "spread": 0.0004},
-    "calibrated_at": "2026-11-21T06:02:11Z",
-    "received_at": "2026-11-21T06:02:11.131Z",
-    "by": "lathe-1",
-    "key": "lathe-1:cal:17",
-    "accepted": None,
-    "warnings": [],
-}
-PAIR: dict[str, JsonValue] = {
-    "id": 31,
-    "machine_value": 39.9981,
-    "external_value": 39.9955,
-    "difference": 0.0026,
-    "instrument": "CMM, hall C",
-    "characteristic": "shaft-d40",
-    "sequence": 812,
-    "at": "2026-11-21T09:12:40Z",
-    "by": "ana",
-    "counts": True,
-    "excluded": None,
-    "warnings": [],
-}
 
 
 class OutcomeReason(BaseModel):
@@ -86,8 +41,6 @@ class Accepted(BaseModel):
 
 class CalibrationOut(BaseModel):
     """A calibration as it came out. Lengths in mm."""
-
-    model_config = ConfigDict(json_schema_extra={"example": CALIBRATION})
 
     machine: str
     number: Annotated[int, Field(description="Counts per machine.")]
@@ -206,8 +159,6 @@ class ExcludedPair(BaseModel):
 class PairOut(BaseModel):
     """The same part on the machine and on an external gauge."""
 
-    model_config = ConfigDict(json_schema_extra={"example": PAIR})
-
     id: int
     machine_value: float
     external_value: float
@@ -246,30 +197,6 @@ def pair_out(pair: Pair) -> PairOut:
 
 class SuggestionOut(BaseModel):
     """The comparison of the pairs of a location."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "machine": "lathe-1",
-                "average_memory": 5,
-                "empirical_value": 0.0,
-                "suggested": 0.0026,
-                "pairs": 6,
-                "missing": 0,
-                "mean": 0.0026,
-                "deviation": 0.0006,
-                "low": 0.0020,
-                "high": 0.0032,
-                "confidence": 0.95,
-                "equal": False,
-                "step": None,
-                "outlier": None,
-                "since": "2026-11-20T05:02:11Z",
-                "text": "The machine reads +2.6 µm too much, with 95 % confidence between +2.0 µm and +3.2 µm. The empirical "
-                "value +0.0 µm lies outside: +2.6 µm is suggested.",
-            }
-        }
-    )
 
     machine: str
     average_memory: int
@@ -314,26 +241,6 @@ def suggestion_out(found: Suggestion, machine: str, location: int) -> Suggestion
 
 class PlaceOut(BaseModel):
     """A place that is calibrated, and when that is due."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "machine": "lathe-1",
-                "average_memory": 5,
-                "tool_memory": None,
-                "state": "due_soon",
-                "characteristics": ["shaft-d40"],
-                "value": 0.0026,
-                "acceptance": "accept",
-                "due_parts": 500,
-                "due_days": 7.0,
-                "parts": 461,
-                "since": "2026-11-19T06:02:11Z",
-                "due_at": "2026-11-26T06:02:11Z",
-                "last": 17,
-            }
-        }
-    )
 
     machine: str
     average_memory: Annotated[int | None, Field(description="R11, whose empirical value is calibrated.")]

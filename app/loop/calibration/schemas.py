@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, JsonValue, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.core.calibration import SECTIONS
@@ -41,38 +41,6 @@ R_CODES: dict[str, dict[int, str]] = {
     "R31": {0: "positive", 1: "negative"},
 }
 MACRO_NAMES = {"#502": "radius_term", "#505": "nominal", "#506": "upper_deviation", "#507": "lower_deviation"}
-GAUGE: dict[str, JsonValue] = {
-    "average_memory": 5,
-    "gauge_size": 199.852,
-    "touches": [199.8552, 199.8548, 199.855],
-    "surface": "free",
-    "probe_type": "axial",
-    "axis": "X",
-    "direction": "negative",
-    "zero_range": 0.001,
-    "averaging_limit": 0.01,
-    "confidence_limit": 1.0,
-    "weighting_factor": 2,
-    "path_factor": 1,
-    "tool_memory": 30,
-    "calibrated_at": "2026-11-21T06:02:11Z",
-    "key": "lathe-1:cal:17",
-}
-RING: dict[str, JsonValue] = {
-    "tool_memory": 32,
-    "nominal": 30.0,
-    "upper_deviation": 0.01,
-    "lower_deviation": -0.01,
-    "radius_term": 6.0,
-    "sections": [
-        {"plus": 24.013, "minus": -23.991},
-        {"plus": 24.014, "minus": -23.99},
-        {"plus": 24.015, "minus": -23.989},
-    ],
-    "first_move_triggered": False,
-    "calibrated_at": "2026-11-21T06:02:11Z",
-    "key": "lathe-2:ring:4",
-}
 
 
 def _by_number(value: Any, names: dict[str, str]) -> Any:
@@ -95,8 +63,6 @@ def _by_number(value: Any, names: dict[str, str]) -> Any:
 
 class GaugeIn(Body):
     """A calibration against a gauge of known size, as L92 makes it. R numbers may stand in place of names (`"R33": 0.001`)."""
-
-    model_config = ConfigDict(json_schema_extra={"example": GAUGE})
 
     average_memory: Annotated[
         int, Field(strict=True, ge=1, le=MOST_LOCATIONS, description="R11: whose empirical value is found (R46).")
@@ -157,8 +123,6 @@ class RingIn(Body):
     The macro's variables may stand in place of names (`"#502": 6.0`).
     """
 
-    model_config = ConfigDict(json_schema_extra={"example": RING})
-
     tool_memory: Annotated[
         int, Field(strict=True, ge=1, le=MOST_LOCATIONS, description="The location that holds the probe's offset.")
     ]
@@ -191,18 +155,6 @@ class PairIn(Body):
     The machine's reading is named by characteristic and sequence, or typed as `machine_value`.
     """
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "characteristic": "shaft-d40",
-                "sequence": 812,
-                "external_value": 39.9955,
-                "instrument": "CMM, hall C",
-                "key": "cmm:4711",
-            }
-        }
-    )
-
     characteristic: Annotated[Slug | None, Field(description="Whose reading it is.")] = None
     sequence: Annotated[int | None, Field(strict=True, ge=1, le=LARGEST_ID, description="Which reading.")] = None
     machine_value: Annotated[
@@ -216,10 +168,6 @@ class PairIn(Body):
 class SuggestionAcceptIn(Body):
     """Acceptance of the suggested empirical value, with a reason."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"example": {"empirical_value": 0.0026, "reason": "compared with the CMM, parts 812 to 820"}}
-    )
-
     empirical_value: Annotated[
         Length | None,
         Field(description="The suggestion as you have seen it; if it is another by now, nothing happens."),
@@ -229,8 +177,6 @@ class SuggestionAcceptIn(Body):
 
 class CalibrationPlanIn(Body):
     """Interval of calibration, and automatic or approved application of its results."""
-
-    model_config = ConfigDict(json_schema_extra={"example": {"due_parts": 500, "due_days": 7, "acceptance": "accept"}})
 
     due_parts: Annotated[
         int | None, Field(strict=True, ge=1, le=100_000_000, description="Due after so many parts; none: not by parts.")

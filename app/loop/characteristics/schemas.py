@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, Field, JsonValue
 
 from app.core.decision.limits import nanometres
 from app.core.parameters import FIELDS, Kind, MachineType, ParameterError, Problem, read, unusual_on
@@ -38,14 +38,6 @@ PARAMETERS: dict[str, JsonValue] = {
     "max_step": None,
     "max_total": None,
     "plausible_jump": None,
-}
-CHARACTERISTIC: dict[str, JsonValue] = {
-    "key": "shaft-d40",
-    "name": "Bearing seat Ø40 h6",
-    "machine": "lathe-1",
-    "part": "shaft-0815",
-    "unit": "mm",
-    "parameters": PARAMETERS,
 }
 
 
@@ -98,8 +90,6 @@ Part = Annotated[Text200, Field(description="The part it belongs to: drawing or 
 class CharacteristicIn(Body):
     """A characteristic to set up."""
 
-    model_config = ConfigDict(json_schema_extra={"example": CHARACTERISTIC})
-
     key: Annotated[Slug, Field(description="Its name in addresses and readings; it stays for good.")]
     name: Annotated[Text200, Field(description="What people call it, as on the drawing.")]
     machine: Annotated[str, Field(description="The key of the machine that cuts and measures it; it stays for good.")]
@@ -110,12 +100,6 @@ class CharacteristicIn(Body):
 
 class CharacteristicChange(Body):
     """Change of a characteristic. Omitted fields and parameters stay; null resets a parameter to its default."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {"parameters": {"zero_range": 0.0015}, "reason": "scatter of the new probe is larger"}
-        }
-    )
 
     key: Annotated[Slug | None, Field(description="May be sent along, unchanged.")] = None
     name: Text200 | None = None
@@ -132,12 +116,6 @@ class CharacteristicChange(Body):
 class CharacteristicOut(BaseModel):
     """A characteristic as it stands."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": CHARACTERISTIC | {"parameters_version": 4, "created_at": "2026-11-21T07:00:00Z", "warnings": []}
-        }
-    )
-
     key: str
     name: str
     machine: str
@@ -151,18 +129,6 @@ class CharacteristicOut(BaseModel):
 
 class VersionOut(BaseModel):
     """One version of the parameters; readings keep the version they were judged by."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "version": 4,
-                "at": "2026-11-21T07:00:00Z",
-                "by": "Ana",
-                "reason": "scatter of the new probe is larger",
-                "parameters": PARAMETERS,
-            }
-        }
-    )
 
     version: int
     at: datetime

@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from fastapi import Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from app.access.deps import AnyCaller
 from app.loop.faults import actions
@@ -18,10 +18,6 @@ router = api_router("machines")
 class FaultIn(Body):
     """A fault that a machine reports, or its end."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"example": {"kind": "battery_low", "text": "Probe battery low", "active": True}}
-    )
-
     kind: Annotated[Fault, Field(description="What has failed.")]
     text: Annotated[Text200 | None, Field(description="Words of the control; shown with the alarm.")] = None
     active: Annotated[bool, Field(strict=True, description="true: the fault is there; false: it is over.")] = True
@@ -29,10 +25,6 @@ class FaultIn(Body):
 
 class FaultOut(BaseModel):
     """The alarm that a fault has raised."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"example": {"kind": "battery_low", "active": True, "alarm": 17, "count": 1}}
-    )
 
     kind: Fault
     active: bool

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.core.parameters import AVERAGE_LOCATIONS, LARGEST_LENGTH, MOST_LOCATIONS, TOOL_LOCATIONS
 from app.core.uncertainty import DEFAULT_DELAY, DEFAULT_FEED
@@ -95,29 +95,10 @@ PlausibleAxisShift = Annotated[
         description="mm. A rotary axis that lies further from where its kinematics has it is warned of.",
     ),
 ]
-MACHINE: dict[str, JsonValue] = {
-    "key": "lathe-1",
-    "name": "Lathe 1, hall B",
-    "control": "sinumerik",
-    "type": "lathe",
-    "tool_locations": 32,
-    "average_locations": 20,
-    "corrections_expire_after": 8.0,
-    "signal_path": "plc",
-    "signal_delay": 0.25,
-    "signal_jitter": None,
-    "probing_feed": 150.0,
-    "plausible_turn": 5.0,
-    "plausible_shift": 10.0,
-    "plausible_axis_turn": 1.0,
-    "plausible_axis_shift": 1.0,
-}
 
 
 class MachineIn(Body):
     """A machine to set up."""
-
-    model_config = ConfigDict(json_schema_extra={"example": dict(MACHINE)})
 
     key: Annotated[Slug, Field(description="Its name in addresses and keys; it stays for good.")]
     name: Annotated[Text200, Field(description="What people call it.")]
@@ -139,8 +120,6 @@ class MachineIn(Body):
 class MachineChange(Body):
     """Change of a machine. Omitted fields stay. The key never changes, because programs call the machine by it."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"name": "Lathe 1, hall C"}})
-
     key: Annotated[Slug | None, Field(description="May be sent along, unchanged.")] = None
     name: Text200 | None = None
     control: Control | None = None
@@ -161,13 +140,7 @@ class MachineChange(Body):
 class MachineOut(BaseModel):
     """A machine."""
 
-    model_config = ConfigDict(
-        from_attributes=True,
-        json_schema_extra={
-            "example": MACHINE
-            | {"position_uncertainty": 0.000625, "zero_range_floor": 0.000625, "created_at": "2026-11-21T07:00:00Z"}
-        },
-    )
+    model_config = ConfigDict(from_attributes=True)
 
     key: str
     name: str

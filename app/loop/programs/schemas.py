@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, Field
 
 from app.core.programs import fanuc
 from app.core.programs.lines import MOST_CHARACTERS, WARNINGS, Note, Program
@@ -15,43 +15,9 @@ from app.web.warnings import Warnings
 Verdict = Literal["understood", "ignored", "not_understood"]
 KindOf = Literal["calibration", "measuring", "assignments", "results", "kinematics", "work_zero"]
 
-TEXT = (
-    "L15\nN5 R103 R115 R240 R250\nN10 R33=0.001 R36=1 R37=0.3\nN15 R40=0 R41=-0.016 R42=40\nN20 L75\nN25 L93\nN30 M17\n"
-)
-LINE: dict[str, JsonValue] = {
-    "line": 3,
-    "text": "N10 R33=0.001 R36=1 R37=0.3",
-    "verdict": "understood",
-    "notes": [{"code": "assigned", "text": "R33 = 0.001 mm zero range", "warning": False}],
-}
-PARAMETERS: dict[str, JsonValue] = {
-    "tool_memory": 3,
-    "average_memory": 5,
-    "variant": "single",
-    "nominal": 40.0,
-    "upper_deviation": 0.0,
-    "lower_deviation": -0.016,
-    "zero_range": 0.001,
-    "wear_limit": 0.3,
-    "confidence_limit": 1.0,
-}
-PROGRAM: dict[str, JsonValue] = {
-    "kind": "measuring",
-    "first_line": 1,
-    "last_line": 7,
-    "parameters": PARAMETERS,
-    "about": {},
-    "values": {},
-    "results": {},
-    "touches": None,
-    "notes": [],
-}
-
 
 class ProgramIn(Body):
     """A program text to be read."""
-
-    model_config = ConfigDict(json_schema_extra={"example": {"control": "sinumerik", "text": TEXT}})
 
     control: Annotated[
         ReadableControl | None, Field(description="Whose text it is; if left out, taken from the text.")
@@ -80,8 +46,6 @@ class NoteOut(BaseModel):
 class ProgramLineOut(BaseModel):
     """A line and what was made of it."""
 
-    model_config = ConfigDict(json_schema_extra={"example": LINE})
-
     line: int
     text: str
     verdict: Verdict
@@ -90,8 +54,6 @@ class ProgramLineOut(BaseModel):
 
 class ProgramOut(BaseModel):
     """One of the programs in the text."""
-
-    model_config = ConfigDict(json_schema_extra={"example": PROGRAM})
 
     kind: KindOf
     first_line: int
@@ -114,25 +76,6 @@ class ProgramOut(BaseModel):
 
 class ProgramRead(BaseModel):
     """The content of a program text. Nothing was stored."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "control": "sinumerik",
-                "program": PROGRAM,
-                "problems": [
-                    {
-                        "field": "parameters.factor",
-                        "message": "The factor is missing: it says which way the offset acts.",
-                    }
-                ],
-                "warnings": [],
-                "not_understood": 0,
-                "lines": [LINE],
-                "programs": [PROGRAM],
-            }
-        }
-    )
 
     control: ReadableControl
     program: Annotated[

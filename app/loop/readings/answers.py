@@ -4,13 +4,13 @@ from collections.abc import Iterable
 from datetime import datetime
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, Field
 
 from app.core.decision.decide import needs_approval
 from app.core.decision.step import DECIMALS, Action
 from app.core.parameters import Parameters
 from app.core.variants import Results
-from app.loop.readings.by_hand.schemas import BY_HAND, HandMeasurementOut
+from app.loop.readings.by_hand.schemas import HandMeasurementOut
 from app.loop.readings.records import Record
 from app.loop.readings.wording import reason
 
@@ -65,37 +65,6 @@ def answer(
     }
 
 
-ANSWER: dict[str, JsonValue] = {
-    "characteristic": "shaft-d40",
-    "sequence": 812,
-    "key": "lathe-1:000812:d40",
-    "part": "SN-000812",
-    "measured": 39.9981,
-    "measured_at": "2026-11-21T07:15:02.120Z",
-    "received_at": "2026-11-21T07:15:02.131Z",
-    "late": False,
-    "deviation": 0.0061,
-    "size": 39.9981,
-    "decided_deviation": 0.0061,
-    "outstanding": [],
-    "zone": "full",
-    "results": None,
-    "average_before": 0.0012,
-    "average_after": 0.0,
-    "action": "correct",
-    "correction": {"number": 18, "tool_memory": 3, "amount": -0.0061, "status": "pending"},
-    "alarms": [],
-    "reason": {
-        "code": "full_deviation",
-        "text": "Deviation 6.1 µm is beyond the averaging limit 5.3 µm: corrected in full.",
-        "notes": [],
-    },
-    "parameters_version": 4,
-}
-ROW = ANSWER | {"excluded": None}
-DETAIL = ROW | {"by_hand": [BY_HAND], "touches": None, "machined_at": None, "correction_in_effect": 17}
-
-
 class IssuedCorrection(BaseModel):
     """The correction that a reading led to, as it was issued."""
 
@@ -145,8 +114,6 @@ class VariantResults(BaseModel):
 class ReadingAnswer(BaseModel):
     """The answer to one reading. Lengths in mm; `deviation` is raw, `decided_deviation` counts outstanding corrections."""
 
-    model_config = ConfigDict(json_schema_extra={"example": ANSWER})
-
     characteristic: str
     sequence: Annotated[int, Field(description="Counts 1, 2, 3 … per characteristic, without gaps.")]
     key: str | None
@@ -195,15 +162,11 @@ class Excluded(BaseModel):
 class ReadingRow(ReadingAnswer):
     """A stored reading."""
 
-    model_config = ConfigDict(json_schema_extra={"example": ROW})
-
     excluded: Annotated[Excluded | None, Field(description="If it was taken out of the statistics.")]
 
 
 class ReadingDetail(ReadingRow):
     """A stored reading with everything about it."""
-
-    model_config = ConfigDict(json_schema_extra={"example": DETAIL})
 
     by_hand: Annotated[list[HandMeasurementOut], Field(description="What people measured on this part.")]
     touches: Annotated[list[list[float]] | None, Field(description="One list per point, each with its repeats.")]

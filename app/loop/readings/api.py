@@ -7,7 +7,7 @@ from typing import Annotated, Any, cast
 
 import msgspec
 from fastapi import APIRouter, Path, Query, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 
 from app.access.deps import AnyCaller, Operator
@@ -26,17 +26,11 @@ from app.loop.readings.writer.pending import Stored, Verdict
 from app.web.api import BASE, CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import Body, Limit, Page, Reason, page_of
+from app.web.openapi import example_of
 
 MOST_IN_BATCH = 10_000
 NDJSON = "application/x-ndjson"
-EXAMPLE = {
-    "characteristic": "shaft-d40",
-    "measured": 39.9981,
-    "measured_at": "2026-11-21T08:15:02.120+01:00",
-    "part": "SN-000812",
-    "key": "lathe-1:000812:d40",
-    "correction_in_effect": 17,
-}
+EXAMPLE = example_of("ReadingIn")
 (_schema,), _definitions = msgspec.json.schema_components((ReadingIn,), ref_template="#/components/schemas/{name}")
 SCHEMAS = _definitions
 _BODY = {"schema": _schema}
@@ -50,12 +44,6 @@ Sequence = Annotated[int, Path(ge=1, le=2**63 - 1, description="Number of the re
 class BatchCounts(BaseModel):
     """The result of a batch."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {"stored": 3, "repeated": 0, "zones": {"zero": 2, "full": 1}, "corrections": 1, "alarms": 0}
-        }
-    )
-
     stored: Annotated[int, Field(description="Readings that are new.")]
     repeated: Annotated[int, Field(description="Readings whose key was sent before; nothing happened twice.")]
     zones: Annotated[dict[str, int], Field(description="How many of the new ones were decided in each zone.")]
@@ -68,8 +56,6 @@ class BatchCounts(BaseModel):
 
 class ExcludeIn(Body):
     """The reason for taking a reading out of the statistics."""
-
-    model_config = ConfigDict(json_schema_extra={"example": {"reason": "chip under the stylus"}})
 
     reason: Reason
 

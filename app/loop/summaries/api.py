@@ -5,7 +5,7 @@ from datetime import datetime
 from typing import Annotated
 
 from fastapi import Query
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from app.access.deps import AnyCaller
 from app.errors import FieldError, Invalid
@@ -25,39 +25,6 @@ class StatisticsOut(BaseModel):
     A probe fault (R36 reached) measured no part: it is in `count` and `zones`, and left out of mean, standard deviation,
     minimum, maximum and share, as capability and control charts leave it out.
     """
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "characteristic": "shaft-d40",
-                "first_sequence": 613,
-                "last_sequence": 812,
-                "count": 199,
-                "excluded": 1,
-                "probe_faults": 0,
-                "mean": 0.00042,
-                "standard_deviation": 0.00193,
-                "minimum": -0.0061,
-                "maximum": 0.0092,
-                "in_tolerance": 198,
-                "share_in_tolerance": 0.99497,
-                "corrections": 17,
-                "rejected": None,
-                "sections_outside": None,
-                "rejected_since_tool_change": None,
-                "sections_outside_since_tool_change": None,
-                "zones": {
-                    "zero": 71,
-                    "average": 109,
-                    "full": 18,
-                    "oversize": 1,
-                    "undersize": 0,
-                    "wear": 0,
-                    "probe_fault": 0,
-                },
-            }
-        }
-    )
 
     characteristic: str
     first_sequence: int | None = Field(description="First reading that was looked at.")

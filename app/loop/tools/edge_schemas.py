@@ -3,40 +3,15 @@
 from datetime import UTC, datetime
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, Field
 
 from app.core.parameters import LARGEST_LENGTH, MOST_LOCATIONS
 from app.loop.tools.lives import Life, Lives
 from app.web.fields import Body, Reason, Text200
 
-LIFE: dict[str, JsonValue] = {
-    "began_at": "2026-11-20T05:02:11Z",
-    "ended_at": "2026-11-21T05:02:11Z",
-    "seconds": 86400,
-    "parts": 412,
-    "total": -0.0312,
-    "edge": "D1",
-    "name": "T03 finishing",
-    "actor": "ana",
-    "reason": "New insert",
-}
-
 
 class ToolSettings(Body):
     """The tool in a location. Omitted fields stay as they are; null clears a field."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "edge": "D1",
-                "name": "T03 finishing",
-                "kind": "DCMT 11T304",
-                "planned_parts": 400,
-                "planned_total": 0.05,
-                "sister": 13,
-            }
-        }
-    )
 
     edge: Annotated[Text200 | None, Field(description="The cutting edge: D number or name.")] = None
     name: Annotated[Text200 | None, Field(description="What the tool is called.")] = None
@@ -64,26 +39,11 @@ class ToolSettings(Body):
 class SisterIn(Body):
     """The reason for the change to the sister tool."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"reason": "edge worn after 412 parts"}})
-
     reason: Reason
 
 
 class SwitchedOut(BaseModel):
     """The characteristics that correct the sister tool now."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "machine": "lathe-1",
-                "tool": 3,
-                "sister": 13,
-                "characteristics": ["shaft-d40"],
-                "superseded": [19],
-                "averages": [5],
-            }
-        }
-    )
 
     machine: str
     tool: Annotated[int, Field(description="R10 of the tool that is not corrected any more.")]
@@ -95,8 +55,6 @@ class SwitchedOut(BaseModel):
 
 class LifeOut(BaseModel):
     """One edge, from the tool change that brought it in to the one that took it out."""
-
-    model_config = ConfigDict(json_schema_extra={"example": LIFE})
 
     began_at: Annotated[datetime | None, Field(description="None if nobody recorded how it came in.")]
     ended_at: Annotated[datetime | None, Field(description="None while it is in.")]
@@ -113,22 +71,6 @@ class LifeOut(BaseModel):
 
 class LivesOut(BaseModel):
     """The lives of the edges in one location, newest first; the first is the present one."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "machine": "lathe-1",
-                "tool_memory": 3,
-                "usual_parts": 412.0,
-                "life_used": 0.5275,
-                "parts_left": 189,
-                "lives": [
-                    LIFE | {"ended_at": None, "parts": 211, "total": -0.0081, "actor": None, "reason": None},
-                    LIFE,
-                ],
-            }
-        }
-    )
 
     machine: str
     tool_memory: Annotated[int, Field(description="R10")]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, Field
 
 from app.core.parameters import LARGEST_LENGTH
 from app.core.tool_life import LifePlan, use_of
@@ -20,63 +20,9 @@ DESCRIBED = ("edge", "name", "kind", "planned_parts", "planned_total", "sister")
 Status = Literal["held", "awaiting_approval", "pending", "applied", "rejected", "superseded"]
 Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
 
-CORRECTION: dict[str, JsonValue] = {
-    "machine": "lathe-1",
-    "number": 18,
-    "tool_memory": 3,
-    "amount": -0.0061,
-    "status": "pending",
-    "characteristic": "shaft-d40",
-    "sequence": 812,
-    "size_error": 0.0061,
-    "created_at": "2026-11-21T07:15:02.131Z",
-    "offset_expected": -0.0142,
-    "applied_at": None,
-    "applied_by": None,
-    "offset_after": None,
-    "decided_at": None,
-    "decided_by": None,
-    "status_reason": None,
-    "superseded_by": None,
-    "fetched_at": None,
-    "fetched_by": None,
-    "reason": {
-        "code": "full_deviation",
-        "text": "Deviation 6.1 µm is beyond the averaging limit 5.3 µm: corrected in full.",
-        "notes": [],
-    },
-    "note": None,
-}
-LAST: dict[str, JsonValue] = {
-    name: CORRECTION[name] for name in ("number", "amount", "status", "created_at", "applied_at")
-}
-TOOL: dict[str, JsonValue] = {
-    "machine": "lathe-1",
-    "tool_memory": 3,
-    "offset": -0.0081,
-    "total": -0.0081,
-    "parts": 211,
-    "changed_at": "2026-11-20T05:02:11Z",
-    "reset_at": "2026-11-20T05:02:11Z",
-    "last_correction": LAST,
-    "open_corrections": [LAST],
-    "characteristics": ["shaft-d40"],
-    "edge": "D1",
-    "name": "T03 finishing",
-    "kind": "DCMT 11T304",
-    "planned_parts": 400,
-    "planned_total": 0.05,
-    "sister": 13,
-    "life_used": 0.5275,
-    "parts_left": 189,
-    "paused_by": None,
-}
-
 
 class AppliedIn(Body):
     """The machine (or a person at it) says that a correction is in the offset now."""
-
-    model_config = ConfigDict(json_schema_extra={"example": {"offset_after": -0.0142}})
 
     offset_after: Annotated[
         Length | None, Field(description="The offset that the control holds now; it is compared with the expected one.")
@@ -87,15 +33,11 @@ class AppliedIn(Body):
 class CorrectionDecisionIn(Body):
     """Approval, release or rejection of a correction, with a reason."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"reason": "insert looked at, still good"}})
-
     reason: Reason
 
 
 class DecisionsIn(Body):
     """Approval of several corrections together, with a reason."""
-
-    model_config = ConfigDict(json_schema_extra={"example": {"numbers": [17, 18], "reason": "part measured, agrees"}})
 
     numbers: Annotated[
         list[Annotated[int, Field(strict=True, ge=1, le=LARGEST_SERIAL)]],
@@ -106,10 +48,6 @@ class DecisionsIn(Body):
 
 class RejectionIn(CorrectionDecisionIn):
     """Rejection of a correction, with a reason."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"example": {"reason": "part was dirty, measured again", "although_fetched": False}}
-    )
 
     although_fetched: Annotated[
         bool,
@@ -123,8 +61,6 @@ class RejectionIn(CorrectionDecisionIn):
 class ToolEdit(Body):
     """The offset as somebody has set it by hand."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"offset": -0.012, "reason": "set at the control"}})
-
     offset: Length
     reason: Reason
 
@@ -132,18 +68,12 @@ class ToolEdit(Body):
 class ToolChange(Body):
     """A new tool in this location."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"offset": 0.0, "reason": "insert worn after 211 parts"}})
-
     offset: Annotated[Length, Field(description="The offset that the new tool starts with.")] = 0.0
     reason: Reason
 
 
 class EmpiricalValueIn(Body):
     """The empirical value: machine reading minus true value, taken off every measurement."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"example": {"empirical_value": 0.002, "reason": "compared with the CMM, part 812"}}
-    )
 
     empirical_value: Length
     reason: Reason
@@ -159,8 +89,6 @@ class ReadingReason(BaseModel):
 
 class CorrectionOut(BaseModel):
     """A change of a tool offset, on its way from the reading that asked for it to the machine that makes it."""
-
-    model_config = ConfigDict(json_schema_extra={"example": CORRECTION})
 
     machine: str
     number: Annotated[int, Field(description="Counts per machine, without gaps.")]
@@ -203,8 +131,6 @@ class CorrectionBrief(BaseModel):
 class ToolOut(BaseModel):
     """One location of the tool memory."""
 
-    model_config = ConfigDict(json_schema_extra={"example": TOOL})
-
     machine: str
     tool_memory: Annotated[int, Field(description="R10")]
     offset: Annotated[float, Field(description="The offset that the control is known to hold, mm.")]
@@ -234,37 +160,13 @@ class ToolOut(BaseModel):
 class ToolSet(ToolOut):
     """A location whose offset was set just now."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": TOOL
-            | {
-                "open_corrections": [],
-                "superseded": [18],
-                "note": "Correction 18 was computed for the offset before and is superseded: do not apply it.",
-                "warnings": [],
-            }
-        }
-    )
-
     superseded: Annotated[list[int], Field(description="Corrections that must not be applied any more.")]
     note: str | None = None
     warnings: Warnings
 
 
-AVERAGE: dict[str, JsonValue] = {
-    "machine": "lathe-1",
-    "average_memory": 5,
-    "average": 0.0012,
-    "empirical_value": 0.0,
-    "updated_at": "2026-11-21T07:15:02.131Z",
-    "characteristics": ["shaft-d40"],
-}
-
-
 class AverageOut(BaseModel):
     """One location of the average memory."""
-
-    model_config = ConfigDict(json_schema_extra={"example": AVERAGE})
 
     machine: str
     average_memory: Annotated[int, Field(description="R11")]
@@ -276,8 +178,6 @@ class AverageOut(BaseModel):
 
 class AverageSet(AverageOut):
     """A location whose empirical value was set just now."""
-
-    model_config = ConfigDict(json_schema_extra={"example": AVERAGE | {"warnings": []}})
 
     warnings: Warnings
 

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, Field
 
 from app.core.programs.corrections import MOST_STEPS
 from app.loop.tools.fetching import Fetched
@@ -14,19 +14,9 @@ Numbers = Annotated[
     list[Number], Field(min_length=1, max_length=MOST_STEPS, description="Which corrections, by their numbers.")
 ]
 
-MARKED: dict[str, JsonValue] = {
-    "number": 18,
-    "fetched_at": "2026-11-21T07:15:40Z",
-    "fetched_by": "ana",
-    "fetched_as": "turning 5e8a0c1d77f2",
-    "fetched_before": False,
-}
-
 
 class FetchedIn(Body):
     """Corrections that were fetched, and the form of their text."""
-
-    model_config = ConfigDict(json_schema_extra={"example": {"numbers": [18], "form": "turning"}})
 
     numbers: Numbers
     form: Annotated[
@@ -36,8 +26,6 @@ class FetchedIn(Body):
 
 class FetchedOne(BaseModel):
     """A correction that was fetched."""
-
-    model_config = ConfigDict(json_schema_extra={"example": MARKED})
 
     number: int
     fetched_at: datetime
@@ -51,25 +39,17 @@ class FetchedOne(BaseModel):
 class FetchedOut(BaseModel):
     """Corrections that were marked as fetched."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"items": [MARKED]}})
-
     items: list[FetchedOne]
 
 
 class ConfirmedIn(Body):
     """Corrections that are in the control now."""
 
-    model_config = ConfigDict(json_schema_extra={"example": {"numbers": [17, 18]}})
-
     numbers: Numbers
 
 
 class ConfirmedOut(BaseModel):
     """The result of the confirmation."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"example": {"applied": [18], "applied_before": [17], "must_not_be_in": [], "note": None}}
-    )
 
     applied: list[int]
     applied_before: list[int]

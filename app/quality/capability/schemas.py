@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from app.core.spc.capability import Fallout, Index
 from app.core.spc.in_time import InTime
@@ -137,64 +137,8 @@ class InForceOut(BaseModel):
     readings: int
 
 
-EXAMPLE: dict[str, Any] = {
-    "characteristic": "shaft-d40",
-    "first_sequence": 1,
-    "last_sequence": 200,
-    "first_at": "2026-11-20T06:00:00Z",
-    "last_at": "2026-11-21T08:15:02Z",
-    "readings": 199,
-    "excluded": [17],
-    "probe_faults": [],
-    "far": [],
-    "lower_limit": -0.008,
-    "upper_limit": 0.008,
-    "versions": [{"version": 1, "target": 40.0, "half": 0.008, "readings": 199}],
-    "confidence": 0.95,
-    "mean": 0.00042,
-    "sigma_within": 0.0018,
-    "sigma_overall": 0.0019,
-    "quote": "ppk",
-    "quoted": {
-        "index": "ppk",
-        "value": 1.33,
-        "low": 1.19,
-        "high": 1.47,
-        "preliminary": False,
-        "method": "normal distribution, spread of all readings",
-        "window": "199 readings, 1 to 200; normal distribution, spread of all readings",
-    },
-    "why_none": None,
-    "cp": {"value": 1.48, "low": 1.29, "high": 1.67, "method": "chi_square"},
-    "cpk": {"value": 1.4, "low": 1.2, "high": 1.6, "method": "bissell"},
-    "pp": {"value": 1.4, "low": 1.26, "high": 1.54, "method": "chi_square"},
-    "ppk": {"value": 1.33, "low": 1.19, "high": 1.47, "method": "bissell"},
-    "cpm": {"value": 1.37, "low": 1.24, "high": 1.5, "method": "boyles"},
-    "percentiles": None,
-    "ppm_within": {"below": 1.5, "above": 12.9, "total": 14.4},
-    "ppm_overall": {"below": 4.7, "above": 33.1, "total": 37.8},
-    "ppm_observed": {"below": 0.0, "above": 0.0, "total": 0.0},
-    "outside": 0,
-    "refused": None,
-    "normal": True,
-    "normality": [],
-    "stable": False,
-    "in_control": False,
-    "constant_in_time": True,
-    "stability": "Not in control: more signals than chance explains by Nelson 2 (judged by baseline 1).",
-    "baseline": 1,
-    "signals": [{"rule": "nelson_2", "signals": 4, "expected": 0.4, "p_value": 0.0008}],
-    "in_time": None,
-    "compensated": True,
-    "without": None,
-    "cautions": ["Do not report Cp and Cpk: the process is not in control (run rules)."],
-}
-
-
 class CapabilityOut(BaseModel):
     """Capability of a run of readings. What cannot be said of them is null, and `refused` or a text says why."""
-
-    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE})
 
     characteristic: str
     first_sequence: int | None

@@ -13,25 +13,11 @@ from app.quality.control_charts.rules_queries import Preview, RuleTrial
 from app.quality.control_charts.tables import Baseline
 from app.web.fields import LARGEST_SERIAL, Body, Reason
 
-RULES_IN: dict[str, Any] = {
-    "rules": {"main": {"nelson_1": "alarm", "nelson_2": "watch"}, "ewma": {"nelson_1": "watch"}},
-    "reason": "Found on the preview: hardly any by chance",
-    "look_back": False,
-}
-_RULE: dict[str, Any] = {
-    "rule": "nelson_2",
-    "name": "Nelson 2",
-    "looks_for": "9 points in a row lie on the same side of the centre.",
-    "causes": "The mean has moved: a new edge, another batch of material, an offset edited by hand.",
-    "do": "watch",
-    "since": 812,
-}
-
 
 class RulesIn(Body):
     """The rules that are to watch; what is not named is switched off."""
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, json_schema_extra={"example": RULES_IN})
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     rules: dict[Place, dict[RuleName, Do]] = Field(
         description="By chart: `main` (individuals or subgroup means), `scatter` (moving range, R or s), `ewma`, "
@@ -70,20 +56,6 @@ class ChartRulesOut(BaseModel):
 
 class RulesOut(BaseModel):
     """The rules of a characteristic. Without a baseline in force they judge nothing."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "characteristic": "shaft-d40",
-                "version": 2,
-                "baseline": 3,
-                "charts": [{"place": "main", "chart": "individuals", "rules": [_RULE]}],
-                "at": "2026-11-21T07:15:02.131Z",
-                "actor": "ana",
-                "reason": "Found on the preview: hardly any by chance",
-            }
-        }
-    )
 
     characteristic: str
     version: int = Field(description="0: the default, which nobody has set: nelson_1 is watched and raises no alarm.")
@@ -152,45 +124,6 @@ class TriedRuleOut(TriedOut):
 
 class PreviewOut(BaseModel):
     """Signals that every rule would have given on the last readings, judged by the baseline in force."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "characteristic": "shaft-d40",
-                "baseline": 3,
-                "first_sequence": 813,
-                "last_sequence": 1812,
-                "rules": [
-                    {
-                        "place": "main",
-                        "chart": "individuals",
-                        "rule": "nelson_2",
-                        "do": "watch",
-                        "signals": 2,
-                        "points": 1000,
-                        "points_inside": 21,
-                        "every": 511.0,
-                        "per_1000": 1.957,
-                        "expected": 1.957,
-                        "exact": True,
-                        "more_than_chance": False,
-                        "text": "2 times, by chance 2.0: no more than by chance",
-                    }
-                ],
-                "together": {
-                    "signals": 6,
-                    "points": 1000,
-                    "points_inside": 25,
-                    "every": 216.7,
-                    "per_1000": 4.615,
-                    "expected": 4.615,
-                    "exact": True,
-                    "more_than_chance": False,
-                    "text": "6 times, by chance 4.6: no more than by chance",
-                },
-            }
-        }
-    )
 
     characteristic: str
     baseline: int | None = Field(description="null: none is in force, so nothing can be tried.")

@@ -1,7 +1,7 @@
 """Baselines and charts as JSON. Lengths in mm; k, h and headstart in sigma."""
 
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
@@ -12,14 +12,6 @@ ChartName = Literal["individuals", "xbar_r", "xbar_s"]
 Grouping = Literal["consecutive", "pause", "part"]
 Place = Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID)]
 MOST_EXCLUDED = 100
-
-_PERIOD: dict[str, Any] = {
-    "chart": "individuals",
-    "quantity": "wear_residuals",
-    "first_sequence": 613,
-    "last_sequence": 812,
-    "excluded": [{"first": 640, "last": 641, "reason": "Chip on the stylus"}],
-}
 
 
 class ExcludedIn(Body):
@@ -33,7 +25,7 @@ class ExcludedIn(Body):
 class PeriodIn(Body):
     """A period, and what a baseline of it is to be: its chart, its quantity, and the settings of the charts that remember."""
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, json_schema_extra={"example": _PERIOD})
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     chart: ChartName = Field("individuals", description="Single values, or subgroups by their ranges or by s.")
     quantity: Quantity = Field(description="What is charted; see the how-to about control charts.")
@@ -74,11 +66,7 @@ class PeriodIn(Body):
 class BaselineIn(PeriodIn):
     """A baseline to be frozen. Sent again with the same `key`, it is answered again and nothing new is frozen."""
 
-    model_config = ConfigDict(
-        extra="forbid",
-        allow_inf_nan=False,
-        json_schema_extra={"example": _PERIOD | {"reason": "New toolholder, stable since Monday"}},
-    )
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     reason: Reason
     key: str | None = Field(None, min_length=1, max_length=128, description="Your own, so that it is frozen once.")
@@ -90,9 +78,7 @@ class BaselineIn(PeriodIn):
 class BaselineWhyIn(Body):
     """Reason, in words."""
 
-    model_config = ConfigDict(
-        extra="forbid", allow_inf_nan=False, json_schema_extra={"example": {"reason": "The spindle was rebuilt"}}
-    )
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     reason: Reason
 
@@ -102,50 +88,6 @@ class CautionOut(Body):
 
     code: str
     text: str
-
-
-EXAMPLE: dict[str, Any] = _PERIOD | {
-    "characteristic": "shaft-d40",
-    "grouping": None,
-    "group_size": None,
-    "group_pause": None,
-    "ewma_lambda": 0.2,
-    "ewma_width": 3.0,
-    "ewma_exact": True,
-    "cusum_k": 0.5,
-    "cusum_h": 5.0,
-    "cusum_headstart": 0.0,
-    "average_span": 5,
-    "centre": 0.0,
-    "sigma": 0.00121,
-    "lower": -0.00363,
-    "upper": 0.00363,
-    "estimator": "moving_range",
-    "degrees_of_freedom": 119.4,
-    "readings": 198,
-    "groups": 197,
-    "provisional": False,
-    "factor": -1.0,
-    "wear_per_reading": 0.000021,
-    "wear_error": 0.0000014,
-    "settle": 20,
-    "signals": 0,
-    "normal_p": 0.41,
-}
-FROZEN: dict[str, Any] = EXAMPLE | {
-    "version": 3,
-    "in_force": True,
-    "repeats": None,
-    "parameters_version": 4,
-    "at": "2026-11-21T08:15:02Z",
-    "actor": "ana",
-    "reason": "New toolholder, stable since Monday",
-    "retired_at": None,
-    "retired_by": None,
-    "retired_why": None,
-}
-LEFT_OUT: dict[str, Any] = {"excluded": [], "by_baseline": [640, 641], "faults": [], "unknown": [], "count": 2}
-CAUTION = {"code": "provisional", "text": "Fewer than 100 readings: the limits are provisional."}
 
 
 class LeftOutOut(Body):
@@ -160,8 +102,6 @@ class LeftOutOut(Body):
 
 class DraftOut(Body):
     """Preview of the baseline of this period; nothing is stored."""
-
-    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE | {"left_out": LEFT_OUT, "cautions": [CAUTION]}})
 
     characteristic: str
     chart: ChartName
@@ -201,16 +141,12 @@ class DraftOut(Body):
 class DraftAnswer(DraftOut):
     """The draft with what is to be known before it is frozen."""
 
-    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE | {"left_out": LEFT_OUT, "cautions": [CAUTION]}})
-
     left_out: LeftOutOut = Field(description="Readings of the period that count for nothing.")
     cautions: list[CautionOut]
 
 
 class BaselineOut(DraftOut):
     """A frozen baseline. The newest version is in force unless it is retired."""
-
-    model_config = ConfigDict(json_schema_extra={"example": FROZEN})
 
     version: int
     in_force: bool
@@ -250,44 +186,6 @@ class ChartSignalOut(Body):
 
 class ControlOut(Body):
     """A chart in numbers: at most 10 000 points, the newest; signals of all."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "characteristic": "shaft-d40",
-                "chart": "individuals",
-                "quantity": "wear_residuals",
-                "baseline": 3,
-                "first_sequence": 810,
-                "last_sequence": 812,
-                "count": 3,
-                "waiting": 0,
-                "settling": 0,
-                "left_out": LEFT_OUT,
-                "points": {
-                    "first": [810, 811, 812],
-                    "last": [810, 811, 812],
-                    "size": [1, 1, 1],
-                    "value": [0.0004, -0.0011, 0.0052],
-                    "below": None,
-                    "centre": 0.0,
-                    "lower": -0.00363,
-                    "upper": 0.00363,
-                },
-                "signal_count": 1,
-                "signals": [
-                    {
-                        "rule": "nelson_1",
-                        "side": 1,
-                        "first": 812,
-                        "last": 812,
-                        "points": 1,
-                        "text": "A point lies beyond 3 sigma.",
-                    }
-                ],
-            }
-        }
-    )
 
     characteristic: str
     chart: str

@@ -1,7 +1,7 @@
 """Signals as JSON."""
 
 from datetime import datetime
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -12,36 +12,9 @@ from app.quality.control_charts.signals_queries import SignalRow
 from app.quality.control_charts.signals_wording import Cause
 from app.web.fields import Body, Reason
 
-SIGNAL: dict[str, Any] = {
-    "id": 17,
-    "state": "open",
-    "machine": "lathe-1",
-    "characteristic": "shaft-d40",
-    "chart": "individuals",
-    "rule": "nelson_2",
-    "side": "above",
-    "first_sequence": 812,
-    "last_sequence": 825,
-    "points": 14,
-    "text": "Nelson 2, Individuals, readings 812 to 825: 14 points in a row on one side of the centre, above",
-    "baseline": 3,
-    "rules_version": 2,
-    "at": "2026-11-21T07:15:02.131Z",
-    "last_at": "2026-11-21T07:20:02.004Z",
-    "alarm": None,
-    "excluded": 0,
-    "withdrawn_at": None,
-    "explained_at": None,
-    "explained_by": None,
-    "cause": None,
-    "comment": None,
-}
-
 
 class SignalOut(BaseModel):
     """A run of points that a rule has found. It is kept for good; while the run goes on, its end moves."""
-
-    model_config = ConfigDict(json_schema_extra={"example": SIGNAL})
 
     id: int
     state: Literal["open", "explained", "withdrawn"] = Field(
@@ -73,11 +46,7 @@ class SignalOut(BaseModel):
 class CommentIn(Body):
     """Cause of a signal."""
 
-    model_config = ConfigDict(
-        extra="forbid",
-        allow_inf_nan=False,
-        json_schema_extra={"example": {"cause": "material", "comment": "New batch, harder by 20 HB"}},
-    )
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     cause: Cause
     comment: Reason

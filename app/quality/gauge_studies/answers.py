@@ -4,7 +4,7 @@ from datetime import datetime
 from math import isnan
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from app.core.spc.gauge.crossed import Study
 from app.core.spc.gauge.linearity import Coefficient, Linearity
@@ -121,43 +121,6 @@ class AdviceOut(BaseModel):
 
 class StudyOut(BaseModel):
     """A gauge study with what it says; computed from its values whenever it is asked for."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "id": 7,
-                "kind": "type_one",
-                "machine": "lathe-1",
-                "characteristic": "shaft-d40",
-                "gauge": "Probe T8",
-                "revision": 1,
-                "newest_revision": 1,
-                "at": "2026-11-21T08:15:02Z",
-                "by": "engineer",
-                "reason": None,
-                "settings": {"gauge": "Probe T8", "reference": 39.9921, "tolerance": 0.016, "each": "reading"},
-                "rows": [{"values": [39.9922, 39.9921, 39.992]}],
-                "refused": None,
-                "bias": None,
-                "type_one": None,
-                "linearity": None,
-                "grr": [],
-                "values_left_out": 0,
-                "verdicts": [
-                    {
-                        "name": "Cg",
-                        "value": "1.52",
-                        "verdict": "capable",
-                        "limit": "at least 1.33 (VDA 5); 30 values, 20 % of the tolerance against 6 s",
-                    }
-                ],
-                "zero_range": None,
-                "taken_from": "readings 788 to 812 of shaft-d40; less the empirical value +1.4 µm",
-                "caution": None,
-                "warnings": [],
-            }
-        }
-    )
 
     id: int
     kind: Kind

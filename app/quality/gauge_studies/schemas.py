@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from app.core.parameters import LARGEST_LENGTH
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Body, Reason, Slug, Text200
@@ -54,24 +54,6 @@ class SettingsIn(Body):
 class StudyIn(SettingsIn):
     """A gauge study with all its values."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "kind": "grr",
-                "machine": "lathe-1",
-                "characteristic": "shaft-d40",
-                "gauge": "Probe T8, ruby 2 mm",
-                "tolerance": 0.016,
-                "rows": [
-                    {"part": "1", "operator": "A", "values": [40.001, 40.0012]},
-                    {"part": "1", "operator": "B", "values": [40.0011, 40.0012]},
-                    {"part": "2", "operator": "A", "values": [39.997, 39.9968]},
-                    {"part": "2", "operator": "B", "values": [39.9972, 39.9971]},
-                ],
-            }
-        }
-    )
-
     kind: Kind = Field(description="type_one: Cg, Cgk. bias. linearity. grr: repeatability and reproducibility.")
     machine: Slug = Field(examples=["lathe-1"])
     characteristic: Slug | None = Field(None, description="Which the study is to serve.", examples=["shaft-d40"])
@@ -85,20 +67,6 @@ class StudyIn(SettingsIn):
 
 class FromReadingsIn(SettingsIn):
     """A gauge study of readings that are stored already: one part probed again and again."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "kind": "type_one",
-                "characteristic": "shaft-d40",
-                "gauge": "Probe T8",
-                "reference": 39.9921,
-                "first": 788,
-                "through": 812,
-                "take": "readings",
-            }
-        }
-    )
 
     kind: Literal["type_one", "bias", "grr"] = Field(
         description="grr: of touches alone, each reading is a part and its touches are the trials."
@@ -116,18 +84,6 @@ class FromReadingsIn(SettingsIn):
 
 class CorrectionIn(SettingsIn):
     """A study put right: settings and all values anew, and why. The revision before stays on record."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "gauge": "Probe T8, ruby 2 mm",
-                "reference": 39.992,
-                "tolerance": 0.016,
-                "rows": [{"values": [39.9921, 39.9923, 39.992, 39.9922, 39.9921]}],
-                "reason": "Third value was typed 39.9202",
-            }
-        }
-    )
 
     rows: list[RowIn] = Field(min_length=1, max_length=MOST_ROWS)
     reason: Reason

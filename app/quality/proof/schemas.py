@@ -2,7 +2,7 @@
 
 from math import isnan
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from app.quality.proof.cases import Basis
 from app.quality.proof.queries import Check, Proof, Result
@@ -67,38 +67,6 @@ class ExampleOut(BaseModel):
 
 class ProofOut(BaseModel):
     """All published examples, run through the engine of this process."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "passed": True,
-                "examples": 1,
-                "failing": 0,
-                "numbers": 1,
-                "results": [
-                    {
-                        "kind": "individuals",
-                        "name": "flow rate of ten batches",
-                        "source": "NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2",
-                        "basis": "published",
-                        "note": "",
-                        "passed": True,
-                        "error": None,
-                        "checks": [
-                            {
-                                "name": "moving_range",
-                                "expected": 1.8778,
-                                "got": 1.8777777777777784,
-                                "tolerance": 5e-05,
-                                "difference": 2.2e-05,
-                                "passed": True,
-                            }
-                        ],
-                    }
-                ],
-            }
-        }
-    )
 
     passed: bool
     examples: int = Field(description="How many examples were run.")

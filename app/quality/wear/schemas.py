@@ -4,7 +4,7 @@ from datetime import datetime
 from math import isfinite
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from app.core.decision.step import rounded
 from app.core.hunting import Hunting
@@ -90,54 +90,8 @@ class HuntingOut(BaseModel):
     what_to_do: str
 
 
-EXAMPLE: dict[str, Any] = {
-    "characteristic": "shaft-d40",
-    "first_sequence": 613,
-    "last_sequence": 812,
-    "tool_memory": 3,
-    "changed_at": "2026-11-21T05:58:40Z",
-    "corrections_total": -0.0121,
-    "wear_per_part": {
-        "value": 0.0000612,
-        "low": 0.0000563,
-        "high": 0.0000661,
-        "standard_error": 0.0000025,
-        "is_wear": True,
-        "first_sequence": 613,
-        "last_sequence": 812,
-        "readings": 199,
-        "left_out": 1,
-        "off": 0,
-        "level": 0.0128,
-        "scatter": 0.00094,
-        "correlation": 0.03,
-    },
-    "forecasts": [{"towards": "tolerance", "limit": 0.0201, "parts": 119.0, "low": 54.0, "high": 248.0}],
-    "first": "wear",
-    "record": {"lives": 4, "tested": 15, "held": 14, "widening": 1.2},
-    "hunting": {
-        "state": "quiet",
-        "readings": 200,
-        "corrections": 14,
-        "reversals": 3,
-        "mean_size": 0.0014,
-        "scatter": 0.00091,
-        "probability": 0.999,
-        "expected_corrections": 0.041,
-        "expected_reversals": 0.038,
-        "expected_size": 0.0014,
-        "excess": 0.11,
-        "remedy": None,
-        "text": "14 corrections in 200 readings, 3 took the one before back. Scatter of 0.91 µm alone would correct 4.1 % of the readings.",
-        "what_to_do": "",
-    },
-}
-
-
 class WearOut(BaseModel):
     """True wear behind the corrections: deviation + corrections in effect / factor, since the tool was changed."""
-
-    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE})
 
     characteristic: str
     first_sequence: int | None = Field(description="First reading of this tool that was looked at.")

@@ -3,12 +3,11 @@
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from app.core.policy_map import Criterion
 from app.core.replay import LONGEST_DELAY
 from app.quality.what_if.evidence import cell_of, evidence_of, period_of
-from app.quality.what_if.examples import EXAMPLE_ANSWER, EXAMPLE_MAP, EXAMPLE_PROPOSAL
 from app.quality.what_if.proposals import ProposalRow
 from app.quality.what_if.queries import USUAL, Map, Simulation
 from app.web.fields import LARGEST_ID, Body, Moment, Reason
@@ -17,7 +16,7 @@ LARGEST_LENGTH = 100_000.0
 Length = Annotated[float, Field(ge=0, le=LARGEST_LENGTH, strict=True)]
 
 
-class PeriodIn(Body):
+class ReplayPeriodIn(Body):
     """Readings to replay: the last so many of those measured from … to; 1000 unless chosen otherwise."""
 
     last: Annotated[int | None, Field(ge=1, le=LARGEST_ID, strict=True, description="The last so many readings.")] = (
@@ -32,7 +31,7 @@ class PeriodIn(Body):
         return USUAL if self.last is None and self.start is None and self.end is None else self.last
 
 
-class SettingsIn(PeriodIn):
+class SettingsIn(ReplayPeriodIn):
     """Settings in place of today's; what is left out is as today."""
 
     averaging_limit: Annotated[Length | None, Field(description="R34.")] = None
@@ -68,22 +67,12 @@ class SettingsIn(PeriodIn):
 class WhatIfIn(SettingsIn):
     """Readings to replay, and the selected settings."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"example": {"zero_range": 0.0027, "weighting_factor": 3, "last": 1000}}
-    )
-
     weighting_factor: Annotated[float | None, Field(ge=1, le=1_000_000, strict=True, description="k (R29).")] = None
     zero_range: Annotated[Length | None, Field(description="R33.")] = None
 
 
 class MapIn(SettingsIn):
     """A grid of k and R33 to replay; left out it is made of round values about today's."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {"weighting_factors": [1, 2, 3], "zero_ranges": [0.001, 0.002], "criterion": "ppk", "last": 1000}
-        }
-    )
 
     weighting_factors: Annotated[
         list[Annotated[float, Field(ge=1, le=1_000_000, strict=True)]] | None,
@@ -98,19 +87,11 @@ class MapIn(SettingsIn):
 class ProposalIn(WhatIfIn):
     """The settings to propose; the evidence is worked out anew."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {"zero_range": 0.0027, "last": 1000, "reason": "Half the corrections, fewer rejects"}
-        }
-    )
-
     reason: Reason
 
 
 class ProposalDecisionIn(Body):
     """Reason why it is approved, rejected or withdrawn."""
-
-    model_config = ConfigDict(json_schema_extra={"example": {"reason": "Agreed with the shop floor"}})
 
     reason: Reason
 
@@ -189,8 +170,6 @@ class PeriodOut(BaseModel):
 class WhatIfOut(PeriodOut):
     """Side by side: what was, today's settings and the others, both replayed."""
 
-    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE_ANSWER})
-
     parameters_version: int = Field(description="Today's.")
     delay: int = Field(description="Parts between a correction and its effect in the replay.")
     effect: float = Field(description="The share of a correction that acts in the replay.")
@@ -222,8 +201,6 @@ class CellOut(BaseModel):
 class MapOut(PeriodOut):
     """A grid of settings, row by row of k."""
 
-    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE_MAP})
-
     criterion: Criterion
     averaging_limit: float
     delay: int
@@ -247,8 +224,6 @@ class MapOut(PeriodOut):
 
 class ProposalOut(BaseModel):
     """A change of parameters that somebody proposed, with its evidence."""
-
-    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE_PROPOSAL})
 
     id: int
     characteristic: str

@@ -10,7 +10,7 @@ from app.loop.characteristics.queries import Standing
 from app.loop.summaries import queries as statistics
 from app.quality.what_if import map_axes, queries
 from app.quality.what_if.queries import Map, Settings, Simulation
-from app.quality.what_if.schemas import MapIn, PeriodIn, SettingsIn, WhatIfIn
+from app.quality.what_if.schemas import MapIn, ReplayPeriodIn, SettingsIn, WhatIfIn
 from app.quality.what_if.tool_history import ToolHistory
 from app.quality.what_if.turn_limit import turn
 
@@ -85,7 +85,7 @@ def settings(past: ToolHistory, given: SettingsIn) -> Settings:
     )
 
 
-def _past(session: Session, standing: Standing, given: PeriodIn) -> ToolHistory:
+def _past(session: Session, standing: Standing, given: ReplayPeriodIn) -> ToolHistory:
     if given.start is not None and given.end is not None and given.start > given.end:
         message = _("is later than `to`; exchange the two moments")
         raise Invalid(f"from: {message}.", errors=[FieldError("from", message)])

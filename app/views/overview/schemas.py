@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from app.core.spc.quoting import Quote
 from app.quality.capability import wording as capability
@@ -54,44 +54,6 @@ class RankedOut(BaseModel):
 
 class Overview(BaseModel):
     """A page of the ranking."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "items": [
-                    {
-                        "characteristic": "plate-d30",
-                        "name": "Bore Ø30 H7",
-                        "machine": "mill-1",
-                        "state": "correcting",
-                        "reasons": [
-                            {"code": "hunting", "text": "over-corrects"},
-                            {"code": "barely_capable", "text": "Barely capable"},
-                        ],
-                        "ppk": 1.21,
-                        "quote": "ppk",
-                        "low": 1.15,
-                        "high": 1.27,
-                        "preliminary": False,
-                        "method": "normal distribution, spread of all readings",
-                        "why_none": None,
-                        "readings": 998,
-                        "first_reading": 4003,
-                        "last_reading": 5002,
-                        "first_at": "2026-11-19T06:00:12Z",
-                        "last_at": "2026-11-21T08:15:02Z",
-                        "judged_at": "2026-11-21T08:15:40Z",
-                        "now": None,
-                        "parts_left": 312.0,
-                        "signals": [],
-                        "alarms": 0,
-                        "alarms_per_shift": 0.3,
-                    }
-                ],
-                "next": None,
-            }
-        }
-    )
 
     items: list[RankedOut]
     next: int | None = Field(description="`after` of the next page; null at the end.")

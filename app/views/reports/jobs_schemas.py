@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from app.files.documents.content import Paper
 from app.language.i18n import current_language
@@ -22,20 +22,6 @@ class ReportsIn(Body):
 
     `format`: a ZIP of files, or one `workbook` with a sheet for each characteristic.
     """
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "characteristics": ["shaft-d40"],
-                "machines": ["lathe-1"],
-                "from": "2026-11-16T06:00:00+01:00",
-                "to": "2026-11-21T22:00:00+01:00",
-                "format": "pdf",
-                "paper": "a4",
-                "timezone": "Europe/Belgrade",
-            }
-        }
-    )
 
     characteristics: Keys = Field(default=[], description="Keys of characteristics.")
     machines: Keys = Field(default=[], description="Keys of machines: all of their characteristics.")
@@ -74,27 +60,6 @@ class TroubleOut(Body):
 
 class ReportsOut(Body):
     """Progress of a request for reports. `done` of `total` characteristics are ready; `current` is worked on."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "id": 7,
-                "state": "running",
-                "done": 3,
-                "total": 12,
-                "current": "shaft-d35",
-                "format": "pdf",
-                "asked_by": "Ana",
-                "asked_at": "2026-11-21T15:05:00Z",
-                "finished_at": None,
-                "problem": None,
-                "problems": 0,
-                "without_report": [],
-                "file": None,
-                "size": None,
-            }
-        }
-    )
 
     id: int
     state: Literal["queued", "running", "done", "failed", "cancelled"]

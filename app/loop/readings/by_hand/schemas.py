@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, Field
 
 from app.core.parameters import LARGEST_LENGTH
 from app.web.fields import Body, Reason
@@ -19,24 +19,10 @@ HandSize = Annotated[
     ),
 ]
 HandVerdict = Annotated[Verdict, Field(description="Whether the part is good, by the person's own judgement.")]
-BY_HAND: dict[str, JsonValue] = {
-    "id": 7,
-    "sequence": 812,
-    "at": "2026-11-21T07:21:10.500Z",
-    "by": "ana",
-    "measured": 25.019,
-    "verdict": "good",
-    "comment": "Plug gauge and bore gauge",
-    "alarm": 41,
-}
 
 
 class HandMeasurementIn(Body):
     """The result: a size, a verdict, or both."""
-
-    model_config = ConfigDict(
-        json_schema_extra={"example": {"measured": 40.001, "verdict": "good", "comment": "Micrometer"}}
-    )
 
     measured: HandSize | None = None
     verdict: HandVerdict | None = None
@@ -45,8 +31,6 @@ class HandMeasurementIn(Body):
 
 class HandMeasurementOut(BaseModel):
     """The result of a person, beside the machine's own value."""
-
-    model_config = ConfigDict(json_schema_extra={"example": BY_HAND})
 
     id: int
     sequence: Annotated[int, Field(description="The reading of the same part.")]
