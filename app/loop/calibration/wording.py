@@ -210,7 +210,7 @@ def what_pairs_say(found: Comparison, empirical_value: float) -> str:
         ).format(n=found.missing, **values)
     if found.equal:
         return _(
-            "The machine reads {mean} too much in every one of {n} pairs: where nothing varies nobody can say how well that is known, and nothing is suggested. Read the gauge with one more decimal, or measure other parts."
+            "The machine reads {mean} too much in every one of {n} pairs: where nothing varies nobody can say how well that is known, and nothing is suggested. Read the gauge with one more decimal, or measure other parts. Who knows the value all the same sets the empirical value by hand, with the reason."
         ).format(n=found.pairs, **values)
     text = _("The machine reads {mean} too much, with {confidence} confidence between {low} and {high}.").format(
         **values

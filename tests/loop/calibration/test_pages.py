@@ -34,6 +34,27 @@ def probe(shop: Shop) -> str:
 
 
 class TestWithoutScripts:
+    def test_pairs_that_are_all_equal_leave_a_way_by_hand_with_a_reason(self, shop: Shop, operator: Person) -> None:
+        for number in range(5):
+            shop.call(
+                "POST",
+                f"/machines/{shop.machine}/averages/5/pairs",
+                201,
+                machine_value=40.002 + number,
+                external_value=40.0 + number,
+                instrument="CMM",
+            )
+        shown = operator.open(place(shop))
+        assert f"{place(shop)}/suggestion/0" not in shown
+        assert "sets the empirical value by hand, with the reason" in shown
+        address = f"/machines/{shop.machine}/averages/5/edit"
+        assert f'href="{address}"' in shown
+        operator.open(address)
+        operator.send(address, 422, empirical_value="0,002", reason="")
+        operator.send(address, 200, empirical_value="0,002", reason="The certificate of the master says so")
+        average = shop.call("GET", f"/machines/{shop.machine}/averages/5")
+        assert average["empirical_value"] == 0.002
+
     def test_every_place_with_its_state(self, shop: Shop, operator: Person) -> None:
         shop.add(f"{shop.characteristic}-b", average_memory=6)
         calibrate(shop)
