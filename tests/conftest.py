@@ -1,4 +1,4 @@
-"""What tests stand on: a real PostgreSQL with the schema by migrations, real server processes, a real browser.
+"""Fixtures of all tests: a real PostgreSQL with the schema by migrations, real server processes, a real browser.
 
 One embedded server serves the whole run, xdist's workers too: each enters it as any process of Inband would, and the last
 one out stops it. A test that commits has a database of its own (``database``), made from a migrated template in some
@@ -389,7 +389,7 @@ def _works(program: str) -> bool:
 
 @pytest.fixture
 def complaints() -> list[str]:
-    """What the page did that no page may do. A test that provokes an error on purpose looks at it and clears it."""
+    """Faults of the page that no page may have. A test that provokes an error on purpose looks at it and clears it."""
     return []
 
 

@@ -22,7 +22,7 @@ class Forked(ForkServerProcess):
         self.start()
 
     def run(self) -> None:
-        """What the process does."""
+        """Run the command in the forked process."""
         from app.cli import main
 
         said = os.open(self.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)

@@ -547,7 +547,7 @@ def as_text(operation: Operation, body: dict[str, Any], field: str | None = None
 
 
 def complaint(answer: httpx.Response, what: str, statuses: range = range(400, 500)) -> str | None:
-    """What is wrong with an answer to bad input; None if it is as it should be."""
+    """Fault of an answer to bad input; None if it is as it should be."""
     what = what if len(what) < 200 else what[:100] + " … " + what[-60:]
     if answer.status_code not in statuses:
         return f"{what}: {answer.status_code} {answer.text[:200]}"

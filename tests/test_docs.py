@@ -72,7 +72,7 @@ def shell(path: Path, server: Server, folder: Path, **environment: str) -> list[
 
 
 def parts_that_differ(said: Any, printed: Any, where: str = "") -> list[str]:
-    """Where the printed answer says something else than the real one; it may leave fields out."""
+    """Differences of the printed answer from the real one; it may leave fields out."""
     if isinstance(printed, dict) and isinstance(said, dict):
         return [
             each

@@ -85,7 +85,7 @@ def test_the_table_of_zones(
 def test_a_correction_brings_the_next_part_to_the_target(
     shaft: Made, factor: float, surface: str, inside: bool, error: float
 ) -> None:
-    """What the machine does with an offset, from its geometry, not from our formula."""
+    """Effect of an offset on the machine, from its geometry, not from our formula."""
 
     def size(offset: float) -> float:
         move = {

@@ -29,7 +29,7 @@ directions = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda each: hypot(*each)
 
 
 def touched(faces: list[Face], motion: Floats, noise: list[float] | None = None) -> list[Touch]:
-    """Where a probe that moves along the nominal normal meets the faces of the moved part."""
+    """Points at which a probe that moves along the nominal normal meets the faces of the moved part."""
     found = []
     for at, (nominal, normal) in enumerate(faces):
         n, r = np.array(normal, dtype=float), np.array(nominal, dtype=float)

@@ -1,4 +1,4 @@
-"""What a machine can hardly have measured: warned of, and a plausible set-up is not."""
+"""Implausible measurements are warned of, and a plausible set-up is not."""
 
 from math import cos, radians, sin
 

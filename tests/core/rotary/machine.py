@@ -18,7 +18,7 @@ LETTERS = {"A": 0, "B": 1, "C": 2}
 
 @dataclass(frozen=True)
 class Place:
-    """Where an axis stands in the machine (mm) and how it leans (a rotation vector, radians)."""
+    """Position of an axis in the machine (mm) and its lean (a rotation vector, radians)."""
 
     at: tuple[float, float, float]
     lean: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -30,7 +30,7 @@ class Place:
         return leaning * Rotation.from_rotvec(about) * leaning.inv(), np.array(self.at)
 
     def moved(self, letter: str, point: Point, angle: float) -> Floats:
-        """Where a point goes that this axis carries."""
+        """Position of a point that this axis carries."""
         rotation, stays = self.turn(letter, angle)
         made: Floats = rotation.apply(np.asarray(point) - stays) + stays
         return made
@@ -66,7 +66,7 @@ class Machine:
         return self.built.moved(self.letter, ball, self._angle(angle))
 
     def table_expected(self, ball: Point, angle: float) -> Floats:
-        """Where the control sends the probe for the same ball."""
+        """Position to which the control sends the probe for the same sphere."""
         return self.believed.moved(self.letter, ball, self._angle(angle))
 
     def head(self, ball: Point, angle: float) -> Floats:

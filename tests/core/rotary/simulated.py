@@ -23,7 +23,7 @@ def positions(
     both: bool = False,
     seed: int = 1,
 ) -> list[Position]:
-    """Where a table carries the ball. errors: two in mm, two in degrees, in the order of the result string.
+    """Position to which a table carries the sphere. errors: two in mm, two in degrees, in the order of the result string.
 
     The axis stands at t and leans by w = (w1, w2, 0): a turn about it is T W R W⁻¹ T⁻¹.
     """

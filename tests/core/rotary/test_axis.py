@@ -137,7 +137,7 @@ class TestRecovered:
         assert all(0.91 <= hits / 300 <= 0.98 for hits in inside.values()), inside
 
     def test_exact_touches_weigh_nothing(self) -> None:
-        """What scatters then is not the touches, so every coordinate is as sure as the others."""
+        """The scatter is not that of the points then, so every coordinate is as sure as the others."""
         plain = positions("C", BALLS["C"], ANGLES, errors=TRUE, noise=0.001)
         spread = ((0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 1.25))
         weighed = estimate("C", [each._replace(spread=spread) for each in plain], BALLS["C"], touch=0.0)

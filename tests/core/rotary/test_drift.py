@@ -1,4 +1,4 @@
-"""What has moved."""
+"""Drift over the runs, and changes between two of them."""
 
 import numpy as np
 import pytest

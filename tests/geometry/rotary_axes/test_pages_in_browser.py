@@ -23,7 +23,7 @@ def engineer(server: Server, page: Page) -> Person:
 
 
 def chart(page: Page, source: str) -> list[str]:
-    """What is written in a chart, once it is drawn."""
+    """Text in a chart, once it is drawn."""
     found = page.locator(f'plotly-chart[src*="{source}"]')
     expect(found.locator(".main-svg").first).to_be_attached()
     expect(found.locator("text").first).to_be_attached()

@@ -11,7 +11,7 @@ from tests.shop import Person, Shop
 
 class TestComparing:
     def test_a_protocol_of_last_month_and_of_today(self, shop: Shop, operator: Person) -> None:
-        """What moved is named, with what to enter and its sign."""
+        """Pages name the axis that moved, with what to enter and its sign."""
         today = protocol("de")
         then = take(shop, protocol=last_month())
         now = take(shop, protocol=today)

@@ -25,7 +25,7 @@ def machine(shop: Shop) -> str:
 
 
 def words(page: str) -> str:
-    """What people read: no markup, single blanks."""
+    """Text that people read: no markup, single blanks."""
     body = re.sub(r"<script.*?</script>", " ", page.partition("<main")[2], flags=re.DOTALL)
     return " ".join(re.sub(r"<[^>]+>", " ", body).replace("\N{NO-BREAK SPACE}", " ").split())
 

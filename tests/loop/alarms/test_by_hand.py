@@ -141,7 +141,7 @@ def test_noted_is_an_action_of_its_own_that_claims_nothing(shop: Shop, server: S
 
 
 def test_no_words_are_put_into_anybodys_mouth(shop: Shop, server: Server) -> None:
-    """What is chosen before the person has chosen repeats the action and no more; a reason for an approval is never chosen."""
+    """The choice made in advance repeats the action and no more; a reason for an approval is never chosen."""
     operator = Person(server, "operator")
     worn = shop.read(400.0)["alarms"][0]["id"]
     for action, chosen in (("tool_replaced", "Tool replaced"), ("keep_cutting", "Keep cutting"), ("noted", "Seen")):

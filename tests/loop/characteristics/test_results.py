@@ -1,4 +1,4 @@
-"""What the variants yield, charted beside the value; touches drawn on the part; rejects counted; the hand's own mark."""
+"""Results of the variants, charted beside the value; touches drawn on the part; rejects counted; the hand's own mark."""
 
 import time
 from typing import Any

@@ -27,7 +27,7 @@ def plant(database: Database) -> Database:
 
 @dataclass
 class Done:
-    """How a command ended and what it said."""
+    """Exit status and output of a command."""
 
     returncode: int
     stdout: str

@@ -1,4 +1,4 @@
-"""What a file's columns mean, and what is wrong with its lines: no database."""
+"""Meaning of a file's columns, and faults of its lines: no database."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""What must hold of the record whatever happened on the way, and a replay of it by the core alone."""
+"""Invariants of the record after any sequence of events, and a replay of it by the core alone."""
 
 from collections import defaultdict
 from collections.abc import Iterable
@@ -16,13 +16,13 @@ from app.loop.readings.writer.statements import BASE_LEVEL, FAN, TOP_LEVEL
 
 
 def rows(dsn: str, query: str, *values: Any) -> list[tuple[Any, ...]]:
-    """What a question to the database is answered."""
+    """Rows that a query returns."""
     with psycopg.connect(dsn, autocommit=True) as connection:
         return connection.execute(query, values).fetchall()
 
 
 def counts(dsn: str) -> dict[str, int]:
-    """How many rows each table has, but for what the rounds foretell while nobody asks."""
+    """Number of rows of each table, without those of the periodic jobs."""
     with psycopg.connect(dsn, autocommit=True) as connection:
         tables = [
             name

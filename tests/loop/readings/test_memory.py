@@ -1,4 +1,4 @@
-"""What the writer keeps in memory is what it would have loaded: the same things done to two machines, one read from memory."""
+"""The writer keeps in memory exactly the state that it would have loaded: the same things done to two machines, one read from memory."""
 
 import json
 import random
@@ -116,5 +116,5 @@ def test_readings_are_decided_from_memory_as_if_all_were_loaded(server: Server, 
 
 
 def numbers(twin: Twin) -> int:
-    """How many corrections there are."""
+    """Number of corrections."""
     return len(twin.shop.call("GET", f"/machines/{twin.shop.machine}/corrections?limit=1000")["items"])

@@ -1,4 +1,4 @@
-"""What the measuring variants yield beside the value: answered, kept, found again, in single readings, batches and imports."""
+"""Results of the measuring variants beside the value: answered, kept, found again, in single readings, batches and imports."""
 
 from collections.abc import Iterator
 from typing import Any
