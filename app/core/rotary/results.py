@@ -130,15 +130,15 @@ def write_string(values: Sequence[float]) -> str:
 def write_number(value: float) -> str:
     """A number in ten characters.
 
-    >>> write_number(-12.5), write_number(9.9999999999), write_number(-1e-12)
+    >>> write_number(-12.5), write_number(9.9999999999), write_number(-1.7e-8)
     ('-12.500000', '10.0000000', '0.00000000')
     """
     if not isfinite(value) or abs(value) > LARGEST:
         raise ValueError(f"{value} does not fit into {WIDTH} characters")
     for decimals in range(WIDTH - 2, 0, -1):
         text = f"{round(value, decimals) + 0.0:.{decimals}f}"
-        if len(text) == WIDTH:
-            return text
+        if len(text) <= WIDTH:  # shorter by the sign that a value rounded to 0 has lost
+            return text.ljust(WIDTH, "0")
     raise AssertionError(value)  # five digits before the point and a sign leave room for decimals
 
 
