@@ -9,7 +9,7 @@ from app.db.engine import Database
 from app.geometry.alignment import actions, queries
 from app.geometry.alignment.answers import AlignmentOut, alignment_out
 from app.geometry.alignment.schemas import AlignmentIn, AlignmentRecomputeIn, PalletIn
-from app.loop.machines.queries import machine_named
+from app.loop.machines.queries import machine_for, only_machine
 from app.loop.readings import actions as readings
 from app.web.api import MachineFilter, api_router, problems, sent_again
 from app.web.deps import SessionDep
@@ -33,8 +33,7 @@ def align(
     caller.must_somewhere("operator")
     database: Database = request.app.state.database
     with database.begin() as own:
-        machine = machine_named(own, body.machine)
-        caller.must_at(machine.id, "operator")
+        machine = machine_for(own, caller, body.machine, "operator")
         created = actions.align(own, machine, body, caller)
     readings.push_results(database)
     response.status_code = 200 if created.again else 201
@@ -59,11 +58,7 @@ def list_alignments(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[AlignmentOut]:
     """Alignments in the order in which they came."""
-    only = caller.only_machine
-    if machine is not None:
-        machine_row = machine_named(session, machine)
-        caller.must_at(machine_row.id, "viewer")
-        only = machine_row.id
+    only = only_machine(session, caller, machine)
     rows = queries.alignments(session, only, after=after, limit=limit + 1)
     return page_of([alignment_out(session, row) for row in rows], limit, lambda row: row.id)
 

@@ -13,7 +13,7 @@ from app.geometry.alignment import figures, queries, trends
 from app.geometry.alignment.answers import TEXT, program_of, stop_of
 from app.geometry.alignment.tables import Alignment
 from app.language.i18n import _
-from app.loop.machines.queries import machine_named, machine_of
+from app.loop.machines.queries import machine_for, machine_of
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
 from app.web.api import FIGURE, MachineKey, Theme, api_router, plain, problems
 from app.web.deps import SessionDep
@@ -93,8 +93,7 @@ def alignment_trend_figure(
     theme: Theme = "light",
 ) -> dict[str, Any]:
     """Shifts and turns of what was aligned under one name over time, as a Plotly figure."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     rows = queries.history(session, machine_row.id, name) if "\0" not in name else []
     if not rows:
         raise NotFound(

@@ -12,7 +12,7 @@ from app.geometry.geometric_form.answers import FormOut, form_out
 from app.geometry.geometric_form.queries import FormRow
 from app.geometry.geometric_form.schemas import FormIn, FormRecomputeIn
 from app.language.i18n import _
-from app.loop.machines.queries import machine_keys_by_id, machine_named
+from app.loop.machines.queries import machine_for, machine_keys_by_id, machine_named
 from app.web.api import FIGURE, MachineFilter, MachineKey, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
 from app.web.fields import Cursor, Limit, Page, Slug, page_of
@@ -42,8 +42,7 @@ def measure_form(request: Request, session: SessionDep, caller: AnyCaller, body:
     """
     database: Database = request.app.state.database
     with database.begin() as own:
-        machine = machine_named(own, body.machine)
-        caller.must_at(machine.id, "operator")
+        machine = machine_for(own, caller, body.machine, "operator")
     created = actions.measure_and_push(database, machine, body, caller)
     response.status_code = 200 if created.again else 201
     return _answer(session, created.row)
@@ -118,8 +117,7 @@ def form_trend_figure(
     theme: Theme = "light",
 ) -> dict[str, Any]:
     """The deviations of a feature over time as a Plotly figure, with tolerance and uncertainty."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     rows = queries.trend(session, machine_row, feature, kind)
     if not rows:
         raise NotFound(

@@ -22,7 +22,7 @@ from app.geometry.rotary_axes.drift_answers import (
 from app.geometry.rotary_axes.result_values import UNITS
 from app.geometry.rotary_axes.schemas import EnterIn, KinematicsPlanIn, RestoreIn, RunIn
 from app.language.i18n import _
-from app.loop.machines.queries import machine_named
+from app.loop.machines.queries import machine_for, machine_named, only_machine
 from app.loop.readings import actions as readings
 from app.web.api import FIGURE, MachineKey, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
@@ -52,8 +52,7 @@ def take_kinematics_run(
     """
     database: Database = request.app.state.database
     with database.begin() as own:
-        machine = machine_named(own, body.machine)
-        caller.must_at(machine.id, "operator")
+        machine = machine_for(own, caller, body.machine, "operator")
         created = actions.take(own, machine, body, caller)
         number = created.row.run.id
     readings.push_results(database)
@@ -71,13 +70,7 @@ def list_kinematics_runs(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[RunOut]:
     """Runs, oldest first, refused ones too."""
-    only = caller.only_machine
-    if machine is not None:
-        machine_row = machine_named(session, machine)
-        caller.must_at(machine_row.id, "viewer")
-        only = machine_row.id
-    elif only is None:
-        caller.must("viewer")
+    only = only_machine(session, caller, machine)
     rows = queries.runs(session, only, head=head, after=after, limit=limit + 1)
     return page_of([run_out(row) for row in rows], limit, lambda answer: answer.run)
 
@@ -196,8 +189,7 @@ def get_kinematics(
     head: Annotated[HeadName | None, Query(description="Drift with this head; else the reference head.")] = None,
 ) -> MachineKinematicsOut:
     """Return a machine's limits, its entered values, the drift of every value, and its heads compared."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     return machine_state(session, machine_row, head)
 
 
@@ -224,8 +216,7 @@ def kinematics_drift_figure(
     theme: Theme = "light",
 ) -> dict[str, Any]:
     """A value over the runs with its limit, what has been entered, and the trend."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     if value not in UNITS:
         wrong = _("there is no such value; there are EX0C, EY0C, EA0C, Q141 to Q149, backlash.C …")
         raise Invalid(f"value: {wrong}.", errors=[FieldError("value", wrong)])
@@ -243,8 +234,7 @@ def list_kinematics_backups(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[BackupOut]:
     """Every kinematics that was in effect, oldest first, as cycle 450 keeps them."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     rows = queries.backups(session, machine_row.id, after=after, limit=limit + 1)
     return page_of([backup_out(row) for row in rows], limit, lambda answer: answer.version)
 

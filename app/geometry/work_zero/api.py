@@ -20,7 +20,7 @@ from app.geometry.work_zero.answers import (
 )
 from app.geometry.work_zero.figures import Mark
 from app.geometry.work_zero.schemas import FixtureIn, ZeroIn, ZeroRecomputeIn
-from app.loop.machines.queries import machine_named, machine_of
+from app.loop.machines.queries import machine_for, machine_of, only_machine
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
 from app.loop.readings import actions as readings
 from app.web.api import FIGURE, MachineFilter, MachineKey, Theme, api_router, plain, problems, sent_again
@@ -48,8 +48,7 @@ def find_work_zero(
     caller.must_somewhere("operator")
     database: Database = request.app.state.database
     with database.begin() as own:
-        machine = machine_named(own, body.machine)
-        caller.must_at(machine.id, "operator")
+        machine = machine_for(own, caller, body.machine, "operator")
         created = actions.find(own, machine, body, caller)
     readings.push_results(database)
     response.status_code = 200 if created.again else 201
@@ -66,11 +65,7 @@ def list_work_zeros(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[ZeroOut]:
     """Work zeros in the order in which they came."""
-    only = caller.only_machine
-    if machine is not None:
-        machine_row = machine_named(session, machine)
-        caller.must_at(machine_row.id, "viewer")
-        only = machine_row.id
+    only = only_machine(session, caller, machine)
     rows = queries.work_zeros(session, only, fixture, after=after, limit=limit + 1)
     return page_of(zeros_out(session, rows), limit, lambda row: row.id)
 
@@ -84,7 +79,7 @@ def list_fixtures(session: SessionDep, caller: AnyCaller) -> Page[FixtureOut]:
 @router.get("/work-zeros/fixtures/{machine}/{fixture}", responses=problems(404))
 def get_fixture(session: SessionDep, caller: AnyCaller, machine: MachineKey, fixture: FixtureKey) -> FixtureOut:
     """One fixture; its zeros: `GET /work-zeros?machine=…&fixture=…`."""
-    caller.must_at(machine_named(session, machine).id, "viewer")
+    machine_for(session, caller, machine, "viewer")
     return fixture_out(queries.fixture_of(session, machine, fixture))
 
 
@@ -108,8 +103,7 @@ def fixture_figure(
     limit: Annotated[Limit, Query()] = 200,
 ) -> dict[str, Any]:
     """The shift of a fixture over its last zeros as a Plotly figure."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     row = queries.fixture_of(session, machine, fixture)
     marks = [
         Mark(

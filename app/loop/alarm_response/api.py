@@ -10,7 +10,7 @@ from app.loop.alarm_response.by_hand import ByHand
 from app.loop.alarm_response.queries import State
 from app.loop.alarm_response.schemas import AlarmAcknowledgeIn, AlarmOut, alarm_out
 from app.loop.characteristics.queries import characteristic_named
-from app.loop.machines.queries import machine_named
+from app.loop.machines.queries import only_machine
 from app.web.api import api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import Cursor, Limit, Page, Slug, Text200, page_of
@@ -31,12 +31,7 @@ def list_alarms(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[AlarmOut]:
     """Alarms, oldest first. The key of a machine sees those of that machine."""
-    machine_id = caller.only_machine
-    if machine is not None:
-        machine_id = machine_named(session, machine).id
-        caller.must_at(machine_id, "viewer")
-    elif machine_id is None:
-        caller.must("viewer")
+    machine_id = only_machine(session, caller, machine)
     if characteristic is not None:
         characteristic_named(session, characteristic)
     rows = queries.alarms(

@@ -20,7 +20,7 @@ from app.loop.calibration.answers import (
 )
 from app.loop.calibration.queries import Place
 from app.loop.calibration.schemas import CalibrationPlanIn, GaugeIn, PairIn, RingIn, SuggestionAcceptIn
-from app.loop.machines.queries import machine_named
+from app.loop.machines.queries import machine_for, machine_named
 from app.web.api import FIGURE, MachineKey, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
 from app.web.fields import Cursor, Limit, Page, ReasonIn, SerialCursor, page_of
@@ -54,8 +54,7 @@ def calibrate_gauge(
     From R36 on, and with a touch outside ±a, it is refused: that is kept and answered as `"status": "refused"`, and
     changes nothing. Its result is applied after approval, or at once where the plan says so.
     """
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "operator")
+    machine_row = machine_for(session, caller, machine, "operator")
     stored = actions.calibrate_gauge(session, machine_row, given, caller)
     response.status_code = 200 if stored.again else 201
     return calibration_out(stored.row, machine_row.key)
@@ -71,8 +70,7 @@ def calibrate_ring(
 
     Refused, kept, and without effect: a section outside the ring's limits, or a first move along Z that triggered.
     """
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "operator")
+    machine_row = machine_for(session, caller, machine, "operator")
     stored = actions.calibrate_ring(session, machine_row, given, caller)
     response.status_code = 200 if stored.again else 201
     return calibration_out(stored.row, machine_row.key)
@@ -93,8 +91,7 @@ def list_calibrations(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[CalibrationOut]:
     """Calibrations, oldest first, refused ones too."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     place = None
     if average_memory is not None or tool_memory is not None:
         place = Place("average", average_memory) if average_memory is not None else Place("tool", tool_memory or 0)
@@ -105,8 +102,7 @@ def list_calibrations(
 @router.get("/machines/{machine}/calibrations/{number}", responses=problems(404))
 def get_calibration(session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number) -> CalibrationOut:
     """One calibration."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     return calibration_out(queries.calibration(session, machine_row, number), machine_row.key)
 
 
@@ -128,8 +124,7 @@ def accept_calibration(
 @router.post("/machines/{machine}/averages/{location}/pairs", status_code=201, responses=problems(404, 409))
 def add_pair(session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11, given: PairIn) -> PairOut:
     """Keep a reading of the machine beside what an external gauge (micrometer, CMM) says of the same part."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "operator")
+    machine_row = machine_for(session, caller, machine, "operator")
     (row,) = pairs.add_pairs(session, machine_row, location, [given], caller)
     return pair_out(queries.pairs(session, machine_row, location, only=row.id)[0])
 
@@ -144,8 +139,7 @@ def list_pairs(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[PairOut]:
     """Paired readings of a location, oldest first."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     queries.value_of(session, machine_row, Place("average", location))
     rows = queries.pairs(session, machine_row, location, after=after, limit=limit + 1)
     return page_of([pair_out(pair) for pair in rows], limit, lambda pair: pair.id)
@@ -170,8 +164,7 @@ def get_suggestion(
     confidence: Annotated[float, Query(gt=0.5, lt=1, description="Of the interval.")] = queries.CONFIDENCE,
 ) -> SuggestionOut:
     """The empirical value that the pairs suggest: their mean difference with its confidence interval."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     return suggestion_out(queries.suggestion(session, machine_row, location, confidence), machine_row.key, location)
 
 
@@ -226,8 +219,7 @@ def calibration_figure(
     limit: Annotated[Limit, Query()] = 200,
 ) -> dict[str, Any]:
     """The history of a location as a Plotly figure: differences, empirical value, limits R33 and R34."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     place = Place("average", location)
     value = queries.value_of(session, machine_row, place)
     rows = queries.calibrations(session, machine_row, place, newest_first=True, limit=limit)
@@ -250,8 +242,7 @@ def ring_figure(
     limit: Annotated[Limit, Query()] = 200,
 ) -> dict[str, Any]:
     """The history of a probe in the ring as a Plotly figure: how far it stood beside the spindle, and the diameters."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     place = Place("tool", tool)
     queries.value_of(session, machine_row, place)
     rows = queries.calibrations(session, machine_row, place, newest_first=True, limit=limit)

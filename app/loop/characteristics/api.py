@@ -41,12 +41,7 @@ def list_characteristics(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[CharacteristicOut]:
     """Characteristics by key; for the key of a machine, those of that machine."""
-    machine_id = caller.only_machine
-    if machine is not None:
-        machine_id = machines.machine_named(session, machine).id
-        caller.must_at(machine_id, "viewer")
-    elif machine_id is None:
-        caller.must("viewer")
+    machine_id = machines.only_machine(session, caller, machine)
     rows = queries.characteristics(session, machine_id=machine_id, after=after, limit=limit + 1)
     return page_of([characteristic_out(row) for row in rows], limit, lambda row: row.key)
 
@@ -54,8 +49,7 @@ def list_characteristics(
 @router.get("/characteristics/{characteristic}", responses=problems(404))
 def get_characteristic(session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey) -> CharacteristicOut:
     """One characteristic with its parameters in force."""
-    standing = queries.characteristic_named(session, characteristic)
-    caller.must_at(standing.machine.id, "viewer")
+    standing = queries.characteristic_for(session, caller, characteristic, "viewer")
     return characteristic_out(standing)
 
 
@@ -79,7 +73,6 @@ def list_parameter_versions(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[VersionOut]:
     """Every version of the parameters, newest first: who, when, why."""
-    standing = queries.characteristic_named(session, characteristic)
-    caller.must_at(standing.machine.id, "viewer")
+    standing = queries.characteristic_for(session, caller, characteristic, "viewer")
     rows = queries.versions(session, standing.characteristic, before=before, limit=limit + 1)
     return page_of([version_out(row) for row in rows], limit, lambda row: row.version)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from app.access.callers import Caller, Role
 from app.core.parameters import Parameters
 from app.errors import NotFound
 from app.language.i18n import _
@@ -50,6 +51,16 @@ def characteristic_named(session: Session, key: str) -> Standing:
             _("Check the key; GET /api/v1/characteristics lists them."),
         )
     return Standing(*row)
+
+
+def characteristic_for(session: Session, caller: Caller, key: str, role: Role) -> Standing:
+    """The characteristic with this key, for the key of its machine or somebody with the role.
+
+    Raises `NotFound`, `NotAllowed`.
+    """
+    standing = characteristic_named(session, key)
+    caller.must_at(standing.machine.id, role)
+    return standing
 
 
 def key_is_taken(session: Session, key: str) -> bool:

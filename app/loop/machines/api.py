@@ -39,9 +39,7 @@ def list_machines(
 @router.get("/machines/{machine}", responses=problems(404))
 def get_machine(session: SessionDep, caller: AnyCaller, machine: MachineKey) -> MachineOut:
     """One machine."""
-    machine_row = queries.machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
-    return MachineOut.model_validate(machine_row)
+    return MachineOut.model_validate(queries.machine_for(session, caller, machine, "viewer"))
 
 
 @router.patch("/machines/{machine}", responses=problems(404))

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
 
+from app.access.callers import Caller, Role
 from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.tables.machines import Machine, MachineState
@@ -27,6 +28,18 @@ def machine_named(session: Session, key: str) -> Machine:
             _("Check the key; GET /api/v1/machines lists them."),
         )
     return machine
+
+
+def machine_for(session: Session, caller: Caller, key: str, role: Role) -> Machine:
+    """The machine with this key, for its own key or somebody with the role. Raises `NotFound`, `NotAllowed`."""
+    machine = machine_named(session, key)
+    caller.must_at(machine.id, role)
+    return machine
+
+
+def only_machine(session: Session, caller: Caller, key: str | None) -> int | None:
+    """The machine to which a list is limited: the one asked for, else the caller's own. Raises as `machine_for` does."""
+    return caller.only_machine if key is None else machine_for(session, caller, key, "viewer").id
 
 
 def machine_of(session: Session, machine_id: int) -> Machine:

@@ -57,8 +57,7 @@ def write_program(
 
     What R numbers cannot say (factor, mode, acceptance …) stands in comments such as `(INBAND FACTOR=-1)`.
     """
-    standing = characteristics.characteristic_named(session, characteristic)
-    caller.must_at(standing.machine.id, "viewer")
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     chosen = queries.control_of(standing, control)
     text = queries.program_of(standing, chosen, kind, gauge=gauge, surface=surface, probe=probe)
     name = queries.file_name(standing, chosen, kind)

@@ -66,8 +66,7 @@ def get_statistics(
     With `last` as well, of the last so many readings those that were measured from … to count.
     """
     check_order(start, end)
-    standing = characteristics.characteristic_named(session, characteristic)
-    caller.must_at(standing.machine.id, "viewer")
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     window = replace(queries.window_of(session, standing.characteristic, last=last), start=start, end=end)
     numbers = queries.numbers_of(session, standing.characteristic, window)
     rejects = of_tool = None

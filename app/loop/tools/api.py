@@ -7,7 +7,7 @@ from fastapi import Path, Query
 from app.access.deps import AnyCaller, Operator
 from app.core.parameters import MOST_LOCATIONS
 from app.core.plausibility import empirical_value_warnings, offset_warnings
-from app.loop.machines.queries import machine_named
+from app.loop.machines.queries import machine_for, machine_named
 from app.loop.tools import actions, applying, queries, wording
 from app.loop.tools.figures import OffsetChange, offset_figure
 from app.loop.tools.schemas import (
@@ -53,8 +53,7 @@ def list_tools(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[ToolOut]:
     """The tool memory: every location with its offset, the sum of corrections since the tool was changed, parts cut."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     rows = queries.tools(session, machine_row, after=after, limit=limit + 1)
     return page_of([tool_out(row, machine_row.key) for row in rows], limit, lambda tool: tool.tool_memory)
 
@@ -62,8 +61,7 @@ def list_tools(
 @router.get("/machines/{machine}/tools/{tool}", responses=problems(404))
 def get_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10) -> ToolOut:
     """One location of the tool memory."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     queries.tool(session, machine_row, tool)
     return tool_out(queries.tools(session, machine_row, only=tool)[0], machine_row.key)
 
@@ -75,8 +73,7 @@ def edit_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool:
     Corrections that are still open were computed for the offset before: they are superseded. The running averages of the
     characteristics on this tool begin again at 0, and parts cut before say nothing about the new offset.
     """
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "operator")
+    machine_row = machine_for(session, caller, machine, "operator")
     before = queries.tool(session, machine_row, tool).offset
     done = actions.edit_tool(session, machine_row, tool, edit.offset, edit.reason, caller)
     warnings = offset_warnings(before, edit.offset)
@@ -90,8 +87,7 @@ def change_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, too
     As a manual edit; besides, its parts and the sum of its corrections begin again at 0. Alarms about the old tool stay
     until somebody acknowledges them.
     """
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "operator")
+    machine_row = machine_for(session, caller, machine, "operator")
     done = actions.change_tool(session, machine_row, tool, change.offset, change.reason, caller)
     return tool_set(queries.tools(session, machine_row, only=tool)[0], machine_row.key, done.superseded)
 
@@ -106,8 +102,7 @@ def tool_figure(
     limit: Annotated[Limit, Query()] = 500,
 ) -> dict[str, Any]:
     """The history of the offset as a Plotly figure: `{"data", "layout"}`."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     queries.tool(session, machine_row, tool)
     steps = reversed(queries.offset_history(session, machine_row, tool, limit=limit))
     changes = [OffsetChange(step.event.at, step.event.offset_after, step.kind, wording.step(step)) for step in steps]
@@ -126,8 +121,7 @@ def list_averages(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[AverageOut]:
     """The average memory: running average and empirical value of every location."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     rows = queries.averages(session, machine_row, after=after, limit=limit + 1)
     return page_of([average_out(row, machine_row.key) for row in rows], limit, lambda average: average.average_memory)
 
@@ -135,8 +129,7 @@ def list_averages(
 @router.get("/machines/{machine}/averages/{location}", responses=problems(404))
 def get_average(session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11) -> AverageOut:
     """One location of the average memory."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     queries.average(session, machine_row, location)
     return average_out(queries.averages(session, machine_row, only=location)[0], machine_row.key)
 
@@ -146,8 +139,7 @@ def set_empirical_value(
     session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11, value: EmpiricalValueIn
 ) -> AverageSet:
     """Set the empirical value; the running average begins again at 0."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "operator")
+    machine_row = machine_for(session, caller, machine, "operator")
     actions.set_empirical_value(session, machine_row, location, value.empirical_value, value.reason, caller)
     warnings = empirical_value_warnings(value.empirical_value)
     return average_set(queries.averages(session, machine_row, only=location)[0], machine_row.key, warnings)
@@ -169,8 +161,7 @@ def list_corrections(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[CorrectionOut]:
     """Corrections, oldest first: the order in which a machine applies the pending ones."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     rows = queries.corrections(
         session, machine_row, statuses=status, tool_memory=tool_memory, after=after, limit=limit + 1
     )
@@ -180,8 +171,7 @@ def list_corrections(
 @router.get("/corrections/{machine}/{number}", responses=problems(404))
 def get_correction(session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number) -> CorrectionOut:
     """One correction."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     return correction_out(queries.row_of(session, machine_row, queries.correction(session, machine_row, number)))
 
 
@@ -195,8 +185,7 @@ def mark_applied(
     is corrected through this tool until somebody has said which offset is true. If it is the offset that later pending
     corrections of the tool lead to, those are confirmed with this one.
     """
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "operator")
+    machine_row = machine_for(session, caller, machine, "operator")
     confirmation = applied or AppliedIn()
     done = applying.mark_applied(
         session, machine_row, number, caller, offset_after=confirmation.offset_after, applied_at=confirmation.applied_at
@@ -209,8 +198,7 @@ def reject_correction(
     session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number, decision: RejectionIn
 ) -> CorrectionOut:
     """It will not be applied: the machine refuses the offset, or a person decides against it."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "operator")
+    machine_row = machine_for(session, caller, machine, "operator")
     done = actions.decide(
         session, machine_row, number, "rejected", decision.reason, caller, although_fetched=decision.although_fetched
     )

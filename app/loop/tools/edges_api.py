@@ -3,7 +3,7 @@
 from typing import Any
 
 from app.access.deps import AnyCaller, Operator
-from app.loop.machines.queries import machine_named
+from app.loop.machines.queries import machine_for, machine_named
 from app.loop.tools import queries
 from app.loop.tools.api import R10
 from app.loop.tools.edge_schemas import LivesOut, SisterIn, SwitchedOut, ToolSettings, lives_out
@@ -29,8 +29,7 @@ def describe(session: SessionDep, caller: Operator, machine: MachineKey, tool: R
 @router.get("/machines/{machine}/tools/{tool}/lives", responses=problems(404))
 def tool_lives(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10) -> LivesOut:
     """The edges that were in this location, newest first: parts cut, corrections summed, how long each lasted."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     return lives_out(lives(session, machine_row, tool), machine_row.key)
 
 
@@ -39,8 +38,7 @@ def tool_lives_figure(
     session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, theme: Theme = "light"
 ) -> dict[str, Any]:
     """Parts cut and corrections summed per edge as a Plotly figure: `{"data", "layout"}`."""
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     known = lives(session, machine_row, tool, limit=20)
     bars = [LifeBar(life.parts, life.total, life.ended_at, life.edge) for life in reversed(known.lives)]
     return lives_figure(

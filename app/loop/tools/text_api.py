@@ -9,7 +9,7 @@ from app.access.deps import AnyCaller
 from app.core.parameters import Axis
 from app.core.programs.correction_forms import Form
 from app.core.programs.corrections import PendingCorrection, steps, write
-from app.loop.machines.queries import machine_named
+from app.loop.machines.queries import machine_for
 from app.loop.tools import fetching
 from app.loop.tools.text_schemas import ConfirmedIn, ConfirmedOut, FetchedIn, FetchedOut, fetched_out
 from app.web.api import MachineKey, api_router, plain, problems
@@ -37,8 +37,7 @@ def write_corrections(
     The header `Inband-Corrections` names the corrections in it, in the order of the text; `Inband-Fetched` those that were
     fetched before. Say that you took it with `POST …/corrections/fetched`. While nothing else changes, the text is the same.
     """
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "viewer")
+    machine_row = machine_for(session, caller, machine, "viewer")
     handed = fetching.pending_text(session, machine_row, form)
     fetched = [c.number for c in handed.corrections if c.fetched_at is not None]
     return PlainTextResponse(
@@ -65,8 +64,7 @@ def mark_fetched(session: SessionDep, caller: AnyCaller, machine: MachineKey, fe
 
     Marking twice is harmless: the answer says who fetched first. All of them are marked, or none.
     """
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "operator")
+    machine_row = machine_for(session, caller, machine, "operator")
     return fetched_out(fetching.mark_fetched(session, machine_row, fetched.numbers, fetched.form, caller))
 
 
@@ -78,8 +76,7 @@ def confirm_corrections(
 
     Those that were rejected or superseded meanwhile are named in `must_not_be_in`, and are not confirmed.
     """
-    machine_row = machine_named(session, machine)
-    caller.must_at(machine_row.id, "operator")
+    machine_row = machine_for(session, caller, machine, "operator")
     done = fetching.confirm_all(session, machine_row, confirmed.numbers, caller)
     refused = [fetching.must_not_be_in(correction, machine_row) for correction in done.refused]
     return ConfirmedOut(

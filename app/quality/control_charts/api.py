@@ -49,12 +49,6 @@ Kind = Annotated[
 Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
 
 
-def _standing(session: SessionDep, caller: AnyCaller, key: str) -> Standing:
-    standing = characteristics.characteristic_named(session, key)
-    caller.must_at(standing.machine.id, "viewer")
-    return standing
-
-
 def _in_force(session: SessionDep, standing: Standing) -> int | None:
     baseline = queries.baseline_in_force(session, standing.characteristic)
     return None if baseline is None else baseline.version
@@ -80,7 +74,7 @@ def list_baselines(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[BaselineOut]:
     """Every baseline that was frozen, newest first: who, when, why, and its numbers."""
-    standing = _standing(session, caller, characteristic)
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     rows = queries.baselines(session, standing.characteristic, before=after, limit=limit + 1)
     now = _in_force(session, standing)
     listed = [baseline_out(row, characteristic, now) for row in rows]
@@ -113,7 +107,7 @@ def preview_baseline(
     session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, given: PeriodIn
 ) -> DraftAnswer:
     """Preview the baseline of a period, with the cautions that a person should read before freezing it. Nothing is stored."""
-    standing = _standing(session, caller, characteristic)
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     return draft_out(draft_of(session, standing, given), characteristic)
 
 
@@ -122,7 +116,7 @@ def get_baseline(
     session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, version: Version
 ) -> BaselineOut:
     """One baseline."""
-    standing = _standing(session, caller, characteristic)
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     baseline = queries.baseline_of(session, standing.characteristic, version)
     return baseline_out(baseline, characteristic, _in_force(session, standing))
 
@@ -166,7 +160,7 @@ def get_control(
 
     All by the frozen baseline, never by the readings shown. Without a baseline in force: deviations and no limits.
     """
-    standing = _standing(session, caller, characteristic)
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     window = statistics.window_of(session, standing.characteristic, **choice._asdict())
     baseline = _judge(session, standing, version)
     if baseline is None:
@@ -189,7 +183,7 @@ def get_control_chart(
     width: Width = 1240,
 ) -> Response:
     """A control chart as a figure. Of more points than can be drawn the extremes and the signals of each stretch."""
-    standing = _standing(session, caller, characteristic)
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     window = statistics.window_of(session, standing.characteristic, **choice._asdict())
     baseline = _judge(session, standing, version)
     if baseline is None:
@@ -229,7 +223,7 @@ def get_baseline_editor(
     width: Width = 1240,
 ) -> Response:
     """The chart on which a period is chosen: the readings, the period, and the limits that it would give."""
-    standing = _standing(session, caller, characteristic)
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     window = statistics.window_of(session, standing.characteristic, **choice._asdict())
     picked = EditorChoice(
         quantity, chart, grouping, group_size, group_pause, settle, first_sequence, last_sequence, excluded

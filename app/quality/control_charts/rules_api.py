@@ -6,7 +6,6 @@ from fastapi import Query
 
 from app.access.deps import AnyCaller, Engineer
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
 from app.quality.control_charts import rules_queries
 from app.quality.control_charts.queries import baseline_in_force
 from app.quality.control_charts.rules_actions import set_rules
@@ -18,16 +17,10 @@ from app.web.fields import LARGEST_ID
 router = api_router("control charts")
 
 
-def _standing(session: SessionDep, caller: AnyCaller, key: str) -> Standing:
-    standing = characteristics.characteristic_named(session, key)
-    caller.must_at(standing.machine.id, "viewer")
-    return standing
-
-
 @router.get("/characteristics/{characteristic}/rules", responses=problems(404))
 def get_rules(session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey) -> RulesOut:
     """List the rules that watch the charts of a characteristic, and the rules that could: those that make sense there."""
-    row = _standing(session, caller, characteristic).characteristic
+    row = characteristics.characteristic_for(session, caller, characteristic, "viewer").characteristic
     return RulesOut.of(row.key, rules_queries.rules_in_force(session, row), baseline_in_force(session, row))
 
 
@@ -65,7 +58,7 @@ def preview_rules(
 
     Chance: independent, normally distributed readings about the centre of the baseline, with its sigma.
     """
-    standing = _standing(session, caller, characteristic)
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     watched = rules_queries.rules_in_force(session, standing.characteristic)
     preview = rules_queries.preview(session, standing, watched.rules, last)
     return PreviewOut.of(standing.characteristic.key, watched, preview)

@@ -5,8 +5,8 @@ from typing import Annotated
 from fastapi import Path, Query
 
 from app.access.deps import AnyCaller, Engineer
-from app.loop.characteristics.queries import characteristic_named
-from app.loop.machines.queries import machine_named
+from app.loop.characteristics.queries import characteristic_for
+from app.loop.machines.queries import only_machine
 from app.quality.control_charts import signals_actions, signals_queries
 from app.quality.control_charts.signals_queries import State
 from app.quality.control_charts.signals_schemas import CommentIn, SignalOut, signal_out
@@ -31,17 +31,10 @@ def list_signals(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[SignalOut]:
     """Signals, newest first. The key of a machine sees those of that machine."""
-    machine_id = caller.only_machine
-    if machine is not None:
-        machine_id = machine_named(session, machine).id
-        caller.must_at(machine_id, "viewer")
+    machine_id = only_machine(session, caller, machine)
     only = None
     if characteristic is not None:
-        standing = characteristic_named(session, characteristic)
-        caller.must_at(standing.machine.id, "viewer")
-        only = standing.characteristic
-    elif machine_id is None:
-        caller.must("viewer")
+        only = characteristic_for(session, caller, characteristic, "viewer").characteristic
     if only is not None and machine_id is not None and only.machine_id != machine_id:
         return Page(items=[])
     rows = signals_queries.signals(

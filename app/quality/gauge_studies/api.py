@@ -6,8 +6,8 @@ import msgspec
 from fastapi import Path, Query, Response
 
 from app.access.deps import AnyCaller, Engineer
-from app.loop.characteristics.queries import characteristic_named
-from app.loop.machines.queries import machine_named
+from app.loop.characteristics.queries import characteristic_for, characteristic_named
+from app.loop.machines.queries import machine_for, machine_named
 from app.quality.gauge_studies import actions, queries
 from app.quality.gauge_studies.answers import StudyOut, study_out
 from app.quality.gauge_studies.figures import figure_of
@@ -24,8 +24,7 @@ Revision = Annotated[int | None, Query(ge=1, description="Of this revision; of t
 @router.post("/gauge-studies", status_code=201, responses=problems(404, 409) | sent_again(StudyOut))
 def add_gauge_study(session: SessionDep, caller: AnyCaller, given: StudyIn, response: Response) -> StudyOut:
     """Keep a gauge study with all its values, and answer what it says."""
-    machine = machine_named(session, given.machine)
-    caller.must_at(machine.id, "operator")
+    machine = machine_for(session, caller, given.machine, "operator")
     result = actions.add_study(session, machine, given, caller)
     response.status_code = 200 if result.again else 201
     return study_out(result.row, queries.advice(session, result.row))
@@ -37,8 +36,7 @@ def take_gauge_study(session: SessionDep, caller: AnyCaller, given: FromReadings
 
     Excluded readings are left out. The values are copied: what becomes of the readings later does not change the study.
     """
-    standing = characteristic_named(session, given.characteristic)
-    caller.must_at(standing.machine.id, "operator")
+    standing = characteristic_for(session, caller, given.characteristic, "operator")
     result = actions.take_study(session, standing, given, caller)
     response.status_code = 200 if result.again else 201
     return study_out(result.row, queries.advice(session, result.row))

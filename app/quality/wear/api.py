@@ -32,8 +32,7 @@ def get_wear(
 
     Without `last` of the present tool life. Excluded readings, probe faults and parts cut before the tool change are left out.
     """
-    standing = characteristics.characteristic_named(session, characteristic)
-    caller.must_at(standing.machine.id, "viewer")
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     window = queries.life_of(session, standing)
     if last is not None:
         window = statistics.window_of(session, standing.characteristic, last=last, first=window.first)
@@ -56,8 +55,7 @@ def get_wear_figure(
     width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")] = 1240,
 ) -> Response:
     """The wear curve with its line, what the corrections took out of it, and the forecast to the limits that are near."""
-    standing = characteristics.characteristic_named(session, characteristic)
-    caller.must_at(standing.machine.id, "viewer")
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     wear = queries.wear_of(session, standing, queries.shown(session, standing, last))
     return Response(
         msgspec.json.encode(wear_figure(chart_of(wear), theme=theme, width=width)),

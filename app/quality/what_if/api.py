@@ -102,8 +102,7 @@ def get_what_if_figure(
     width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")] = 1240,
 ) -> Response:
     """Deviations with today's and the other settings, and what each loop had taken out by its corrections."""
-    standing = characteristics.characteristic_named(session, characteristic)
-    caller.must_at(standing.machine.id, "viewer")
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     figure = course_figure(chart_of(simulation.replayed(session, standing, asked)), theme=theme, width=width)
     return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})
 
@@ -129,8 +128,7 @@ def list_proposals_of(
     limit: Annotated[Limit, Query()] = 100,
 ) -> Page[ProposalOut]:
     """Proposals for this characteristic, newest first."""
-    standing = characteristics.characteristic_named(session, characteristic)
-    caller.must_at(standing.machine.id, "viewer")
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     rows = proposals.proposals(
         session, characteristic=standing.characteristic, status=status, before=before, limit=limit + 1
     )

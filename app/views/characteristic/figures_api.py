@@ -26,8 +26,7 @@ Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pix
 
 
 def _found(session: SessionDep, caller: AnyCaller, characteristic: str, choice: Choice) -> tuple[Standing, Window]:
-    standing = queries.characteristic_named(session, characteristic)
-    caller.must_at(standing.machine.id, "viewer")
+    standing = queries.characteristic_for(session, caller, characteristic, "viewer")
     return standing, statistics.window_of(session, standing.characteristic, **choice._asdict())
 
 

@@ -69,8 +69,7 @@ def get_control_points(
 
     Without a baseline in force: deviations and no limits.
     """
-    standing = characteristics.characteristic_named(session, characteristic)
-    caller.must_at(standing.machine.id, "viewer")
+    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     window = statistics.window_of(session, standing.characteristic, **choice._asdict())
     baseline = (
         queries.baseline_in_force(session, standing.characteristic)
