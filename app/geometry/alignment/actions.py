@@ -1,7 +1,6 @@
 """Aligning, composing pallets with parts, computing again, acknowledging warnings. Lengths in mm, angles in degrees."""
 
 from datetime import UTC, datetime
-from typing import NamedTuple
 
 import numpy as np
 from sqlalchemy.orm import Session
@@ -27,19 +26,13 @@ from app.loop.readings import queries as reading_queries
 from app.loop.tables.machines import Machine
 from app.loop.warnings import actions as warned
 from app.loop.warnings.queries import acknowledgement, bounds_of
+from app.web.created import Created, sent_before
 from app.web.warnings import WarningsAcknowledgeIn
 
 ASKED_ONCE = {"machine", "kind", "method", "name", "part", "key", "aligned_at", "characteristics"}
 
 
-class Created(NamedTuple):
-    """An alignment; again: it was sent before with the same key, and nothing happened now."""
-
-    alignment: Alignment
-    again: bool = False
-
-
-def align(session: Session, machine: Machine, body: AlignmentIn, caller: Caller) -> Created:
+def align(session: Session, machine: Machine, body: AlignmentIn, caller: Caller) -> Created[Alignment]:
     """Find where the part lies and keep it with its touches. Raises `Invalid`, `Conflict`."""
     lock_machines(session, [machine.id])
     inputs = _kept(machine, body)
@@ -94,19 +87,12 @@ def _kept(machine: Machine, body: AlignmentIn) -> Values:
 
 def _sent_before(
     session: Session, machine: Machine, key: str | None, kind: str, method: str, inputs: Values
-) -> Created | None:
+) -> Created[Alignment] | None:
     earlier = None if key is None else queries.by_key(session, machine, key)
     if earlier is None:
         return None
-    if (earlier.kind, earlier.method, earlier.given) == (kind, method, inputs):
-        return Created(earlier, again=True)
-    raise Conflict(
-        _("Alignment {number} was sent with the key {key} already, and with other values.").format(
-            number=earlier.id, key=repr(key)
-        ),
-        _("A key names one alignment for ever: use another one."),
-        number=earlier.id,
-    )
+    same = (earlier.kind, earlier.method, earlier.given) == (kind, method, inputs)
+    return sent_before(earlier, key, _("alignment"), same=same, number=earlier.id)
 
 
 def _keep(session: Session, machine: Machine, alignment: Alignment, caller: Caller) -> Alignment:
@@ -122,7 +108,7 @@ def _keep(session: Session, machine: Machine, alignment: Alignment, caller: Call
 # --- pallets, and once more
 
 
-def compose(session: Session, body: PalletIn, caller: Caller) -> Created:
+def compose(session: Session, body: PalletIn, caller: Caller) -> Created[Alignment]:
     """The alignment of a pallet and that of a part on it, the one after the other. Raises `NotFound`, `Conflict`."""
     pallet, part = queries.alignment(session, body.pallet), queries.alignment(session, body.part)
     machine = session.get_one(Machine, pallet.machine_id)

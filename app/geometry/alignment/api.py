@@ -37,7 +37,7 @@ def align(
         created = actions.align(own, machine, body, caller)
     readings.push_results(database)
     response.status_code = 200 if created.again else 201
-    return alignment_out(session, queries.alignment(session, created.alignment.id))
+    return alignment_out(session, queries.alignment(session, created.row.id))
 
 
 @router.post("/alignments/pallets", status_code=201, responses=problems(404, 409) | sent_again(AlignmentOut))
@@ -46,7 +46,7 @@ def compose_pallet(session: SessionDep, caller: AnyCaller, body: PalletIn, respo
     caller.must_somewhere("operator")
     created = actions.compose(session, body, caller)
     response.status_code = 200 if created.again else 201
-    return alignment_out(session, created.alignment)
+    return alignment_out(session, created.row)
 
 
 @router.get("/alignments", responses=problems(404))

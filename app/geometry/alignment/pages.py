@@ -142,7 +142,7 @@ def align(request: Request, session: SessionDep, caller: Operator, form: FormDep
         body = parsed(AlignmentIn, fields)
         machine = machine_named(session, body.machine)
         with database.begin() as own:
-            number = actions.align(own, machine, body, caller).alignment.id
+            number = actions.align(own, machine, body, caller).row.id
     except (Invalid, Conflict) as error:
         return _new(request, session, form, error, lines)
     except NotFound as error:
@@ -197,7 +197,7 @@ def compose(request: Request, session: SessionDep, caller: Operator, form: FormD
             created = actions.compose(session, parsed(PalletIn, form_reader.pallet(form)), caller)
     except (Invalid, Conflict, NotFound) as error:
         return _pallet(request, session, form, error)
-    return RedirectResponse(f"/alignments/{created.alignment.id}", 303)
+    return RedirectResponse(f"/alignments/{created.row.id}", 303)
 
 
 # --- one alignment

@@ -5,7 +5,6 @@ readings, like any other.
 """
 
 from datetime import UTC, datetime
-from typing import NamedTuple
 
 from sqlalchemy import select
 from sqlalchemy.dialects.postgresql import insert
@@ -18,7 +17,6 @@ from app.core.geometry.points import Degenerate
 from app.core.geometry.relations import DatumRefused
 from app.db.engine import Database
 from app.db.events import publish
-from app.errors import Conflict
 from app.geometry.geometric_form import queries, wording
 from app.geometry.geometric_form.evaluation import EvaluatedForm, find
 from app.geometry.geometric_form.queries import FormRow
@@ -28,18 +26,12 @@ from app.language.i18n import _
 from app.loop.readings import actions as readings
 from app.loop.readings import queries as streams
 from app.loop.tables.machines import Machine
+from app.web.created import Created, sent_before
 
 HELD = ("method", "tolerance", "repeatability", "part")  # what makes another measurement of the same touches
 
 
-class Created(NamedTuple):
-    """A measurement; again: it was sent before with the same key, and nothing happened now."""
-
-    row: FormRow
-    again: bool = False
-
-
-def measure_and_push(database: Database, machine: Machine, body: FormIn, caller: Caller) -> Created:
+def measure_and_push(database: Database, machine: Machine, body: FormIn, caller: Caller) -> Created[FormRow]:
     """Measure, commit, and push the reading that the result becomes; where that cannot be now, a periodic job does it.
 
     Raises what `measure` raises.
@@ -56,7 +48,7 @@ def measure_and_push(database: Database, machine: Machine, body: FormIn, caller:
     return Created(row, created.again)
 
 
-def measure(session: Session, machine: Machine, body: FormIn, caller: Caller) -> Created:
+def measure(session: Session, machine: Machine, body: FormIn, caller: Caller) -> Created[FormRow]:
     """Evaluate and keep a measurement, and ask for the reading that its result is to become.
 
     Raises `Invalid` for touches that carry no result, and for a characteristic that the machine has not; `Conflict` for a
@@ -130,26 +122,14 @@ def found_in(
     return evaluated
 
 
-def _sent_before(session: Session, machine: Machine, body: FormIn) -> Created | None:
+def _sent_before(session: Session, machine: Machine, body: FormIn) -> Created[FormRow] | None:
     before = None if body.key is None else queries.by_key(session, machine.id, body.key)
     if before is None:
         return None
     measurement = before.measurement
     sent = (body.feature, body.kind, stored(body), *(getattr(body, name) for name in HELD))
-    if (
-        measurement.feature,
-        measurement.kind,
-        measurement.given,
-        *(getattr(measurement, name) for name in HELD),
-    ) == sent:
-        return Created(before, again=True)
-    raise Conflict(
-        _("Form measurement {number} was sent with the key {key} already, and with other values.").format(
-            number=measurement.id, key=repr(body.key)
-        ),
-        _("A key names one measurement for ever: use another one."),
-        number=measurement.id,
-    )
+    kept = (measurement.feature, measurement.kind, measurement.given, *(getattr(measurement, name) for name in HELD))
+    return sent_before(before, body.key, _("form measurement"), same=kept == sent, number=measurement.id)
 
 
 def recompute(session: Session, number: int, reason: str, caller: Caller) -> FormRow:

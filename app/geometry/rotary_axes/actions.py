@@ -4,7 +4,7 @@ Every verb locks the machine first: of two who enter at once one wins, and the o
 """
 
 from datetime import UTC, datetime
-from typing import Any, NamedTuple
+from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -31,19 +31,13 @@ from app.loop.machines.queries import lock_machines
 from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
 from app.loop.tables.machines import Machine
+from app.web.created import Created, sent_before
 from app.web.fields import AHEAD, EARLIEST
 
 SETTINGS = ("ball_radius", "max_modification", "max_modification_angle", "max_dev_cal_ball")
 
 
-class Created(NamedTuple):
-    """A run; again: it was sent before with the same key, and nothing happened now."""
-
-    row: RunRow
-    again: bool = False
-
-
-def take(session: Session, machine: Machine, body: RunIn, caller: Caller) -> Created:
+def take(session: Session, machine: Machine, body: RunIn, caller: Caller) -> Created[RunRow]:
     """Evaluate a run and keep it; a refused one is kept as well and counts for nothing.
 
     Raises `Invalid` for what determines nothing; `Conflict` for a key that was used otherwise.
@@ -52,15 +46,8 @@ def take(session: Session, machine: Machine, body: RunIn, caller: Caller) -> Cre
     sent = body.model_dump(mode="json", exclude={"machine", "key", "confirm"}, exclude_none=True)
     if body.key is not None and (before := queries.run_by_key(session, machine, body.key)) is not None:
         # Another time is no other run, as for readings: a client may say the same one by the clock of another zone.
-        if before.run.given | {"measured_at": None} == sent | {"measured_at": None}:
-            return Created(before, again=True)
-        raise Conflict(
-            _("Run {number} was sent with the key {key} already, and with other values.").format(
-                number=before.run.id, key=repr(body.key)
-            ),
-            _("A key names one run for ever: use another one."),
-            run=before.run.id,
-        )
+        same = before.run.given | {"measured_at": None} == sent | {"measured_at": None}
+        return sent_before(before, body.key, _("run"), same=same, run=before.run.id)
     plan = queries.plan(session, machine.id)
     limits = limits_of(plan)
     evaluated = evaluate(body, limits)

@@ -4,7 +4,7 @@ Every verb locks the machine first: the zero may raise an alarm of it.
 """
 
 from datetime import UTC, datetime
-from typing import Any, NamedTuple
+from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -27,20 +27,14 @@ from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
 from app.loop.tables.machines import Machine
 from app.loop.warnings import actions as warned
+from app.web.created import Created, sent_before
 from app.web.warnings import WarningsAcknowledgeIn
 
 ASKED_ONCE = {"machine", "key", "touched_at", "fixture", "part", "work_offset", "kind", "characteristics"}
 RESULTS = ("x", "y", "z", "diameter", "length", "width")
 
 
-class Created(NamedTuple):
-    """A work zero; again: it was sent before with the same key, and nothing happened now."""
-
-    zero: WorkZero
-    again: bool = False
-
-
-def find(session: Session, machine: Machine, body: ZeroIn, caller: Caller) -> Created:
+def find(session: Session, machine: Machine, body: ZeroIn, caller: Caller) -> Created[WorkZero]:
     """Find the work zero of these touches and keep it.
 
     Raises `Invalid` where they make none, `Conflict` for a key that was used otherwise.
@@ -55,8 +49,10 @@ def find(session: Session, machine: Machine, body: ZeroIn, caller: Caller) -> Cr
             errors=[FieldError("work_offset", message)],
         )
     inputs = body.model_dump(exclude=ASKED_ONCE, exclude_none=True)
-    if (before := _sent_before(session, machine, body, offset.word, inputs)) is not None:
-        return before
+    if body.key is not None and (before := queries.by_key(session, machine, body.key)) is not None:
+        sent = (inputs, body.kind, body.fixture, body.part, offset.word)
+        same = (before.given, before.kind, before.fixture, before.part, before.work_offset) == sent
+        return sent_before(before, body.key, _("work zero"), same=same, number=before.id)
     now = datetime.now(UTC)
     zero = WorkZero(
         machine_id=machine.id,
@@ -76,29 +72,6 @@ def acknowledge(session: Session, zero: WorkZero, body: WarningsAcknowledgeIn, c
     """Take a work zero as it is, although there are warnings. Raises `Conflict`."""
     machine = session.get_one(Machine, zero.machine_id)
     warned.acknowledge(session, machine, queries.subject_of(zero), warnings_of(zero, machine), body.reason, caller)
-
-
-def _sent_before(
-    session: Session, machine: Machine, body: ZeroIn, offset: str, inputs: dict[str, Any]
-) -> Created | None:
-    earlier = None if body.key is None else queries.by_key(session, machine, body.key)
-    if earlier is None:
-        return None
-    if (earlier.given, earlier.kind, earlier.fixture, earlier.part, earlier.work_offset) == (
-        inputs,
-        body.kind,
-        body.fixture,
-        body.part,
-        offset,
-    ):
-        return Created(earlier, again=True)
-    raise Conflict(
-        _("Work zero {number} was sent with the key {key} already, and with other values.").format(
-            number=earlier.id, key=repr(body.key)
-        ),
-        _("A key names one work zero for ever: use another one."),
-        number=earlier.id,
-    )
 
 
 def recompute(session: Session, zero: WorkZero, body: ZeroRecomputeIn, caller: Caller) -> WorkZero:

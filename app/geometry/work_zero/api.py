@@ -52,7 +52,7 @@ def find_work_zero(
         created = actions.find(own, machine, body, caller)
     readings.push_results(database)
     response.status_code = 200 if created.again else 201
-    return zero_out(session, queries.work_zero(session, created.zero.id))
+    return zero_out(session, queries.work_zero(session, created.row.id))
 
 
 @router.get("/work-zeros", responses=problems(404))

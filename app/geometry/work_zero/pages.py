@@ -138,7 +138,7 @@ def find(request: Request, session: SessionDep, caller: Operator, form: FormDep)
         body = parsed(ZeroIn, fields)
         machine = machine_named(session, body.machine)
         with database.begin() as own:
-            number = actions.find(own, machine, body, caller).zero.id
+            number = actions.find(own, machine, body, caller).row.id
     except (Invalid, Conflict) as error:
         return _new(request, session, form, error=error, typed_in=typed_in)
     except NotFound as error:

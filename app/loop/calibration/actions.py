@@ -7,7 +7,7 @@ the first.
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 from sqlalchemy import func, select
 from sqlalchemy.dialects.postgresql import insert
@@ -33,13 +33,7 @@ from app.loop.tables.calibration import CalibrationAcceptance, CalibrationPlan, 
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
 from app.loop.tools import actions as offsets
-
-
-class StoredCalibration(NamedTuple):
-    """A stored calibration; again: it was sent before with the same key, and nothing was changed now."""
-
-    row: CalibrationRow
-    again: bool = False
+from app.web.created import Created, sent_before
 
 
 def _must_have(last: int, field: str, number: int) -> None:
@@ -49,7 +43,7 @@ def _must_have(last: int, field: str, number: int) -> None:
         raise Invalid(f"{field}: {wrong}.", errors=[FieldError(field, wrong)])
 
 
-def calibrate_gauge(session: Session, machine: Machine, given: GaugeIn, caller: Caller) -> StoredCalibration:
+def calibrate_gauge(session: Session, machine: Machine, given: GaugeIn, caller: Caller) -> Created[CalibrationRow]:
     """Calibrate against a gauge (L92). A refused one is kept as well and changes nothing.
 
     Raises `NotFound`; `Invalid` for limits out of order or a wrong count; `Conflict` for a key that was used otherwise.
@@ -106,7 +100,7 @@ def _gauge(given: GaugeIn) -> Gauge:
     )
 
 
-def calibrate_ring(session: Session, machine: Machine, given: RingIn, caller: Caller) -> StoredCalibration:
+def calibrate_ring(session: Session, machine: Machine, given: RingIn, caller: Caller) -> Created[CalibrationRow]:
     """Calibrate the X offset of a probe in a ring on the spindle. Raises as `calibrate_gauge` does."""
     lock_machines(session, [machine.id])
     _must_have(machine.tool_locations, "tool_memory", given.tool_memory)
@@ -175,20 +169,13 @@ def _kept(warnings: Sequence[CodedWarning]) -> dict[str, Any]:
 
 def _sent_before(
     session: Session, machine: Machine, place: Place, key: str | None, settings: dict[str, Any], touches: Sequence[Any]
-) -> StoredCalibration | None:
+) -> Created[CalibrationRow] | None:
     row = None if key is None else queries.by_key(session, machine, key)
     if row is None:
         return None
     same = {name: row.record.settings.get(name) for name in settings} == settings
-    if same and row.record.touches == list(touches) and Place(row.record.memory, row.record.location) == place:
-        return StoredCalibration(row, again=True)
-    raise Conflict(
-        _("Calibration {number} was sent with the key {key} already, and with other values.").format(
-            number=row.record.number, key=repr(key)
-        ),
-        _("A key names one calibration for ever: use another one."),
-        number=row.record.number,
-    )
+    same &= row.record.touches == list(touches) and Place(row.record.memory, row.record.location) == place
+    return sent_before(row, key, _("calibration"), same=same, number=row.record.number)
 
 
 def _keep(
@@ -199,7 +186,7 @@ def _keep(
     at: datetime | None,
     key: str | None,
     caller: Caller,
-) -> StoredCalibration:
+) -> Created[CalibrationRow]:
     """Store it; what follows from it follows at once."""
     made.machine_id, made.number = machine.id, queries.next_number(session, machine)
     made.memory, made.location, made.refused = place.memory, place.location, Outcome(made.outcome).refused
@@ -223,7 +210,7 @@ def _keep(
         after = {"outcome": made.outcome, "difference": made.difference, "proposed": made.proposed}
         audit(session, caller.name, "calibrated", f"calibration/{machine.key}/{made.number}", None, after)
     publish(session, *changes)
-    return StoredCalibration(queries.calibration(session, machine, made.number))
+    return Created(queries.calibration(session, machine, made.number))
 
 
 def end_alarms(session: Session, machine: Machine, made: CalibrationRecord) -> list[dict[str, Any]]:

@@ -1,7 +1,5 @@
 """Freezing a baseline, retiring it, and putting an older one in force again."""
 
-from typing import NamedTuple
-
 from sqlalchemy import func, inspect, select
 from sqlalchemy.orm import Session
 
@@ -16,20 +14,14 @@ from app.quality.control_charts import queries, wording
 from app.quality.control_charts.drafts import draft_of
 from app.quality.control_charts.schemas import BaselineIn, PeriodIn
 from app.quality.control_charts.tables import Baseline
+from app.web.created import Created
 
 OF_ITS_TIME = frozenset(
     {"version", "key", "repeats", "at", "actor", "reason", "retired_at", "retired_by", "retired_why"}
 )
 
 
-class Frozen(NamedTuple):
-    """A baseline; again: it was sent before with the same key, and nothing happened now."""
-
-    baseline: Baseline
-    again: bool = False
-
-
-def freeze(session: Session, standing: Standing, given: BaselineIn, caller: Caller) -> Frozen:
+def freeze(session: Session, standing: Standing, given: BaselineIn, caller: Caller) -> Created[Baseline]:
     """From now on readings are judged by this period. Raises `Invalid`; `Conflict`: another was meanwhile, or by this key."""
     _lock(session, standing)
     if given.key is not None:
@@ -50,10 +42,10 @@ def freeze(session: Session, standing: Standing, given: BaselineIn, caller: Call
         )
     baseline = draft_of(session, standing, given).baseline
     baseline.key, baseline.reason = given.key, given.reason
-    return Frozen(_keep(session, standing, baseline, caller))
+    return Created(_keep(session, standing, baseline, caller))
 
 
-def _sent_before(before: Baseline, given: BaselineIn) -> Frozen:
+def _sent_before(before: Baseline, given: BaselineIn) -> Created[Baseline]:
     same = all(
         getattr(before, name) == value
         for name, value in given.model_dump(mode="json", include=set(PeriodIn.model_fields)).items()
@@ -66,7 +58,7 @@ def _sent_before(before: Baseline, given: BaselineIn) -> Frozen:
             ),
             _("Send another key for another baseline."),
         )
-    return Frozen(before, again=True)
+    return Created(before, again=True)
 
 
 def put_in_force(session: Session, standing: Standing, version: int, reason: str, caller: Caller) -> Baseline:

@@ -97,7 +97,7 @@ def freeze_baseline(
     done = actions.freeze(session, standing, given, caller)
     if done.again:
         response.status_code = 200
-    return baseline_out(done.baseline, characteristic, _in_force(session, standing))
+    return baseline_out(done.row, characteristic, _in_force(session, standing))
 
 
 @router.post(

@@ -1,6 +1,6 @@
 """Entering gauge studies, taking them from readings, and putting them right. Lengths in mm."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -18,19 +18,13 @@ from app.quality.gauge_studies.evaluation import design
 from app.quality.gauge_studies.queries import StudyRow
 from app.quality.gauge_studies.schemas import CorrectionIn, FromReadingsIn, SettingsIn, StudyIn
 from app.quality.gauge_studies.tables import GaugeStudy, GaugeStudyRevision
+from app.web.created import Created, sent_before
 from app.web.forms import parsed
-
-
-class StoreResult(NamedTuple):
-    """A study; again: it was sent before with the same key, and nothing happened now."""
-
-    row: StudyRow
-    again: bool = False
 
 
 def add_study(
     session: Session, machine: Machine, given: StudyIn, caller: Caller, source: dict[str, Any] | None = None
-) -> StoreResult:
+) -> Created[StudyRow]:
     """Keep a study with all its values. source: the readings that it was taken from.
 
     Raises `NotFound`; `Invalid` for what is no study of its kind; `Conflict` for a key that was used otherwise.
@@ -40,15 +34,8 @@ def add_study(
     settings, rows = _settings(given, standing, source), [_row(row.model_dump()) for row in given.rows]
     before = None if given.key is None else queries.by_key(session, machine, given.key)
     if before is not None:
-        if _same(before, given.kind, settings, rows):
-            return StoreResult(before, again=True)
-        raise Conflict(
-            _("Gauge study {number} was sent with the key {key} already, and with other values.").format(
-                number=before.study.id, key=repr(given.key)
-            ),
-            _("A key names one study permanently: use another one."),
-            id=before.study.id,
-        )
+        same = _same(before, given.kind, settings, rows)
+        return sent_before(before, given.key, _("gauge study"), same=same, id=before.study.id)
     design(given.kind, settings, rows)
     study = GaugeStudy(
         machine_id=machine.id,
@@ -63,10 +50,10 @@ def add_study(
     subject, values = f"gauge-study/{study.id}", sum(len(row["values"]) for row in rows)
     audit(session, caller.name, "gauge study entered", subject, None, {"kind": given.kind, "values": values})
     publish(session, _news(machine, standing, study.id))
-    return StoreResult(queries.study(session, study.id))
+    return Created(queries.study(session, study.id))
 
 
-def take_study(session: Session, standing: Standing, given: FromReadingsIn, caller: Caller) -> StoreResult:
+def take_study(session: Session, standing: Standing, given: FromReadingsIn, caller: Caller) -> Created[StudyRow]:
     """A study of readings that are stored: one part probed again and again, or the repeats of each touch.
 
     Raises `Invalid` where these readings make no study, `Conflict` for a key that was used otherwise.
