@@ -5,7 +5,6 @@ from typing import Annotated
 from fastapi import Path, Query, Request, Response
 
 from app.access.deps import AnyCaller, Operator
-from app.db.engine import Database
 from app.geometry.alignment import actions, queries
 from app.geometry.alignment.answers import AlignmentOut, alignment_out
 from app.geometry.alignment.schemas import AlignmentIn, AlignmentRecomputeIn, PalletIn
@@ -31,11 +30,9 @@ def align(
     plausible: until somebody acknowledges them the text stops the control.
     """
     caller.must_somewhere("operator")
-    database: Database = request.app.state.database
-    with database.begin() as own:
+    with readings.pushing(request.app.state.database) as own:
         machine = machine_for(own, caller, body.machine, "operator")
         created = actions.align(own, machine, body, caller)
-    readings.push_results(database)
     response.status_code = 200 if created.again else 201
     return alignment_out(session, queries.alignment(session, created.row.id))
 

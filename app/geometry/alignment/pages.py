@@ -10,7 +10,6 @@ from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Operator, Viewer, require
-from app.db.engine import Database
 from app.errors import Conflict, FieldError, InbandError, Invalid, NotFound
 from app.geometry.alignment import actions, form_reader, queries, wording
 from app.geometry.alignment.answers import alignment_out, program_of, stop_of
@@ -136,20 +135,17 @@ def align(request: Request, session: SessionDep, caller: Operator, form: FormDep
     if form.get("do") == "grid":
         return _new(request, session, dict(form) | {"rows": str(form_reader.rows_of(form) + form_reader.ROWS)})
     lines: list[str] = []
-    database: Database = request.app.state.database
     try:
         fields, lines = form_reader.fields(form)
         body = parsed(AlignmentIn, fields)
         machine = machine_named(session, body.machine)
-        with database.begin() as own:
+        with readings.pushing(request.app.state.database) as own:
             number = actions.align(own, machine, body, caller).row.id
     except (Invalid, Conflict) as error:
         return _new(request, session, form, error, lines)
     except NotFound as error:
         error.errors = [FieldError("machine", error.detail)]
         return _new(request, session, form, error)
-    if body.characteristics:
-        readings.push_results(database)
     return RedirectResponse(f"/alignments/{number}", 303)
 
 

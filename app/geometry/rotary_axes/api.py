@@ -6,7 +6,6 @@ from fastapi import Path, Query, Request, Response
 from pydantic import StringConstraints
 
 from app.access.deps import AnyCaller, Caller, Engineer, Operator
-from app.db.engine import Database
 from app.errors import FieldError, Invalid
 from app.geometry.rotary_axes import actions, figures, queries, run_history
 from app.geometry.rotary_axes.answers import RecomputedOut, RunOut, axis_out, run_out
@@ -50,14 +49,11 @@ def take_kinematics_run(
     maxModification, and one with `warnings` (an axis further off than is plausible on this machine), waits to be confirmed
     (`"status": "to_confirm"`). What of a protocol was not understood is answered.
     """
-    database: Database = request.app.state.database
-    with database.begin() as own:
+    with readings.pushing(request.app.state.database) as own:
         machine = machine_for(own, caller, body.machine, "operator")
         created = actions.take(own, machine, body, caller)
-        number = created.row.run.id
-    readings.push_results(database)
     response.status_code = 200 if created.again else 201
-    return run_out(queries.run(session, number))
+    return run_out(queries.run(session, created.row.run.id))
 
 
 @router.get("/kinematics/runs", responses=problems(404))

@@ -10,7 +10,6 @@ from starlette.datastructures import UploadFile
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Operator, require
-from app.db.engine import Database
 from app.errors import FieldError, Invalid, NotFound
 from app.geometry.rotary_axes import actions, form_reader, queries
 from app.geometry.rotary_axes.evaluation import evaluate
@@ -89,13 +88,11 @@ def _send(request: Request, session: Session, caller: Caller, form: dict[str, st
         if form.get("do") == "look":
             limits = actions.limits_of(queries.plan(session, machine.id))
             return _form(request, session, form, evaluated=evaluate(body, limits))
-        database: Database = request.app.state.database
-        with database.begin() as own:
+        with readings.pushing(request.app.state.database) as own:
             created = actions.take(own, machine, body, caller)
             number = created.row.run.id
     except (Invalid, NotFound) as error:
         return _form(request, session, form, error)
-    readings.push_results(database)
     return RedirectResponse(f"/kinematics/runs/{number}?done={'again' if created.again else 'taken'}", 303)
 
 

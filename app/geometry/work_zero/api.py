@@ -6,7 +6,6 @@ from fastapi import Path, Query, Request, Response
 from fastapi.responses import PlainTextResponse
 
 from app.access.deps import AnyCaller, Engineer, Operator
-from app.db.engine import Database
 from app.geometry.work_zero import actions, figures, queries
 from app.geometry.work_zero.answers import (
     TEXT,
@@ -46,11 +45,9 @@ def find_work_zero(
     `warnings` names what is hardly plausible: until somebody acknowledges them the text stops the control.
     """
     caller.must_somewhere("operator")
-    database: Database = request.app.state.database
-    with database.begin() as own:
+    with readings.pushing(request.app.state.database) as own:
         machine = machine_for(own, caller, body.machine, "operator")
         created = actions.find(own, machine, body, caller)
-    readings.push_results(database)
     response.status_code = 200 if created.again else 201
     return zero_out(session, queries.work_zero(session, created.row.id))
 

@@ -10,7 +10,6 @@ from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Engineer, Operator, Viewer, require
-from app.db.engine import Database
 from app.errors import Conflict, FieldError, InbandError, Invalid, NotFound
 from app.geometry.work_zero import actions, form_reader, pictures, queries, wording
 from app.geometry.work_zero.answers import program_of, stop_of, zero_out
@@ -132,19 +131,17 @@ def _new(
 def find(request: Request, session: SessionDep, caller: Operator, form: FormDep) -> Response:
     """Find the zero of what was typed and keep it; or show what is wrong, with everything still there."""
     typed_in: list[str] = []
-    database: Database = request.app.state.database
     try:
         fields, typed_in = form_reader.fields(form)
         body = parsed(ZeroIn, fields)
         machine = machine_named(session, body.machine)
-        with database.begin() as own:
+        with readings.pushing(request.app.state.database) as own:
             number = actions.find(own, machine, body, caller).row.id
     except (Invalid, Conflict) as error:
         return _new(request, session, form, error=error, typed_in=typed_in)
     except NotFound as error:
         error.errors = [FieldError("machine", error.detail)]
         return _new(request, session, form, error=error)
-    readings.push_results(database)
     return RedirectResponse(f"/work-zeros/{number}", 303)
 
 

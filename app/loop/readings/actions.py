@@ -17,7 +17,7 @@ from app.loop.readings.by_hand.actions import HandResult
 from app.loop.readings.by_hand.actions import measure as measure_by_hand
 from app.loop.readings.by_hand.actions import measure_typed as measure_typed_by_hand
 from app.loop.readings.records import Entry
-from app.loop.readings.results import Source, ask_for, push_results
+from app.loop.readings.results import Source, ask_for, push_results, pushing
 from app.loop.tables.readings import Exclusion, Reading, Stream
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "measure_by_hand",
     "measure_typed_by_hand",
     "push_results",
+    "pushing",
 ]
 
 

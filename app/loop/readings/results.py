@@ -5,7 +5,8 @@ answered. Its key, e.g. `work-zero:12:x`, makes pushing it again harmless, so wh
 """
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from datetime import datetime
 from typing import NamedTuple
 
@@ -53,6 +54,14 @@ def ask_for(session: Session, entries: Mapping[str, Entry], values: Mapping[str,
     ]
     if rows:
         session.execute(insert(ResultReading).values(rows).on_conflict_do_nothing())
+
+
+@contextmanager
+def pushing(database: Database) -> Iterator[Session]:
+    """A transaction of its own; the results that it asks for become readings after its commit."""
+    with database.begin() as session:
+        yield session
+    push_results(database)
 
 
 def push_results(database: Database) -> None:
