@@ -31,6 +31,7 @@ _UNSEEN = frozenset("\u200b\u2060\ufeff")
 LARGEST_ID = 2**63 - 1
 LARGEST_SERIAL = 2**31 - 1
 Item = TypeVar("Item")
+Answer = TypeVar("Answer", bound=BaseModel)
 
 
 def is_slug(text: str) -> bool:
@@ -121,6 +122,12 @@ class ReasonIn(Body):
     """The reason for a change."""
 
     reason: Reason
+
+
+def answer_from(schema: type[Answer], row: object, /, **more: Any) -> Answer:
+    """An answer of this schema: what is given as `more`, and the attributes of the row that bear the names of its fields."""
+    fields = {name: getattr(row, name) for name in schema.model_fields if name not in more and hasattr(row, name)}
+    return schema.model_validate(fields | more, from_attributes=True)
 
 
 class Page(BaseModel, Generic[Item]):

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -19,6 +19,7 @@ from app.geometry.alignment.tables import Alignment
 from app.loop.tables.machines import Machine
 from app.loop.warnings.queries import acknowledgement
 from app.loop.warnings.wording import sentence
+from app.web.fields import answer_from
 from app.web.warnings import Acknowledged, Warnings, acknowledged_out, warnings_out
 
 Kind = Literal["points", "two_points", "two_holes", "pallet"]
@@ -209,13 +210,10 @@ def alignment_out(session: Session, alignment: Alignment) -> AlignmentOut:
             shift=_shift(turned.motion[:3, 3]),
             angles=Angles(x=left["X"], y=left["Y"], z=left["Z"]),
         )
-    return AlignmentOut(
-        id=alignment.id,
+    return answer_from(
+        AlignmentOut,
+        alignment,
         machine=machine.key,
-        kind=cast("Kind", alignment.kind),
-        method=cast("MethodName", alignment.method),
-        name=alignment.name,
-        part=alignment.part,
         shift=_shift(result["shift"]),
         angles=Angles(x=x, y=y, z=z),
         turns=Turns.model_validate(turns),
@@ -245,9 +243,5 @@ def alignment_out(session: Session, alignment: Alignment) -> AlignmentOut:
         pallet=alignment.pallet_id,
         part_on_pallet=alignment.part_id,
         given=inputs,
-        aligned_at=alignment.aligned_at,
-        received_at=alignment.received_at,
         by=alignment.actor,
-        key=alignment.key,
-        recomputed_from=alignment.recomputed_from,
     )

@@ -9,6 +9,7 @@ from app.geometry.geometric_form import wording
 from app.geometry.geometric_form.evaluation import warnings_of
 from app.geometry.geometric_form.queries import FormRow, ResultReading
 from app.loop.warnings.wording import sentence
+from app.web.fields import answer_from
 from app.web.warnings import Warnings, warnings_out
 
 
@@ -104,15 +105,13 @@ def form_out(row: FormRow, reading: ResultReading | None = None) -> FormOut:
             sure=evaluation.uncertainty is not None and not evaluation.verdict.endswith("unsure"),
             text=wording.sentence(evaluation.value, measurement.tolerance, evaluation.uncertainty, evaluation.verdict),
         )
-    return FormOut(
-        id=measurement.id,
+    return answer_from(
+        FormOut,
+        measurement,
         machine=row.machine,
-        feature=measurement.feature,
-        kind=measurement.kind,
         method=evaluation.method,
         value=evaluation.value,
         uncertainty=evaluation.uncertainty,
-        tolerance=measurement.tolerance,
         verdict=verdict,
         values=[FormDeviationOut(**value) for value in result["values"]],
         suspects=[SuspectOut(**suspect, text=wording.suspicion(suspect)) for suspect in result["suspects"]],
@@ -120,13 +119,7 @@ def form_out(row: FormRow, reading: ResultReading | None = None) -> FormOut:
         tested=result["tested"],
         corrected=result["corrected"],
         details=result["details"],
-        given=measurement.given,
-        repeatability=measurement.repeatability,
-        part=measurement.part,
-        measured_at=measurement.measured_at,
-        received_at=measurement.received_at,
         by=measurement.actor,
-        key=measurement.key,
         engine=evaluation.engine,
         evaluation=evaluation.number,
         evaluated_at=evaluation.at,

@@ -11,6 +11,7 @@ from app.core.rotary.results import MEASURED, OFFSETS, OPTIMISED, STRINGS, write
 from app.geometry.rotary_axes import wording
 from app.geometry.rotary_axes.queries import RunRow
 from app.geometry.rotary_axes.tables import KinematicsRun
+from app.web.fields import answer_from
 from app.web.warnings import Warnings, warnings_out
 
 Status = Literal["refused", "to_confirm", "confirmed", "measured", "entered"]
@@ -132,30 +133,26 @@ class RunOut(BaseModel):
 def run_out(row: RunRow) -> RunOut:
     """A run as it is answered."""
     run, results = row.run, row.run.results
-    return RunOut(
+    return answer_from(
+        RunOut,
+        run,
         run=run.id,
         machine=row.machine.key,
-        form=run.form,
         head=run.head or None,
         **{name: said_of(run).get(name) for name in ("program", "tool", "kinematics", "mode")},
-        status=row.status,  # type: ignore[arg-type] # `RunRow.status` makes no others
+        status=row.status,
         reason=RunReasonOut(code=run.reason["code"], text=wording.sentence(run)),
-        measured_at=run.measured_at,
-        received_at=run.received_at,
         by=run.actor,
-        key=run.key,
         axes=[axis_out(axis) for axis in results["axes"]],
         offsets=results["offsets"],
         parameters=parameters_of(row),
         balls=results["balls"],
         not_understood=results["notes"],
         warnings=warnings_out(row.warnings, wording.warning),
-        limits=run.limits,
         overtaken=row.overtaken,
         undone=row.undone,
         confirmed=_decided(row, "confirmed"),
         entered=_decided(row, "entered"),
-        given=run.given,
     )
 
 

@@ -12,6 +12,7 @@ from app.geometry.rotary_axes.drift import Compared, Drift
 from app.geometry.rotary_axes.result_values import UNITS
 from app.geometry.rotary_axes.tables import KinematicsBackup, KinematicsPlan
 from app.loop.tables.machines import Machine
+from app.web.fields import answer_from
 
 
 class BackupOut(BaseModel):
@@ -93,17 +94,7 @@ class MachineKinematicsOut(BaseModel):
 
 def backup_out(row: KinematicsBackup) -> BackupOut:
     """A back-up as it is answered."""
-    return BackupOut(
-        version=row.version,
-        head=row.head or None,
-        at=row.at,
-        since=row.since,
-        by=row.actor,
-        reason=row.reason,
-        errors=row.errors,
-        run=row.run,
-        restores=row.restores,
-    )
+    return answer_from(BackupOut, row, head=row.head or None, by=row.actor)
 
 
 def drift_out(drift: Drift) -> DriftOut:
@@ -128,15 +119,10 @@ def machine_out(
     machine: str, plan: KinematicsPlan, in_effect: dict[str, float], drifts: list[Drift], heads: list[HeadOut]
 ) -> MachineKinematicsOut:
     """The kinematics of a machine as it is answered."""
-    return MachineKinematicsOut(
+    return answer_from(
+        MachineKinematicsOut,
+        plan,
         machine=machine,
-        ball_radius=plan.ball_radius,
-        max_modification=plan.max_modification,
-        max_modification_angle=plan.max_modification_angle,
-        max_dev_cal_ball=plan.max_dev_cal_ball,
-        reference_head=plan.reference_head,
-        limits=plan.limits,
-        characteristics=plan.characteristics,
         in_effect=in_effect,
         drift=[drift_out(drift_row) for drift_row in drifts],
         heads=heads,
@@ -155,15 +141,12 @@ class ComparisonOut(BaseModel):
 def changes_out(changes: list[Compared], errors: Mapping[str, float]) -> list[ChangeOut]:
     """Every value that both runs hold."""
     return [
-        ChangeOut(
+        answer_from(
+            ChangeOut,
+            change_row.change,
             name=change_row.name,
             words=wording.name_words(change_row.name),
             unit=change_row.unit,
-            before=change_row.change.before,
-            after=change_row.change.after,
-            difference=change_row.change.difference,
-            deviation=change_row.change.deviation,
-            moved=change_row.change.moved,
             enter=errors.get(change_row.name),
         )
         for change_row in changes

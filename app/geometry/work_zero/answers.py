@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
@@ -16,6 +16,7 @@ from app.geometry.work_zero.tables import Fixture, WorkZero
 from app.loop.tables.machines import Machine
 from app.loop.warnings.queries import acknowledgement
 from app.loop.warnings.wording import sentence
+from app.web.fields import answer_from
 from app.web.warnings import Acknowledged, Warnings, acknowledged_out, warnings_out
 
 State = Literal["unknown", "steady", "warning", "alarm"]
@@ -179,20 +180,10 @@ def _zero_out(session: Session, zero: WorkZero, pushed: Sequence[queries.Pushed]
     inputs: dict[str, Any] = zero.given
     warnings = warnings_of(zero, machine)
     acknowledged = acknowledgement(session, machine.id, queries.subject_of(zero)) if warnings else None
-    return ZeroOut(
-        id=zero.id,
+    return answer_from(
+        ZeroOut,
+        zero,
         machine=machine.key,
-        kind=cast("KindName", zero.kind),
-        work_offset=zero.work_offset,
-        fixture=zero.fixture,
-        part=zero.part,
-        x=zero.x,
-        y=zero.y,
-        z=zero.z,
-        rotation=zero.rotation,
-        diameter=zero.diameter,
-        length=zero.length,
-        width=zero.width,
         squareness=zero.result["squareness"],
         uncertainty=zero.result["uncertainty"],
         touches=[TouchOut(**touch) for touch in inputs.get("touches") or ()],
@@ -205,25 +196,18 @@ def _zero_out(session: Session, zero: WorkZero, pushed: Sequence[queries.Pushed]
         program=program_of(zero, machine, stop=[] if acknowledged else [warning.code for warning in warnings]) or "",
         shift=None if compared is None else shift_out(compared, basis),
         readings=[PushedOut(**warning._asdict()) for warning in pushed],
-        touched_at=zero.touched_at,
-        received_at=zero.received_at,
         by=zero.actor,
-        key=zero.key,
-        recomputed_from=zero.recomputed_from,
     )
 
 
 def fixture_out(row: FixtureRow) -> FixtureOut:
     """A fixture as it is answered."""
     settings = row.settings
-    return FixtureOut(
+    return answer_from(
+        FixtureOut,
+        settings,
         machine=row.machine.key,
         fixture=row.key,
-        basis=cast("Basis", settings.basis),
-        reference=settings.reference,
-        warning=settings.warning,
-        alarm=settings.alarm,
-        characteristics=settings.characteristics,
         zeros=row.zeros,
         last=row.last.zero.id,
         shift=shift_out(row.last, settings.basis),

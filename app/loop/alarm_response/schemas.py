@@ -9,7 +9,7 @@ from app.core.parameters import LARGEST_LENGTH
 from app.loop.alarm_response import outcomes, wording
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.alarms.kinds import Action
-from app.web.fields import LARGEST_ID, Body, Reason, Text200
+from app.web.fields import LARGEST_ID, Body, Reason, Text200, answer_from
 
 
 class AlarmAcknowledgeIn(Body):
@@ -98,25 +98,14 @@ def alarm_out(row: AlarmRow) -> AlarmOut:
     """An alarm as it is answered."""
     alarm, held = row.alarm, row.held
     done = alarm.acknowledged_at is not None
-    return AlarmOut(
-        id=alarm.id,
-        kind=alarm.kind,
+    return answer_from(
+        AlarmOut,
+        alarm,
         state="acknowledged" if done else "active",
         machine=row.machine.key,
         characteristic=row.characteristic.key if row.characteristic else None,
-        tool_memory=alarm.tool_memory,
         text=wording.sentence(alarm),
         what_to_do=wording.what_to_do(alarm.kind),
-        raised_at=alarm.raised_at,
-        last_at=alarm.last_at,
-        count=alarm.count,
-        sequence=alarm.sequence,
-        last_sequence=alarm.last_sequence,
         held_correction=None if held is None else HeldCorrection(number=held.number, amount=held.amount),
-        data=alarm.data,
-        acknowledged_at=alarm.acknowledged_at,
-        acknowledged_by=alarm.acknowledged_by,
-        action=alarm.action,  # type: ignore[arg-type] # only `acknowledge` writes it
-        comment=alarm.comment,
         outcome=[Followed(**item) for item in outcomes.outcomes(alarm.outcome)] if done else None,
     )

@@ -10,6 +10,7 @@ from app.loop.calibration.figures import Mark
 from app.loop.calibration.places import PlaceRow
 from app.loop.calibration.queries import CalibrationRow, Pair, Suggestion
 from app.loop.warnings.wording import sentence
+from app.web.fields import answer_from
 from app.web.warnings import Warnings, warnings_out
 
 Status = Literal["refused", "unchanged", "proposed", "accepted", "overtaken"]
@@ -96,28 +97,19 @@ def calibration_out(row: CalibrationRow, machine: str) -> CalibrationOut:
         "R47": tool,
         "R49": record.average,
     }
-    return CalibrationOut(
+    return answer_from(
+        CalibrationOut,
+        record,
         machine=machine,
-        number=record.number,
-        kind=record.kind,  # type: ignore[arg-type] # the table's CHECK holds it
         average_memory=record.location if average else None,
         tool_memory=tool,
-        status=row.status,  # type: ignore[arg-type] # one of those that the query gives
+        status=row.status,
         action=ACTIONS.get(row.status, "none"),
         reason=OutcomeReason(code=record.outcome, text=wording.sentence(record)),
         gauge_size=record.size,
-        measured=record.measured,
-        difference=record.difference,
-        average=record.average,
-        value_before=record.value_before,
-        proposed=record.proposed,
         results=results,
-        touches=record.touches,
         settings={name: value for name, value in record.settings.items() if name != "warnings"},
-        calibrated_at=record.calibrated_at,
-        received_at=record.received_at,
         by=record.actor,
-        key=record.key,
         accepted=None
         if acceptance is None
         else Accepted(at=acceptance.at, by=acceptance.actor, reason=acceptance.reason, automatic=acceptance.automatic),
@@ -179,15 +171,12 @@ def pair_out(pair: Pair) -> PairOut:
     excluded = None
     if row.excluded_at is not None:
         excluded = ExcludedPair(at=row.excluded_at, by=row.excluded_by or "", reason=row.excluded_why or "")
-    return PairOut(
-        id=row.id,
-        machine_value=row.machine_value,
+    return answer_from(
+        PairOut,
+        row,
         external_value=row.true_value,
         difference=pair.difference,
-        instrument=row.instrument,
         characteristic=pair.characteristic,
-        sequence=row.sequence,
-        at=row.at,
         by=row.actor,
         counts=pair.counts,
         excluded=excluded,
@@ -260,18 +249,15 @@ class PlaceOut(BaseModel):
 def place_out(row: PlaceRow) -> PlaceOut:
     """A place as it is answered."""
     plan, average = row.plan, row.place.memory == "average"
-    return PlaceOut(
+    return answer_from(
+        PlaceOut,
+        row,
         machine=row.machine.key,
         average_memory=row.place.location if average else None,
         tool_memory=None if average else row.place.location,
-        state=row.state,  # type: ignore[arg-type] # one of those that the row gives
-        characteristics=row.characteristics,
-        value=row.value,
         acceptance="accept" if plan is None else plan.acceptance,
         due_parts=None if plan is None else plan.due_parts,
         due_days=None if plan is None else plan.due_days,
-        parts=row.parts,
         since=None if plan is None else plan.since,
-        due_at=row.due_at,
         last=None if row.last is None else row.last.record.number,
     )

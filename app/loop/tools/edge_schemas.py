@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 
 from app.core.parameters import LARGEST_LENGTH, MOST_LOCATIONS
 from app.loop.tools.lives import Life, Lives
-from app.web.fields import Body, Reason, Text200
+from app.web.fields import Body, Reason, Text200, answer_from
 
 
 class ToolSettings(Body):
@@ -95,14 +95,4 @@ def lives_out(found: Lives, machine: str) -> LivesOut:
 
 def _life(life: Life, now: datetime) -> LifeOut:
     lasted = life.lasted(now)
-    return LifeOut(
-        began_at=life.began_at,
-        ended_at=life.ended_at,
-        seconds=None if lasted is None else round(lasted.total_seconds(), 3),
-        parts=life.parts,
-        total=life.total,
-        edge=life.edge,
-        name=life.name,
-        actor=life.actor,
-        reason=life.reason,
-    )
+    return answer_from(LifeOut, life, seconds=None if lasted is None else round(lasted.total_seconds(), 3))

@@ -13,7 +13,7 @@ from app.loop.tables.tools import Correction
 from app.loop.tools import wording
 from app.loop.tools.queries import AverageRow, CorrectionRow, ToolRow
 from app.loop.warnings.wording import sentence
-from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Reason
+from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Reason, answer_from
 from app.web.warnings import Warnings, warnings_out
 
 DESCRIBED = ("edge", "name", "kind", "planned_parts", "planned_total", "sister")
@@ -185,26 +185,13 @@ class AverageSet(AverageOut):
 def correction_out(row: CorrectionRow, note: str | None = None) -> CorrectionOut:
     """A correction as it is answered."""
     c = row.correction
-    return CorrectionOut(
+    return answer_from(
+        CorrectionOut,
+        c,
         machine=row.machine,
-        number=c.number,
-        tool_memory=c.tool_memory,
-        amount=c.amount,
-        status=c.status,  # type: ignore[arg-type] # the table's CHECK holds it
         characteristic=row.characteristic,
-        sequence=c.sequence,
-        size_error=c.size_error,
-        created_at=c.created_at,
         offset_expected=row.expected,
-        applied_at=c.applied_at,
-        applied_by=c.applied_by,
-        offset_after=c.offset_after,
-        decided_at=c.decided_at,
-        decided_by=c.decided_by,
         status_reason=wording.why(c),
-        superseded_by=c.superseded_by,
-        fetched_at=c.fetched_at,
-        fetched_by=c.fetched_by,
         reason=None if row.reason is None else ReadingReason(**row.reason),
         note=note,
     )

@@ -12,6 +12,7 @@ from app.core.spc.refusal import Refused
 from app.loop.summaries import wording as statistics
 from app.quality.capability import wording
 from app.quality.capability.queries import Study
+from app.web.fields import answer_from
 
 
 class IndexOut(BaseModel):
@@ -228,15 +229,7 @@ def capability_out(study: Study) -> CapabilityOut:
         pp=IndexOut.of(result.pp if result else None),
         ppk=IndexOut.of(result.ppk if result else None),
         cpm=IndexOut.of(result.cpm if result else None),
-        percentiles=PercentileOut(
-            low=by_percentile.low,
-            median=by_percentile.median,
-            high=by_percentile.high,
-            pp=by_percentile.pp,
-            ppk=by_percentile.ppk,
-        )
-        if by_percentile
-        else None,
+        percentiles=answer_from(PercentileOut, by_percentile) if by_percentile else None,
         ppm_within=FalloutOut.of(study.within),
         ppm_overall=FalloutOut.of(study.overall),
         ppm_observed=FalloutOut.of(study.fallout),
@@ -271,14 +264,8 @@ def _quoted(study: Study) -> QuotedOut | None:
     quoting = study.quoting
     if quoting.value is None or study.quote == "none":
         return None
-    return QuotedOut(
-        index=study.quote,
-        value=quoting.value,
-        low=quoting.low,
-        high=quoting.high,
-        preliminary=quoting.preliminary,
-        method=wording.method(study.quote),
-        window=wording.window_of(study),
+    return answer_from(
+        QuotedOut, quoting, index=study.quote, method=wording.method(study.quote), window=wording.window_of(study)
     )
 
 
@@ -303,15 +290,12 @@ def _without(study: Study) -> WithoutOut | None:
     process = study.without
     if process is None or isinstance(process, Refused):
         return None
-    return WithoutOut(
-        readings=process.readings,
-        lives=process.lives,
-        mean=process.mean,
+    return answer_from(
+        WithoutOut,
+        process,
         standard_deviation=process.tool.value,
         ppk=IndexOut.of(process.ppk),
         scatter=process.ideal_sigma.value,
         ideal=IndexOut.of(process.ideal),
-        gain=process.gain,
-        price=process.price,
         unknown=study.unknown,
     )

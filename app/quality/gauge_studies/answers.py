@@ -15,6 +15,7 @@ from app.quality.gauge_studies import wording
 from app.quality.gauge_studies.evaluation import Evaluation
 from app.quality.gauge_studies.queries import Advice, StudyRow
 from app.quality.gauge_studies.schemas import Kind
+from app.web.fields import answer_from
 from app.web.warnings import Warnings, warnings_out
 
 
@@ -190,42 +191,29 @@ def _bias(found: Bias) -> BiasOut:
 
 
 def _type_one(found: TypeOne) -> TypeOneOut:
-    return TypeOneOut(
-        cg=found.cg,
-        cgk=found.cgk,
-        tolerance=found.tolerance,
-        resolution=found.resolution,
-        resolved=found.resolved,
-        few=found.few,
-    )
+    return answer_from(TypeOneOut, found)
 
 
 def _linearity(found: Linearity) -> LinearityOut:
     def coefficient(c: Coefficient) -> CoefficientOut:
-        return CoefficientOut(value=c.value, standard_error=c.standard_error, t=c.t, p_value=c.p_value)
+        return answer_from(CoefficientOut, c)
 
-    return LinearityOut(
-        readings=found.readings,
+    return answer_from(
+        LinearityOut,
+        found,
         biases={f"{reference:g}": value for reference, value in found.biases.items()},
-        average_bias=found.average_bias,
         slope=coefficient(found.slope),
         intercept=coefficient(found.intercept),
-        r_squared=found.r_squared,
-        s=found.s,
-        by_size=found.by_size,
         biased_at=list(found.biased_at),
-        holds_zero=found.holds_zero,
-        acceptable=found.acceptable,
     )
 
 
 def _crossed(found: Evaluation, tolerance: float | None) -> list[CrossedOut]:
     return [
-        CrossedOut(
+        answer_from(
+            CrossedOut,
+            study,
             method=study.method.value,
-            parts=study.parts,
-            operators=study.operators,
-            trials=study.trials,
             components=[
                 ComponentOut(
                     name=name,  # type: ignore[arg-type]
@@ -235,8 +223,6 @@ def _crossed(found: Evaluation, tolerance: float | None) -> list[CrossedOut]:
                 )
                 for name, sigma in _sigmas(study)
             ],
-            ndc=study.ndc,
-            pooled=study.pooled,
             zeroed=["reproducibility" if name == "appraiser" else name for name in study.zeroed],
             table=[
                 VarianceLineOut(
