@@ -1,6 +1,6 @@
 """Forms that people send: read by the same schemas as JSON, and shown again with everything they typed."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -46,10 +46,26 @@ def length(text: str | None) -> float | str | None:
     return text if value is None else value
 
 
+def micrometres(text: str | None) -> float | str | None:
+    """A length as people type it in µm, in mm."""
+    value = length(text)
+    return round(value / 1000, 9) if isinstance(value, float) else value
+
+
 def whole(text: str | None) -> int | str | None:
     """A whole number as people type it; what is none is left for the schema to refuse."""
     text = (text or "").strip()
     return int(text) if text.isdecimal() and len(text) < 12 else text or None
+
+
+def whole_numbers(text: str | None) -> list[int | str | None]:
+    """Whole numbers between commas, semicolons or blanks."""
+    return [whole(number) for number in (text or "").replace(",", " ").replace(";", " ").split()]
+
+
+def characteristics_typed(form: Mapping[str, str], results: Iterable[str]) -> dict[str, str]:
+    """The characteristics whose readings results become, from the fields `as_x`, by result."""
+    return {result: key for result in results if (key := form.get(f"as_{result}", "").strip())}
 
 
 def words(fields: Mapping[str, str], name: str) -> str:

@@ -13,7 +13,7 @@ from app.core.number_text import plain as plain_text
 from app.errors import FieldError, InbandError, Invalid
 from app.geometry.alignment.schemas import MOST_TOUCHES
 from app.language.i18n import _
-from app.web.forms import by_field, length
+from app.web.forms import by_field, characteristics_typed, length, micrometres, whole, whole_numbers
 
 KINDS = ("points", "two_points", "two_holes")
 FACES = ("+Z", "+Z", "+Z", "-Y", "-Y", "-X")  # the six points, where nobody says otherwise
@@ -53,8 +53,7 @@ def blank(kind: str) -> dict[str, str]:
 def fields(form: Mapping[str, str]) -> tuple[FormValues, list[str]]:
     """The form as the API takes it, and by touch the line in which it was typed. Raises `Invalid` for a line that is none."""
     values: FormValues = {name: form.get(name, "").strip() for name in WORDS}
-    micrometres = length(form.get("repeatability"))
-    values["repeatability"] = round(micrometres / 1000, 9) if isinstance(micrometres, float) else micrometres
+    values["repeatability"] = micrometres(form.get("repeatability"))
     base = [length(form.get(f"base_{axis}")) for axis in AXES]
     values["base"] = base if any(value is not None for value in base) else None
     values["solve_for"] = UNKNOWNS.get(form.get("solve_for", ""))
@@ -66,7 +65,7 @@ def fields(form: Mapping[str, str]) -> tuple[FormValues, list[str]]:
             "position": length(form.get("table_position")) or 0.0,
             "clockwise": form.get("table_sense") != "counter",
         }
-    if named := {name: key for name in "abc" if (key := form.get(f"as_{name}", "").strip())}:
+    if named := characteristics_typed(form, "abc"):
         values["characteristics"] = named
     lines: list[str] = []
     match form.get("kind"):
@@ -213,19 +212,9 @@ def pallet(form: Mapping[str, str]) -> FormValues:
 
 def again(form: Mapping[str, str]) -> FormValues:
     """Computing once more, as the API takes it."""
-    values: FormValues = {"method": form.get("method", "").strip(), "reason": form.get("reason", "").strip()}
-    micrometres = length(form.get("repeatability"))
-    values["repeatability"] = round(micrometres / 1000, 9) if isinstance(micrometres, float) else micrometres
-    values["leave_out"] = [
-        whole(number) for number in form.get("leave_out", "").replace(",", " ").replace(";", " ").split()
-    ]
-    return values
-
-
-def whole(text: str) -> int | str:
-    """A whole number; what is none is left for the schema to refuse."""
-    text = text.strip()
-    return int(text) if text.isascii() and text.isdigit() and len(text) < 19 else text
+    values = {name: form.get(name, "").strip() for name in ("method", "reason")}
+    repeatability = micrometres(form.get("repeatability"))
+    return values | {"repeatability": repeatability, "leave_out": whole_numbers(form.get("leave_out"))}
 
 
 # --- what is wrong, where it was typed

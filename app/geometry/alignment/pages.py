@@ -22,7 +22,7 @@ from app.loop.machines.wording import texts_by_control
 from app.loop.readings import actions as readings
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_ID
-from app.web.forms import parsed
+from app.web.forms import parsed, whole
 from app.web.paging import address, part_of
 from app.web.templates import page
 from app.web.warnings import WarningsAcknowledgeIn
@@ -164,7 +164,7 @@ def _pallet(request: Request, session: Session, form: Mapping[str, str], error: 
     rows = queries.alignments(session, newest_first=True, limit=TO_CHOOSE)
     known = {row.id for row in rows}
     for name in ("pallet", "part"):
-        number = form_reader.whole(form.get(name, ""))
+        number = whole(form.get(name, ""))
         if isinstance(number, int) and number not in known:
             try:
                 rows.append(queries.alignment(session, number))

@@ -9,7 +9,7 @@ from app.core.number_text import plain as plain_text
 from app.errors import FieldError, Invalid
 from app.geometry.geometric_form.schemas import OF_POINTS, OF_SECTIONS, WITH_DATUM, WITH_LENGTH
 from app.language.i18n import _
-from app.web.forms import length
+from app.web.forms import length, micrometres
 
 HEAD = re.compile(
     r"^\s*(?:section\s*\d*)?\s*[,:;]?\s*(?:[Zz]\s*[=:]?\s*(?P<height>[-+−]?[\d.,]+)\s*)?(?:mm)?\s*:?\s*$", re.IGNORECASE
@@ -73,8 +73,7 @@ def fields(form: Mapping[str, str]) -> dict[str, Any]:
     if kind in WITH_LENGTH:
         given["length"] = length(form.get("length"))
     for name in ("tolerance", "repeatability"):  # typed in µm
-        micrometres = length(form.get(name))
-        given[name] = round(micrometres / 1000, 9) if isinstance(micrometres, float) else micrometres
+        given[name] = micrometres(form.get(name))
     touched = _touched(form, "touches", in_points=_in_points(form, kind, "feature_as"))
     given |= touched
     if kind in WITH_DATUM and form.get("datum", "").strip():

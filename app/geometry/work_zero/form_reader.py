@@ -12,7 +12,7 @@ from app.core.number_text import has_broken_number
 from app.errors import FieldError, InbandError, Invalid
 from app.geometry.work_zero.schemas import MOST_TOUCHES, OTHER_NAMES, RECORDS
 from app.language.i18n import _
-from app.web.forms import by_field, length
+from app.web.forms import by_field, characteristics_typed, length, micrometres, whole, whole_numbers
 
 ROWS = 6
 SHOWN_ROWS = 4  # the others are opened where they are needed
@@ -60,9 +60,8 @@ def fields(form: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
     """The form as the API takes it, and by touch the field in which it was typed. Raises `Invalid` for a line that is none."""
     values: dict[str, Any] = {name: form.get(name, "").strip() for name in WORDS}
     values |= {name: length(form.get(name)) for name in NUMBERS}
-    micrometres = length(form.get("repeatability"))
-    values["repeatability"] = round(micrometres / 1000, 9) if isinstance(micrometres, float) else micrometres
-    if named := {name: key for name in RESULTS if (key := form.get(f"as_{name}", "").strip())}:
+    values["repeatability"] = micrometres(form.get("repeatability"))
+    if named := characteristics_typed(form, RESULTS):
         values["characteristics"] = named
     touches: list[dict[str, Any]] = []
     typed_in: list[str] = []
@@ -147,26 +146,15 @@ def _line(row: str, number: int) -> dict[str, Any]:
 def watch(form: Mapping[str, str]) -> dict[str, Any]:
     """The settings of a fixture as the API takes them; limits are typed in µm."""
     values: dict[str, Any] = {"basis": form.get("basis", "").strip(), "reason": form.get("reason", "").strip()}
-    number = form.get("reference", "").strip()
-    values["reference"] = int(number) if number.isascii() and number.isdigit() and len(number) < 19 else number
-    if values["basis"] != "frozen":
-        values["reference"] = None
-    for name in ("warning", "alarm"):
-        micrometres = length(form.get(name))
-        values[name] = round(micrometres / 1000, 9) if isinstance(micrometres, float) else micrometres
-    values["characteristics"] = {name: key for name in RESULTS if (key := form.get(f"as_{name}", "").strip())}
-    return values
+    values["reference"] = whole(form.get("reference")) if values["basis"] == "frozen" else None
+    values |= {name: micrometres(form.get(name)) for name in ("warning", "alarm")}
+    return values | {"characteristics": characteristics_typed(form, RESULTS)}
 
 
 def again(form: Mapping[str, str]) -> dict[str, Any]:
     """Computing once more, as the API takes it."""
-    values: dict[str, Any] = {"tip": length(form.get("tip")), "reason": form.get("reason", "").strip()}
-    numbers = form.get("leave_out", "").replace(",", " ").replace(";", " ").split()
-    values["leave_out"] = [
-        int(number_text) if number_text.isascii() and number_text.isdigit() and len(number_text) < 6 else number_text
-        for number_text in numbers
-    ]
-    return values
+    tip, reason = length(form.get("tip")), form.get("reason", "").strip()
+    return {"tip": tip, "reason": reason, "leave_out": whole_numbers(form.get("leave_out"))}
 
 
 def at_fields(error: InbandError, typed_in: Sequence[str] = ()) -> dict[str, str]:
