@@ -25,7 +25,7 @@ from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
 from app.loop.tables.machines import Machine
 from app.loop.warnings import actions as warned
-from app.loop.warnings.queries import acknowledgement, bounds_of
+from app.loop.warnings.queries import bounds_of, unacknowledged
 from app.web.created import Created, sent_before
 from app.web.warnings import WarningsAcknowledgeIn
 
@@ -159,7 +159,7 @@ def compose(session: Session, body: PalletIn, caller: Caller) -> Created[Alignme
 def warned_of(session: Session, alignment: Alignment) -> bool:
     """Return whether an alignment has warnings that nobody has acknowledged."""
     machine = session.get_one(Machine, alignment.machine_id)
-    return bool(warnings_of(alignment, machine)) and acknowledgement(session, machine.id, subject_of(alignment)) is None
+    return bool(unacknowledged(session, machine.id, subject_of(alignment), warnings_of(alignment, machine)))
 
 
 def acknowledge(session: Session, alignment: Alignment, body: WarningsAcknowledgeIn, caller: Caller) -> None:

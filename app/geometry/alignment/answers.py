@@ -17,9 +17,10 @@ from app.geometry.alignment.evaluation import warnings_of
 from app.geometry.alignment.schemas import MethodName
 from app.geometry.alignment.tables import Alignment
 from app.loop.tables.machines import Machine
-from app.loop.warnings.queries import acknowledgement
+from app.loop.warnings.queries import acknowledgement, unacknowledged
 from app.loop.warnings.wording import sentence
 from app.web.fields import answer_from
+from app.web.pushed import PushedOut
 from app.web.warnings import Acknowledged, Warnings, acknowledged_out, warnings_out
 
 Kind = Literal["points", "two_points", "two_holes", "pallet"]
@@ -76,15 +77,6 @@ class RotaryTableOut(BaseModel):
     position: Annotated[float, Field(description="To command.")]
     shift: Annotated[Shift, Field(description="What is left for the frame after the table has turned.")]
     angles: Angles
-
-
-class PushedOut(BaseModel):
-    """A result as a reading of a characteristic."""
-
-    result: str
-    characteristic: str
-    sequence: Annotated[int | None, Field(description="Null while it waits to be stored.")]
-    refused: Annotated[str | None, Field(description="Why it became no reading.")]
 
 
 class AlignmentOut(BaseModel):
@@ -181,9 +173,7 @@ def program_of(
 
 def stop_of(session: Session, alignment: Alignment, machine: Machine) -> list[str]:
     """The codes of the warnings that stop its program text; none once somebody has acknowledged them."""
-    if acknowledgement(session, machine.id, queries.subject_of(alignment)) is not None:
-        return []
-    return [warning.code for warning in warnings_of(alignment, machine)]
+    return unacknowledged(session, machine.id, queries.subject_of(alignment), warnings_of(alignment, machine))
 
 
 def _shift(values: Any) -> Shift:
@@ -236,10 +226,7 @@ def alignment_out(session: Session, alignment: Alignment) -> AlignmentOut:
         acknowledged=acknowledged_out(acknowledged),
         program=program_of(alignment, machine, stop=[] if acknowledged else [warning.code for warning in warnings])
         or "",
-        readings=[
-            PushedOut(result=name, characteristic=key, sequence=sequence, refused=refused)
-            for name, key, sequence, refused in queries.pushed(session, alignment)
-        ],
+        readings=[PushedOut(**result._asdict()) for result in queries.pushed(session, alignment)],
         pallet=alignment.pallet_id,
         part_on_pallet=alignment.part_id,
         given=inputs,

@@ -75,13 +75,10 @@ def recomputed_as(session: Session, alignment: Alignment) -> list[int]:
     )
 
 
-def pushed(session: Session, alignment: Alignment) -> list[tuple[str, str, int | None, str | None]]:
-    """Values of a, b, c that are, or become, readings: with characteristic, sequence, and the reason for refusal."""
-    keys = {f"alignment:{alignment.id}:{name}": name for name in "abc"}
-    rows = readings.readings_of_results(session, keys)
-    return [
-        (name, rows[key][0], rows[key][1].sequence, rows[key][1].refused) for key, name in keys.items() if key in rows
-    ]
+def pushed(session: Session, alignment: Alignment) -> list[readings.PushedResult]:
+    """Values of a, b, c that are, or become, readings."""
+    source = f"alignment:{alignment.id}"
+    return readings.pushed_results(session, [source], "abc")[source]
 
 
 def set_ups(session: Session, machine_id: int | None = None, limit: int = 100) -> list[SetUp]:

@@ -7,7 +7,8 @@ from pydantic import BaseModel, Field
 
 from app.geometry.geometric_form import wording
 from app.geometry.geometric_form.evaluation import warnings_of
-from app.geometry.geometric_form.queries import FormRow, ResultReading
+from app.geometry.geometric_form.queries import FormRow
+from app.loop.readings.queries import PushedResult
 from app.loop.warnings.wording import sentence
 from app.web.fields import answer_from
 from app.web.warnings import Warnings, warnings_out
@@ -93,7 +94,7 @@ class FormOut(BaseModel):
     reading: FormReadingOut | None
 
 
-def form_out(row: FormRow, reading: ResultReading | None = None) -> FormOut:
+def form_out(row: FormRow, reading: PushedResult | None = None) -> FormOut:
     """A measurement as it is answered."""
     measurement, evaluation = row.measurement, row.evaluation
     result = evaluation.result
@@ -123,5 +124,5 @@ def form_out(row: FormRow, reading: ResultReading | None = None) -> FormOut:
         engine=evaluation.engine,
         evaluation=evaluation.number,
         evaluated_at=evaluation.at,
-        reading=None if reading is None else FormReadingOut(**reading._asdict()),
+        reading=None if reading is None else answer_from(FormReadingOut, reading),
     )

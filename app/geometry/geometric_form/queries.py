@@ -25,14 +25,6 @@ class FormRow(NamedTuple):
     plausible_shift: float
 
 
-class ResultReading(NamedTuple):
-    """Reading that a result was pushed as: its characteristic and number; refused: the reason for refusal."""
-
-    characteristic: str
-    sequence: int | None
-    refused: str | None
-
-
 class Feature(NamedTuple):
     """A feature with its newest measurement, and how many there are."""
 
@@ -139,24 +131,14 @@ def evaluations(session: Session, row: FormRow) -> Sequence[FormEvaluation]:
     ).all()
 
 
-def became(session: Session, rows: Sequence[FormRow]) -> dict[int, ResultReading]:
+def became(session: Session, rows: Sequence[FormRow]) -> dict[int, readings.PushedResult]:
     """Readings that results were pushed as, by the number of the measurement."""
-    keys = {reading_key(row.measurement.id): row for row in rows if row.measurement.characteristic_id is not None}
-    readings_by_key = readings.readings_of_results(session, keys) if keys else {}
-    return {
-        row.measurement.id: ResultReading(
-            readings_by_key[key][0], readings_by_key[key][1].sequence, readings_by_key[key][1].refused
-        )
-        for key, row in keys.items()
-        if key in readings_by_key
-    }
+    measurements = [row.measurement for row in rows if row.measurement.characteristic_id is not None]
+    numbers = {source_key(measurement.id): measurement.id for measurement in measurements}
+    results = readings.pushed_results(session, numbers, ["deviation"]) if numbers else {}
+    return {numbers[source]: pushed[0] for source, pushed in results.items() if pushed}
 
 
 def source_key(number: int) -> str:
     """The beginning of the key of the reading that a result becomes."""
     return f"form:{number}"
-
-
-def reading_key(number: int) -> str:
-    """The key of the reading that a result becomes."""
-    return f"{source_key(number)}:deviation"

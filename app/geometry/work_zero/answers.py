@@ -13,10 +13,12 @@ from app.geometry.work_zero.evaluation import warnings_of
 from app.geometry.work_zero.queries import Compared, FixtureRow
 from app.geometry.work_zero.schemas import ApproachName, KindName
 from app.geometry.work_zero.tables import Fixture, WorkZero
+from app.loop.readings.queries import PushedResult
 from app.loop.tables.machines import Machine
-from app.loop.warnings.queries import acknowledgement
+from app.loop.warnings.queries import acknowledgement, unacknowledged
 from app.loop.warnings.wording import sentence
 from app.web.fields import answer_from
+from app.web.pushed import PushedOut
 from app.web.warnings import Acknowledged, Warnings, acknowledged_out, warnings_out
 
 State = Literal["unknown", "steady", "warning", "alarm"]
@@ -39,15 +41,6 @@ class ShiftOut(BaseModel):
     total: Annotated[float | None, Field(description="All axes together; this is what is held against the limits.")]
     reference: Annotated[int | None, Field(description="The work zero compared with; null for a median.")]
     text: Annotated[str, Field(description="For people.")]
-
-
-class PushedOut(BaseModel):
-    """A result as a reading of a characteristic."""
-
-    result: str
-    characteristic: str
-    sequence: Annotated[int | None, Field(description="Null while it waits to be stored.")]
-    refused: Annotated[str | None, Field(description="Why it became no reading.")]
 
 
 class TouchOut(BaseModel):
@@ -141,9 +134,7 @@ def program_of(
 
 def stop_of(session: Session, zero: WorkZero, machine: Machine) -> list[str]:
     """The codes of the warnings that stop its program text; none once somebody has acknowledged them."""
-    if acknowledgement(session, machine.id, queries.subject_of(zero)) is not None:
-        return []
-    return [warning.code for warning in warnings_of(zero, machine)]
+    return unacknowledged(session, machine.id, queries.subject_of(zero), warnings_of(zero, machine))
 
 
 def shift_out(compared: Compared, basis: str) -> ShiftOut:
@@ -173,7 +164,7 @@ def zero_out(session: Session, zero: WorkZero) -> ZeroOut:
     return zeros_out(session, [zero])[0]
 
 
-def _zero_out(session: Session, zero: WorkZero, pushed: Sequence[queries.Pushed], settings: Fixture | None) -> ZeroOut:
+def _zero_out(session: Session, zero: WorkZero, pushed: Sequence[PushedResult], settings: Fixture | None) -> ZeroOut:
     machine = session.get_one(Machine, zero.machine_id)
     compared = queries.compared(session, zero, settings)
     basis = "first" if settings is None else settings.basis
@@ -195,7 +186,7 @@ def _zero_out(session: Session, zero: WorkZero, pushed: Sequence[queries.Pushed]
         acknowledged=acknowledged_out(acknowledged),
         program=program_of(zero, machine, stop=[] if acknowledged else [warning.code for warning in warnings]) or "",
         shift=None if compared is None else shift_out(compared, basis),
-        readings=[PushedOut(**warning._asdict()) for warning in pushed],
+        readings=[PushedOut(**result._asdict()) for result in pushed],
         by=zero.actor,
     )
 

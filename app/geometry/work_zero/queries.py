@@ -39,15 +39,6 @@ class Compared(NamedTuple):
         return hypot(*self.shifts.values()) if self.shifts else None
 
 
-class Pushed(NamedTuple):
-    """A result that is, or becomes, a reading. sequence: its number; refused: why it is none."""
-
-    result: str
-    characteristic: str
-    sequence: int | None
-    refused: str | None
-
-
 class FixtureRow(NamedTuple):
     """A fixture as the overview shows it."""
 
@@ -249,20 +240,12 @@ def _fixture_row(session: Session, machine: Machine, key: str, count: int) -> Fi
     return FixtureRow(machine, key, count, against(session, last, settings), settings)
 
 
-def pushed(session: Session, zeros: Sequence[WorkZero]) -> dict[int, list[Pushed]]:
+def pushed(session: Session, zeros: Sequence[WorkZero]) -> dict[int, list[readings.PushedResult]]:
     """The results of these zeros that are, or become, readings, by the number of the zero."""
-    keys = {
-        f"work-zero:{zero.id}:{name}": (zero.id, name)
-        for zero in zeros
-        for name in (*AXES, "diameter", "length", "width")
-    }
-    rows = readings.readings_of_results(session, keys)
-    by_zero: dict[int, list[Pushed]] = {zero.id: [] for zero in zeros}
-    for key, (number, name) in keys.items():
-        if key in rows:
-            characteristic, row = rows[key]
-            by_zero[number].append(Pushed(name, characteristic, row.sequence, row.refused))
-    return by_zero
+    results = readings.pushed_results(
+        session, [f"work-zero:{zero.id}" for zero in zeros], (*AXES, "diameter", "length", "width")
+    )
+    return {zero.id: results[f"work-zero:{zero.id}"] for zero in zeros}
 
 
 def recomputed_as(session: Session, zero: WorkZero) -> int | None:

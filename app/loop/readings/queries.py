@@ -1,7 +1,7 @@
 """Everything that is read of readings."""
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, func, select, tuple_
 from sqlalchemy.orm import Session
@@ -80,10 +80,26 @@ def entries_for_results(
     return found
 
 
-def readings_of_results(session: Session, keys: Iterable[str]) -> dict[str, tuple[str, ResultReading]]:
-    """Return the readings of results, by key: the key of their characteristic, and the row."""
-    rows = session.scalars(select(ResultReading).where(ResultReading.key.in_(list(keys)))).all()
-    return {row.key: (entry_by_id(session, row.machine_id, row.characteristic_id).characteristic, row) for row in rows}
+class PushedResult(NamedTuple):
+    """A result that is, or becomes, a reading. sequence: its number; refused: the reason for refusal."""
+
+    result: str
+    characteristic: str
+    sequence: int | None
+    refused: str | None
+
+
+def pushed_results(session: Session, sources: Iterable[str], results: Sequence[str]) -> dict[str, list[PushedResult]]:
+    """The results of measurements that are, or become, readings, by the key of the measurement (`work-zero:12`)."""
+    pushed: dict[str, list[PushedResult]] = {source: [] for source in sources}
+    keys = [f"{source}:{result}" for source in pushed for result in results]
+    rows = {row.key: row for row in session.scalars(select(ResultReading).where(ResultReading.key.in_(keys)))}
+    for key in keys:
+        if key in rows:
+            (source, _colon, result), row = key.rpartition(":"), rows[key]
+            characteristic = entry_by_id(session, row.machine_id, row.characteristic_id).characteristic
+            pushed[source].append(PushedResult(result, characteristic, row.sequence, row.refused))
+    return pushed
 
 
 def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[str, Any]]:

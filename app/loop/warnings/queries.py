@@ -6,6 +6,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.core.geometry.plausible import Bounds
+from app.core.warning import CodedWarning
 from app.loop.tables.machines import Machine
 from app.loop.warnings.tables import WarningAcknowledgement
 
@@ -18,6 +19,11 @@ def bounds_of(machine: Machine) -> Bounds:
 def acknowledgement(session: Session, machine_id: int, subject: str) -> WarningAcknowledgement | None:
     """The acknowledgement of the warnings of this result, if there is one."""
     return session.get(WarningAcknowledgement, (machine_id, subject))
+
+
+def unacknowledged(session: Session, machine_id: int, subject: str, warnings: Iterable[CodedWarning]) -> list[str]:
+    """The codes of the warnings that stop a program text; none once somebody has acknowledged them."""
+    return [] if acknowledgement(session, machine_id, subject) else [warning.code for warning in warnings]
 
 
 def acknowledgements(session: Session, subjects: Iterable[str]) -> dict[str, WarningAcknowledgement]:
