@@ -22,6 +22,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from app.core.parameters import LARGEST_LENGTH
 from app.language.i18n import _
 
 SLUG = r"[a-z0-9][a-z0-9._-]{0,63}"
@@ -104,6 +105,18 @@ Reason = Annotated[
     Field(description="Why, in words; it stays on record."),
 ]
 """Reason for an action: 1 to 1000 characters."""
+
+Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
+"""A length in mm."""
+
+RecordKey = Annotated[
+    Text200,
+    Field(
+        max_length=128,
+        description="Unique per machine: sent again, the answer is the first answer and nothing happens twice.",
+    ),
+]
+"""The key of what is sent, for sending it again."""
 
 Limit = Annotated[int, Field(ge=1, le=1000, description="How many items at most.")]
 Cursor = Annotated[int, Field(ge=0, le=LARGEST_ID, description="Cursor: the `next` of the page before.")]

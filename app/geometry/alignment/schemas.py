@@ -5,12 +5,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, JsonValue, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.core.parameters import LARGEST_LENGTH
 from app.language.i18n import _
-from app.web.fields import LARGEST_ID, Body, LatelyOrNow, Reason, Slug, Text200
+from app.web.fields import LARGEST_ID, Body, LatelyOrNow, Length, Reason, RecordKey, Slug, Text200
 
 MOST_TOUCHES = 1000  # a hundred holes of a plate, ten touches each
-Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
 Angle = Annotated[float, Field(strict=True, ge=-360, le=360, allow_inf_nan=False)]
 Share = Annotated[float, Field(strict=True, ge=-1e3, le=1e3, allow_inf_nan=False)]
 Vector = Annotated[list[Length], Field(min_length=3, max_length=3)]
@@ -24,13 +22,6 @@ Repeatability = Annotated[
         le=1,
         allow_inf_nan=False,
         description="Standard deviation of one touch; with it uncertainties (95 %) and misfits are stated.",
-    ),
-]
-Key = Annotated[
-    Text200,
-    Field(
-        max_length=128,
-        description="Unique per machine: sent again, the answer is the first answer and nothing happens twice.",
     ),
 ]
 MethodName = Literal["exact", "small", "printed"]
@@ -178,7 +169,7 @@ class AlignmentIn(Body):
         Field(description="Characteristics of this machine whose readings a, b, c become."),
     ] = None
     aligned_at: Annotated[LatelyOrNow | None, Field(description="When; if left out, now.")] = None
-    key: Key | None = None
+    key: RecordKey | None = None
 
 
 class PoseIn(Body):
@@ -197,7 +188,7 @@ class PalletIn(Body):
         None
     )
     name: Annotated[Text200 | None, Field(description="What lies there.")] = None
-    key: Key | None = None
+    key: RecordKey | None = None
 
 
 class AlignmentRecomputeIn(Body):

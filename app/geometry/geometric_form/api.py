@@ -10,12 +10,12 @@ from app.errors import NotFound
 from app.geometry.geometric_form import actions, figures, queries, wording
 from app.geometry.geometric_form.answers import FormOut, form_out
 from app.geometry.geometric_form.queries import FormRow
-from app.geometry.geometric_form.schemas import FormIn, FormRecomputeIn
+from app.geometry.geometric_form.schemas import FormIn
 from app.language.i18n import _
 from app.loop.machines.queries import machine_for, machine_keys_by_id, machine_named
 from app.web.api import FIGURE, MachineFilter, MachineKey, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
-from app.web.fields import Cursor, Limit, Page, Slug, page_of
+from app.web.fields import Cursor, Limit, Page, ReasonIn, Slug, page_of
 
 router = api_router("forms")
 Number = Annotated[int, Path(description="Number of the measurement.", examples=[17])]
@@ -78,7 +78,7 @@ def get_form_measurement(session: SessionDep, caller: AnyCaller, number: Number)
 
 
 @router.post("/forms/{number}/recompute", status_code=201, responses=problems(404))
-def recompute_form(session: SessionDep, caller: AnyCaller, number: Number, body: FormRecomputeIn) -> FormOut:
+def recompute_form(session: SessionDep, caller: AnyCaller, number: Number, body: ReasonIn) -> FormOut:
     """Evaluate the stored touches anew by the present code; what was found before stays on record."""
     caller.must_somewhere("operator")
     row = queries.form(session, number)

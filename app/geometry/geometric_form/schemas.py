@@ -9,12 +9,11 @@ from pydantic_core import PydanticCustomError
 from app.core.geometry.form import Kind
 from app.core.parameters import LARGEST_LENGTH
 from app.language.i18n import _
-from app.web.fields import Body, LatelyOrNow, Reason, Slug, Text200
+from app.web.fields import Body, LatelyOrNow, Length, RecordKey, Slug, Text200
 
 MOST_TOUCHES = 2000
 MOST_SECTIONS = 200
 
-Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(strict=True, ge=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
 Flat = Annotated[list[Length], Field(min_length=2, max_length=2, examples=[[-6.096, 24.249]])]
@@ -116,10 +115,7 @@ class FormIn(Body):
     characteristic: Annotated[
         Slug | None, Field(description="A characteristic of the machine whose reading the result becomes.")
     ] = None
-    key: Annotated[
-        Text200 | None,
-        Field(max_length=128, description="Unique per machine: sent again, the answer is the first answer."),
-    ] = None
+    key: RecordKey | None = None
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -184,12 +180,6 @@ def _depth(points: Sequence[Sequence[float]], coordinates: int, name: str) -> No
             _("point {at} of {name} has not {count} coordinates").format(at=wrong, name=name, count=coordinates),
             {"at": name},
         )
-
-
-class FormRecomputeIn(Body):
-    """Reason for computing again."""
-
-    reason: Reason
 
 
 def stored(body: FormIn) -> dict[str, Any]:

@@ -10,9 +10,8 @@ from app.core.rotary.axis import AxisName, Carried
 from app.files.formats.cell_values import Unreadable, zone_named
 from app.geometry.rotary_axes.result_values import UNITS
 from app.language.i18n import _
-from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Reason, Slug, Text200
+from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Length, Reason, RecordKey, Slug, Text200
 
-Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
 Angle = Annotated[float, Field(strict=True, ge=-360, le=360, allow_inf_nan=False)]
 Limit = Annotated[float, Field(strict=True, gt=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
 Ball = Annotated[float, Field(strict=True, ge=0.0001, le=99.9999, allow_inf_nan=False)]
@@ -111,10 +110,7 @@ class RunIn(Body):
 
     machine: Slug
     measured_at: Annotated[LatelyOrNow | None, Field(description="If left out: as the protocol says, else now.")] = None
-    key: Annotated[
-        Text200 | None,
-        Field(max_length=128, description="Unique per machine: sent again, the answer is the first answer."),
-    ] = None
+    key: RecordKey | None = None
     head: Annotated[
         Text200 | None, Field(max_length=64, description="The interchangeable head that was in, if there are several.")
     ] = None

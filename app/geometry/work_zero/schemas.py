@@ -7,10 +7,9 @@ from pydantic_core import PydanticCustomError
 
 from app.core.parameters import LARGEST_LENGTH
 from app.language.i18n import _
-from app.web.fields import LARGEST_ID, Body, LatelyOrNow, Reason, Slug, Text200
+from app.web.fields import LARGEST_ID, Body, LatelyOrNow, Length, Reason, RecordKey, Slug, Text200
 
 MOST_TOUCHES = 100
-Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
 Tip = Annotated[float, Field(strict=True, ge=0, le=1000, allow_inf_nan=False)]
 Repeatability = Annotated[
@@ -21,13 +20,6 @@ Repeatability = Annotated[
         le=1,
         allow_inf_nan=False,
         description="Standard deviation of one touch; with it the answer states uncertainties (95 %).",
-    ),
-]
-Key = Annotated[
-    Text200,
-    Field(
-        max_length=128,
-        description="Unique per machine: sent again, the answer is the first answer and nothing happens twice.",
     ),
 ]
 KindName = Literal["bore", "boss", "pocket", "web", "corner"]
@@ -91,7 +83,7 @@ class ZeroIn(Body):
     repeatability: Repeatability | None = None
     characteristics: Characteristics | None = None
     touched_at: Annotated[LatelyOrNow | None, Field(description="When; if left out or still to come, now.")] = None
-    key: Key | None = None
+    key: RecordKey | None = None
 
     @model_validator(mode="before")
     @classmethod

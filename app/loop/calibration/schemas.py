@@ -8,17 +8,9 @@ from pydantic_core import PydanticCustomError
 from app.core.calibration import SECTIONS
 from app.core.parameters import LARGEST_LENGTH, MOST_LOCATIONS
 from app.language.i18n import _
-from app.web.fields import LARGEST_ID, Body, LatelyOrNow, Reason, Slug, Text200
+from app.web.fields import LARGEST_ID, Body, LatelyOrNow, Length, Reason, RecordKey, Slug, Text200
 
-Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, ge=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
-Key = Annotated[
-    Text200,
-    Field(
-        max_length=128,
-        description="Unique per machine: sent again, the answer is the first answer and nothing happens twice.",
-    ),
-]
 MOST_TOUCHES = 100
 
 R_NAMES = {
@@ -93,7 +85,7 @@ class GaugeIn(Body):
         int | None, Field(strict=True, ge=1, le=MOST_LOCATIONS, description="R47: the offset that the probe has.")
     ] = None
     calibrated_at: Annotated[LatelyOrNow | None, Field(description="When; if left out, now.")] = None
-    key: Key | None = None
+    key: RecordKey | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -141,7 +133,7 @@ class RingIn(Body):
         bool, Field(strict=True, description="The first move along Z triggered: it is not a bore.")
     ] = False
     calibrated_at: Annotated[LatelyOrNow | None, Field(description="When; if left out, now.")] = None
-    key: Key | None = None
+    key: RecordKey | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -162,7 +154,7 @@ class PairIn(Body):
     ] = None
     external_value: Annotated[Length, Field(description="What the external gauge says, taken for true.")]
     instrument: Annotated[Text200, Field(description="Which gauge: micrometer, measuring machine.")]
-    key: Key | None = None
+    key: RecordKey | None = None
 
 
 class SuggestionAcceptIn(Body):

@@ -6,19 +6,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from app.core.parameters import LARGEST_LENGTH
 from app.core.tool_life import LifePlan, use_of
 from app.core.warning import CodedWarning
 from app.loop.tables.tools import Correction
 from app.loop.tools import wording
 from app.loop.tools.queries import AverageRow, CorrectionRow, ToolRow
 from app.loop.warnings.wording import sentence
-from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Reason, answer_from
+from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Length, Reason, answer_from
 from app.web.warnings import Warnings, warnings_out
 
 DESCRIBED = ("edge", "name", "kind", "planned_parts", "planned_total", "sister")
 Status = Literal["held", "awaiting_approval", "pending", "applied", "rejected", "superseded"]
-Length = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
 
 
 class AppliedIn(Body):

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.core.parameters import LARGEST_LENGTH
-from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Body, Reason, Slug, Text200
+from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Body, Reason, RecordKey, Slug, Text200
 
 Kind = Literal["type_one", "bias", "linearity", "grr"]
 Value = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
@@ -58,11 +58,7 @@ class StudyIn(SettingsIn):
     machine: Slug = Field(examples=["lathe-1"])
     characteristic: Slug | None = Field(None, description="Which the study is to serve.", examples=["shaft-d40"])
     rows: list[RowIn] = Field(min_length=1, max_length=MOST_ROWS)
-    key: Text200 | None = Field(
-        None,
-        max_length=128,
-        description="Unique per machine: sent again, the answer is the first answer and nothing happens twice.",
-    )
+    key: RecordKey | None = None
 
 
 class FromReadingsIn(SettingsIn):
