@@ -179,17 +179,7 @@ def recompute(session: Session, alignment: Alignment, body: AlignmentRecomputeIn
                 pallet=alignment.pallet_id, part=alignment.part_id
             ),
         )
-    inputs = dict(alignment.given)
-    method = body.method or alignment.method
-    if body.repeatability is not None:
-        inputs["repeatability"] = body.repeatability
-    if body.leave_out:
-        touches = inputs.get("touches") or []
-        beyond = [at for at in body.leave_out if at > len(touches)]
-        if beyond:
-            wrong = _("there is no point {at}").format(at=", ".join(map(str, beyond)))
-            raise Invalid(f"leave_out: {wrong}.", errors=[FieldError("leave_out", wrong)])
-        inputs["touches"] = [touch for at, touch in enumerate(touches, 1) if at not in body.leave_out]
+    inputs, method = body.applied_to(alignment.given), body.method or alignment.method
     recomputed = Alignment(
         machine_id=machine.id,
         kind=alignment.kind,

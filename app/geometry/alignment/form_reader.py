@@ -11,8 +11,8 @@ from typing import Any
 from app.core.number_text import has_broken_number
 from app.core.number_text import plain as plain_text
 from app.errors import FieldError, InbandError, Invalid
-from app.geometry.alignment.schemas import MOST_TOUCHES
 from app.language.i18n import _
+from app.web.again import MOST_TOUCHES
 from app.web.forms import by_field, characteristics_typed, length, micrometres, whole, whole_numbers
 
 KINDS = ("points", "two_points", "two_holes")

@@ -6,24 +6,14 @@ from pydantic import Field, JsonValue, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.language.i18n import _
-from app.web.fields import LARGEST_ID, Body, LatelyOrNow, Length, Reason, RecordKey, Slug, Text200
+from app.web.again import MOST_TOUCHES, Repeatability, TouchesAgainIn
+from app.web.fields import LARGEST_ID, Body, LatelyOrNow, Length, RecordKey, Slug, Text200
 
-MOST_TOUCHES = 1000  # a hundred holes of a plate, ten touches each
 Angle = Annotated[float, Field(strict=True, ge=-360, le=360, allow_inf_nan=False)]
 Share = Annotated[float, Field(strict=True, ge=-1e3, le=1e3, allow_inf_nan=False)]
 Vector = Annotated[list[Length], Field(min_length=3, max_length=3)]
 Normal = Annotated[list[Share], Field(min_length=3, max_length=3)]
 Place = Annotated[list[Length], Field(min_length=2, max_length=2)]
-Repeatability = Annotated[
-    float,
-    Field(
-        strict=True,
-        gt=0,
-        le=1,
-        allow_inf_nan=False,
-        description="Standard deviation of one touch; with it uncertainties (95 %) and misfits are stated.",
-    ),
-]
 MethodName = Literal["exact", "small", "printed"]
 Motion = Literal["a", "b", "c", "lambda", "beta", "gamma"]
 DIRECTIONS = {
@@ -191,13 +181,7 @@ class PalletIn(Body):
     key: RecordKey | None = None
 
 
-class AlignmentRecomputeIn(Body):
+class AlignmentRecomputeIn(TouchesAgainIn):
     """The same touches once more: by another method, or without some of them. The first result stays on record."""
 
     method: Annotated[MethodName | None, Field(description="If left out, as before.")] = None
-    repeatability: Repeatability | None = None
-    leave_out: Annotated[
-        list[Annotated[int, Field(strict=True, ge=1, le=MOST_TOUCHES)]],
-        Field(max_length=MOST_TOUCHES, description="Touches that do not count, from 1."),
-    ] = Field(default=[])
-    reason: Reason

@@ -15,7 +15,7 @@ from app.core.programs.frames import offset_of
 from app.core.warning import as_stored
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
-from app.geometry.work_zero import queries, wording
+from app.geometry.work_zero import queries
 from app.geometry.work_zero.alarm_kinds import SHIFTED
 from app.geometry.work_zero.evaluation import evaluated, warnings_in, warnings_of
 from app.geometry.work_zero.schemas import FixtureIn, ZeroIn, ZeroRecomputeIn
@@ -85,18 +85,9 @@ def recompute(session: Session, zero: WorkZero, body: ZeroRecomputeIn, caller: C
             _("Compute that one again."),
             number=later,
         )
-    inputs = dict(zero.given)
+    inputs = body.applied_to(zero.given)
     if body.tip is not None:
         inputs["tip"] = body.tip
-    if body.repeatability is not None:
-        inputs["repeatability"] = body.repeatability
-    if body.leave_out:
-        touches = inputs.get("touches") or []
-        beyond = [at for at in body.leave_out if at > len(touches)]
-        if beyond:
-            wrong = _("there is no point {at}").format(at=wording.numbers(beyond))
-            raise Invalid(f"leave_out: {wrong}.", errors=[FieldError("leave_out", wrong)])
-        inputs["touches"] = [touch for at, touch in enumerate(touches, 1) if at not in body.leave_out]
     recomputed = WorkZero(
         machine_id=machine.id,
         kind=zero.kind,

@@ -7,21 +7,12 @@ from pydantic_core import PydanticCustomError
 
 from app.core.parameters import LARGEST_LENGTH
 from app.language.i18n import _
+from app.web.again import Repeatability, TouchesAgainIn
 from app.web.fields import LARGEST_ID, Body, LatelyOrNow, Length, Reason, RecordKey, Slug, Text200
 
 MOST_TOUCHES = 100
 Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
 Tip = Annotated[float, Field(strict=True, ge=0, le=1000, allow_inf_nan=False)]
-Repeatability = Annotated[
-    float,
-    Field(
-        strict=True,
-        gt=0,
-        le=1,
-        allow_inf_nan=False,
-        description="Standard deviation of one touch; with it the answer states uncertainties (95 %).",
-    ),
-]
 KindName = Literal["bore", "boss", "pocket", "web", "corner"]
 ApproachName = Literal["+X", "-X", "+Y", "-Y"]
 ResultName = Literal["x", "y", "z", "diameter", "length", "width"]
@@ -110,16 +101,10 @@ class ZeroIn(Body):
         return fields
 
 
-class ZeroRecomputeIn(Body):
+class ZeroRecomputeIn(TouchesAgainIn):
     """The same touches once more: with another tip, or without some of them. The first result stays on record."""
 
     tip: Annotated[Tip | None, Field(description="Diameter of the tip; if left out, as before.")] = None
-    repeatability: Repeatability | None = None
-    leave_out: Annotated[
-        list[Annotated[int, Field(strict=True, ge=1, le=MOST_TOUCHES)]],
-        Field(max_length=MOST_TOUCHES, description="Touches that do not count, from 1."),
-    ] = Field(default=[])
-    reason: Reason
 
 
 class FixtureIn(Body):
