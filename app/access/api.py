@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import Path, Query
+from fastapi import Path
 
 from app.access import actions, queries
 from app.access.deps import Admin, AnyCaller, require
@@ -10,18 +10,16 @@ from app.access.schemas import InvitationIn, InvitationOut, PersonChange, Person
 from app.access.tables import Person
 from app.errors import NotFound
 from app.language.i18n import _
-from app.web.api import api_router, problems
+from app.web.api import Limit, SerialAfter, api_router, problems
 from app.web.deps import AddressDep, SessionDep
-from app.web.fields import LARGEST_SERIAL, Limit, Page, SerialCursor, page_of
+from app.web.fields import LARGEST_SERIAL, Page, page_of
 
 router = api_router("people")
 PersonId = Annotated[int, Path(ge=1, le=LARGEST_SERIAL, description="The person's number.")]
 
 
 @router.get("/people", dependencies=[require("admin")])
-def list_people(
-    session: SessionDep, after: Annotated[SerialCursor, Query()] = 0, limit: Annotated[Limit, Query()] = 100
-) -> Page[PersonOut]:
+def list_people(session: SessionDep, after: SerialAfter = 0, limit: Limit = 100) -> Page[PersonOut]:
     """Everybody who may or might sign in, the disabled too."""
     rows = [PersonOut.model_validate(row.person) for row in queries.people(session, after, limit + 1)]
     return page_of(rows, limit, lambda person: person.id)

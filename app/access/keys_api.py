@@ -2,23 +2,21 @@
 
 from typing import Annotated
 
-from fastapi import Path, Query, Response
+from fastapi import Path, Response
 
 from app.access import actions, queries
 from app.access.deps import Admin, require
 from app.access.schemas import KeyOut, NewKeyOut, RoleKeyIn, key_out
-from app.web.api import api_router, problems
+from app.web.api import Limit, SerialAfter, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import LARGEST_SERIAL, Limit, Page, SerialCursor, page_of
+from app.web.fields import LARGEST_SERIAL, Page, page_of
 
 router = api_router("keys")
 KeyId = Annotated[int, Path(ge=1, le=LARGEST_SERIAL, description="The number of the key.")]
 
 
 @router.get("/keys", dependencies=[require("admin")])
-def list_keys(
-    session: SessionDep, after: Annotated[SerialCursor, Query()] = 0, limit: Annotated[Limit, Query()] = 100
-) -> Page[KeyOut]:
+def list_keys(session: SessionDep, after: SerialAfter = 0, limit: Limit = 100) -> Page[KeyOut]:
     """The keys with a role, revoked ones too; never their secrets."""
     rows = [key_out(key) for key in queries.role_keys(session, after, limit + 1)]
     return page_of(rows, limit, lambda key: key.id)

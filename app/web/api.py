@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
 from fastapi.routing import APIRoute
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from app.errors import (
     Conflict,
@@ -18,7 +18,7 @@ from app.errors import (
     TooLarge,
     TooManyRequests,
 )
-from app.web.fields import Slug
+from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Slug, one_line
 from app.web.json_bodies import JsonRoute
 from app.web.problems import PROBLEM_JSON
 from app.web.theme import ThemeName
@@ -27,6 +27,16 @@ BASE = "/api/v1"
 MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
 CharacteristicKey = Annotated[str, Path(description="The key of the characteristic.", examples=["shaft-d40"])]
 MachineFilter = Annotated[Slug | None, Query(description="Only of this machine.", examples=["mill-1"])]
+_CURSOR = "Cursor: the `next` of the page before."
+After = Annotated[int, Query(ge=0, le=LARGEST_ID, description=_CURSOR)]
+"""Number of the last item seen."""
+SerialAfter = Annotated[int, Query(ge=0, le=LARGEST_SERIAL, description=_CURSOR)]
+"""The same, where items are counted with 32 bits."""
+KeyAfter = Annotated[str, Query(max_length=64, description=_CURSOR), AfterValidator(one_line)]
+"""Key of the last item seen."""
+Before = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description=_CURSOR)]
+SerialBefore = Annotated[int | None, Query(ge=1, le=LARGEST_SERIAL, description=_CURSOR)]
+Limit = Annotated[int, Query(ge=1, le=1000, description="How many items at most.")]
 Theme = Annotated[ThemeName, Query(description="For a light or a dark page.")]
 FIGURE: dict[int | str, dict[str, Any]] = {
     200: {

@@ -1,11 +1,11 @@
-"""Parameters that routes share: a session of the database, the settings, the address of the server, the fields of a form."""
+"""Parameters that routes share: a session of the database, the settings, the address of the server, numbers, words, forms."""
 
 import socket
 from collections.abc import Iterator, Mapping
 from typing import Annotated, cast
 from urllib.parse import urlsplit
 
-from fastapi import Depends, Request
+from fastapi import Depends, Query, Request
 from sqlalchemy.orm import Session
 from starlette.datastructures import FormData
 
@@ -13,7 +13,12 @@ from app.db.engine import Database
 from app.errors import FieldError, Invalid, NotAllowed
 from app.language.i18n import _
 from app.settings import Settings, is_loopback
+from app.web.fields import LARGEST_ID
 
+Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
+Before = Annotated[int | None, Query(ge=1, le=LARGEST_ID)]
+"""Number of the last item of the part before."""
+Word = Annotated[str | None, Query(max_length=64)]
 SESSION_COOKIE = "inband_session"
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 

@@ -53,7 +53,8 @@ def _readable(text: str) -> str:
     return text
 
 
-def _one_line(text: str) -> str:
+def one_line(text: str) -> str:
+    """The text; raises an error of pydantic if it is none that fits a line."""
     if "\n" in text or "\t" in text:
         raise PydanticCustomError("one_line", "one line")
     for character in _UNSEEN.intersection(text):
@@ -91,12 +92,9 @@ Slug = Annotated[str, AfterValidator(_slug), Field(json_schema_extra={"pattern":
 """A key that people choose and programs use in addresses."""
 
 Text200 = Annotated[
-    str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200), AfterValidator(_one_line)
+    str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200), AfterValidator(one_line)
 ]
 """A name: one line, 1 to 200 characters."""
-
-KeyCursor = Annotated[str, Field(max_length=64), AfterValidator(_one_line)]
-"""A cursor that is the key of the last item seen; empty for the first page."""
 
 Reason = Annotated[
     str,
@@ -117,12 +115,6 @@ RecordKey = Annotated[
     ),
 ]
 """The key of what is sent, for sending it again."""
-
-Limit = Annotated[int, Field(ge=1, le=1000, description="How many items at most.")]
-Cursor = Annotated[int, Field(ge=0, le=LARGEST_ID, description="Cursor: the `next` of the page before.")]
-"""A cursor that is the number of the last item seen."""
-SerialCursor = Annotated[int, Field(ge=0, le=LARGEST_SERIAL, description="Cursor: the `next` of the page before.")]
-"""The same, where items are counted with 32 bits."""
 
 
 class Body(BaseModel):

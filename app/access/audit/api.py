@@ -8,9 +8,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.access.audit import queries
 from app.access.deps import require
-from app.web.api import api_router
+from app.web.api import Before, Limit, api_router
 from app.web.deps import SessionDep
-from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Limit, Page, Text200, page_of
+from app.web.fields import LARGEST_SERIAL, Page, Text200, page_of
 
 router = api_router("audit")
 
@@ -46,10 +46,8 @@ def list_audit_entries(
     key: Annotated[
         int | None, Query(ge=1, le=LARGEST_SERIAL, description="Only what the key with this number changed.")
     ] = None,
-    before: Annotated[
-        int | None, Query(ge=1, le=LARGEST_ID, description="Cursor: the `next` of the page before.")
-    ] = None,
-    limit: Annotated[Limit, Query()] = 100,
+    before: Before = None,
+    limit: Limit = 100,
 ) -> Page[AuditEntryOut]:
     """The record of changes, newest first. Nothing in it is ever altered."""
     rows = queries.entries(

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import Path, Query, Request, Response
+from fastapi import Path, Request, Response
 
 from app.access.deps import AnyCaller, Operator
 from app.geometry.alignment import actions, queries
@@ -10,9 +10,9 @@ from app.geometry.alignment.answers import AlignmentOut, alignment_out
 from app.geometry.alignment.schemas import AlignmentIn, AlignmentRecomputeIn, PalletIn
 from app.loop.machines.queries import machine_for, only_machine
 from app.loop.readings import actions as readings
-from app.web.api import MachineFilter, api_router, problems, sent_again
+from app.web.api import After, Limit, MachineFilter, api_router, problems, sent_again
 from app.web.deps import SessionDep
-from app.web.fields import Cursor, Limit, Page, page_of
+from app.web.fields import Page, page_of
 from app.web.warnings import WarningsAcknowledgeIn
 
 router = api_router("alignments")
@@ -51,8 +51,8 @@ def list_alignments(
     session: SessionDep,
     caller: AnyCaller,
     machine: MachineFilter = None,
-    after: Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")] = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    after: After = 0,
+    limit: Limit = 100,
 ) -> Page[AlignmentOut]:
     """Alignments in the order in which they came."""
     only = only_machine(session, caller, machine)

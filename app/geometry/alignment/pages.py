@@ -20,8 +20,7 @@ from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named, machine_of
 from app.loop.machines.wording import texts_by_control
 from app.loop.readings import actions as readings
-from app.web.deps import FormDep, SessionDep
-from app.web.fields import LARGEST_ID
+from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.forms import parsed, whole
 from app.web.paging import address, part_of
 from app.web.templates import page
@@ -30,9 +29,7 @@ from app.web.warnings import WarningsAcknowledgeIn
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 25
 TO_CHOOSE = 60  # alignments offered for a pallet and its part
-Word = Annotated[str | None, Query(max_length=64)]
 Name = Annotated[str, Query(max_length=200)]
-Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
 
 
 def history_url(machine: str, name: str) -> str:

@@ -13,9 +13,9 @@ from app.geometry.geometric_form.queries import FormRow
 from app.geometry.geometric_form.schemas import FormIn
 from app.language.i18n import _
 from app.loop.machines.queries import machine_for, machine_keys_by_id, machine_named
-from app.web.api import FIGURE, MachineFilter, MachineKey, Theme, api_router, problems, sent_again
+from app.web.api import FIGURE, After, Limit, MachineFilter, MachineKey, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
-from app.web.fields import Cursor, Limit, Page, ReasonIn, Slug, page_of
+from app.web.fields import Page, ReasonIn, Slug, page_of
 
 router = api_router("forms")
 Number = Annotated[int, Path(description="Number of the measurement.", examples=[17])]
@@ -55,8 +55,8 @@ def list_forms(
     machine: MachineFilter = None,
     feature: Annotated[Slug | None, Query(description="Only of this feature.")] = None,
     kind: Annotated[KindName | None, Query(description="Only of this kind.")] = None,
-    after: Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")] = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    after: After = 0,
+    limit: Limit = 100,
 ) -> Page[FormOut]:
     """Form measurements, oldest first, with what counts of each."""
     machine_row = machine_named(session, machine) if machine is not None else None

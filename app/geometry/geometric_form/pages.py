@@ -18,8 +18,7 @@ from app.geometry.geometric_form.schemas import FormIn
 from app.language.i18n import _
 from app.loop.machines.queries import machine_named, machines
 from app.loop.warnings.wording import sentence
-from app.web.deps import FormDep, SessionDep
-from app.web.fields import LARGEST_ID
+from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.forms import by_field, parsed
 from app.web.paging import address, part_of
 from app.web.templates import page
@@ -36,8 +35,6 @@ PRINTED = {
     "touches": "-6.096 24.249\n22.578 10.784\n12.465 -21.678\n\n23.99 -7.346\n20.880 13.749\n-23.388 8.859\n\n"
     "5.675 24.341\n-24.71 -3.748\n23.78 -7.699\n\n-12.55 21.611\n-6.82 -24.059\n23.699 7.911",
 }
-Word = Annotated[str | None, Query(max_length=64)]
-Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
 # Where the form shows what is wrong with the parts of a measurement.
 FIELDS = (
     *(

@@ -23,15 +23,13 @@ from app.geometry.rotary_axes.schemas import EnterIn, KinematicsPlanIn, RestoreI
 from app.language.i18n import _
 from app.loop.machines.queries import machine_for, machine_named, only_machine
 from app.loop.readings import actions as readings
-from app.web.api import FIGURE, MachineKey, Theme, api_router, problems, sent_again
+from app.web.api import FIGURE, After, Limit, MachineKey, SerialAfter, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
-from app.web.fields import Cursor, Limit, Page, ReasonIn, SerialCursor, Text200, page_of
+from app.web.fields import Page, ReasonIn, Text200, page_of
 
 router = api_router("kinematics")
 RunNumber = Annotated[int, Path(description="Number of the run.", examples=[118])]
 Version = Annotated[int, Path(description="Version of the kinematics.", examples=[3])]
-After = Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")]
-SerialAfter = Annotated[SerialCursor, Query(description="Cursor: the `next` of the page before.")]
 Other = Annotated[int, Query(alias="with", ge=1, le=2**63 - 1, description="Number of the other run.", examples=[97])]
 HeadName = Annotated[str, StringConstraints(strip_whitespace=True, max_length=64, pattern=r"^[^\x00-\x1f]*$")]
 
@@ -63,7 +61,7 @@ def list_kinematics_runs(
     machine: Annotated[str | None, Query(max_length=64, description="Only of this machine.")] = None,
     head: Annotated[Text200 | None, Query(max_length=64, description="Only with this head.")] = None,
     after: After = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    limit: Limit = 100,
 ) -> Page[RunOut]:
     """Runs, oldest first, refused ones too."""
     only = only_machine(session, caller, machine)
@@ -227,7 +225,7 @@ def list_kinematics_backups(
     caller: AnyCaller,
     machine: MachineKey,
     after: SerialAfter = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    limit: Limit = 100,
 ) -> Page[BackupOut]:
     """Every kinematics that was in effect, oldest first, as cycle 450 keeps them."""
     machine_row = machine_for(session, caller, machine, "viewer")

@@ -21,15 +21,13 @@ from app.geometry.rotary_axes.schemas import EnterIn, KinematicsPlanIn
 from app.geometry.rotary_axes.view import COMMON, ON_PAGE, machine_url, others_of, shown_machine, shown_run
 from app.language.i18n import _
 from app.loop.machines.queries import machine_named
-from app.web.deps import FormDep, SessionDep
+from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed, words
 from app.web.paging import address, part_of
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
-Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
-Word = Annotated[str | None, Query(max_length=64)]
 
 
 @router.get("/kinematics", dependencies=[require("viewer")])

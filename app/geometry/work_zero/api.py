@@ -22,10 +22,10 @@ from app.geometry.work_zero.schemas import FixtureIn, ZeroIn, ZeroRecomputeIn
 from app.loop.machines.queries import machine_for, machine_of, only_machine
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
 from app.loop.readings import actions as readings
-from app.web.api import FIGURE, MachineFilter, MachineKey, Theme, api_router, plain, problems, sent_again
+from app.web.api import FIGURE, After, Limit, MachineFilter, MachineKey, Theme, api_router, plain, problems, sent_again
 from app.web.deps import SessionDep
 from app.web.downloads import download
-from app.web.fields import Control, Cursor, Limit, Page, Slug, page_of
+from app.web.fields import Control, Page, Slug, page_of
 from app.web.warnings import WarningsAcknowledgeIn
 
 router = api_router("work zeros")
@@ -58,8 +58,8 @@ def list_work_zeros(
     caller: AnyCaller,
     machine: MachineFilter = None,
     fixture: FixtureFilter = None,
-    after: Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")] = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    after: After = 0,
+    limit: Limit = 100,
 ) -> Page[ZeroOut]:
     """Work zeros in the order in which they came."""
     only = only_machine(session, caller, machine)
@@ -97,7 +97,7 @@ def fixture_figure(
     machine: MachineKey,
     fixture: FixtureKey,
     theme: Theme = "light",
-    limit: Annotated[Limit, Query()] = 200,
+    limit: Limit = 200,
 ) -> dict[str, Any]:
     """The shift of a fixture over its last zeros as a Plotly figure."""
     machine_row = machine_for(session, caller, machine, "viewer")

@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 from secrets import token_hex
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Request, Response
 from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
@@ -20,8 +20,7 @@ from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named, machine_of
 from app.loop.machines.wording import texts_by_control
 from app.loop.readings import actions as readings
-from app.web.deps import FormDep, SessionDep
-from app.web.fields import LARGEST_ID
+from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.forms import parsed
 from app.web.paging import address, part_of
 from app.web.templates import page
@@ -30,8 +29,6 @@ from app.web.warnings import WarningsAcknowledgeIn
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 25
 KINDS = ("bore", "boss", "pocket", "web", "corner")
-Word = Annotated[str | None, Query(max_length=64)]
-Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
 
 
 @router.get("/work-zeros", dependencies=[require("viewer")])

@@ -11,9 +11,9 @@ from app.loop.alarm_response.queries import State
 from app.loop.alarm_response.schemas import AlarmAcknowledgeIn, AlarmOut, alarm_out
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.machines.queries import only_machine
-from app.web.api import api_router, problems
+from app.web.api import After, Limit, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import Cursor, Limit, Page, Slug, Text200, page_of
+from app.web.fields import Page, Slug, Text200, page_of
 
 router = api_router("alarms")
 Number = Annotated[int, Path(description="Number of the alarm.", examples=[41])]
@@ -27,8 +27,8 @@ def list_alarms(
     machine: Annotated[Slug | None, Query(description="Only those of this machine.", examples=["lathe-1"])] = None,
     characteristic: Annotated[Slug | None, Query(description="Only those of this characteristic.")] = None,
     kind: Annotated[Text200 | None, Query(description="Only this kind.", examples=["tool_worn"])] = None,
-    after: Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")] = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    after: After = 0,
+    limit: Limit = 100,
 ) -> Page[AlarmOut]:
     """Alarms, oldest first. The key of a machine sees those of that machine."""
     machine_id = only_machine(session, caller, machine)

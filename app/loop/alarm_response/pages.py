@@ -15,8 +15,7 @@ from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.alarm_response.schemas import AlarmAcknowledgeIn
 from app.loop.machines import queries as machines
-from app.web.deps import FormDep, SessionDep
-from app.web.fields import LARGEST_ID
+from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.forms import by_field, length, parsed, words
 from app.web.paging import address, part_of
 from app.web.templates import page
@@ -24,15 +23,13 @@ from app.web.templates import page
 router = APIRouter(include_in_schema=False)
 MOST_ON_BOARD = 100
 ON_HISTORY_PAGE = 50
-MachineFilter = Annotated[str | None, Query(max_length=64)]
-Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
 
 
 @router.get("/alarms", dependencies=[require("viewer")])
 def board(
     request: Request,
     session: SessionDep,
-    machine: MachineFilter = None,
+    machine: Word = None,
     done: Number = None,
     late: Number = None,
 ) -> Response:
@@ -64,7 +61,7 @@ def count(request: Request, session: SessionDep) -> Response:
 
 
 @router.get("/alarms/history", dependencies=[require("viewer")])
-def history(request: Request, session: SessionDep, machine: MachineFilter = None, before: Number = None) -> Response:
+def history(request: Request, session: SessionDep, machine: Word = None, before: Number = None) -> Response:
     """All alarms, newest first."""
     machine_row = machines.machine_named(session, machine) if machine else None
     rows = queries.history(
@@ -90,7 +87,7 @@ def alarm_page(
     caller: Viewer,
     number: int,
     action: Annotated[str | None, Query(max_length=40)] = None,
-    machine: MachineFilter = None,
+    machine: Word = None,
 ) -> Response:
     """One alarm; with ``action`` it asks for the second touch."""
     return _alarm(request, queries.alarm(session, number), caller, action, machine)

@@ -21,17 +21,15 @@ from app.loop.calibration.answers import (
 from app.loop.calibration.queries import Place
 from app.loop.calibration.schemas import CalibrationPlanIn, GaugeIn, PairIn, RingIn, SuggestionAcceptIn
 from app.loop.machines.queries import machine_for, machine_named
-from app.web.api import FIGURE, MachineKey, Theme, api_router, problems, sent_again
+from app.web.api import FIGURE, After, Limit, MachineKey, SerialAfter, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
-from app.web.fields import Cursor, Limit, Page, ReasonIn, SerialCursor, page_of
+from app.web.fields import Page, ReasonIn, page_of
 
 router = api_router("calibration")
 R10 = Annotated[int, Path(description="Tool memory location R10 of the probe.", examples=[32])]
 R11 = Annotated[int, Path(description="Average memory location R11.", examples=[5])]
 Number = Annotated[int, Path(description="Number of the calibration; counts per machine.", examples=[17])]
 PairId = Annotated[int, Path(description="Number of the pair.", examples=[31])]
-After = Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")]
-SerialAfter = Annotated[SerialCursor, Query(description="Cursor: the `next` of the page before.")]
 
 
 # --- calibrations
@@ -88,7 +86,7 @@ def list_calibrations(
         int | None, Query(description="Only of the probe in this location R10.", ge=1, le=MOST_LOCATIONS)
     ] = None,
     after: SerialAfter = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    limit: Limit = 100,
 ) -> Page[CalibrationOut]:
     """Calibrations, oldest first, refused ones too."""
     machine_row = machine_for(session, caller, machine, "viewer")
@@ -136,7 +134,7 @@ def list_pairs(
     machine: MachineKey,
     location: R11,
     after: After = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    limit: Limit = 100,
 ) -> Page[PairOut]:
     """Paired readings of a location, oldest first."""
     machine_row = machine_for(session, caller, machine, "viewer")
@@ -216,7 +214,7 @@ def calibration_figure(
     machine: MachineKey,
     location: R11,
     theme: Theme = "light",
-    limit: Annotated[Limit, Query()] = 200,
+    limit: Limit = 200,
 ) -> dict[str, Any]:
     """The history of a location as a Plotly figure: differences, empirical value, limits R33 and R34."""
     machine_row = machine_for(session, caller, machine, "viewer")
@@ -239,7 +237,7 @@ def ring_figure(
     machine: MachineKey,
     tool: R10,
     theme: Theme = "light",
-    limit: Annotated[Limit, Query()] = 200,
+    limit: Limit = 200,
 ) -> dict[str, Any]:
     """The history of a probe in the ring as a Plotly figure: how far it stood beside the spindle, and the diameters."""
     machine_row = machine_for(session, caller, machine, "viewer")

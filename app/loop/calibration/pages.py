@@ -19,16 +19,13 @@ from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named
 from app.loop.warnings.wording import sentence
 from app.web import paging
-from app.web.deps import FormDep, SessionDep
-from app.web.fields import LARGEST_ID
+from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.forms import by_field, parsed, words
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 25
 MEMORIES = {"averages": "average", "probes": "tool"}
-Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
-Word = Annotated[str | None, Query(max_length=40)]
 
 
 def address(machine: str, place: Place, **query: Any) -> str:

@@ -15,9 +15,9 @@ from app.loop.characteristics.schemas import (
     version_out,
 )
 from app.loop.machines import queries as machines
-from app.web.api import CharacteristicKey, api_router, problems
+from app.web.api import CharacteristicKey, KeyAfter, Limit, SerialBefore, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import LARGEST_SERIAL, KeyCursor, Limit, Page, page_of
+from app.web.fields import Page, page_of
 
 router = api_router("characteristics")
 
@@ -37,8 +37,8 @@ def list_characteristics(
     session: SessionDep,
     caller: AnyCaller,
     machine: Annotated[str | None, Query(description="Only those of this machine.", examples=["lathe-1"])] = None,
-    after: Annotated[KeyCursor, Query(description="Cursor: the `next` of the page before.")] = "",
-    limit: Annotated[Limit, Query()] = 100,
+    after: KeyAfter = "",
+    limit: Limit = 100,
 ) -> Page[CharacteristicOut]:
     """Characteristics by key; for the key of a machine, those of that machine."""
     machine_id = machines.only_machine(session, caller, machine)
@@ -67,10 +67,8 @@ def list_parameter_versions(
     session: SessionDep,
     caller: AnyCaller,
     characteristic: CharacteristicKey,
-    before: Annotated[
-        int | None, Query(ge=1, le=LARGEST_SERIAL, description="Cursor: the `next` of the page before.")
-    ] = None,
-    limit: Annotated[Limit, Query()] = 100,
+    before: SerialBefore = None,
+    limit: Limit = 100,
 ) -> Page[VersionOut]:
     """Every version of the parameters, newest first: who, when, why."""
     standing = queries.characteristic_for(session, caller, characteristic, "viewer")

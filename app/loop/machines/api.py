@@ -1,15 +1,13 @@
 """JSON routes: machines and their keys."""
 
-from typing import Annotated
-
-from fastapi import Query, Response
+from fastapi import Response
 
 from app.access.deps import AnyCaller, Engineer
 from app.loop.machines import actions, queries
 from app.loop.machines.schemas import MachineChange, MachineIn, MachineOut
-from app.web.api import MachineKey, api_router, problems
+from app.web.api import KeyAfter, Limit, MachineKey, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import KeyCursor, Limit, Page, page_of
+from app.web.fields import Page, page_of
 
 router = api_router("machines")
 
@@ -26,8 +24,8 @@ def add_machine(session: SessionDep, caller: Engineer, machine: MachineIn, respo
 def list_machines(
     session: SessionDep,
     caller: AnyCaller,
-    after: Annotated[KeyCursor, Query(description="Cursor: the `next` of the page before.")] = "",
-    limit: Annotated[Limit, Query()] = 100,
+    after: KeyAfter = "",
+    limit: Limit = 100,
 ) -> Page[MachineOut]:
     """All machines by key; for the key of a machine, that machine."""
     if caller.only_machine is None:

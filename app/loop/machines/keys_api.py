@@ -2,16 +2,16 @@
 
 from typing import Annotated
 
-from fastapi import Path, Query, Response
+from fastapi import Path, Response
 
 from app.access.deps import Engineer, require
 from app.access.keys import add_key
 from app.access.schemas import KeyOut, MachineKeyIn, NewKeyOut, key_out
 from app.loop.machines import keys
 from app.loop.machines import queries as machines
-from app.web.api import MachineKey, api_router, problems
+from app.web.api import Limit, MachineKey, SerialAfter, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import LARGEST_SERIAL, Limit, Page, SerialCursor, page_of
+from app.web.fields import LARGEST_SERIAL, Page, page_of
 
 router = api_router("keys")
 KeyId = Annotated[int, Path(ge=1, le=LARGEST_SERIAL, description="The number of the key.")]
@@ -28,8 +28,8 @@ def make_machine_key(session: SessionDep, caller: Engineer, machine: MachineKey,
 def list_machine_keys(
     session: SessionDep,
     machine: MachineKey,
-    after: Annotated[SerialCursor, Query()] = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    after: SerialAfter = 0,
+    limit: Limit = 100,
 ) -> Page[KeyOut]:
     """The keys of this machine, revoked ones too; never their secrets."""
     machine_row = machines.machine_named(session, machine)

@@ -23,9 +23,9 @@ from app.loop.readings.writer.batch import store_batch
 from app.loop.readings.writer.columnar import ColumnarReadings, Outcome
 from app.loop.readings.writer.group_commit import Writer
 from app.loop.readings.writer.pending import Stored, Verdict
-from app.web.api import BASE, CharacteristicKey, api_router, problems
+from app.web.api import BASE, CharacteristicKey, Limit, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import Body, Limit, Page, Reason, page_of
+from app.web.fields import Body, Page, Reason, page_of
 from app.web.openapi import example_of
 
 MOST_IN_BATCH = 10_000
@@ -210,7 +210,7 @@ def list_readings(
     caller: AnyCaller,
     characteristic: Annotated[str, Query(description="The key of the characteristic.", examples=["shaft-d40"])],
     after: Annotated[int, Query(ge=0, le=2**63 - 1, description="Cursor: readings after this number.")] = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    limit: Limit = 100,
 ) -> Page[ReadingRow]:
     """The readings of a characteristic in the order of their arrival."""
     entry = _entry(session, caller, characteristic)

@@ -30,15 +30,14 @@ from app.loop.tools.schemas import (
     tool_out,
     tool_set,
 )
-from app.web.api import FIGURE, MachineKey, Theme, api_router, problems
+from app.web.api import FIGURE, Limit, MachineKey, SerialAfter, Theme, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import Limit, Page, SerialCursor, page_of
+from app.web.fields import Page, page_of
 
 router = api_router("offsets")
 R10 = Annotated[int, Path(description="Tool memory location R10, 1 to what the machine has.", examples=[3])]
 R11 = Annotated[int, Path(description="Average memory location R11, 1 to what the machine has.", examples=[5])]
 Number = Annotated[int, Path(description="Number of the correction; counts per machine.", examples=[18])]
-After = Annotated[SerialCursor, Query(description="Cursor: the `next` of the page before.")]
 
 
 # --- tool memory
@@ -49,8 +48,8 @@ def list_tools(
     session: SessionDep,
     caller: AnyCaller,
     machine: MachineKey,
-    after: After = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    after: SerialAfter = 0,
+    limit: Limit = 100,
 ) -> Page[ToolOut]:
     """The tool memory: every location with its offset, the sum of corrections since the tool was changed, parts cut."""
     machine_row = machine_for(session, caller, machine, "viewer")
@@ -99,7 +98,7 @@ def tool_figure(
     machine: MachineKey,
     tool: R10,
     theme: Theme = "light",
-    limit: Annotated[Limit, Query()] = 500,
+    limit: Limit = 500,
 ) -> dict[str, Any]:
     """The history of the offset as a Plotly figure: `{"data", "layout"}`."""
     machine_row = machine_for(session, caller, machine, "viewer")
@@ -117,8 +116,8 @@ def list_averages(
     session: SessionDep,
     caller: AnyCaller,
     machine: MachineKey,
-    after: After = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    after: SerialAfter = 0,
+    limit: Limit = 100,
 ) -> Page[AverageOut]:
     """The average memory: running average and empirical value of every location."""
     machine_row = machine_for(session, caller, machine, "viewer")
@@ -157,8 +156,8 @@ def list_corrections(
     tool_memory: Annotated[
         int | None, Query(description="Only those of this location R10.", ge=1, le=MOST_LOCATIONS)
     ] = None,
-    after: After = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    after: SerialAfter = 0,
+    limit: Limit = 100,
 ) -> Page[CorrectionOut]:
     """Corrections, oldest first: the order in which a machine applies the pending ones."""
     machine_row = machine_for(session, caller, machine, "viewer")

@@ -20,8 +20,7 @@ from app.loop.tools import actions, applying, confirmation, queries, sisters, wo
 from app.loop.tools.confirmation import Question
 from app.loop.tools.edge_schemas import SisterIn
 from app.loop.tools.schemas import AppliedIn, CorrectionDecisionIn, EmpiricalValueIn, ToolChange, ToolEdit
-from app.web.deps import FormDep, SessionDep
-from app.web.fields import LARGEST_ID
+from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.forms import by_field, length, parsed, words
 from app.web.paging import address, part_of
 from app.web.templates import page
@@ -30,8 +29,6 @@ router = APIRouter(include_in_schema=False)
 MOST_IN_QUEUE = 50
 STEPS_ON_PAGE = 10
 QUEUE, FROM_QUEUE = "/corrections", "queue"  # where a decision may have been begun
-Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
-Word = Annotated[str | None, Query(max_length=40)]
 
 
 def memory_address(machine: str, **query: Any) -> str:

@@ -29,10 +29,10 @@ from app.quality.control_charts.schemas import (
 )
 from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import Marks
-from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, problems, sent_again
+from app.web.api import FIGURE, CharacteristicKey, Limit, Theme, api_router, problems, sent_again
 from app.web.choice import Chosen
 from app.web.deps import SessionDep
-from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Limit, Page, page_of
+from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Page, page_of
 
 router = api_router("control charts")
 
@@ -71,7 +71,7 @@ def list_baselines(
     after: Annotated[
         int | None, Query(ge=0, le=LARGEST_SERIAL, description="Cursor: the `next` of the page before.")
     ] = None,
-    limit: Annotated[Limit, Query()] = 100,
+    limit: Limit = 100,
 ) -> Page[BaselineOut]:
     """Every baseline that was frozen, newest first: who, when, why, and its numbers."""
     standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")

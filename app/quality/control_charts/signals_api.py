@@ -10,9 +10,9 @@ from app.loop.machines.queries import only_machine
 from app.quality.control_charts import signals_actions, signals_queries
 from app.quality.control_charts.signals_queries import State
 from app.quality.control_charts.signals_schemas import CommentIn, SignalOut, signal_out
-from app.web.api import api_router, problems
+from app.web.api import Before, Limit, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import LARGEST_ID, Limit, Page, Slug, page_of
+from app.web.fields import Page, Slug, page_of
 
 router = api_router("control charts")
 Number = Annotated[int, Path(description="Number of the signal.", examples=[17])]
@@ -25,10 +25,8 @@ def list_signals(
     characteristic: Annotated[Slug | None, Query(description="Only those of this characteristic.")] = None,
     machine: Annotated[Slug | None, Query(description="Only those of this machine.", examples=["lathe-1"])] = None,
     state: Annotated[State, Query(description="`open`, `explained`, `withdrawn`, or all of them.")] = "all",
-    before: Annotated[
-        int | None, Query(ge=1, le=LARGEST_ID, description="Cursor: the `next` of the page before.")
-    ] = None,
-    limit: Annotated[Limit, Query()] = 100,
+    before: Before = None,
+    limit: Limit = 100,
 ) -> Page[SignalOut]:
     """Signals, newest first. The key of a machine sees those of that machine."""
     machine_id = only_machine(session, caller, machine)

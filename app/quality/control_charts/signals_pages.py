@@ -22,8 +22,7 @@ from app.quality.control_charts.signals_schemas import CommentIn
 from app.quality.control_charts.signals_wording import Cause
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
-from app.web.deps import FormDep, SessionDep
-from app.web.fields import LARGEST_ID
+from app.web.deps import Before, FormDep, SessionDep
 from app.web.forms import by_field, parsed
 from app.web.paging import address, part_of
 from app.web.templates import page
@@ -38,7 +37,7 @@ def signals_page(
     session: SessionDep,
     characteristic: str,
     state: Annotated[State, Query()] = "all",
-    before: Annotated[int | None, Query(ge=1, le=LARGEST_ID)] = None,
+    before: Before = None,
 ) -> Response:
     """List the signals, newest first."""
     standing = characteristics.characteristic_named(session, characteristic)

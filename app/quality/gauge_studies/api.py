@@ -12,9 +12,9 @@ from app.quality.gauge_studies import actions, queries
 from app.quality.gauge_studies.answers import StudyOut, study_out
 from app.quality.gauge_studies.figures import figure_of
 from app.quality.gauge_studies.schemas import CorrectionIn, FromReadingsIn, StudyIn
-from app.web.api import FIGURE, Theme, api_router, problems, sent_again
+from app.web.api import FIGURE, Limit, Theme, api_router, problems, sent_again
 from app.web.deps import SessionDep
-from app.web.fields import LARGEST_ID, Limit, Page, page_of
+from app.web.fields import LARGEST_ID, Page, page_of
 
 router = api_router("gauges")
 Number = Annotated[int, Path(description="Number of the study.", examples=[7])]
@@ -51,7 +51,7 @@ def list_gauge_studies(
     before: Annotated[
         int, Query(ge=0, le=LARGEST_ID, description="Cursor: the `next` of the page before; 0 for the first.")
     ] = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    limit: Limit = 100,
 ) -> Page[StudyOut]:
     """Gauge studies, newest first."""
     chosen = None if characteristic is None else characteristic_named(session, characteristic)

@@ -23,15 +23,13 @@ from app.quality.gauge_studies.schemas import CorrectionIn, StudyIn
 from app.quality.gauge_studies.tables import KINDS
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
-from app.web.deps import FormDep, SessionDep
-from app.web.fields import LARGEST_ID
+from app.web.deps import Before, FormDep, SessionDep
 from app.web.forms import by_field, parsed
 from app.web.paging import address, part_of
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 25
-Before = Annotated[int | None, Query(ge=1, le=LARGEST_ID)]
 
 
 def _failing() -> dict[str, Any]:

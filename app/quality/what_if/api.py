@@ -21,9 +21,9 @@ from app.quality.what_if.schemas import (
     WhatIfIn,
     WhatIfOut,
 )
-from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, problems
+from app.web.api import FIGURE, Before, CharacteristicKey, Limit, Theme, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import LARGEST_ID, Limit, Moment, Page, page_of
+from app.web.fields import LARGEST_ID, Moment, Page, page_of
 
 router = api_router("what-if")
 
@@ -32,7 +32,6 @@ Status = Annotated[
     Literal["open", "outdated", "approved", "rejected", "withdrawn"] | None,
     Query(description="Only those with this status."),
 ]
-Before = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="Cursor: the `next` of the page before.")]
 
 
 @router.post(
@@ -125,7 +124,7 @@ def list_proposals_of(
     characteristic: CharacteristicKey,
     status: Status = None,
     before: Before = None,
-    limit: Annotated[Limit, Query()] = 100,
+    limit: Limit = 100,
 ) -> Page[ProposalOut]:
     """Proposals for this characteristic, newest first."""
     standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
@@ -140,7 +139,7 @@ def list_proposals(
     session: SessionDep,
     status: Status = None,
     before: Before = None,
-    limit: Annotated[Limit, Query()] = 100,
+    limit: Limit = 100,
 ) -> Page[ProposalOut]:
     """All proposals, newest first."""
     rows = proposals.proposals(session, status=status, before=before, limit=limit + 1)

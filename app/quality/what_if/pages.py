@@ -23,7 +23,7 @@ from app.quality.what_if.evidence import effect_of, period_of, quote_of
 from app.quality.what_if.map_view import view_of
 from app.quality.what_if.queries import Map, Simulation
 from app.quality.what_if.schemas import ProposalDecisionIn, ProposalIn
-from app.web.deps import FormDep, SessionDep
+from app.web.deps import Before, FormDep, SessionDep, Word
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed
 from app.web.paging import address, part_of
@@ -37,7 +37,6 @@ VERBS = {
     "reject": (actions.reject, "rejected"),
     "withdraw": (actions.withdraw, "withdrawn"),
 }
-Word = Annotated[str | None, Query(max_length=40)]
 
 
 @router.get("/characteristics/{characteristic}/what-if")
@@ -152,7 +151,7 @@ def proposals_page(
     request: Request,
     session: SessionDep,
     status: Annotated[str | None, Query(max_length=20)] = None,
-    before: Annotated[int | None, Query(ge=1, le=LARGEST_ID)] = None,
+    before: Before = None,
 ) -> Response:
     """Proposals, newest first: those that wait, or all."""
     chosen = status if status in proposals.STATUSES else "all" if status == "all" else "open"

@@ -1,9 +1,9 @@
 """Pages: everything that waits for a person's decision about a correction, and approving all of one tool together."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Request, Response
 from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
@@ -17,16 +17,12 @@ from app.loop.tools.schemas import DecisionsIn
 from app.quality.what_if import queries as what_if
 from app.views.approvals import queries as queue
 from app.views.characteristic.glance import band_picture
-from app.web.deps import FormDep, SessionDep
-from app.web.fields import LARGEST_ID
+from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.forms import by_field, parsed, words
 from app.web.paging import address
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
-Slug = Annotated[str | None, Query(max_length=64)]
-Word = Annotated[str | None, Query(max_length=40)]
-Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
 
 
 def queue_address(machine: str | None = None, **query: Any) -> str:
@@ -38,8 +34,8 @@ def queue_address(machine: str | None = None, **query: Any) -> str:
 def queue_page(
     request: Request,
     session: SessionDep,
-    machine: Slug = None,
-    at: Slug = None,
+    machine: Word = None,
+    at: Word = None,
     done: Word = None,
     late: Word = None,
     n: Number = None,

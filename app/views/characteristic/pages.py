@@ -44,7 +44,7 @@ from app.views.characteristic.figures_api import ResultName
 from app.views.characteristic.glance import band_picture
 from app.views.characteristic.wording import state_word
 from app.web.choice import Choice, Chosen
-from app.web.deps import FormDep, SessionDep
+from app.web.deps import Before, FormDep, SessionDep
 from app.web.fields import LARGEST_ID, Reason
 from app.web.forms import by_field
 from app.web.paging import part_of
@@ -130,7 +130,7 @@ def characteristic_page(
     characteristic: str,
     choice: Chosen,
     scale: Annotated[Literal["zones", "true", "time"], Query()] = "zones",
-    before: Annotated[int | None, Query(ge=1, le=LARGEST_ID)] = None,
+    before: Before = None,
     edge: Annotated[Literal["tool", "1000", "all"], Query()] = "tool",
     result: Annotated[ResultName | None, Query()] = None,
     x_live_part: Annotated[str | None, Header()] = None,

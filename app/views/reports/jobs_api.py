@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from fastapi import Path, Query, Request, Response
+from fastapi import Path, Request, Response
 
 from app.access.audit.actions import record
 from app.access.deps import Viewer, require
@@ -10,10 +10,10 @@ from app.views.reports import actions, queries
 from app.views.reports.bundle import media_type
 from app.views.reports.jobs_schemas import ReportsIn, ReportsOut
 from app.views.reports.worker import ReportWorker
-from app.web.api import api_router, problems
+from app.web.api import Limit, SerialBefore, api_router, problems
 from app.web.deps import SessionDep
 from app.web.downloads import download
-from app.web.fields import LARGEST_SERIAL, Limit, Page, page_of
+from app.web.fields import LARGEST_SERIAL, Page, page_of
 
 router = api_router("reports")
 
@@ -49,9 +49,7 @@ def ask_for_reports(request: Request, session: SessionDep, caller: Viewer, given
 @router.get("/reports", dependencies=[require("viewer")])
 def list_reports(
     session: SessionDep,
-    before: Annotated[
-        int | None, Query(ge=1, le=LARGEST_SERIAL, description="Cursor: the `next` of the page before.")
-    ] = None,
+    before: SerialBefore = None,
     limit: Limit = 100,
 ) -> Page[ReportsOut]:
     """All requests for reports, newest first; finished ones for a week."""

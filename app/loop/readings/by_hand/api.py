@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import Path, Query
+from fastapi import Path
 
 from app.access.deps import AnyCaller, Operator
 from app.errors import NotFound
@@ -13,9 +13,9 @@ from app.loop.readings.by_hand.actions import HandResult
 from app.loop.readings.by_hand.schemas import HandMeasurementIn, HandMeasurementOut
 from app.loop.readings.by_hand.wording import as_json
 from app.loop.readings.records import Entry
-from app.web.api import CharacteristicKey, api_router, problems
+from app.web.api import After, CharacteristicKey, Limit, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import LARGEST_ID, Cursor, Limit, Page, page_of
+from app.web.fields import LARGEST_ID, Page, page_of
 
 router = api_router("readings")
 Sequence = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the reading: 1, 2, 3 … without gaps.")]
@@ -52,8 +52,8 @@ def list_hand_measurements(
     session: SessionDep,
     caller: AnyCaller,
     characteristic: CharacteristicKey,
-    after: Annotated[Cursor, Query(description="Cursor: the `next` of the page before.")] = 0,
-    limit: Annotated[Limit, Query()] = 100,
+    after: After = 0,
+    limit: Limit = 100,
 ) -> Page[HandMeasurementOut]:
     """All measurements by hand of a characteristic, in the order in which they were entered."""
     entry = _entry(session, caller, characteristic)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Path, Request, Response
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import UploadFile
 from starlette.responses import RedirectResponse
@@ -21,12 +21,11 @@ from app.loop.readings.importing.actions import import_readings
 from app.loop.readings.importing.history import Flawed
 from app.loop.readings.importing.layout import NAMES, Layout, Wishes, look
 from app.loop.readings.importing.preview import Preview, preview
-from app.web.deps import FormDep, SessionDep, SettingsDep
+from app.web.deps import FormDep, Number, SessionDep, SettingsDep
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 Token = Annotated[str, Path(max_length=64)]
-Number = Annotated[int | None, Query(ge=0)]
 HOW = ("timezone", "unit", "decimal", "delimiter", "encoding", "time_format")
 SIGNS = {"tab": "\t", "comma": ",", "semicolon": ";", "bar": "|"}
 
