@@ -18,7 +18,7 @@ that a machinist understands. The web layer makes RFC 9457 problem documents or 
 """
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 from app.language.i18n import _
 from app.logs import REQUEST
@@ -139,6 +139,11 @@ class Invalid(InbandError):
     status = 422
     kind = "invalid"
     title = "The request cannot be used as it is"
+
+    @classmethod
+    def at(cls, field: str, wrong: str, *, do: str | None = None) -> Self:
+        """Refusal of one field. wrong: without a capital and a full stop, for it follows the name of the field."""
+        return cls(f"{field}: {wrong}.", do, errors=[FieldError(field, wrong)])
 
     def as_problem(self) -> dict[str, Any]:
         """With the usual advice where it has none of its own."""

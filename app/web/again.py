@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from app.errors import FieldError, Invalid
+from app.errors import Invalid
 from app.language.i18n import _
 from app.web.fields import Body, Reason
 
@@ -42,7 +42,6 @@ class TouchesAgainIn(Body):
             touches = inputs.get("touches") or []
             beyond = [at for at in self.leave_out if at > len(touches)]
             if beyond:
-                wrong = _("there is no point {at}").format(at=", ".join(map(str, beyond)))
-                raise Invalid(f"leave_out: {wrong}.", errors=[FieldError("leave_out", wrong)])
+                raise Invalid.at("leave_out", _("there is no point {at}").format(at=", ".join(map(str, beyond))))
             changed["touches"] = [touch for at, touch in enumerate(touches, 1) if at not in self.leave_out]
         return changed

@@ -10,7 +10,7 @@ from fastapi import FastAPI
 from sqlalchemy import exc as sql
 from starlette.requests import Request
 
-from app.errors import FieldError, NotFound, TooManyRequests
+from app.errors import FieldError, Invalid, NotFound, TooManyRequests
 from app.web.json_bodies import read_json
 from app.web.limits import LARGER, MEGABYTE, BodyLimit, limit_of
 from app.web.problems import add_problem_handlers
@@ -39,6 +39,13 @@ def test_what_is_wrong_by_what_is_stored_says_what_to_do_too(shop: Shop) -> None
     problem = refused(shop.admin.post("/api/v1/characteristics", json=body), 422)
     assert [error["field"] for error in problem["errors"]] == ["machine"]
     assert problem["what_to_do"]
+
+
+def test_a_refusal_of_one_field_names_it_as_a_list_of_one_would() -> None:
+    wrong, remedy = "needs more than one value in each reading", "Take the touches."
+    written_out = Invalid(f"take: {wrong}.", remedy, errors=[FieldError("take", wrong)])
+    assert Invalid.at("take", wrong, do=remedy).as_problem() == written_out.as_problem()
+    assert Invalid.at("take", wrong).as_problem()["what_to_do"] == "Correct the named fields and send it again."
 
 
 class TestBodies:

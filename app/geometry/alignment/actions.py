@@ -13,7 +13,7 @@ from app.core.geometry.plausible import motion_warnings
 from app.core.programs.frames import offset_of
 from app.core.warning import CodedWarning, as_stored
 from app.db.events import publish
-from app.errors import Conflict, FieldError, Invalid
+from app.errors import Conflict, Invalid
 from app.geometry.alignment import queries
 from app.geometry.alignment.evaluation import NEEDS, Values, frame_values, middle_of, solved, warnings_of
 from app.geometry.alignment.queries import subject_of
@@ -64,12 +64,10 @@ def _kept(machine: Machine, body: AlignmentIn) -> Values:
     """Inputs of the computation, checked for what the schema cannot see."""
     needed = NEEDS[body.kind]
     if getattr(body, needed) is None:
-        message = _("is needed for the kind {kind}").format(kind=body.kind)
-        raise Invalid(f"{needed}: {message}.", _("Send the points."), errors=[FieldError(needed, message)])
+        raise Invalid.at(needed, _("is needed for the kind {kind}").format(kind=body.kind), do=_("Send the points."))
     if (body.work_offset is None) != (body.base is None):
         missing = "base" if body.base is None else "work_offset"
-        message = _("work_offset and base belong together: the offset, and its value while probing")
-        raise Invalid(f"{missing}: {message}.", errors=[FieldError(missing, message)])
+        raise Invalid.at(missing, _("work_offset and base belong together: the offset, and its value while probing"))
     inputs = body.model_dump(exclude=ASKED_ONCE, exclude_none=True)
     for name in NEEDS.values():
         if name != needed:
@@ -79,8 +77,9 @@ def _kept(machine: Machine, body: AlignmentIn) -> Values:
     if body.work_offset is not None:
         offset = offset_of(machine.control, body.work_offset)
         if offset is None:
-            message = _("{offset} is no work offset of this control").format(offset=repr(body.work_offset))
-            raise Invalid(f"work_offset: {message}.", errors=[FieldError("work_offset", message)])
+            raise Invalid.at(
+                "work_offset", _("{offset} is no work offset of this control").format(offset=repr(body.work_offset))
+            )
         inputs["work_offset"] = offset.word
     return inputs
 
@@ -116,8 +115,7 @@ def compose(session: Session, body: PalletIn, caller: Caller) -> Created[Alignme
     caller.must_at(part.machine_id, "viewer")
     lock_machines(session, [machine.id])
     if pallet.id == part.id:
-        wrong = _("is the alignment of the pallet itself")
-        raise Invalid(f"part: {wrong}.", errors=[FieldError("part", wrong)])
+        raise Invalid.at("part", _("is the alignment of the pallet itself"))
     inputs: Values = {"pallet": pallet.id, "part": part.id} | (
         {"pose": body.pose.model_dump()} if body.pose is not None else {}
     )

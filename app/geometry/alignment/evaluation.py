@@ -118,7 +118,7 @@ def _holes(inputs: Values, bounds: Bounds) -> Values:
         except Degenerate as problem:
             wrong, remedy = degenerate(problem)
             field = f"holes[{at}].touches"
-            raise Invalid(f"{field}: {wrong}.", remedy, errors=[FieldError(field, wrong)]) from None
+            raise Invalid.at(field, wrong, do=remedy) from None
     nominal = [hole["nominal"] for hole in inputs["holes"]]
     fit = two_holes(nominal, holes, inputs.get("repeatability"))
     return _plane(fit) | {

@@ -113,8 +113,7 @@ def face(text: str) -> str | list[Any]:
 
 def _pasted(text: str) -> list[FormValues]:
     if len(text) > MOST_LETTERS:
-        wrong = _("the text is too long for {most} points").format(most=MOST_TOUCHES)
-        raise Invalid(f"lines: {wrong}.", errors=[FieldError("lines", wrong)])
+        raise Invalid.at("lines", _("the text is too long for {most} points").format(most=MOST_TOUCHES))
     return [line(row, number) for number, row in enumerate(text.splitlines(), 1) if row.strip()]
 
 
@@ -140,11 +139,10 @@ def line(row: str, number: int) -> FormValues:
         every = numbers[0] or []
         nominal, normal, result = every[:3], every[3:6], every[6:]
     if len(nominal) != 3 or len(normal) not in (2, 3) or len(result) not in (1, 3):
-        wrong = _("line {number} is not a valid point: {row}").format(number=number, row=repr(row.strip()[:60]))
-        raise Invalid(
-            f"lines: {wrong}.",
-            _("Write one point per line: X Y Z, the face such as +Z, and the deviation or the probed X Y Z."),
-            errors=[FieldError("lines", wrong)],
+        raise Invalid.at(
+            "lines",
+            _("line {number} is not a valid point: {row}").format(number=number, row=repr(row.strip()[:60])),
+            do=_("Write one point per line: X Y Z, the face such as +Z, and the deviation or the probed X Y Z."),
         )
     return {"nominal": nominal, "normal": normal} | (
         {"deviation": result[0]} if len(result) == 1 else {"measured": result}

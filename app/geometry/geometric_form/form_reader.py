@@ -6,7 +6,7 @@ from typing import Any
 
 from app.core.number_text import has_broken_number
 from app.core.number_text import plain as plain_text
-from app.errors import FieldError, Invalid
+from app.errors import Invalid
 from app.geometry.geometric_form.schemas import OF_POINTS, OF_SECTIONS, WITH_DATUM, WITH_LENGTH
 from app.language.i18n import _
 from app.web.forms import length, micrometres
@@ -53,11 +53,10 @@ def _numbers(row: str, number: int, field: str) -> list[float]:
         plain = plain.replace(",", ";")
     parts = [part for part in re.split(r"[;\s]+", plain.replace(",", ".")) if part]
     if has_broken_number(row) or not 2 <= len(parts) <= 3 or not all(NUMBER.match(part) for part in parts):
-        wrong = _("line {number} is not a valid point: {row}").format(number=number, row=repr(row[:60]))
-        raise Invalid(
-            f"{field}: {wrong}.",
-            _("Write one point per line: X and Y, or X, Y and Z, in mm, with blanks between."),
-            errors=[FieldError(field, wrong)],
+        raise Invalid.at(
+            field,
+            _("line {number} is not a valid point: {row}").format(number=number, row=repr(row[:60])),
+            do=_("Write one point per line: X and Y, or X, Y and Z, in mm, with blanks between."),
         )
     return [float(part) for part in parts]
 
@@ -93,8 +92,7 @@ def _in_points(form: Mapping[str, str], kind: str, name: str) -> bool:
 def _touched(form: Mapping[str, str], name: str, *, in_points: bool) -> dict[str, Any]:
     text = form.get(name, "")
     if len(text) > MOST_LETTERS:
-        wrong = _("the text is too long for 2000 points")
-        raise Invalid(f"{name}: {wrong}.", errors=[FieldError(name, wrong)])
+        raise Invalid.at(name, _("the text is too long for 2000 points"))
     return {"points": points(text, name)} if in_points else {"sections": sections(text, name)}
 
 

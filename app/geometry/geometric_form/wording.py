@@ -206,11 +206,10 @@ def refused(refusal: Degenerate | WrongSection | DatumRefused, kind: str, given:
 
 def tip_too_large() -> Invalid:
     """A tip that leaves no shaft: its centre cannot have gone round one on so small a circle."""
-    wrong = _("the tip is as large as the circle of its centre, so no shaft remains")
-    return Invalid(
-        f"tip_diameter: {wrong}.",
-        _("State the diameter of the tip in mm; for a bore choose the side inside."),
-        errors=[FieldError("tip_diameter", wrong)],
+    return Invalid.at(
+        "tip_diameter",
+        _("the tip is as large as the circle of its centre, so no shaft remains"),
+        do=_("State the diameter of the tip in mm; for a bore choose the side inside."),
     )
 
 

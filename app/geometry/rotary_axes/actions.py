@@ -14,7 +14,7 @@ from app.core.decision.limits import nanometres
 from app.core.decision.step import rounded
 from app.core.warning import as_stored
 from app.db.events import publish
-from app.errors import Conflict, FieldError, Invalid
+from app.errors import Conflict, Invalid
 from app.files.formats.cell_values import Unreadable, moment, zone_named
 from app.geometry.rotary_axes import queries, refusals, wording
 from app.geometry.rotary_axes.alarm_kinds import DRIFT
@@ -216,7 +216,7 @@ def _could_be(session: Session, run: KinematicsRun, at: datetime) -> None:
     elif later is not None:
         wrong = _("run {number} was measured after that, and was received without the entry").format(number=later.id)
     if wrong is not None:
-        raise Invalid(f"at: {wrong}.", _("Leave it out if it was just now."), errors=[FieldError("at", wrong)])
+        raise Invalid.at("at", wrong, do=_("Leave it out if it was just now."))
 
 
 def undo(session: Session, number: int, reason: str, caller: Caller) -> RunRow:

@@ -6,7 +6,7 @@ from fastapi import Path, Query, Request, Response
 from pydantic import StringConstraints
 
 from app.access.deps import AnyCaller, Caller, Engineer, Operator
-from app.errors import FieldError, Invalid
+from app.errors import Invalid
 from app.geometry.rotary_axes import actions, figures, queries, run_history
 from app.geometry.rotary_axes.answers import RecomputedOut, RunOut, axis_out, run_out
 from app.geometry.rotary_axes.drift import drift
@@ -167,8 +167,7 @@ def kinematics_run_figure(
     row = _run(session, caller, run)
     result = next((axis_result for axis_result in row.run.results["axes"] if axis_result["axis"] == axis), None)
     if result is None:
-        wrong = _("run {run} did not measure axis {axis}").format(run=run, axis=axis)
-        raise Invalid(f"axis: {wrong}.", errors=[FieldError("axis", wrong)])
+        raise Invalid.at("axis", _("run {run} did not measure axis {axis}").format(run=run, axis=axis))
     return figures.diagram(result, letter, theme=theme, height=figures.greatest(result))
 
 
@@ -212,8 +211,7 @@ def kinematics_drift_figure(
     """A value over the runs with its limit, what has been entered, and the trend."""
     machine_row = machine_for(session, caller, machine, "viewer")
     if value not in UNITS:
-        wrong = _("there is no such value; there are EX0C, EY0C, EA0C, Q141 to Q149, backlash.C …")
-        raise Invalid(f"value: {wrong}.", errors=[FieldError("value", wrong)])
+        raise Invalid.at("value", _("there is no such value; there are EX0C, EY0C, EA0C, Q141 to Q149, backlash.C …"))
     limits = queries.plan(session, machine_row.id).limits
     course = drift(value, run_history.measured(session, machine_row, head), limits.get(value))
     return figures.course(course, theme=theme)

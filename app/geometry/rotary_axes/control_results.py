@@ -43,11 +43,10 @@ def of_parameters(read: Results, came_as: str) -> Evaluated:
     _fill_in(evaluated, read, {})
     if not evaluated.results["axes"] and evaluated.results["offsets"] is None:
         notes = "; ".join(evaluated.results["notes"][:3])
-        wrong = _("no result parameter can be read: {notes}").format(notes=notes or _("no axis was measured"))
-        raise Invalid(
-            f"{came_as}: {wrong}.",
-            _('Write a line for each, like Q143 = 0.0134 or QS146 = "0.01234567 -0.0123456 0.00123456 -0.0012345".'),
-            errors=[FieldError(came_as, wrong)],
+        raise Invalid.at(
+            came_as,
+            _("no result parameter can be read: {notes}").format(notes=notes or _("no axis was measured")),
+            do=_('Write a line for each, like Q143 = 0.0134 or QS146 = "0.01234567 -0.0123456 0.00123456 -0.0012345".'),
         )
     return evaluated
 
@@ -154,13 +153,12 @@ def _moved(axis_protocol: AxisProtocol) -> tuple[float, float, float] | None:
 def of_protocol(text: str) -> Evaluated:
     protocol: Protocol = read_protocol(text)
     if protocol.is_foreign:
-        wrong = _("this is no protocol of a run: {unread} of {rows} lines were not understood").format(
-            unread=len(protocol.unread), rows=protocol.rows
-        )
-        raise Invalid(
-            f"protocol: {wrong}.",
-            _("Send TCHPRAUTO.html as the control has written it, or the result parameters as `results`."),
-            errors=[FieldError("protocol", wrong)],
+        raise Invalid.at(
+            "protocol",
+            _("this is no protocol of a run: {unread} of {rows} lines were not understood").format(
+                unread=len(protocol.unread), rows=protocol.rows
+            ),
+            do=_("Send TCHPRAUTO.html as the control has written it, or the result parameters as `results`."),
         )
     evaluated = Evaluated("protocol", head=protocol.head)
     read = read_results("\n".join(protocol.parameters))
@@ -184,10 +182,9 @@ def of_protocol(text: str) -> Evaluated:
             axis["incidence"] = protocol.incidence
     if not evaluated.results["axes"] and evaluated.results["offsets"] is None:
         notes = "; ".join(evaluated.results["notes"][:3])
-        wrong = _("nothing of a rotary axis can be read in it: {notes}").format(notes=notes or _("it is empty"))
-        raise Invalid(
-            f"protocol: {wrong}.",
-            _("Send TCHPRAUTO.html as the control has written it, in German, English or Slovene."),
-            errors=[FieldError("protocol", wrong)],
+        raise Invalid.at(
+            "protocol",
+            _("nothing of a rotary axis can be read in it: {notes}").format(notes=notes or _("it is empty")),
+            do=_("Send TCHPRAUTO.html as the control has written it, in German, English or Slovene."),
         )
     return evaluated

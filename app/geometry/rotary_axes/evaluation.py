@@ -9,7 +9,7 @@ from app.core.decision.step import rounded
 from app.core.rotary.axis import AxisErrors, Estimate, NoAxis, Position, estimate
 from app.core.rotary.results import OFFSETS, read_results
 from app.core.rotary.sphere import FEWEST, NoSphere, Sphere, fit_sphere, radius_is_wrong
-from app.errors import FieldError, Invalid
+from app.errors import Invalid
 from app.geometry.rotary_axes import wording
 from app.geometry.rotary_axes.control_results import of_parameters, of_protocol, results_of
 from app.geometry.rotary_axes.outcome import LETTERS, Evaluated, Limits
@@ -95,11 +95,8 @@ def _of_positions(axes: Sequence[AxisIn], body: RunIn, limits: Limits) -> Evalua
                 touch=_of_a_touch(balls),
             )
         except NoAxis as fault:
-            wrong = wording.no_axis(axis.axis, fault)
-            raise Invalid(
-                f"axes[{at}].positions: {wrong}.",
-                wording.what_axis_needs(fault),
-                errors=[FieldError(f"axes[{at}].positions", wrong)],
+            raise Invalid.at(
+                f"axes[{at}].positions", wording.no_axis(axis.axis, fault), do=wording.what_axis_needs(fault)
             ) from None
         if axis.ball is not None and errors.shift is not None:
             shifts.append(errors.shift)
@@ -127,11 +124,10 @@ def _ball(
     try:
         ball = fit_sphere(position.touches)
     except NoSphere as fault:
-        wrong = wording.no_sphere(fault)
-        raise Invalid(
-            f"{where}.touches: {wrong}.",
-            _("Probe the sphere at several places round its equator and once on top."),
-            errors=[FieldError(f"{where}.touches", wrong)],
+        raise Invalid.at(
+            f"{where}.touches",
+            wording.no_sphere(fault),
+            do=_("Probe the sphere at several places round its equator and once on top."),
         ) from None
     radius = round(ball.radius - body.tip_radius, 9)
     evaluated.results["balls"].append({"radius": radius, "deviation": ball.deviation, "form": ball.form})

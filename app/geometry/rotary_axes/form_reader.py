@@ -73,8 +73,7 @@ def run(form: Mapping[str, str]) -> dict[str, Any]:
                 values["timezone"] = form.get("timezone", "").strip()
             if not values[kind]:
                 wrong = _("choose the file of the protocol, or paste its text")
-                wrong = wrong if kind == "protocol" else _("paste the result parameters")
-                raise Invalid(f"{kind}: {wrong}.", errors=[FieldError(kind, wrong)])
+                raise Invalid.at(kind, wrong if kind == "protocol" else _("paste the result parameters"))
     return values
 
 
@@ -143,8 +142,7 @@ def _axes(form: Mapping[str, str]) -> list[dict[str, Any]]:
             raise _no_position(line)
         seen.setdefault(axis, {}).setdefault((angle, came), []).append(point)
     if not seen:
-        wrong = _("enter the positions: one line per angle, or per probed point")
-        raise Invalid(f"positions: {wrong}.", errors=[FieldError("positions", wrong)])
+        raise Invalid.at("positions", _("enter the positions: one line per angle, or per probed point"))
     balls, places = _by_axis(form, "ball"), _by_axis(form, "position")
     return [_axis(axis, positions, form, balls, places) for axis, positions in seen.items()]
 
@@ -179,8 +177,9 @@ def _by_axis(form: Mapping[str, str], field: str) -> dict[str, list[float]]:
         if not words and not axis:
             continue
         if len(point) != 3 or len(words) != 3:
-            wrong = _("X, Y and Z are needed, such as 180 0 40, not “{text}”").format(text=part.strip()[:60])
-            raise Invalid(f"{field}: {wrong}.", errors=[FieldError(field, wrong)])
+            raise Invalid.at(
+                field, _("X, Y and Z are needed, such as 180 0 40, not “{text}”").format(text=part.strip()[:60])
+            )
         points[axis] = point
     return points
 
@@ -202,12 +201,12 @@ def _points(form: Mapping[str, str], field: str) -> list[list[float]]:
         if not words:
             continue
         if len(point) != 3 or len(words) != 3:
-            wrong = _("line {line}: X, Y and Z are needed, not “{text}”").format(line=number, text=text.strip()[:60])
-            raise Invalid(f"{field}: {wrong}.", errors=[FieldError(field, wrong)])
+            raise Invalid.at(
+                field, _("line {line}: X, Y and Z are needed, not “{text}”").format(line=number, text=text.strip()[:60])
+            )
         points.append(point)
     if not points:
-        wrong = _("X, Y and Z are needed, such as 0 0 0")
-        raise Invalid(f"{field}: {wrong}.", errors=[FieldError(field, wrong)])
+        raise Invalid.at(field, _("X, Y and Z are needed, such as 0 0 0"))
     return points
 
 
@@ -240,10 +239,12 @@ def _pairs(form: Mapping[str, str], field: str) -> list[tuple[str, str]]:
         if not words:
             continue
         if len(words) != 2:
-            wrong = _("line {line}: a name and a value are needed, not “{text}”").format(
-                line=number, text=line.strip()[:60]
+            raise Invalid.at(
+                field,
+                _("line {line}: a name and a value are needed, not “{text}”").format(
+                    line=number, text=line.strip()[:60]
+                ),
             )
-            raise Invalid(f"{field}: {wrong}.", errors=[FieldError(field, wrong)])
         pairs.append((words[0], words[1]))
     return pairs
 

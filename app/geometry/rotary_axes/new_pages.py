@@ -10,7 +10,7 @@ from starlette.datastructures import UploadFile
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Operator, require
-from app.errors import FieldError, Invalid, NotFound
+from app.errors import Invalid, NotFound
 from app.geometry.rotary_axes import actions, form_reader, queries
 from app.geometry.rotary_axes.evaluation import evaluate
 from app.geometry.rotary_axes.outcome import Evaluated
@@ -99,6 +99,5 @@ def _send(request: Request, session: Session, caller: Caller, form: dict[str, st
 def _given(form: Mapping[str, str]) -> RunIn:
     fields: dict[str, Any] = form_reader.run(form)
     if not fields["machine"]:
-        wrong = _("choose the machine")
-        raise Invalid(f"machine: {wrong}.", errors=[FieldError("machine", wrong)])
+        raise Invalid.at("machine", _("choose the machine"))
     return parsed(RunIn, fields)

@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from app.core.rotary.plausible import AxisBounds, axis_warnings
 from app.core.rotary.results import STRINGS
 from app.core.warning import CodedWarning, of_stored
-from app.errors import FieldError, Invalid, NotFound
+from app.errors import Invalid, NotFound
 from app.geometry.rotary_axes.result_values import AXIS_OF, to_enter, values_of
 from app.geometry.rotary_axes.tables import KinematicsBackup, KinematicsDecision, KinematicsPlan, KinematicsRun
 from app.language.i18n import _
@@ -311,10 +311,13 @@ def two_runs(session: Session, first: int, second: int) -> tuple[RunRow, RunRow]
     """Two runs to be compared, the older first. Raises `NotFound`; `Invalid` for runs of two machines."""
     one, two = run(session, first), run(session, second)
     if one.machine.id != two.machine.id:
-        wrong = _("run {a} is of {first}, run {b} of {second}").format(
-            a=first, first=one.machine.key, b=second, second=two.machine.key
+        raise Invalid.at(
+            "with",
+            _("run {a} is of {first}, run {b} of {second}").format(
+                a=first, first=one.machine.key, b=second, second=two.machine.key
+            ),
+            do=_("Compare runs of one machine."),
         )
-        raise Invalid(f"with: {wrong}.", _("Compare runs of one machine."), errors=[FieldError("with", wrong)])
     return (one, two) if (one.run.measured_at, one.run.id) <= (two.run.measured_at, two.run.id) else (two, one)
 
 

@@ -42,11 +42,10 @@ def find(session: Session, machine: Machine, body: ZeroIn, caller: Caller) -> Cr
     lock_machines(session, [machine.id])
     offset = offset_of(machine.control, body.work_offset)
     if offset is None:
-        message = _("{offset} is no work offset of this control").format(offset=repr(body.work_offset))
-        raise Invalid(
-            f"work_offset: {message}.",
-            _("Sinumerik: G54 to G57, G505 to G599. Fanuc: G54 to G59, G54.1 P1 to P300. Others: preset 1 …"),
-            errors=[FieldError("work_offset", message)],
+        raise Invalid.at(
+            "work_offset",
+            _("{offset} is no work offset of this control").format(offset=repr(body.work_offset)),
+            do=_("Sinumerik: G54 to G57, G505 to G599. Fanuc: G54 to G59, G54.1 P1 to P300. Others: preset 1 …"),
         )
     inputs = body.model_dump(exclude=ASKED_ONCE, exclude_none=True)
     if body.key is not None and (before := queries.by_key(session, machine, body.key)) is not None:

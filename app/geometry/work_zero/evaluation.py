@@ -48,8 +48,7 @@ def touches_of(kind: str, inputs: dict[str, Any]) -> list[dict[str, Any]]:
 def evaluated(kind: str, inputs: dict[str, Any]) -> Zero:
     """Compute the zero from its probed points. Raises `Invalid` that names those that are wrong."""
     if inputs.get("touches") and inputs.get("records"):
-        wrong = _("state touches or records, not both")
-        raise Invalid(f"records: {wrong}.", _("Leave one of them out."), errors=[FieldError("records", wrong)])
+        raise Invalid.at("records", _("state touches or records, not both"), do=_("Leave one of them out."))
     touches = _touches(kind, inputs)
     height = None
     if inputs.get("z_touched") is not None:

@@ -108,8 +108,7 @@ def _records(text: str) -> dict[str, Any]:
 
 def _lines(text: str) -> list[dict[str, Any]]:
     if len(text) > MOST_LETTERS:
-        wrong = _("the text is too long for {most} points").format(most=MOST_TOUCHES)
-        raise Invalid(f"lines: {wrong}.", errors=[FieldError("lines", wrong)])
+        raise Invalid.at("lines", _("the text is too long for {most} points").format(most=MOST_TOUCHES))
     return [_line(row, number) for number, row in enumerate(_plain(text).splitlines(), 1) if row.strip()]
 
 
@@ -135,11 +134,10 @@ def _line(row: str, number: int) -> dict[str, Any]:
         if not named and len(bare) == 1 and approach:
             along_x = approach.endswith("X")
             return _touch(bare[0] if along_x else None, None if along_x else bare[0], approach)
-    wrong = _("line {number} is not a valid point: {row}").format(number=number, row=repr(row.strip()[:60]))
-    raise Invalid(
-        f"lines: {wrong}.",
-        _("Write one point per line: -X -353.012, or X and Y. Or paste R1 to R4."),
-        errors=[FieldError("lines", wrong)],
+    raise Invalid.at(
+        "lines",
+        _("line {number} is not a valid point: {row}").format(number=number, row=repr(row.strip()[:60])),
+        do=_("Write one point per line: -X -353.012, or X and Y. Or paste R1 to R4."),
     )
 
 

@@ -273,8 +273,11 @@ def _false_reading(session: Session, row: AlarmRow, comment: str, caller: Caller
     characteristic, sequences = queries.readings_behind(session, row)
     entry = reading_queries.entry_of(session, characteristic) if characteristic else None
     if entry is None or not sequences:
-        wrong = _("cannot be false_reading: this alarm does not come from a reading")
-        raise Invalid(f"action: {wrong}.", _("Choose noted instead."), errors=[FieldError("action", wrong)])
+        raise Invalid.at(
+            "action",
+            _("cannot be false_reading: this alarm does not come from a reading"),
+            do=_("Choose noted instead."),
+        )
     done = readings.exclude_all(session, entry, sequences, caller.name, comment)
     before = sorted(set(sequences) - set(done))
     outcome: Outcome = []

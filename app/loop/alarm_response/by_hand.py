@@ -5,7 +5,7 @@ from typing import Any, Literal, NamedTuple
 from sqlalchemy.orm import Session
 
 from app.access.callers import Caller
-from app.errors import FieldError, Invalid
+from app.errors import Invalid
 from app.language.i18n import _
 from app.loop.alarm_response import queries
 from app.loop.alarm_response.queries import AlarmRow
@@ -34,15 +34,19 @@ def keep(session: Session, row: AlarmRow, found: ByHand, comment: str, caller: C
     characteristic, behind = queries.readings_behind(session, row)
     entry = reading_queries.entry_of(session, characteristic) if characteristic else None
     if entry is None or not behind:
-        wrong = _("no reading has raised this alarm, so nothing can be measured by hand for it; leave it out")
-        raise Invalid(f"hand_measured: {wrong}.", _("Leave it out."), errors=[FieldError("hand_measured", wrong)])
+        raise Invalid.at(
+            "hand_measured",
+            _("no reading has raised this alarm, so nothing can be measured by hand for it; leave it out"),
+            do=_("Leave it out."),
+        )
     sequence = behind[-1] if found.sequence is None else found.sequence
     if sequence not in behind:
-        wrong = _("reading {sequence} is not behind this alarm; its last one is {last}").format(
-            sequence=sequence, last=behind[-1]
-        )
-        raise Invalid(
-            f"hand_sequence: {wrong}.", _("Name one of its readings."), errors=[FieldError("hand_sequence", wrong)]
+        raise Invalid.at(
+            "hand_sequence",
+            _("reading {sequence} is not behind this alarm; its last one is {last}").format(
+                sequence=sequence, last=behind[-1]
+            ),
+            do=_("Name one of its readings."),
         )
     good = None if found.verdict is None else found.verdict == "good"
     measurement = readings.measure_by_hand(

@@ -39,8 +39,7 @@ from app.web.created import Created, sent_before
 def _must_have(last: int, field: str, number: int) -> None:
     """Raises `Invalid` for a location that the machine does not have."""
     if number > last:
-        wrong = _("this machine has {last} locations").format(last=last)
-        raise Invalid(f"{field}: {wrong}.", errors=[FieldError(field, wrong)])
+        raise Invalid.at(field, _("this machine has {last} locations").format(last=last))
 
 
 def calibrate_gauge(session: Session, machine: Machine, given: GaugeIn, caller: Caller) -> Created[CalibrationRow]:
@@ -58,8 +57,9 @@ def calibrate_gauge(session: Session, machine: Machine, given: GaugeIn, caller: 
     if (before := _sent_before(session, machine, place, given.key, settings, given.touches)) is not None:
         return before
     if given.repeats is not None and given.repeats != len(given.touches):
-        wrong = wording.missing_touch(given.repeats, len(given.touches))
-        raise Invalid(f"touches: {wrong}.", _("Send one touch per repeat."), errors=[FieldError("touches", wrong)])
+        raise Invalid.at(
+            "touches", wording.missing_touch(given.repeats, len(given.touches)), do=_("Send one touch per repeat.")
+        )
     value = queries.value_of(session, machine, place)
     average = queries.running_average(session, machine, place, value)
     done = calibrate(gauge, given.touches, empirical_value=value, average=average)
@@ -86,10 +86,13 @@ def _gauge(given: GaugeIn) -> Gauge:
     order = (("R33", "zero_range"), ("R34", "averaging_limit"), ("R36", "confidence_limit"))
     for (low, lower), (high, higher) in pairwise(order):
         if nanometres(getattr(given, lower)) >= nanometres(getattr(given, higher)):
-            wrong = _("{high} = {larger} must be larger than {low} = {smaller}").format(
-                high=high, larger=f"{getattr(given, higher):g}", low=low, smaller=f"{getattr(given, lower):g}"
+            raise Invalid.at(
+                higher,
+                _("{high} = {larger} must be larger than {low} = {smaller}").format(
+                    high=high, larger=f"{getattr(given, higher):g}", low=low, smaller=f"{getattr(given, lower):g}"
+                ),
+                do=_("R33 < R34 < R36 must hold."),
             )
-            raise Invalid(f"{higher}: {wrong}.", _("R33 < R34 < R36 must hold."), errors=[FieldError(higher, wrong)])
     return Gauge(
         given.gauge_size,
         given.zero_range,
@@ -107,11 +110,13 @@ def calibrate_ring(session: Session, machine: Machine, given: RingIn, caller: Ca
     place = Place("tool", given.tool_memory)
     smallest, largest = given.nominal + given.lower_deviation, given.nominal + given.upper_deviation
     if given.lower_deviation > given.upper_deviation:
-        wrong = _("ES (#506) must not be smaller than EI (#507)")
-        raise Invalid(f"upper_deviation: {wrong}.", errors=[FieldError("upper_deviation", wrong)])
+        raise Invalid.at("upper_deviation", _("ES (#506) must not be smaller than EI (#507)"))
     if given.nominal <= 0:
-        wrong = _("a ring has a diameter: its nominal size must be larger than 0 mm")
-        raise Invalid(f"nominal: {wrong}.", _("State the size of the ring."), errors=[FieldError("nominal", wrong)])
+        raise Invalid.at(
+            "nominal",
+            _("a ring has a diameter: its nominal size must be larger than 0 mm"),
+            do=_("State the size of the ring."),
+        )
     settings = given.model_dump(exclude={"sections", "calibrated_at", "key", "tool_memory"})
     settings |= {"smallest": round(smallest, 9), "largest": round(largest, 9)}
     touches = [[section.plus, section.minus] for section in given.sections]
@@ -134,11 +139,12 @@ def calibrate_ring(session: Session, machine: Machine, given: RingIn, caller: Ca
             blocked=given.first_move_triggered,
         )
     except TouchError as error:
-        wrong = _("{got} sections came, all inside the ring's limits; {expected} are needed").format(
-            got=error.got, expected=error.expected
-        )
-        raise Invalid(
-            f"sections: {wrong}.", _("Touch the missing sections."), errors=[FieldError("sections", wrong)]
+        raise Invalid.at(
+            "sections",
+            _("{got} sections came, all inside the ring's limits; {expected} are needed").format(
+                got=error.got, expected=error.expected
+            ),
+            do=_("Touch the missing sections."),
         ) from None
     settings |= {"diameters": list(done.diameters)}
     if done.section is not None:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from app.core.calibration import SECTIONS
-from app.errors import FieldError, Invalid
+from app.errors import Invalid
 from app.language.i18n import _
 from app.language.numbers import as_typed
 from app.loop.calibration.places import PlaceRow
@@ -66,13 +66,14 @@ def pairs(form: Mapping[str, str]) -> list[dict[str, Any]]:
     read = []
     lines = [(number, line) for number, line in enumerate(form.get("lines", "").splitlines(), 1) if line.strip()]
     if not lines or len(lines) > MOST_LINES:
-        wrong = _("needs a line for each pair, {most} at most").format(most=MOST_LINES)
-        raise Invalid(f"lines: {wrong}.", errors=[FieldError("lines", wrong)])
+        raise Invalid.at("lines", _("needs a line for each pair, {most} at most").format(most=MOST_LINES))
     for number, line in lines:
         columns = lengths(line)
         if len(columns) != 2 or not all(isinstance(number_read, float) for number_read in columns):
-            wrong = _("line {line}: two numbers are needed, not “{text}”").format(line=number, text=line.strip()[:60])
-            raise Invalid(f"lines: {wrong}.", errors=[FieldError("lines", wrong)])
+            raise Invalid.at(
+                "lines",
+                _("line {line}: two numbers are needed, not “{text}”").format(line=number, text=line.strip()[:60]),
+            )
         pair: dict[str, Any] = {"external_value": columns[1], "instrument": form.get("instrument", "")}
         if characteristic:
             pair |= {"characteristic": characteristic, "sequence": whole(_BETWEEN.split(line.strip())[0])}

@@ -10,7 +10,7 @@ from app.access.callers import Caller
 from app.core.calibration import Outcome
 from app.core.decision.limits import nanometres
 from app.db.events import publish
-from app.errors import Conflict, FieldError, Invalid
+from app.errors import Conflict, Invalid
 from app.language.i18n import _
 from app.loop.calibration import queries, wording
 from app.loop.calibration.actions import count_anew, end_alarms, news, put_into_effect
@@ -66,16 +66,15 @@ def _add(session: Session, machine: Machine, location: int, given: PairIn, calle
 def _machine_value(session: Session, machine: Machine, given: PairIn) -> tuple[float, int | None]:
     if given.characteristic is None:
         if given.machine_value is None or given.sequence is not None:
-            wrong = _("say either characteristic and sequence, or machine_value")
-            raise Invalid(f"machine_value: {wrong}.", errors=[FieldError("machine_value", wrong)])
+            raise Invalid.at("machine_value", _("say either characteristic and sequence, or machine_value"))
         return given.machine_value, None
     if given.sequence is None or given.machine_value is not None:
-        wrong = _("say either characteristic and sequence, or machine_value")
-        raise Invalid(f"sequence: {wrong}.", errors=[FieldError("sequence", wrong)])
+        raise Invalid.at("sequence", _("say either characteristic and sequence, or machine_value"))
     entry = readings.entry_of(session, given.characteristic)
     if entry is None or entry.machine_id != machine.id:
-        wrong = _("machine {machine} has no such characteristic").format(machine=machine.key)
-        raise Invalid(f"characteristic: {wrong}.", errors=[FieldError("characteristic", wrong)])
+        raise Invalid.at(
+            "characteristic", _("machine {machine} has no such characteristic").format(machine=machine.key)
+        )
     return readings.record_of(session, entry, given.sequence).measured, entry.characteristic_id
 
 

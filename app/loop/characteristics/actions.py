@@ -52,8 +52,9 @@ def add_characteristic(session: Session, given: CharacteristicIn, actor: str) ->
     """
     machine = machines.find_machine(session, given.machine)
     if machine is None:
-        wrong = _("There is no machine {key}; set it up first").format(key=repr(given.machine[:64]))
-        raise Invalid(f"machine: {wrong}.", errors=[FieldError("machine", wrong)])
+        raise Invalid.at(
+            "machine", _("There is no machine {key}; set it up first").format(key=repr(given.machine[:64]))
+        )
     if queries.key_is_taken(session, given.key):
         raise Conflict(
             _("There is a characteristic {key} already.").format(key=repr(given.key)),

@@ -128,13 +128,10 @@ def control_of(standing: Standing, control: str | None) -> str:
     """The control that was asked for, else the machine's. Raises `Invalid` where nothing is written for it."""
     control = control or standing.machine.control
     if control not in WRITTEN:
-        wrong = _("must be sinumerik or fanuc: measuring programs are not written for {control}").format(
-            control=control
-        )
-        raise Invalid(
-            f"control: {wrong}.",
-            _("Say for which control, for example control=sinumerik."),
-            errors=[FieldError("control", wrong)],
+        raise Invalid.at(
+            "control",
+            _("must be sinumerik or fanuc: measuring programs are not written for {control}").format(control=control),
+            do=_("Say for which control, for example control=sinumerik."),
         )
     return control
 

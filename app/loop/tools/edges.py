@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 from app.access.audit.actions import record
 from app.access.callers import Caller
 from app.db.events import publish
-from app.errors import FieldError, Invalid
+from app.errors import Invalid
 from app.language.i18n import _
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.machines import Machine
@@ -26,13 +26,16 @@ def describe_tool(session: Session, machine: Machine, number: int, settings: Too
     tool = queries.tool(session, machine, number)
     changes = settings.model_dump(exclude_unset=True)
     if changes.get("sister") == number:
-        wrong = _("must be another location: tool {tool} cannot be its own sister").format(tool=number)
-        raise Invalid(f"sister: {wrong}.", errors=[FieldError("sister", wrong)])
-    if (changes.get("sister") or 0) > machine.tool_locations:
-        wrong = _("the machine has {last} tool locations; R10 = {tool} is none of them").format(
-            last=machine.tool_locations, tool=changes["sister"]
+        raise Invalid.at(
+            "sister", _("must be another location: tool {tool} cannot be its own sister").format(tool=number)
         )
-        raise Invalid(f"sister: {wrong}.", errors=[FieldError("sister", wrong)])
+    if (changes.get("sister") or 0) > machine.tool_locations:
+        raise Invalid.at(
+            "sister",
+            _("the machine has {last} tool locations; R10 = {tool} is none of them").format(
+                last=machine.tool_locations, tool=changes["sister"]
+            ),
+        )
     before: dict[str, Any] = {name: getattr(tool, name) for name in changes}
     if before == changes:
         return tool

@@ -25,7 +25,7 @@ from app.core.programs.corrections import (
     write,
 )
 from app.db.events import publish
-from app.errors import Conflict, FieldError, Invalid
+from app.errors import Conflict, Invalid
 from app.language.i18n import _, ngettext
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.characteristics import ParametersVersion
@@ -77,10 +77,12 @@ def form_for(machine: Machine, form: str | None) -> Form:
     if form is None:
         return forms[0]
     if form not in forms:
-        wrong = _("must be one of {forms} for the control of {machine}").format(
-            forms=", ".join(forms), machine=machine.key
+        raise Invalid.at(
+            "form",
+            _("must be one of {forms} for the control of {machine}").format(
+                forms=", ".join(forms), machine=machine.key
+            ),
         )
-        raise Invalid(f"form: {wrong}.", errors=[FieldError("form", wrong)])
     return Form(form)
 
 
@@ -118,10 +120,13 @@ def _has_register(form: Form, chain: Sequence[OffsetStep]) -> None:
     last = LAST_REGISTER.get(form)
     beyond = [step.tool for step in chain if last is not None and step.tool > last]
     if beyond:
-        wrong = _("has registers for tools 1 to {last} only, and tool {tool} is corrected").format(
-            last=last, tool=beyond[0]
+        raise Invalid.at(
+            "form",
+            _("has registers for tools 1 to {last} only, and tool {tool} is corrected").format(
+                last=last, tool=beyond[0]
+            ),
+            do=_("Take G10 or the list in place of it."),
         )
-        raise Invalid(f"form: {wrong}.", _("Take G10 or the list in place of it."), errors=[FieldError("form", wrong)])
 
 
 def _axes(session: Session, machine: Machine, corrections: Sequence[Correction]) -> dict[int, Axis]:

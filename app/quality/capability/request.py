@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 from fastapi import Depends, Query
 from sqlalchemy.orm import Session
 
-from app.errors import FieldError, Invalid
+from app.errors import Invalid
 from app.language.i18n import _
 from app.loop.characteristics.queries import Standing
 from app.loop.summaries import queries as statistics
@@ -39,8 +39,7 @@ Confidence = Annotated[float, Query(gt=0.5, lt=1, allow_inf_nan=False, descripti
 def in_order(choice: StudyRequest) -> StudyRequest:
     """Return the choice. Raises `Invalid` where its period runs backwards."""
     if choice.start is not None and choice.end is not None and choice.start > choice.end:
-        message = _("is later than the end; exchange the two")
-        raise Invalid(f"from: {message}.", _("Exchange the two moments."), errors=[FieldError("from", message)])
+        raise Invalid.at("from", _("is later than the end; exchange the two"), do=_("Exchange the two moments."))
     return choice
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from app.core.spc.quantity import Quantity
-from app.errors import FieldError, InbandError, Invalid
+from app.errors import InbandError, Invalid
 from app.language.i18n import _
 from app.quality.control_charts.schemas import PeriodIn
 from app.web.forms import by_field, length, whole
@@ -46,12 +46,14 @@ def runs(text: str) -> list[dict[str, Any]]:
             continue
         match = _RUN.fullmatch(line.strip())
         if match is None or match[3] is None:
-            wrong = (
-                _("line {line} is no run of readings: write 640-641 and the reason")
-                if match is None
-                else _("line {line} has no reason; write it after the numbers")
-            ).format(line=number)
-            raise Invalid(f"excluded: {wrong}.", errors=[FieldError("excluded", wrong)])
+            raise Invalid.at(
+                "excluded",
+                (
+                    _("line {line} is no run of readings: write 640-641 and the reason")
+                    if match is None
+                    else _("line {line} has no reason; write it after the numbers")
+                ).format(line=number),
+            )
         runs.append({"first": int(match[1]), "last": int(match[2] or match[1]), "reason": match[3]})
     return runs
 

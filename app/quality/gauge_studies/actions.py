@@ -91,8 +91,11 @@ def rows_from_readings(
 ) -> list[dict[str, Any]]:
     """The rows of a study that these readings make. Raises `Invalid`."""
     if kind == "grr" and take != "touches":
-        wrong = _("a study of parts and operators takes the touches of each reading: a reading alone has no repeats")
-        raise Invalid(f"take: {wrong}.", _("Take the touches."), errors=[FieldError("take", wrong)])
+        raise Invalid.at(
+            "take",
+            _("a study of parts and operators takes the touches of each reading: a reading alone has no repeats"),
+            do=_("Take the touches."),
+        )
     sizes = queries.taken(session, standing, first, through, take)
     if kind == "grr":
         return [{"part": str(sequence), "operator": "1", "values": values} for sequence, values in sizes]
@@ -120,11 +123,10 @@ def correct_study(session: Session, number: int, given: CorrectionIn, caller: Ca
     settings = _settings(given, standing, study.settings.get("source"))
     rows = [_row(row.model_dump()) for row in given.rows]
     if (settings, rows) == (study.settings, study.revision.rows):
-        wrong = _("nothing differs from revision {n}").format(n=study.newest)
-        raise Invalid(
-            f"rows: {wrong}.",
-            _("Change what is wrong, or leave the study as it is."),
-            errors=[FieldError("rows", wrong)],
+        raise Invalid.at(
+            "rows",
+            _("nothing differs from revision {n}").format(n=study.newest),
+            do=_("Change what is wrong, or leave the study as it is."),
         )
     design(study.study.kind, settings, rows)
     _keep(session, study.study, study.newest + 1, settings, rows, caller, given.reason)
@@ -139,11 +141,10 @@ def _served(session: Session, machine: Machine, key: str | None) -> Standing | N
         return None
     standing = characteristics.characteristic_named(session, key)
     if standing.machine.id != machine.id:
-        wrong = _("belongs to machine {machine}").format(machine=standing.machine.key)
-        raise Invalid(
-            f"characteristic: {wrong}.",
-            _("Name one of the same machine."),
-            errors=[FieldError("characteristic", wrong)],
+        raise Invalid.at(
+            "characteristic",
+            _("belongs to machine {machine}").format(machine=standing.machine.key),
+            do=_("Name one of the same machine."),
         )
     return standing
 

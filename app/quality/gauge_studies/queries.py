@@ -13,7 +13,7 @@ from app.core.spc.gauge.single import FEWEST_REPEATS
 from app.core.spc.gauge.zero_range import Suggestion, suggest
 from app.core.spc.refusal import Reason, Refused
 from app.core.warning import CodedWarning
-from app.errors import FieldError, Invalid, NotFound
+from app.errors import Invalid, NotFound
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import Standing
@@ -279,10 +279,13 @@ def taken(session: Session, standing: Standing, first: int, through: int, take: 
             wrong = _("there are readings 1 to {newest}").format(newest=newest)
         elif newest:
             wrong = _("is beyond the last of them; exchange the two")
-        raise Invalid(f"first: {wrong}.", _("Name other readings."), errors=[FieldError("first", wrong)])
+        raise Invalid.at("first", wrong, do=_("Name other readings."))
     if min(through, newest) - first >= MOST_TAKEN:
-        wrong = _("is too far from the first: a study takes {most} readings at most").format(most=MOST_TAKEN)
-        raise Invalid(f"through: {wrong}.", _("Name fewer readings."), errors=[FieldError("through", wrong)])
+        raise Invalid.at(
+            "through",
+            _("is too far from the first: a study takes {most} readings at most").format(most=MOST_TAKEN),
+            do=_("Name fewer readings."),
+        )
     here = (*_between(standing, first, through), ~_useless())
     sizes: list[tuple[int, list[float]]]
     empirical = _empirical_values(session, standing, first, through)
@@ -308,10 +311,11 @@ def taken(session: Session, standing: Standing, first: int, through: int, take: 
             for sequence, touches in touched
         ]
     if not sizes:
-        wrong = (
+        raise Invalid.at(
+            "first",
             _("none of these readings came as touches")
             if take == "touches"
-            else _("all of these readings are excluded, or probe faults")
+            else _("all of these readings are excluded, or probe faults"),
+            do=_("Name other readings."),
         )
-        raise Invalid(f"first: {wrong}.", _("Name other readings."), errors=[FieldError("first", wrong)])
     return sizes

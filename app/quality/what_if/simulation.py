@@ -87,7 +87,6 @@ def settings(past: ToolHistory, given: SettingsIn) -> Settings:
 
 def _past(session: Session, standing: Standing, given: ReplayPeriodIn) -> ToolHistory:
     if given.start is not None and given.end is not None and given.start > given.end:
-        message = _("is later than `to`; exchange the two moments")
-        raise Invalid(f"from: {message}.", errors=[FieldError("from", message)])
+        raise Invalid.at("from", _("is later than `to`; exchange the two moments"))
     window = statistics.window_of(session, standing.characteristic, last=given.newest, start=given.start, end=given.end)
     return queries.load(session, standing, window)

@@ -91,13 +91,12 @@ def section_names(names: Sequence[str]) -> tuple[SectionName, ...]:
     """Sections by name, in their order; none named means all. Raises `Invalid`."""
     unknown = [name for name in names if name not in set(SectionName)]
     if unknown:
-        message = _("there is no section {name}; there are {names}").format(
-            name=repr(unknown[0][:40]), names=", ".join(SectionName)
-        )
-        raise Invalid(
-            f"section: {message}.",
-            _("Name only these sections, or none for all of them."),
-            errors=[FieldError("section", message)],
+        raise Invalid.at(
+            "section",
+            _("there is no section {name}; there are {names}").format(
+                name=repr(unknown[0][:40]), names=", ".join(SectionName)
+            ),
+            do=_("Name only these sections, or none for all of them."),
         )
     return tuple(name for name in SectionName if not names or name in names)
 

@@ -55,11 +55,12 @@ def measure(
         session, entry.machine_id, entry.characteristic_id, reading.parameters_version
     ).target
     if result.measured is not None and abs(result.measured - target) > FURTHEST:
-        wrong = _("{measured:g} mm lies more than {furthest:g} mm from the target {target:g} mm").format(
-            measured=result.measured, furthest=FURTHEST, target=target
-        )
-        raise Invalid(
-            f"{size}: {wrong}.", _("Sizes are in mm, with a decimal point."), errors=[FieldError(size, wrong)]
+        raise Invalid.at(
+            size,
+            _("{measured:g} mm lies more than {furthest:g} mm from the target {target:g} mm").format(
+                measured=result.measured, furthest=FURTHEST, target=target
+            ),
+            do=_("Sizes are in mm, with a decimal point."),
         )
     made = HandMeasurement(
         machine_id=entry.machine_id,
