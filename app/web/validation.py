@@ -33,7 +33,7 @@ def field_errors(errors: Iterable[Mapping[str, Any]]) -> list[FieldError]:
     sentences: dict[str, list[str]] = {}
     for error in errors:
         sentences.setdefault(_field_of(error), []).append(message(error))
-    return [FieldError(field, _(", or ").join(dict.fromkeys(each))) for field, each in sentences.items()]
+    return [FieldError(field, _(", or ").join(dict.fromkeys(messages))) for field, messages in sentences.items()]
 
 
 def _field_of(error: Mapping[str, Any]) -> str:

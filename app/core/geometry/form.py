@@ -265,7 +265,7 @@ def axis_straightness(feature: ProbedFeature) -> Form:
     details = sections_told(sections)
     printed: tuple[Value, ...] = ()
     with suppress(Degenerate):  # where all centres have one X the printed method has no line
-        printed = (Value(Method.PRINTED, printed_straightness([tuple(each.at) for each in centres])),)
+        printed = (Value(Method.PRINTED, printed_straightness([tuple(point.at) for point in centres])),)
     heights = heights_of(sections)
     if heights is None:
         if not printed:
@@ -287,8 +287,8 @@ def axis_straightness(feature: ProbedFeature) -> Form:
         Value(Method.LEAST_SQUARES, 2 * float(distances.max()), least),
         *printed,
     )
-    for each, off in zip(details, away.tolist(), strict=True):
-        each["off"] = off
+    for point, off in zip(details, away.tolist(), strict=True):
+        point["off"] = off
     return Form(values, in_bore(sections), details={"sections": details, "axis": axis_told(axis)})
 
 

@@ -246,8 +246,8 @@ class _Reader:
             notes.append(Note("from_inch", {}))
         return any(units)
 
-    def _macro(self, number: int, found: re.Match[str], notes: list[Note]) -> None:
-        macro, argument = int(found[1]), _ARGUMENT.search(found[2])
+    def _macro(self, number: int, match: re.Match[str], notes: list[Note]) -> None:
+        macro, argument = int(match[1]), _ARGUMENT.search(match[2])
         if macro == CALIBRATING_MACRO:
             self.kind = self.kind or ProgramKind.CALIBRATION
         else:

@@ -228,23 +228,23 @@ class _Reader:
             notes.append(Note("q_range", {"r": q, "value": value, "lowest": known.lowest, "highest": known.highest}))
         return " "
 
-    def _string(self, number: int, found: re.Match[str], notes: list[Note]) -> str:
-        q = found[1].upper()
+    def _string(self, number: int, match: re.Match[str], notes: list[Note]) -> str:
+        q = match[1].upper()
         if self.call is not None and self.call[0] == 450 and q == "QS409":
-            self.call[2]["Q409"] = found[2]
-            notes.append(Note("q_assigned", {"r": q, "value": found[2][:40]}))
+            self.call[2]["Q409"] = match[2]
+            notes.append(Note("q_assigned", {"r": q, "value": match[2][:40]}))
         elif q in STRINGS:
             self.first_result = self.first_result or number
-            result = read_string(q, found[2])
+            result = read_string(q, match[2])
             known = {name: value for name, value in result.values.items() if value is not None}
             self.results |= known
             notes += [Note("result", {"r": name, "value": value}) for name, value in known.items()]
             notes += [Note("no_number", {"r": q, "text": flaw.text[:40]}) for flaw in result.flaws if not known]
         return " "
 
-    def _substr(self, number: int, found: re.Match[str], notes: list[Note]) -> str:
-        target, source = found[1].upper(), found[2].upper()
-        begin, length = int(found[3]), int(found[4])
+    def _substr(self, number: int, match: re.Match[str], notes: list[Note]) -> str:
+        target, source = match[1].upper(), match[2].upper()
+        begin, length = int(match[3]), int(match[4])
         names = ERRORS[STRINGS[source]]
         at, beside = divmod(begin, WIDTH + 1)
         if length == WIDTH and beside in (0, 1) and at < len(names) and begin in (0, *(11 * n for n in range(1, 4))):
@@ -255,10 +255,10 @@ class _Reader:
             notes.append(Note("cut_wrong", {"source": source, "begin": begin, "length": length}))
         return " "
 
-    def _tonumb(self, number: int, found: re.Match[str], notes: list[Note]) -> str:
-        name = self.pieces.get(found[2].upper())
+    def _tonumb(self, number: int, match: re.Match[str], notes: list[Note]) -> str:
+        name = self.pieces.get(match[2].upper())
         if name is not None:
-            notes.append(Note("as_number", {"name": name, "r": found[1].upper()}))
+            notes.append(Note("as_number", {"name": name, "r": match[1].upper()}))
         return " "
 
 

@@ -236,7 +236,7 @@ def describing(about: Mapping[str, str]) -> Iterator[str]:
 
 
 def settings(
-    parameters: Parameters, said: Container[str], implied: Mapping[str, Any] = MappingProxyType({})
+    parameters: Parameters, stated: Container[str], implied: Mapping[str, Any] = MappingProxyType({})
 ) -> Iterator[str]:
     """The comments for all that the parameters hold beside what is ``said`` already and what goes without saying.
 
@@ -247,7 +247,7 @@ def settings(
     if parameters.nominal is not None:  # target and width follow from the drawing (L75)
         expected |= {name: values[name] for name in ("target", "tolerance_width")}
     for name in (*BY_NAME, *(name for name in values if name not in BY_NAME)):
-        if name not in said and values.get(name) is not None and values[name] != expected.get(name):
+        if name not in stated and values.get(name) is not None and values[name] != expected.get(name):
             yield f"INBAND {name.upper()}={_said(values[name])}"
 
 
@@ -291,8 +291,8 @@ def _escaped(text: str) -> str:
 
 
 def _unescaped(text: str) -> str:
-    def character(found: re.Match[str]) -> str:
-        code = int(found[1], 16)
+    def character(match: re.Match[str]) -> str:
+        code = int(match[1], 16)
         return chr(code) if 32 <= code < 0xD800 or 0xDFFF < code <= 0x10FFFF else ""
 
     return re.sub(r"\{([0-9A-Fa-f]{1,6})\}", character, text)

@@ -115,8 +115,8 @@ def steps(body: str, patterns: Iterable[_Step]) -> tuple[list[Note], str]:
     notes: list[Note] = []
     for pattern, step, names in patterns:
 
-        def said(found: re.Match[str], step: str = step, names: tuple[str, ...] = names) -> str:
-            notes.append(Note("step", {"step": step} | _named(dict(zip(names, found.groups(), strict=False)))))
+        def said(match: re.Match[str], step: str = step, names: tuple[str, ...] = names) -> str:
+            notes.append(Note("step", {"step": step} | _named(dict(zip(names, match.groups(), strict=False)))))
             return " "
 
         body = pattern.sub(said, body)

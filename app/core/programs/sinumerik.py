@@ -121,10 +121,10 @@ class _Reader:
             notes += steps
             text = rest + semicolon + comment if steps else text
 
-        def without(found: re.Match[str]) -> str:
-            if found.string[: found.start()].rstrip().endswith("="):
-                return found[0]  # R33=(…) is a calculation
-            comments.append(next(group for group in found.groups() if group is not None))
+        def without(match: re.Match[str]) -> str:
+            if match.string[: match.start()].rstrip().endswith("="):
+                return match[0]  # R33=(…) is a calculation
+            comments.append(next(group for group in match.groups() if group is not None))
             return " "
 
         body = _COMMENT.sub(without, text)
@@ -215,13 +215,13 @@ class _Reader:
         """On the control it has another value now, one that is not known here: the one before must not stand for it."""
         self.now.assigned.pop(BY_R.get(r, r), None)
 
-    def _together(self, number: int, found: re.Match[str], notes: list[Note]) -> None:
-        r = f"R{found[1]}"
-        if found[2]:
-            self._parameter(number, r, found[2], "run_together", notes)
-        elif found[3]:
+    def _together(self, number: int, match: re.Match[str], notes: list[Note]) -> None:
+        r = f"R{match[1]}"
+        if match[2]:
+            self._parameter(number, r, match[2], "run_together", notes)
+        elif match[3]:
             self._lose(r)
-            notes.append(Note("placeholder", {"r": r, "text": found[3]}))
+            notes.append(Note("placeholder", {"r": r, "text": match[3]}))
         else:
             self._lose(r)
             notes.append(Note("no_value", {"r": r}))

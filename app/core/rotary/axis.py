@@ -177,7 +177,7 @@ def estimate(
     >>> [round(found.errors[name].value, 9) + 0.0 for name in ("EX0C", "EY0C", "EA0C", "EB0C")]
     [1.0, 0.0, 0.0, 0.0]
     """
-    angles = [each.angle for each in positions]
+    angles = [position.angle for position in positions]
     distinct = len({round(angle % 360, 6) for angle in angles})
     if distinct < FEWEST:
         raise NoAxis(AxisFault.TOO_FEW, distinct, FEWEST)
@@ -186,9 +186,9 @@ def estimate(
         raise NoAxis(AxisFault.ONE_SIDED_ARC, arc, NARROWEST_ARC)
     order, sense, head = _order(axis), -1 if reversed_ else 1, carries is Carried.HEAD
     turns = np.array([_about_third(sense * angle) for angle in angles])
-    seen = np.array([each.centre for each in positions], dtype=np.float64)[:, order]
+    seen = np.array([position.centre for position in positions], dtype=np.float64)[:, order]
     nominal, deviations = _near(seen, turns, None if ball is None else np.array(ball, float)[order], head=head)
-    approaches = sense * np.array([each.approach for each in positions], dtype=np.float64)
+    approaches = sense * np.array([position.approach for position in positions], dtype=np.float64)
     both = bool((approaches > 0).any() and (approaches < 0).any())
     columns = _columns(turns, nominal, approaches if both else None, ball_known=ball_known, head=head)
     sure = _spreads(positions, order)
@@ -226,8 +226,8 @@ def estimate(
         condition=condition,
         freedom=freedom,
         noise=noise,
-        measured=tuple(_restored(each, order) for each in deviations),
-        optimised=tuple(_restored(each, order) for each in residuals),
+        measured=tuple(_restored(deviation, order) for deviation in deviations),
+        optimised=tuple(_restored(residual, order) for residual in residuals),
     )
 
 

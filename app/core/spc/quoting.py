@@ -66,7 +66,7 @@ FORBID_CPK = frozenset({Caution.NOT_IN_CONTROL, Caution.FEW_READINGS, Caution.CO
 
 
 def quoting(
-    found: Capability | Refused,
+    indices: Capability | Refused,
     by_percentile: PercentileCapability | Refused,
     *,
     stable: bool | None,
@@ -77,19 +77,19 @@ def quoting(
     stable: of the process in time, None where too little is known. far: a reading lies far from all others, so that the
     readings are of two processes and no index describes both.
     """
-    if isinstance(found, Refused):
-        return Quoting(Quote.NONE, why=found.reason.value)
+    if isinstance(indices, Refused):
+        return Quoting(Quote.NONE, why=indices.reason.value)
     if far:
         return Quoting(Quote.NONE, why=WhyNot.FAR_OFF.value)
-    few = Caution.FEW_READINGS in found.cautions
-    if Caution.NOT_NORMAL in found.cautions:
+    few = Caution.FEW_READINGS in indices.cautions
+    if Caution.NOT_NORMAL in indices.cautions:
         if isinstance(by_percentile, Refused):
             return Quoting(Quote.NONE, why=WhyNot.NO_SHAPE.value)
         preliminary = few or Caution.FEW_FOR_PERCENTILES in by_percentile.cautions
         return Quoting(Quote.PERCENTILE, by_percentile.ppk, preliminary=preliminary)
-    if stable is True and not FORBID_CPK & set(found.cautions):
-        return _of(Quote.CPK, found.cpk, few)
-    return _of(Quote.PPK, found.ppk, few)
+    if stable is True and not FORBID_CPK & set(indices.cautions):
+        return _of(Quote.CPK, indices.cpk, few)
+    return _of(Quote.PPK, indices.ppk, few)
 
 
 def stable(control: Stability | Refused, time: InTime | Refused) -> bool | None:

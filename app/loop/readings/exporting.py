@@ -119,12 +119,12 @@ def rows(
         yield row | {"corrected_size": round(targets[version] + row["deviation"], DECIMALS)}
 
 
-def write_csv(found: Iterator[dict[str, Any]], file: TextIO) -> int:
+def write_csv(readings: Iterator[dict[str, Any]], file: TextIO) -> int:
     """As CSV with a header; texts that a spreadsheet would take for a formula are defused. The number of rows."""
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(COLUMNS)
     count = 0
-    for row in found:
+    for row in readings:
         writer.writerow([_cell(row[name]) for name in COLUMNS])
         count += 1
     return count
@@ -140,10 +140,10 @@ def _cell(value: Any) -> Any:
     return "" if value is None else value
 
 
-def write_ndjson(found: Iterator[dict[str, Any]], file: TextIO) -> int:
+def write_ndjson(readings: Iterator[dict[str, Any]], file: TextIO) -> int:
     """One JSON object per line, with the touches of those that have them. The number of rows."""
     count = 0
-    for row in found:
+    for row in readings:
         if row["touches"] is None:
             del row["touches"]
         file.write(msgspec.json.encode(row).decode() + "\n")

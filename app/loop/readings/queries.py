@@ -66,7 +66,7 @@ def entries_for_results(
 
     field: where a result's characteristic stands in what was sent.
     """
-    found: dict[str, Entry] = {}
+    entries: dict[str, Entry] = {}
     errors = []
     for result, characteristic in named.items():
         entry = entry_of(session, characteristic)
@@ -74,10 +74,10 @@ def entries_for_results(
             wrong = _("there is no characteristic {key} on this machine").format(key=repr(characteristic[:64]))
             errors.append(FieldError(field.format(result=result), wrong))
         else:
-            found[result] = entry
+            entries[result] = entry
     if errors:
         raise Invalid(f"{errors[0].field}: {errors[0].message}.", _("Set the characteristic up first."), errors=errors)
-    return found
+    return entries
 
 
 class PushedResult(NamedTuple):
@@ -247,10 +247,12 @@ def first_answers(session: Session, entry: Entry, sequences: Iterable[int]) -> d
             Reading.sequence.in_(sequences),
         )
     )
-    made = {each["sequence"]: each for each in answers(session, entry, [Record(*row) for row in rows])}
-    for each in made.values():
-        del each["excluded"]  # the first answer could not know it
-    return made
+    answers_by_sequence = {
+        first["sequence"]: first for first in answers(session, entry, [Record(*row) for row in rows])
+    }
+    for first in answers_by_sequence.values():
+        del first["excluded"]  # the first answer could not know it
+    return answers_by_sequence
 
 
 def detail(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
@@ -263,9 +265,9 @@ def detail(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
             ReadingTouches.sequence == sequence,
         )
     )
-    found = by_hand.of_readings(session, entry.machine_id, entry.characteristic_id, [sequence])
+    measurements = by_hand.of_readings(session, entry.machine_id, entry.characteristic_id, [sequence])
     return answers(session, entry, [record])[0] | {
-        "by_hand": [in_json(each) for each in found.get(sequence, ())],
+        "by_hand": [in_json(measurement) for measurement in measurements.get(sequence, ())],
         "touches": touches,
         "machined_at": record.machined_at,
         "correction_in_effect": record.correction_in_effect,
@@ -316,9 +318,9 @@ def reasons(
             Reading.machine_id == machine_id, tuple_(Reading.characteristic_id, Reading.sequence).in_(amounts)
         )
     )
-    found = {}
+    reasons_by_key = {}
     for record in (Record(*row) for row in rows):
         at = (record.characteristic_id, record.sequence)
         parameters = characteristics.parameters_of(session, machine_id, at[0], record.parameters_version)
-        found[at] = reason(record, parameters, amounts[at])
-    return found
+        reasons_by_key[at] = reason(record, parameters, amounts[at])
+    return reasons_by_key

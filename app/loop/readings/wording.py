@@ -66,8 +66,8 @@ class _Values(dict[str, str]):
         self.record, self.parameters = record, parameters
 
     def __missing__(self, name: str) -> str:
-        made = _WORDED[name](self.record, self.parameters)
-        return um(made) if isinstance(made, float) else str(made)
+        value = _WORDED[name](self.record, self.parameters)
+        return um(value) if isinstance(value, float) else str(value)
 
 
 def _of_reading(name: str) -> Callable[[Record, Parameters], Any]:

@@ -80,16 +80,16 @@ class LivesOut(BaseModel):
     lives: list[LifeOut]
 
 
-def lives_out(found: Lives, machine: str) -> LivesOut:
+def lives_out(lives: Lives, machine: str) -> LivesOut:
     """The lives as they are answered."""
     now = datetime.now(UTC)
     return LivesOut(
         machine=machine,
-        tool_memory=found.tool.number,
-        usual_parts=found.usual,
-        life_used=None if found.use.share is None else round(found.use.share, 4),
-        parts_left=found.use.left,
-        lives=[_life(life, now) for life in found.lives],
+        tool_memory=lives.tool.number,
+        usual_parts=lives.usual,
+        life_used=None if lives.use.share is None else round(lives.use.share, 4),
+        parts_left=lives.use.left,
+        lives=[_life(life, now) for life in lives.lives],
     )
 
 

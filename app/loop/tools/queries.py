@@ -202,11 +202,13 @@ def open_corrections(session: Session, machine: Machine, tool_memory: int | None
     return session.scalars(query.order_by(Correction.number).execution_options(populate_existing=True)).all()
 
 
-def counting_on(session: Session, machine: Machine, found: Correction) -> list[int]:
+def counting_on(session: Session, machine: Machine, correction: Correction) -> list[int]:
     """Later open corrections of its tool that were computed as if this one came into effect."""
-    if found.status == "held":
+    if correction.status == "held":
         return []
-    return [c.number for c in open_corrections(session, machine, found.tool_memory) if c.number > found.number]
+    return [
+        c.number for c in open_corrections(session, machine, correction.tool_memory) if c.number > correction.number
+    ]
 
 
 def open_counts(session: Session) -> dict[int, dict[str, int]]:
@@ -245,25 +247,26 @@ def corrections(
     return rows_of(session, machine, session.scalars(query).all())
 
 
-def row_of(session: Session, machine: Machine, found: Correction) -> CorrectionRow:
+def row_of(session: Session, machine: Machine, correction: Correction) -> CorrectionRow:
     """This correction with what belongs beside it."""
-    return rows_of(session, machine, [found])[0]
+    return rows_of(session, machine, [correction])[0]
 
 
-def rows_of(session: Session, machine: Machine, found: Sequence[Correction]) -> list[CorrectionRow]:
+def rows_of(session: Session, machine: Machine, corrections: Sequence[Correction]) -> list[CorrectionRow]:
     """These corrections with what belongs beside them."""
-    if not found:
+    if not corrections:
         return []
     names = {
         row.id: row.key
         for row in session.execute(
             select(Characteristic.id, Characteristic.key).where(
-                Characteristic.machine_id == machine.id, Characteristic.id.in_({c.characteristic_id for c in found})
+                Characteristic.machine_id == machine.id,
+                Characteristic.id.in_({c.characteristic_id for c in corrections}),
             )
         )
     }
-    why = readings.reasons(session, machine.id, [(c.characteristic_id, c.sequence, c.amount) for c in found])
-    expected = _expected(session, machine) if any(c.status in OPEN for c in found) else {}
+    why = readings.reasons(session, machine.id, [(c.characteristic_id, c.sequence, c.amount) for c in corrections])
+    expected = _expected(session, machine) if any(c.status in OPEN for c in corrections) else {}
     return [
         CorrectionRow(
             c,
@@ -272,7 +275,7 @@ def rows_of(session: Session, machine: Machine, found: Sequence[Correction]) -> 
             expected.get(c.number),
             why.get((c.characteristic_id, c.sequence)),
         )
-        for c in found
+        for c in corrections
     ]
 
 

@@ -203,11 +203,11 @@ def event_word(kind: str) -> str:
     }.get(kind, kind)
 
 
-def step(made: OffsetChange) -> str:
+def step(change: OffsetChange) -> str:
     """The text of a step in the history, without its kind."""
-    event = made.event
+    event = change.event
     if event.correction is not None:
         return _("correction {number}: {amount}, {actor}").format(
-            number=event.correction, amount=um(made.amount), actor=event.actor
+            number=event.correction, amount=um(change.amount), actor=event.actor
         )
     return f"{event.reason or '–'}, {event.actor}"

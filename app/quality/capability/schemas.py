@@ -269,19 +269,19 @@ def _quoted(study: Study) -> QuotedOut | None:
     )
 
 
-def _in_time(study: Study, found: InTime) -> InTimeOut:
+def _in_time(study: Study, in_time: InTime) -> InTimeOut:
     return InTimeOut(
-        model=found.model.value,
-        location=found.location.value,
-        scatter_changes=found.scatter_changes,
-        share_between=found.share_between,
-        slope=found.slope,
-        subgroups=found.subgroups,
+        model=in_time.model.value,
+        location=in_time.location.value,
+        scatter_changes=in_time.scatter_changes,
+        share_between=in_time.share_between,
+        slope=in_time.slope,
+        subgroups=in_time.subgroups,
         tests=[
             TestOut(question=question, test=test, numbers=numbers, answer=answer)
-            for question, test, numbers, answer in wording.model_tests(found)
+            for question, test, numbers, answer in wording.model_tests(in_time)
         ],
-        text=wording.model(found),
+        text=wording.model(in_time),
         means=wording.model_means(study),
     )
 

@@ -121,29 +121,29 @@ def normality_name(test: str) -> str:
     return {"anderson_darling": "Anderson-Darling A²", "shapiro_wilk": "Shapiro-Wilk W"}.get(test, test)
 
 
-def stability(found: Stability | Refused, baseline: int | None) -> str:
+def stability(verdict: Stability | Refused, baseline: int | None) -> str:
     """Statistical control by the run rules, and by what it was judged."""
-    if isinstance(found, Refused):
-        return _("Cannot be judged: {why}").format(why=statistics.refusal(found))
+    if isinstance(verdict, Refused):
+        return _("Cannot be judged: {why}").format(why=statistics.refusal(verdict))
     by = (
         _("judged by baseline {n}").format(n=baseline)
         if baseline is not None
         else _("judged by limits of the same readings; a frozen baseline of the deviations is a better judge")
     )
-    if found.in_control:
+    if verdict.in_control:
         return _("In control: no run rule fires more often than chance explains ({by}).").format(by=by)
     why = []
-    if found.beyond_chance:
-        names = ", ".join(statistics.rule_name(fired.rule) for fired in found.beyond_chance)
+    if verdict.beyond_chance:
+        names = ", ".join(statistics.rule_name(fired.rule) for fired in verdict.beyond_chance)
         why.append(_("more signals than chance explains by {names}").format(names=names))
-    if found.gross:
+    if verdict.gross:
         why.append(
             ngettext(
                 "%(num)d point lies far beyond the limits, %(size)s sigma from the centre",
                 "%(num)d points lie far beyond the limits, up to %(size)s sigma from the centre",
-                found.gross,
+                verdict.gross,
             )
-            % {"num": found.gross, "size": f"{found.farthest:.0f}"}
+            % {"num": verdict.gross, "size": f"{verdict.farthest:.0f}"}
         )
     return _("Not in control: {why} ({by}).").format(why="; ".join(why), by=by)
 
@@ -179,28 +179,30 @@ def lives(count: int) -> str:
     ) % {"num": count}
 
 
-def fired(each: Fired) -> str:
+def fired(rule: Fired) -> str:
     """Number of signals against the number that chance explains."""
     return ngettext(
-        "%(num)d signal, by chance %(expected)s", "%(num)d signals, by chance %(expected)s", each.signals
-    ) % {"num": each.signals, "expected": f"{each.expected:.1f}"}
+        "%(num)d signal, by chance %(expected)s", "%(num)d signals, by chance %(expected)s", rule.signals
+    ) % {"num": rule.signals, "expected": f"{rule.expected:.1f}"}
 
 
-def location(found: InTime) -> str:
+def location(in_time: InTime) -> str:
     """Describe the behaviour of the mean."""
     return {
         Location.CONSTANT: _("the mean stays"),
         Location.RANDOM: _("the mean wanders at random"),
         Location.SYSTEMATIC: _("the mean is driven: it follows a line or a course"),
         Location.BOTH: _("the mean is driven, and wanders beside it"),
-    }[found.location]
+    }[in_time.location]
 
 
-def model(found: InTime) -> str:
+def model(in_time: InTime) -> str:
     """The model in words."""
-    scatter = _("the scatter changes") if found.scatter_changes else _("the scatter stays")
-    shape = _("all readings together are normal") if found.normal_overall else _("all readings together are not normal")
-    return _("{mean}, {scatter}, {shape}.").format(mean=location(found), scatter=scatter, shape=shape).capitalize()
+    scatter = _("the scatter changes") if in_time.scatter_changes else _("the scatter stays")
+    shape = (
+        _("all readings together are normal") if in_time.normal_overall else _("all readings together are not normal")
+    )
+    return _("{mean}, {scatter}, {shape}.").format(mean=location(in_time), scatter=scatter, shape=shape).capitalize()
 
 
 def model_means(study: Study) -> str:
@@ -249,7 +251,7 @@ def model_means(study: Study) -> str:
     return sentence.format(index=index)
 
 
-def model_tests(found: InTime) -> list[tuple[str, str, str, str]]:
+def model_tests(in_time: InTime) -> list[tuple[str, str, str, str]]:
     """Question, test, its numbers, answer."""
 
     def answer(said: bool) -> str:
@@ -262,39 +264,39 @@ def model_tests(found: InTime) -> list[tuple[str, str, str, str]]:
         (
             _("Does the mean move?"),
             _("analysis of variance between subgroups"),
-            f(found.between),
-            answer(found.between.significant),
+            f(in_time.between),
+            answer(in_time.between.significant),
         ),
-        (_("Linear drift?"), _("regression of the subgroup means"), f(found.line), answer(found.line.significant)),
+        (_("Linear drift?"), _("regression of the subgroup means"), f(in_time.line), answer(in_time.line.significant)),
         (
             _("Do the means follow each other?"),
             _("von Neumann's ratio"),
-            f"C = {index(found.successive.statistic)}, {p_value(found.successive.p_value)}",
-            answer(found.successive.significant),
+            f"C = {index(in_time.successive.statistic)}, {p_value(in_time.successive.p_value)}",
+            answer(in_time.successive.significant),
         ),
         (
             _("Deviates from linear drift?"),
             _("lack of fit of the line"),
-            f(found.beside_line),
-            answer(found.beside_line.significant),
+            f(in_time.beside_line),
+            answer(in_time.beside_line.significant),
         ),
         (
             _("Does the scatter change?"),
             _("Brown-Forsythe over differences"),
-            f(found.scatter),
-            answer(found.scatter.significant),
+            f(in_time.scatter),
+            answer(in_time.scatter.significant),
         ),
     ]
 
 
-def model_note(found: InTime) -> str:
+def model_note(in_time: InTime) -> str:
     """Of what, and at which level."""
     sentence = _("{n} subgroups of {size} neighbours; tests at {level} %.").format(
-        n=found.subgroups, size=found.size, level=f"{ALPHA * 100:g}"
+        n=in_time.subgroups, size=in_time.size, level=f"{ALPHA * 100:g}"
     )
-    if found.spread:
+    if in_time.spread:
         sentence += " " + _("Evenly spread over the readings.")
-    if found.few:
+    if in_time.few:
         sentence += " " + _("ISO 22514-2 asks for 125 readings and more: a slow change may not be seen yet.")
     return sentence
 

@@ -61,13 +61,13 @@ def baseline_out(baseline: Baseline, key: str, in_force: int | None) -> Baseline
     return BaselineOut(**_numbers(baseline, key), **frozen, in_force=baseline.version == in_force)
 
 
-def left_out(found: LeftOut | None) -> LeftOutOut:
+def left_out(left: LeftOut | None) -> LeftOutOut:
     """Readings that count for nothing."""
-    if found is None:
+    if left is None:
         return LeftOutOut(excluded=[], by_baseline=[], faults=[], unknown=[], count=0)
     kinds = ("excluded", "by_baseline", "faults", "unknown")
-    numbers = {name: getattr(found, name)[-MOST_LEFT_OUT:].tolist() for name in kinds}
-    return LeftOutOut(**numbers, count=len(found))
+    numbers = {name: getattr(left, name)[-MOST_LEFT_OUT:].tolist() for name in kinds}
+    return LeftOutOut(**numbers, count=len(left))
 
 
 def signals_out(view: View, most: int) -> list[ChartSignalOut]:

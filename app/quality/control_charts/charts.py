@@ -271,7 +271,7 @@ def _averaged(baseline: Baseline, kind: Chart, values: Floats) -> ControlChart:
     return ewma.moving_average(judged_by(baseline), values, baseline.average_span)
 
 
-def _sums(made: View, baseline: Baseline, pieces: list[Floats], shown: NDArray[np.bool_]) -> View:
+def _sums(view: View, baseline: Baseline, pieces: list[Floats], shown: NDArray[np.bool_]) -> View:
     charts = [
         cusum.cusum(judged_by(baseline), part, baseline.cusum_k, baseline.cusum_h, headstart=baseline.cusum_headstart)
         for part in pieces
@@ -282,7 +282,7 @@ def _sums(made: View, baseline: Baseline, pieces: list[Floats], shown: NDArray[n
     )
     together = replace(charts[0], above=above, below=below, since_above=since_above, since_below=since_below)
     return replace(
-        made,
+        view,
         points=together.above,
         below=-together.below,
         centre=0.0,

@@ -158,9 +158,9 @@ def _plan(standing: Standing, given: PeriodIn) -> Baseline:
     )
 
 
-def _run_in(session: Session, standing: Standing, baseline: Baseline, made: ReadingSeries, window: Window) -> int:
+def _run_in(session: Session, standing: Standing, baseline: Baseline, series: ReadingSeries, window: Window) -> int:
     """Number of readings that the edges of the period take to run in, by all of their readings."""
-    lines = quantity.individuals_of(made.series, Quantity.WEAR_RESIDUALS, baseline.slope or 0.0)
+    lines = quantity.individuals_of(series.series, Quantity.WEAR_RESIDUALS, baseline.slope or 0.0)
     whole = queries.read_back(session, standing, baseline, window)
     return quantity.run_in(whole.series, window.first, baseline.slope or 0.0, lines.sigma.value)
 
@@ -172,11 +172,11 @@ def _line(series: Series) -> WearLine:
 
 
 def _estimated(
-    session: Session, standing: Standing, baseline: Baseline, made: ReadingSeries, window: Window
+    session: Session, standing: Standing, baseline: Baseline, series: ReadingSeries, window: Window
 ) -> shewhart.Baseline:
     which = Quantity(baseline.quantity)
     if baseline.grouping is None:
-        return quantity.individuals_of(made.series, which, baseline.slope or 0.0)
+        return quantity.individuals_of(series.series, which, baseline.slope or 0.0)
     groups = _groups(session, standing, baseline, window)
     limits = shewhart.subgroup_baseline(groups, ESTIMATORS[baseline.chart])
     if which is Quantity.WEAR_RESIDUALS:  # they are about their own edge's level: by design about 0
@@ -193,18 +193,21 @@ def _groups(session: Session, standing: Standing, baseline: Baseline, window: Wi
     return Subgroups(groups.sizes[inside], groups.means[inside], groups.ranges[inside], groups.deviations[inside])
 
 
-def _take(baseline: Baseline, found: shewhart.Baseline) -> None:
-    baseline.centre, baseline.sigma = found.centre, found.sigma.value
-    baseline.estimator, baseline.freedom = found.sigma.estimator.value, found.sigma.degrees_of_freedom
-    baseline.readings, baseline.groups = found.sigma.readings, found.sigma.groups
+def _take(baseline: Baseline, baseline_limits: shewhart.Baseline) -> None:
+    baseline.centre, baseline.sigma = baseline_limits.centre, baseline_limits.sigma.value
+    baseline.estimator, baseline.freedom = (
+        baseline_limits.sigma.estimator.value,
+        baseline_limits.sigma.degrees_of_freedom,
+    )
+    baseline.readings, baseline.groups = baseline_limits.sigma.readings, baseline_limits.sigma.groups
 
 
 def _cautions(
-    session: Session, standing: Standing, baseline: Baseline, made: ReadingSeries, line: WearLine, window: Window
+    session: Session, standing: Standing, baseline: Baseline, series: ReadingSeries, line: WearLine, window: Window
 ) -> list[tuple[Caution, int]]:
     """Cautions against freezing it; its own signals and normality are noted in the baseline."""
     points = queries.charted(session, standing, baseline, window)
-    values = _flat(baseline, made.series)
+    values = _flat(baseline, series.series)
     baseline.signals = _signals(baseline, points)
     baseline.normal_p = _normal_p(values)
     cautions: list[tuple[Caution, int]] = []
@@ -221,15 +224,15 @@ def _cautions(
         cautions.append((Caution.WEARS, 0))
     elif correlation is not None and correlation > CORRELATED:
         cautions.append((Caution.CORRELATED, round(correlation * 100)))
-    steps = int(made.series.begins[1:].sum())
+    steps = int(series.series.begins[1:].sum())
     if steps and which in (Quantity.DEVIATION, Quantity.WITHOUT_CORRECTIONS):
         cautions.append((Caution.STEPS, steps))
     if which is Quantity.DEVIATION and not standing.parameters.measures_only:
         corrections = statistics.numbers_of(session, standing.characteristic, window).corrections
         if corrections:
             cautions.append((Caution.CORRECTED, corrections))
-    if len(made.left_out.unknown):
-        cautions.append((Caution.UNKNOWN, len(made.left_out.unknown)))
+    if len(series.left_out.unknown):
+        cautions.append((Caution.UNKNOWN, len(series.left_out.unknown)))
     return cautions
 
 

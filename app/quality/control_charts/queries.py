@@ -154,15 +154,15 @@ def _earliest(plan: Plan, window: Window) -> int:
     return max(1, window.first - back)
 
 
-def series_of(baseline: Baseline, made: ReadingSeries) -> Series:
+def series_of(baseline: Baseline, series: ReadingSeries) -> Series:
     """The quantity itself, of what was read."""
     match Quantity(baseline.quantity):
         case Quantity.DIFFERENCES:
-            return quantity.differences(made.series)
+            return quantity.differences(series.series)
         case Quantity.WEAR_RESIDUALS:
-            return quantity.residuals(made.series, baseline.slope or 0.0, baseline.settle or SETTLE)
+            return quantity.residuals(series.series, baseline.slope or 0.0, baseline.settle or SETTLE)
         case _:
-            return made.series
+            return series.series
 
 
 def points_of(baseline: Baseline, made: ReadingSeries, window: Window) -> Charted:
@@ -206,14 +206,16 @@ def points_of(baseline: Baseline, made: ReadingSeries, window: Window) -> Charte
     )
 
 
-def _through(made: ReadingSeries, last: int) -> ReadingSeries:
+def _through(series: ReadingSeries, last: int) -> ReadingSeries:
     """Without what was read of the time after the window."""
-    until_end = made.series.sequence <= last
-    left_out = made.left_out.within(1, last)
-    return ReadingSeries(made.series.only(until_end), made.measured_at[until_end], made.labels[until_end], left_out)
+    until_end = series.series.sequence <= last
+    left_out = series.left_out.within(1, last)
+    return ReadingSeries(
+        series.series.only(until_end), series.measured_at[until_end], series.labels[until_end], left_out
+    )
 
 
-def _singly(baseline: Baseline, made: ReadingSeries, shown: ReadingSeries, window: Window, settling: int) -> Charted:
+def _singly(baseline: Baseline, series: ReadingSeries, shown: ReadingSeries, window: Window, settling: int) -> Charted:
     inside = shown.series.sequence >= window.first
     sequence, at = shown.series.sequence[inside], shown.measured_at[inside]
     values: Floats = shown.series.values[inside]
@@ -229,7 +231,7 @@ def _singly(baseline: Baseline, made: ReadingSeries, shown: ReadingSeries, windo
         shown.series.begins[inside],
         shown.series,
         shown.measured_at,
-        made,
+        series,
         0,
         settling,
     )

@@ -126,9 +126,9 @@ def _found(baseline: Baseline, place: Place, names: tuple[RuleName, ...], piece:
 
 
 def _tried(
-    baseline: Baseline, place: Place, names: list[RuleName], found: list[SignalSpan], piece: Piece | None
+    baseline: Baseline, place: Place, names: list[RuleName], spans: list[SignalSpan], piece: Piece | None
 ) -> RuleTrial:
-    mine = [span for span in found if span.rule in names]
+    mine = [span for span in spans if span.rule in names]
     return RuleTrial(
         len(mine),
         0 if piece is None else len(piece.last),

@@ -162,14 +162,14 @@ def _labels(session: Session, standing: Standing, window: Window, sequence: Whol
     return ids[np.searchsorted(np.array(starts, np.int64), sequence, side="right")]
 
 
-def groups_of(plan: Plan, made: ReadingSeries, window: Window) -> tuple[Whole, int]:
+def groups_of(plan: Plan, series: ReadingSeries, window: Window) -> tuple[Whole, int]:
     """To which subgroup each value belongs (numbers that grow), -1 for those of the last one that is not complete.
 
     Subgroups of n readings are counted from the first reading of the baseline's period, and again from the first one after
     it; so the same readings make the same subgroup whichever of them are looked at. What was excluded makes its subgroup
     smaller. window: what was read, to its end. The second number: how many readings the newest subgroup has so far.
     """
-    sequence = made.series.sequence
+    sequence = series.series.sequence
     if not len(sequence):
         return sequence, 0
     after = sequence > plan.last_sequence
@@ -181,7 +181,7 @@ def groups_of(plan: Plan, made: ReadingSeries, window: Window) -> tuple[Whole, i
         complete = ends <= np.where(after, window.last, min(window.last, plan.last_sequence))
     else:
         complete = np.ones(len(sequence), np.bool_)
-        block = _parted(plan, made)
+        block = _parted(plan, series)
         if after[-1] or window.last < plan.last_sequence:
             complete[(block == block[-1]) & (after == after[-1])] = False  # it may still grow
     changes = np.ones(len(sequence), np.bool_)
@@ -192,11 +192,11 @@ def groups_of(plan: Plan, made: ReadingSeries, window: Window) -> tuple[Whole, i
     return np.where(complete, number, -1), waiting
 
 
-def _parted(plan: Plan, made: ReadingSeries) -> Whole:
-    new = np.ones(len(made.labels), np.bool_)
+def _parted(plan: Plan, series: ReadingSeries) -> Whole:
+    new = np.ones(len(series.labels), np.bool_)
     if plan.grouping == "part":
-        new[1:] = (np.diff(made.labels) != 0) | (made.labels[1:] == 0)
+        new[1:] = (np.diff(series.labels) != 0) | (series.labels[1:] == 0)
     else:
         pause = np.timedelta64(round((plan.group_pause or 0) * 60e6), "us")
-        new[1:] = np.diff(made.measured_at) > pause
+        new[1:] = np.diff(series.measured_at) > pause
     return np.cumsum(new)

@@ -175,13 +175,13 @@ class _Pass:
             looked, pointed = last, max(pointed, int(charted.last[-1]) if len(charted) else 0)
         return spans, {place.value: watch.memory() for place, watch in watches.items()}, pointed
 
-    def _keep(self, found: dict[Key, SignalSpan]) -> _PassResult:
+    def _keep(self, spans: dict[Key, SignalSpan]) -> _PassResult:
         """Each run is one signal: it is added, or goes on. Judged from the start, a signal that no longer fires is withdrawn."""
         now = datetime.now(UTC)
-        before = self._stored(found)
-        rows = self._matched(before, found)
+        before = self._stored(spans)
+        rows = self._matched(before, spans)
         added, changed = [], []
-        for key, run in found.items():
+        for key, run in spans.items():
             row = rows.get(key)
             if row is None:
                 rows[key] = self._added(chart_at(self.baseline, key[0]), run)
@@ -190,14 +190,14 @@ class _Pass:
                 row.first_sequence, row.last_sequence, row.points = run[2:]
                 row.last_at, row.withdrawn_at = now, None
                 changed.append(row)
-        added.sort(key=lambda key: (found[key].last, found[key].first))  # numbers go up with the readings
+        added.sort(key=lambda key: (spans[key].last, spans[key].first))  # numbers go up with the readings
         gone = self._gone(before, set(rows.values())) if self.from_start and self.same_baseline else []
         for row in gone:
             row.withdrawn_at = now
         new = [rows[key] for key in added]
         self.session.add_all(new)
         self.session.flush()
-        alarming = [rows[key] for key in added if self._alarms(key, found[key])]
+        alarming = [rows[key] for key in added if self._alarms(key, spans[key])]
         grown = [row for row in changed if row.alarm is not None]
         return _PassResult([row.id for row in (*new, *changed, *gone)], alarming, grown)
 
@@ -206,11 +206,11 @@ class _Pass:
         setting = self.watched.rules[key[0]][key[1]]
         return setting.do is Do.ALARM and run.last > max(self.known_through, setting.since)
 
-    def _matched(self, before: list[Signal], found: dict[Key, SignalSpan]) -> dict[Key, Signal]:
+    def _matched(self, before: list[Signal], spans: dict[Key, SignalSpan]) -> dict[Key, Signal]:
         """The signals that these runs are: those that begin there, else the first that shares readings with it."""
         runs = {
             key: (chart_at(self.baseline, key[0]).value, run.rule.value, run.side, run.first)
-            for key, run in found.items()
+            for key, run in spans.items()
         }
         beginning = {(row.chart, row.rule, row.side, row.first_sequence): row for row in before}
         rows = {key: beginning[known] for key, known in runs.items() if known in beginning}
@@ -220,13 +220,13 @@ class _Pass:
             if key not in rows:
                 for row in left:
                     alike = (row.chart, row.rule, row.side) == (chart, rule, side)
-                    if alike and row.first_sequence <= found[key].last and row.last_sequence >= first:
+                    if alike and row.first_sequence <= spans[key].last and row.last_sequence >= first:
                         rows[key] = row
                         left.remove(row)
                         break
         return rows
 
-    def _stored(self, found: dict[Key, SignalSpan]) -> list[Signal]:
+    def _stored(self, spans: dict[Key, SignalSpan]) -> list[Signal]:
         """The signals by this baseline that may be meant: all of them when judged from the start."""
         query = select(Signal).where(
             Signal.machine_id == self.row.machine_id,
@@ -235,7 +235,7 @@ class _Pass:
         )
         if not self.from_start:
             query = query.where(
-                Signal.last_sequence >= min((run.first for run in found.values()), default=self.newest + 1)
+                Signal.last_sequence >= min((run.first for run in spans.values()), default=self.newest + 1)
             )
         return list(self.session.scalars(query.order_by(Signal.first_sequence)))
 

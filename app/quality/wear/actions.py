@@ -49,7 +49,7 @@ def look_ahead(session: Session, unit: Unit) -> None:
         publish(session, _tell(session, standing, hunting))
 
 
-def _tell(session: Session, standing: Standing, found: Hunting) -> dict[str, Any]:
+def _tell(session: Session, standing: Standing, hunting: Hunting) -> dict[str, Any]:
     """Raise the alarm: under the machine's lock, as whoever acknowledges the one before it. What is told to live pages."""
     alarm = alarms.raise_for_characteristic(
         session,
@@ -57,7 +57,7 @@ def _tell(session: Session, standing: Standing, found: Hunting) -> dict[str, Any
         standing.characteristic.id,
         standing.parameters.tool_memory,
         HUNTING,
-        wording.hunting_data(found) | {"settings": {name: standing.version.parameters[name] for name in SAID}},
+        wording.hunting_data(hunting) | {"settings": {name: standing.version.parameters[name] for name in SAID}},
     )
     return {
         "kind": "alarm",

@@ -155,14 +155,14 @@ def _forecast(towards: Towards, limit: float, forecast: Forecast) -> ForecastOut
     return ForecastOut(towards=towards.value, limit=limit, parts=forecast.parts, low=forecast.low, high=high)
 
 
-def _hunting(found: Hunting | None, settings: dict[str, Any]) -> HuntingOut | None:
-    if found is None:
+def _hunting(hunting: Hunting | None, settings: dict[str, Any]) -> HuntingOut | None:
+    if hunting is None:
         return None
-    data = wording.hunting_data(found)
+    data = wording.hunting_data(hunting)
     remedy = data.pop("remedy")
     return HuntingOut(
         **data,
-        probability=found.probability,
+        probability=hunting.probability,
         remedy=None if remedy is None else RemedyOut(**{name: remedy[name] for name in RemedyOut.model_fields}),
         text=wording.hunting_sentence(data),
         what_to_do=wording.remedy_sentence(data | {"remedy": remedy}, settings),

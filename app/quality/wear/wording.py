@@ -145,20 +145,20 @@ def hunting_word(state: LoopVerdict | str) -> str:
     }[LoopVerdict(state)]
 
 
-def hunting_data(found: Hunting) -> dict[str, Any]:
+def hunting_data(hunting: Hunting) -> dict[str, Any]:
     """Values that the sentences are worded from; an alarm keeps them."""
-    remedy = found.remedy
+    remedy = hunting.remedy
     return {
-        "state": found.state.value,
-        "readings": found.readings,
-        "corrections": found.corrections,
-        "reversals": found.reversals,
-        "mean_size": found.mean_size,
-        "scatter": found.scatter,
-        "expected_corrections": found.expected.corrections if found.expected else None,
-        "expected_reversals": found.expected.reversals if found.expected else None,
-        "expected_size": found.expected.size if found.expected else None,
-        "excess": found.expected.excess if found.expected else None,
+        "state": hunting.state.value,
+        "readings": hunting.readings,
+        "corrections": hunting.corrections,
+        "reversals": hunting.reversals,
+        "mean_size": hunting.mean_size,
+        "scatter": hunting.scatter,
+        "expected_corrections": hunting.expected.corrections if hunting.expected else None,
+        "expected_reversals": hunting.expected.reversals if hunting.expected else None,
+        "expected_size": hunting.expected.size if hunting.expected else None,
+        "excess": hunting.expected.excess if hunting.expected else None,
         "remedy": None if remedy is None else remedy._asdict(),
     }
 

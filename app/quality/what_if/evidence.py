@@ -80,15 +80,15 @@ def _unsaid(refused: Refused) -> str:
     return wording.effect_unknown(refused, refusal(refused))
 
 
-def cell_of(made: Map, at: int, cell: Cell) -> dict[str, Any]:
+def cell_of(settings_map: Map, at: int, cell: Cell) -> dict[str, Any]:
     """One cell of a map; what cannot be set says why."""
     figures = cell.figures
     return {
         "weighting_factor": cell.weighting_factor,
         "zero_range": cell.zero_range,
         "figures": None if figures is None else figures_of(figures),
-        "inside": made.region.inside[at],
-        "best": made.region.best == at,
-        "calmest": made.region.calmest == at,
-        "reason": None if figures is not None else wording.out_of_order(cell.zero_range, made.averaging_limit),
+        "inside": settings_map.region.inside[at],
+        "best": settings_map.region.best == at,
+        "calmest": settings_map.region.calmest == at,
+        "reason": None if figures is not None else wording.out_of_order(cell.zero_range, settings_map.averaging_limit),
     }

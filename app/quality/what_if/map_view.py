@@ -39,23 +39,23 @@ class MapView(NamedTuple):
     explained: str
 
 
-def view_of(made: Map, answer: Simulation, typed: Mapping[str, str], key: str) -> MapView:
+def view_of(settings_map: Map, answer: Simulation, typed: Mapping[str, str], key: str) -> MapView:
     """Everything in words, shades by rank, so that one bad corner does not wash out the rest."""
     values = [
-        value_of(cell.figures, made.criterion) if cell.figures is not None and choice else None
-        for cell, choice in zip(made.cells, made.region.choice, strict=True)
+        value_of(cell.figures, settings_map.criterion) if cell.figures is not None and choice else None
+        for cell, choice in zip(settings_map.cells, settings_map.region.choice, strict=True)
     ]
-    known = sorted({value for value in values if value is not None}, reverse=made.criterion is Criterion.PPK)
+    known = sorted({value for value in values if value is not None}, reverse=settings_map.criterion is Criterion.PPK)
     rank = {value: at * LEVELS // max(1, len(known)) for at, value in enumerate(known)}
-    wide = len(made.zero_ranges)
-    today, chosen = made.past.standing.parameters, answer.parameters
-    at_today = _at(made, today.weighting_factor, today.zero_range)
-    if abs(made.averaging_limit - today.averaging_limit) > 1e-9:
+    wide = len(settings_map.zero_ranges)
+    today, chosen = settings_map.past.standing.parameters, answer.parameters
+    at_today = _at(settings_map, today.weighting_factor, today.zero_range)
+    if abs(settings_map.averaging_limit - today.averaging_limit) > 1e-9:
         at_today = None
-    at_chosen = _at(made, chosen.weighting_factor, chosen.zero_range)
+    at_chosen = _at(settings_map, chosen.weighting_factor, chosen.zero_range)
     cells = [
         _cell(
-            made,
+            settings_map,
             at,
             cell,
             None if values[at] is None else rank[values[at]],  # type: ignore[index]
@@ -64,23 +64,23 @@ def view_of(made: Map, answer: Simulation, typed: Mapping[str, str], key: str) -
             today=at == at_today,
             chosen=at == at_chosen,
         )
-        for at, cell in enumerate(made.cells)
+        for at, cell in enumerate(settings_map.cells)
     ]
-    cells = [cell._replace(edges=_edges(made.region.inside, at, wide)) for at, cell in enumerate(cells)]
+    cells = [cell._replace(edges=_edges(settings_map.region.inside, at, wide)) for at, cell in enumerate(cells)]
     return MapView(
-        [short(r33 * 1000) for r33 in made.zero_ranges],
+        [short(r33 * 1000) for r33 in settings_map.zero_ranges],
         [
             (f"{k:.6g}", cells[row * wide : (row + 1) * wide])
-            for row, k in reversed(list(enumerate(made.weighting_factors)))
+            for row, k in reversed(list(enumerate(settings_map.weighting_factors)))
         ],
-        _region(made),
-        wording.criterion_explained(made.criterion),
+        _region(settings_map),
+        wording.criterion_explained(settings_map.criterion),
     )
 
 
-def _at(made: Map, k: float, r33: float) -> int | None:
-    row, column = map_axes.place(made.weighting_factors, k), map_axes.place(made.zero_ranges, r33)
-    return None if row is None or column is None else row * len(made.zero_ranges) + column
+def _at(settings_map: Map, k: float, r33: float) -> int | None:
+    row, column = map_axes.place(settings_map.weighting_factors, k), map_axes.place(settings_map.zero_ranges, r33)
+    return None if row is None or column is None else row * len(settings_map.zero_ranges) + column
 
 
 def _edges(inside: Sequence[bool], at: int, wide: int) -> str:
@@ -97,16 +97,22 @@ def _edges(inside: Sequence[bool], at: int, wide: int) -> str:
     return "".join(side for side, there in neighbours.items() if there is None or not inside[there])
 
 
-def _cell(made: Map, at: int, cell: Cell, level: int | None, href: str, *, today: bool, chosen: bool) -> CellView:
+def _cell(
+    settings_map: Map, at: int, cell: Cell, level: int | None, href: str, *, today: bool, chosen: bool
+) -> CellView:
     named = _("k {k}, R33 {r33}").format(
         k=f"{cell.weighting_factor:.6g}", r33=wording.setting("zero_range", cell.zero_range)
     )
     if cell.figures is None:
         return CellView(
-            None, "", f"{named}: {wording.out_of_order(cell.zero_range, made.averaging_limit)}", None,
+            None, "", f"{named}: {wording.out_of_order(cell.zero_range, settings_map.averaging_limit)}", None,
             False, False, False, today, chosen, "",
         )  # fmt: skip
-    inside, best, calmest = made.region.inside[at], made.region.best == at, made.region.calmest == at
+    inside, best, calmest = (
+        settings_map.region.inside[at],
+        settings_map.region.best == at,
+        settings_map.region.calmest == at,
+    )
     lines = [
         f"{name} {value[0]}"
         for name, value in wording.rows([cell.figures])
@@ -122,28 +128,28 @@ def _cell(made: Map, at: int, cell: Cell, level: int | None, href: str, *, today
         )
         if holds
     ]
-    sequence = made.past.history["sequence"]
+    sequence = settings_map.past.history["sequence"]
     window = _("of {n} readings, {first} to {last}").format(n=cell.figures.inner, first=sequence[0], last=sequence[-1])
     title = f"{named}: {', '.join(lines)}, {window}" + (f" ({', '.join(marks)})" if marks else "")
-    text = wording.cell(cell.figures, made.criterion)
+    text = wording.cell(cell.figures, settings_map.criterion)
     return CellView(href, text, title, level, inside, best, calmest, today, chosen, "")
 
 
-def _region(made: Map) -> str:
-    if made.region.best is None or made.region.calmest is None:
+def _region(settings_map: Map) -> str:
+    if settings_map.region.best is None or settings_map.region.calmest is None:
         return _("No setting of this map meets this goal.")
-    best, calmest = made.cells[made.region.best], made.cells[made.region.calmest]
+    best, calmest = settings_map.cells[settings_map.region.best], settings_map.cells[settings_map.region.calmest]
     assert best.figures is not None
     assert calmest.figures is not None
-    inside = [cell for cell, holds in zip(made.cells, made.region.inside, strict=True) if holds]
+    inside = [cell for cell, holds in zip(settings_map.cells, settings_map.region.inside, strict=True) if holds]
     ks, r33s = [cell.weighting_factor for cell in inside], [cell.zero_range for cell in inside]
     lines = [
         _("Best is k {k} with R33 {r33}: {criterion} {value}, now {today}.").format(
             k=f"{best.weighting_factor:.6g}",
             r33=wording.setting("zero_range", best.zero_range),
-            criterion=wording.criterion(made.criterion),
-            value=wording.cell(best.figures, made.criterion),
-            today=wording.cell(made.today, made.criterion),
+            criterion=wording.criterion(settings_map.criterion),
+            value=wording.cell(best.figures, settings_map.criterion),
+            today=wording.cell(settings_map.today, settings_map.criterion),
         )
     ]
     if len(inside) > 1:
@@ -152,14 +158,14 @@ def _region(made: Map) -> str:
                 "{count} settings are as good (within 5 %, or what {readings} readings can tell): k {low_k} to {high_k}, R33 {low} to {high} µm."
             ).format(
                 count=len(inside),
-                readings=made.today.inner,
+                readings=settings_map.today.inner,
                 low_k=f"{min(ks):.6g}",
                 high_k=f"{max(ks):.6g}",
                 low=short(min(r33s) * 1000),
                 high=short(max(r33s) * 1000),
             )
         )
-    if made.region.calmest != made.region.best:
+    if settings_map.region.calmest != settings_map.region.best:
         lines.append(
             _(
                 "Fewest corrections among the equally good: k {k} with R33 {r33}, {count} corrections; now {today}."
@@ -167,7 +173,7 @@ def _region(made: Map) -> str:
                 k=f"{calmest.weighting_factor:.6g}",
                 r33=wording.setting("zero_range", calmest.zero_range),
                 count=calmest.figures.corrections,
-                today=made.today.corrections,
+                today=settings_map.today.corrections,
             )
         )
     return " ".join(lines)

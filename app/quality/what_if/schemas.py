@@ -208,16 +208,16 @@ class MapOut(PeriodOut):
     cells: list[CellOut]
 
     @classmethod
-    def of(cls, made: Map) -> "MapOut":
+    def of(cls, settings_map: Map) -> "MapOut":
         """As it is answered."""
         return cls.model_validate(
-            period_of(made.past)
+            period_of(settings_map.past)
             | {
-                "criterion": made.criterion,
-                "averaging_limit": made.averaging_limit,
-                "delay": made.delay,
-                "today": made.today._asdict() | {"alarms": made.today.alarms},
-                "cells": [cell_of(made, at, cell) for at, cell in enumerate(made.cells)],
+                "criterion": settings_map.criterion,
+                "averaging_limit": settings_map.averaging_limit,
+                "delay": settings_map.delay,
+                "today": settings_map.today._asdict() | {"alarms": settings_map.today.alarms},
+                "cells": [cell_of(settings_map, at, cell) for at, cell in enumerate(settings_map.cells)],
             }
         )
 

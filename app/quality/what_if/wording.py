@@ -67,17 +67,17 @@ def moment(text: str) -> datetime:
     return datetime.fromisoformat(text[:19] + "+00:00")
 
 
-def effect(found: Effect) -> str:
+def effect(effect_size: Effect) -> str:
     """Effect of corrections on this machine."""
     sentence = _(
         "On this machine a correction of 10 µm moves the part by {value} µm ({low}…{high}), by {count} corrections."
     ).format(
-        value=f"{10 * found.value:.1f}",
-        low=f"{10 * found.low:.1f}",
-        high=f"{10 * found.high:.1f}",
-        count=found.corrections,
+        value=f"{10 * effect_size.value:.1f}",
+        low=f"{10 * effect_size.low:.1f}",
+        high=f"{10 * effect_size.high:.1f}",
+        count=effect_size.corrections,
     )
-    if found.is_full:
+    if effect_size.is_full:
         return sentence + " " + _("This agrees with the assumption that they act in full.")
     return (
         sentence
@@ -86,7 +86,7 @@ def effect(found: Effect) -> str:
             _(
                 "They act by less than in full: replay with the measured effect, and look for play, a soft set-up or a wrong factor."
             )
-            if found.value < 1
+            if effect_size.value < 1
             else _("They act by more than in full: replay with the measured effect, and look at the factor.")
         )
     )

@@ -62,7 +62,7 @@ def measure(
             ),
             do=_("Sizes are in mm, with a decimal point."),
         )
-    made = HandMeasurement(
+    measurement = HandMeasurement(
         machine_id=entry.machine_id,
         characteristic_id=entry.characteristic_id,
         sequence=sequence,
@@ -72,7 +72,7 @@ def measure(
         comment=result.comment,
         alarm=alarm,
     )
-    session.add(made)
+    session.add(measurement)
     session.flush()
     record(
         session,
@@ -93,7 +93,7 @@ def measure(
             "by_hand": True,
         },
     )
-    return made
+    return measurement
 
 
 def measure_typed(

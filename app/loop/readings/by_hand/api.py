@@ -43,8 +43,10 @@ def add_hand_measurement(
     """Enter what a person measured on this part. It stands beside the machine's value; the decision stays as it was."""
     entry = _entry(session, caller, characteristic)
     good = None if given.verdict is None else given.verdict == "good"
-    made = actions.measure(session, entry, sequence, HandResult(given.measured, good, given.comment), caller.name)
-    return HandMeasurementOut.model_validate(as_json(made))
+    measurement = actions.measure(
+        session, entry, sequence, HandResult(given.measured, good, given.comment), caller.name
+    )
+    return HandMeasurementOut.model_validate(as_json(measurement))
 
 
 @router.get("/characteristics/{characteristic}/hand-measurements", responses=problems(404))

@@ -22,11 +22,11 @@ def of_readings(
     """Those of these readings, by reading, the latest last."""
     if not sequences:
         return {}
-    found: dict[int, list[HandMeasurement]] = defaultdict(list)
+    measurements: dict[int, list[HandMeasurement]] = defaultdict(list)
     wanted = _here(machine_id, characteristic_id).where(HandMeasurement.sequence.in_(sequences))
-    for each in session.scalars(wanted.order_by(HandMeasurement.sequence, HandMeasurement.id)):
-        found[each.sequence].append(each)
-    return dict(found)
+    for measurement in session.scalars(wanted.order_by(HandMeasurement.sequence, HandMeasurement.id)):
+        measurements[measurement.sequence].append(measurement)
+    return dict(measurements)
 
 
 def between(

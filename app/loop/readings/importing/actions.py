@@ -43,21 +43,23 @@ def import_readings(
                 _("There is no characteristic {key}.").format(key=repr(characteristic)),
                 _("Check its key under Set-up, or set it up first."),
             )
-        found = lines(path, layout, characteristic)
+        parsed_lines = lines(path, layout, characteristic)
         if not live:
-            summary = store_history(session, entry, found, actor=actor, source=source or path.name, progress=progress)
+            summary = store_history(
+                session, entry, parsed_lines, actor=actor, source=source or path.name, progress=progress
+            )
             if dry_run:
                 session.rollback()
             else:
                 session.commit()
             return summary
-    return _store_live(database, entry, found, dry_run=dry_run, progress=progress)
+    return _store_live(database, entry, parsed_lines, dry_run=dry_run, progress=progress)
 
 
 def _store_live(
-    database: Database, entry: Entry, found: Iterable[Line | Flaw], *, dry_run: bool, progress: Progress
+    database: Database, entry: Entry, parsed_lines: Iterable[Line | Flaw], *, dry_run: bool, progress: Progress
 ) -> Summary:
-    wanted, numbers = _all_good(found, progress)
+    wanted, numbers = _all_good(parsed_lines, progress)
     summary = Summary(lines=len(wanted))
     times = [reading.measured_at or datetime.now(UTC) for reading in wanted]
     summary.first_at, summary.last_at = min(times), max(times)
@@ -83,12 +85,12 @@ def _store_live(
     return summary
 
 
-def _all_good(found: Iterable[Line | Flaw], progress: Progress) -> tuple[list[ReadingIn], list[int]]:
+def _all_good(parsed_lines: Iterable[Line | Flaw], progress: Progress) -> tuple[list[ReadingIn], list[int]]:
     wanted: list[ReadingIn] = []
     numbers: list[int] = []
     flaws: list[Flaw] = []
     wrong = 0
-    for line in found:
+    for line in parsed_lines:
         progress()
         if isinstance(line, Flaw):
             wrong += 1

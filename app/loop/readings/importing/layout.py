@@ -227,9 +227,9 @@ def _columns(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str, t
                 columns[name] = places
     if problems:
         raise Invalid(problems[0].message, _("Nothing was imported."), errors=problems)
-    taken = {place for places in columns.values() for place in places}
+    used_places = {place for places in columns.values() for place in places}
     guesses = _guesses(header).items()
-    columns |= {name: guess for name, guess in guesses if name not in mapping and not taken & set(guess)}
+    columns |= {name: guess for name, guess in guesses if name not in mapping and not used_places & set(guess)}
     return columns
 
 
@@ -239,8 +239,8 @@ def _places(header: tuple[str, ...], column: str) -> tuple[int, ...] | None:
     if place is not None:
         return (place,)
     places = [_place(header, part.strip()) for part in column.split("+")]
-    found = tuple(place for place in places if place is not None)
-    return found if len(found) == len(places) else None
+    named_places = tuple(place for place in places if place is not None)
+    return named_places if len(named_places) == len(places) else None
 
 
 def _place(header: tuple[str, ...], column: str) -> int | None:
@@ -253,14 +253,14 @@ def _place(header: tuple[str, ...], column: str) -> int | None:
 
 def _guesses(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     names = [cell_values.folded(name) for name in header]
-    found: dict[str, tuple[int, ...]] = {}
+    guesses: dict[str, tuple[int, ...]] = {}
     for name, words in NAMES.items():
         folded = [cell_values.folded(word) for word in words]
         ranked = sorted((folded.index(each), place) for place, each in enumerate(names) if each in folded)
         if ranked:
-            found[name] = (ranked[0][1],)
+            guesses[name] = (ranked[0][1],)
     date = next((place for place, each in enumerate(names) if each in DATES), None)
     time = next((place for place, each in enumerate(names) if each in TIMES), None)
     if date is not None and time is not None:
-        found["measured_at"] = (date, time)
-    return found
+        guesses["measured_at"] = (date, time)
+    return guesses

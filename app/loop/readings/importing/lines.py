@@ -51,21 +51,21 @@ def lines(path: Path, layout: Layout, characteristic: str, *, now: datetime | No
     now = now or datetime.now(UTC)
     mark = fingerprint(path)
     source = _csv(path, layout) if layout.kind == "csv" else _json(path, layout)
-    for number, found in source:
-        if isinstance(found, Flaw):
-            yield found
+    for number, item in source:
+        if isinstance(item, Flaw):
+            yield item
             continue
-        found["characteristic"] = characteristic
-        if found.get("touches") is not None:
-            found.pop("measured", None)  # it is made of them
-        if found.get("key") is None:
-            found["key"] = f"file:{mark}:{number}"
+        item["characteristic"] = characteristic
+        if item.get("touches") is not None:
+            item.pop("measured", None)  # it is made of them
+        if item.get("key") is None:
+            item["key"] = f"file:{mark}:{number}"
         try:
-            yield Line(number, reading_of(found, now))
+            yield Line(number, reading_of(item, now))
         except Invalid as refusal:
             for error in refusal.errors:
                 column = layout.named(error.field.partition(".")[0]) or error.field
-                yield Flaw(number, column, _shown(found.get(error.field)), error.message)
+                yield Flaw(number, column, _shown(item.get(error.field)), error.message)
 
 
 def _shown(value: Any) -> str:
@@ -86,18 +86,18 @@ def _csv(path: Path, layout: Layout) -> Found:
             if len(row.cells) < width or any(cell.strip() for cell in row.cells[width:]):
                 yield row.line, Flaw(row.line, "", "", _width(len(row.cells), width, layout.delimiter))
                 continue
-            found: dict[str, Any] = {}
+            values: dict[str, Any] = {}
             flaws: list[Flaw] = []
             for name, places, read in readers:
                 text = " ".join(row.cells[place] for place in places).strip()
                 try:
-                    found[name] = read(text)
+                    values[name] = read(text)
                 except Unreadable as error:
                     flaws.append(Flaw(row.line, layout.named(name), _shown(text), str(error)))
             if flaws:
                 yield from ((row.line, flaw) for flaw in flaws)
             else:
-                yield row.line, found
+                yield row.line, values
     except Unusable as error:
         yield error.line or 0, Flaw(error.line or 0, "", "", str(error))
 
@@ -154,16 +154,16 @@ def _json(path: Path, layout: Layout) -> Found:
         if not isinstance(value, dict):
             yield number, Flaw(number, "", _shown(value), _("is not a JSON object with the fields of a reading"))
             continue
-        found = {
+        values = {
             name: value.get(layout.header[places[0]])
             for name, places in layout.columns.items()
             if value.get(layout.header[places[0]]) is not None
         }
-        flaws = list(_converted(found, layout, number))
+        flaws = list(_converted(values, layout, number))
         if flaws:
             yield from ((number, flaw) for flaw in flaws)
         else:
-            yield number, found
+            yield number, values
 
 
 def objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:
@@ -185,14 +185,14 @@ def objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:
         yield number + 1, Flaw(number + 1, "", "", _("JSON files are UTF-8 text; this is not."))
 
 
-def _converted(found: dict[str, Any], layout: Layout, number: int) -> Iterator[Flaw]:
+def _converted(values: dict[str, Any], layout: Layout, number: int) -> Iterator[Flaw]:
     """Bring lengths to mm and times to their zone; what is of the wrong kind is told with the other fields."""
     scale = UNITS[layout.unit]
-    if scale != 1.0 and isinstance(found.get("measured"), int | float) and abs(found["measured"]) < 1e300:
-        found["measured"] = round(found["measured"] * scale, 9)
+    if scale != 1.0 and isinstance(values.get("measured"), int | float) and abs(values["measured"]) < 1e300:
+        values["measured"] = round(values["measured"] * scale, 9)
     for name in ("measured_at", "machined_at"):
-        if isinstance(found.get(name), str):
+        if isinstance(values.get(name), str):
             try:
-                found[name] = cell_values.moment(found[name], layout.zone, layout.time_format)
+                values[name] = cell_values.moment(values[name], layout.zone, layout.time_format)
             except Unreadable as error:
-                yield Flaw(number, layout.named(name), _shown(found[name]), str(error))
+                yield Flaw(number, layout.named(name), _shown(values[name]), str(error))

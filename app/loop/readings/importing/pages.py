@@ -118,15 +118,21 @@ def _preview(
     standing = characteristics.characteristic_named(session, characteristic)
     session.commit()  # nothing is kept open while the file is read
     layout: Layout | None = None
-    found: Preview | None = None
+    preview_result: Preview | None = None
     trouble: InbandError | None = None
     try:
         layout = look(upload.path, _wishes(said), upload.name, complete=False)
-        found = preview(_database(request), characteristic, upload.path, layout)
-        trouble = found.trouble
+        preview_result = preview(_database(request), characteristic, upload.path, layout)
+        trouble = preview_result.trouble
     except InbandError as error:
         trouble = error
-    ready = found is not None and layout is not None and layout.complete and not found.flaw_count and trouble is None
+    ready = (
+        preview_result is not None
+        and layout is not None
+        and layout.complete
+        and not preview_result.flaw_count
+        and trouble is None
+    )
     return page(
         request,
         "imports/preview.html",
@@ -135,7 +141,7 @@ def _preview(
         size=upload.path.stat().st_size,
         to=standing,
         layout=layout,
-        found=found,
+        found=preview_result,
         trouble=trouble,
         ready=ready,
         said={name: said.get(name, "") for name in HOW},
@@ -167,13 +173,15 @@ def _fields(layout: Layout) -> list[dict[str, Any]]:
         "key": _("Key"),
     }
     columns = [(str(at), name or _("Column {n}").format(n=at)) for at, name in enumerate(layout.header, start=1)]
-    made: list[dict[str, Any]] = []
+    fields: list[dict[str, Any]] = []
     for name, label in labels.items():
         places = layout.columns.get(name, ())
         value = "+".join(str(place + 1) for place in places)
         pair = [(value, layout.named(name))] if len(places) > 1 else []
-        made.append({"name": f"column_{name}", "label": label, "value": value, "options": [("", "–"), *pair, *columns]})
-    return made
+        fields.append(
+            {"name": f"column_{name}", "label": label, "value": value, "options": [("", "–"), *pair, *columns]}
+        )
+    return fields
 
 
 def _database(request: Request) -> Database:
@@ -197,7 +205,7 @@ def import_it(
     except Flawed:
         return _preview(request, session, caller, settings, token, characteristic, form, status=422)
     uploads.forget(upload)
-    told = {"characteristic": characteristic, "stored": summary.stored, "repeated": summary.repeated}
+    outcome = {"characteristic": characteristic, "stored": summary.stored, "repeated": summary.repeated}
     if summary.first_sequence is not None:
-        told["first"] = summary.first_sequence
-    return RedirectResponse(f"/import?{urlencode(told)}", 303)
+        outcome["first"] = summary.first_sequence
+    return RedirectResponse(f"/import?{urlencode(outcome)}", 303)

@@ -46,8 +46,8 @@ def preview(database: Database, characteristic: str, path: Path, layout: Layout)
     if not layout.complete:
         return Preview(shown, None, [], 0, None, None)
     if path.stat().st_size > TRIED_WHOLE:
-        found = islice(lines(path, layout, characteristic), CHECKED_LINES)
-        flaws = [each for each in found if isinstance(each, Flaw)]
+        parsed_lines = islice(lines(path, layout, characteristic), CHECKED_LINES)
+        flaws = [line for line in parsed_lines if isinstance(line, Flaw)]
         return Preview(shown, None, flaws[:MOST_FLAWS], len(flaws), None, CHECKED_LINES)
     try:
         summary = import_readings(database, characteristic, path, layout, actor="", dry_run=True)
@@ -64,14 +64,14 @@ def _shown(path: Path, layout: Layout, characteristic: str) -> Iterator[PreviewL
     flaws: dict[int, list[Flaw]] = {}
     if layout.complete:
         last = max(raw, default=0)
-        for each in lines(path, layout, characteristic):
-            number = each.number if isinstance(each, Line) else each.line
+        for line in lines(path, layout, characteristic):
+            number = line.number if isinstance(line, Line) else line.line
             if number > last:
                 break
-            if isinstance(each, Line):
-                read[number] = each
+            if isinstance(line, Line):
+                read[number] = line
             else:
-                flaws.setdefault(number, []).append(each)
+                flaws.setdefault(number, []).append(line)
     for number, cells in raw.items():
         yield PreviewLine(number, cells, read.get(number), flaws.get(number, []))
 

@@ -48,13 +48,13 @@ def count_open(session: Session) -> int:
     return session.scalar(select(func.count()).select_from(ReportJob).where(ReportJob.state.in_(OPEN))) or 0
 
 
-def content(session: Session, found: ReportJob) -> bytes:
+def content(session: Session, job: ReportJob) -> bytes:
     """The file. Raises `Conflict` while there is none."""
-    whole = session.scalar(select(ReportFile.content).where(ReportFile.job_id == found.id))
+    whole = session.scalar(select(ReportFile.content).where(ReportFile.job_id == job.id))
     if whole is None:
         raise Conflict(
-            _("Reports {number} have no file: they are {state}.").format(number=found.id, state=found.state),
-            _("Wait until they are done; GET /api/v1/reports/{number} shows the state.").format(number=found.id),
+            _("Reports {number} have no file: they are {state}.").format(number=job.id, state=job.state),
+            _("Wait until they are done; GET /api/v1/reports/{number} shows the state.").format(number=job.id),
         )
     return whole
 
