@@ -68,7 +68,7 @@ def explanation(name: str) -> str | None:
         "weighting_factor": _(
             "1 takes the last reading whole; larger follows slower and scatters less. Usual: 1 to 4."
         ),
-        "path_factor": _("The touch is expected within ± this many mm of the target. Usual: 1 to 5."),
+        "path_factor": _("The surface is expected within ± this many mm of the target. Usual: 1 to 5."),
         "mode": _("Automatic: the machine fetches each correction. Approval: a person releases it first."),
         "wear_policy": _("What becomes of a correction computed for a worn tool."),
         "max_step": _("A larger correction is cut to this. Empty: no limit."),

@@ -161,6 +161,6 @@ class MachineOut(BaseModel):
         float, Field(description="Probing feed x delay, mm: how far the axis moves on; 0 on the direct path.")
     ]
     zero_range_floor: Annotated[
-        float, Field(description="What of it varies from touch to touch, mm; a smaller R33 is warned of.")
+        float, Field(description="What of it varies from point to point, mm; a smaller R33 is warned of.")
     ]
     created_at: datetime

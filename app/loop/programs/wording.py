@@ -105,7 +105,7 @@ def _step(data: dict[str, Any]) -> str:
     sentence = {
         "touch": _("{r}: where the machine stands in {axis} at the touch"),
         "touch_any": _("where the machine stands in {axis} at the touch, into the variable that {r} counts"),
-        "centre": _("{r}: the middle between two touches"),
+        "centre": _("{r}: the middle between two points"),
         "old_kept": _("{r}: the old {axis} of {offset} is kept"),
         "offset_set": _("{axis} of {offset} is set to {r}"),
         "feeler": _("{r}: thickness of the feeler, {value} mm"),
@@ -157,7 +157,7 @@ def q_name(q: str) -> str:
         "Q408": _("retract height"),
         "Q253": _("feed of pre-positioning"),
         "Q380": _("reference angle"),
-        "Q423": _("touches of the sphere"),
+        "Q423": _("probed points of the sphere"),
         "Q431": _("preset"),
         "Q432": _("backlash angle"),
         "Q410": _("mode"),

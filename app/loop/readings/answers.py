@@ -118,7 +118,9 @@ class ReadingAnswer(BaseModel):
     sequence: Annotated[int, Field(description="Counts 1, 2, 3 … per characteristic, without gaps.")]
     key: str | None
     part: str | None
-    measured: Annotated[float, Field(description="As the machine sent it, mm; of touches, what they amount to.")]
+    measured: Annotated[
+        float, Field(description="As the machine sent it, mm; of probed points, the value that they give.")
+    ]
     measured_at: datetime
     received_at: datetime
     late: Annotated[bool, Field(description="Measured before a reading that had come in already.")]
@@ -138,7 +140,7 @@ class ReadingAnswer(BaseModel):
     ]
     zone: Annotated[str, Field(description="zero, average, full, oversize, undersize, wear or probe_fault.")]
     results: Annotated[
-        VariantResults | None, Field(description="Of touches, what the variant yields beside the value.")
+        VariantResults | None, Field(description="Results of the variant beside the value, where points were sent.")
     ]
     average_before: Annotated[float, Field(description="Running average M before this reading.")]
     average_after: Annotated[float, Field(description="M after it; 0 after a correction.")]

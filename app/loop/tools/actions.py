@@ -83,7 +83,7 @@ def decide(
             _(
                 "Parts measured since lie within the wear limit again: {number} of {amount} mm would spoil the next one."
             ).format(number=correction.number, amount=f"{correction.amount:+.4f}"),
-            _("Reject the correction, and look at the reading that led to it: one bad touch looks like a worn tool."),
+            _("Reject the correction, and look at the reading that led to it: one bad point looks like a worn tool."),
             correction_status=correction.status,
         )
     before = correction.status
