@@ -24,7 +24,7 @@ from app.core.decision.loops import LANE, TALLY, Mark, ProcessTrace, ReplayResul
 from app.core.decision.step import CODES, Action, effect_of, rounded
 from app.core.parameters import Parameters
 from app.core.policy_map import with_settings
-from app.core.replay import Lane, Policy, figures_of, run, without_events
+from app.core.replay import Policy, ReplayedCharacteristic, figures_of, run, without_events
 from app.quality.what_if.turn_limit import on_all_cores
 from bench.plant import PARAMETERS, plant
 from bench.readings import fill
@@ -125,7 +125,7 @@ def decisions(count: int, rounds: int) -> None:
         tool_memory=3,
         average_memory=1,
     )
-    policy = Policy((Lane(parameters, response=1.0),), delay=2)
+    policy = Policy((ReplayedCharacteristic(parameters, response=1.0),), delay=2)
     result, figures = run(trace, policy)  # compiled, or read from the cache
     rows = list(followed(trace, policy))
     compiled_rows = [(*map(float, row), ZONES[zone], CODES[code]) for *row, zone, code in zip(*result, strict=True)]

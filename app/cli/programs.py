@@ -31,7 +31,7 @@ class ReadableControl(StrEnum):
     HEIDENHAIN = "heidenhain"
 
 
-class Kind(StrEnum):
+class Subprogram(StrEnum):
     """One of the two subprograms."""
 
     MEASURING = "measuring"
@@ -47,7 +47,7 @@ def read_program(
     ] = None,
 ) -> None:
     """Read a program text: what was not understood to standard error, the parameters as JSON to standard output."""
-    from app.core.programs.lines import MOST_CHARACTERS, Verdict
+    from app.core.programs.lines import MOST_CHARACTERS, LineVerdict
     from app.loop.programs import queries as programs
     from app.loop.programs import wording
     from app.loop.programs.schemas import program_read
@@ -58,10 +58,10 @@ def read_program(
     answer = program_read(examined)
     for line in answer.lines:
         worth_saying = [
-            note.text for note in line.notes if note.warning or line.verdict == Verdict.NOT_UNDERSTOOD.value
+            note.text for note in line.notes if note.warning or line.verdict == LineVerdict.NOT_UNDERSTOOD.value
         ]
         if worth_saying:
-            style = "bold red" if line.verdict == Verdict.NOT_UNDERSTOOD.value else "yellow"
+            style = "bold red" if line.verdict == LineVerdict.NOT_UNDERSTOOD.value else "yellow"
             words = wording.verdict_word(line.verdict)
             say(f"{line.line}: {line.text.strip()[:120]}\n   {words}: {'; '.join(worth_saying)}", style=style)
     for note in answer.program.notes if answer.program else ():
@@ -84,7 +84,7 @@ def read_program(
 @program.command("write")
 def write_program(
     characteristic: Annotated[str, typer.Argument(help="The key of the characteristic.")],
-    kind: Annotated[Kind, typer.Option(envvar="INBAND_KIND", help="Which subprogram.")] = Kind.MEASURING,
+    kind: Annotated[Subprogram, typer.Option(envvar="INBAND_KIND", help="Which subprogram.")] = Subprogram.MEASURING,
     control: Annotated[
         Control | None, typer.Option(envvar="INBAND_CONTROL", help="For which control.", show_default="the machine's")
     ] = None,

@@ -44,7 +44,7 @@ LONGEST_DELAY = 200  # parts
 FEWEST_FOR_PPK = 20
 
 
-class Lane(NamedTuple):
+class ReplayedCharacteristic(NamedTuple):
     """Readings that are decided by the same parameters.
 
     response: mm of size per mm of offset, -e / f of the machine, whatever factor the policy believes in. memory: index of
@@ -65,7 +65,7 @@ class Lane(NamedTuple):
 class Policy(NamedTuple):
     """Parameters of each lane of a trace, and the number of parts cut with the old offset after a correction is issued."""
 
-    lanes: tuple[Lane, ...]
+    lanes: tuple[ReplayedCharacteristic, ...]
     delay: int = 0
 
     def with_(self, change: Callable[[Parameters], Parameters], delay: int | None = None) -> "Policy":

@@ -13,7 +13,7 @@ QUIET = timedelta(minutes=15)  # nobody expects a reading sooner
 MISSED = 10  # usual intervals without a reading, after which what is known is old
 
 
-class State(StrEnum):
+class CharacteristicState(StrEnum):
     """From the most urgent to the calmest; the first that applies is shown."""
 
     PROBE_FAULT = "probe_fault"
@@ -33,17 +33,25 @@ class State(StrEnum):
 
 NEED_SOMEONE = frozenset(
     {
-        State.PROBE_FAULT,
-        State.PAUSED,
-        State.TOOL_WORN,
-        State.HELD,
-        State.OVERSIZE,
-        State.UNDERSIZE,
-        State.AWAITING_APPROVAL,
+        CharacteristicState.PROBE_FAULT,
+        CharacteristicState.PAUSED,
+        CharacteristicState.TOOL_WORN,
+        CharacteristicState.HELD,
+        CharacteristicState.OVERSIZE,
+        CharacteristicState.UNDERSIZE,
+        CharacteristicState.AWAITING_APPROVAL,
     }
 )
 # What is only worth something while it is new: an old one of these is shown as old.
-CALM = frozenset({State.CORRECTING, State.DRIFTING_UP, State.DRIFTING_DOWN, State.MEASURE_ONLY, State.IN_BAND})
+CALM = frozenset(
+    {
+        CharacteristicState.CORRECTING,
+        CharacteristicState.DRIFTING_UP,
+        CharacteristicState.DRIFTING_DOWN,
+        CharacteristicState.MEASURE_ONLY,
+        CharacteristicState.IN_BAND,
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -88,34 +96,36 @@ class Known:
         return self.last_at + max(QUIET, MISSED * usual)
 
 
-def state_of(known: Known) -> State:
+def state_of(known: Known) -> CharacteristicState:
     """The most urgent thing that can be said."""
     if known.paused or "probe_fault" in known.alarms:
-        return State.PROBE_FAULT
+        return CharacteristicState.PROBE_FAULT
     if known.tool_paused:
-        return State.PAUSED
+        return CharacteristicState.PAUSED
     if "tool_worn" in known.alarms:
-        return State.TOOL_WORN
+        return CharacteristicState.TOOL_WORN
     if "held" in known.corrections:
-        return State.HELD
+        return CharacteristicState.HELD
     if known.readings == 0 or known.deviation is None:
-        return State.NO_DATA
+        return CharacteristicState.NO_DATA
     # The part itself: a reading that counts outstanding corrections may be decided in a milder zone.
     if known.tells_of_the_part and not within_tolerance(known.deviation, known.parameters.limits):
-        return State.OVERSIZE if known.deviation > 0 else State.UNDERSIZE
+        return CharacteristicState.OVERSIZE if known.deviation > 0 else CharacteristicState.UNDERSIZE
     if "awaiting_approval" in known.corrections:
-        return State.AWAITING_APPROVAL
+        return CharacteristicState.AWAITING_APPROVAL
     if "pending" in known.corrections:
-        return State.CORRECTING
+        return CharacteristicState.CORRECTING
     trend = known.trend if known.tells_of_the_part else known.trend[:-1]
-    return drift(trend, known.parameters) or (State.MEASURE_ONLY if known.parameters.measures_only else State.IN_BAND)
+    return drift(trend, known.parameters) or (
+        CharacteristicState.MEASURE_ONLY if known.parameters.measures_only else CharacteristicState.IN_BAND
+    )
 
 
-def drift(trend: Sequence[float], parameters: Parameters) -> State | None:
+def drift(trend: Sequence[float], parameters: Parameters) -> CharacteristicState | None:
     """The drift state when the last readings all lie on one side beyond the zero range, else None."""
     last = [nanometres(deviation) for deviation in trend[-DRIFT:]]
     if len(last) == DRIFT and min(last) > parameters.limits.zero_range:
-        return State.DRIFTING_UP
+        return CharacteristicState.DRIFTING_UP
     if len(last) == DRIFT and max(last) < -parameters.limits.zero_range:
-        return State.DRIFTING_DOWN
+        return CharacteristicState.DRIFTING_DOWN
     return None

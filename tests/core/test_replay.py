@@ -12,8 +12,8 @@ from app.core.decision.loops import Mark, ProcessTrace, ReplayResult, _rounded
 from app.core.decision.step import CODES, Code
 from app.core.parameters import Mode, Parameters, WearPolicy
 from app.core.replay import (
-    Lane,
     Policy,
+    ReplayedCharacteristic,
     agreement,
     figures_of,
     parts_of,
@@ -77,7 +77,9 @@ def parameter_sets(draw: st.DrawFn) -> Parameters:
 @st.composite
 def traces(draw: st.DrawFn) -> tuple[ProcessTrace, Policy]:
     lanes = tuple(
-        Lane(p, -draw(st.sampled_from([1.0, 0.8])) / draw(st.sampled_from([-1.0, -0.5, 0.5])), memory, counts)
+        ReplayedCharacteristic(
+            p, -draw(st.sampled_from([1.0, 0.8])) / draw(st.sampled_from([-1.0, -0.5, 0.5])), memory, counts
+        )
         for p, memory, counts in draw(
             st.lists(st.tuples(parameter_sets(), st.integers(0, 1), st.booleans()), min_size=1, max_size=3)
         )
@@ -143,7 +145,7 @@ def test_rounding_is_pythons(value: float) -> None:
 def test_the_worked_example_of_the_cycles() -> None:
     # What was measured, with the corrections taken out that were made after the third and the seventh.
     free = micrometres(3, 5, 6, 2 + 4.625, 4 + 4.625, 5 + 4.625, 5 + 4.625, 3 + 9, 7 + 9, 7 + 13.25)
-    result, figures = run(without_events(free), Policy((Lane(EXAMPLE, response=1.0),)))
+    result, figures = run(without_events(free), Policy((ReplayedCharacteristic(EXAMPLE, response=1.0),)))
     assert (result.deviation * 1000).round(9).tolist() == [3, 5, 6, 2, 4, 5, 5, 3, 7, 7]
     m = np.where(result.amount != 0, -result.amount, result.average)
     assert (m * 1000).round(9).tolist() == [1.5, 3.25, 4.625, 1.0, 2.5, 3.75, 4.375, 1.5, 4.25, 3.5]
@@ -160,7 +162,9 @@ def test_the_worked_example_of_the_cycles() -> None:
     ],
 )
 def test_a_step_by_hand(delay: int, deviations: list[float], amounts: list[float]) -> None:
-    result, figures = run(without_events(micrometres(7, 7, 7, 7, 7)), Policy((Lane(SHAFT, 1.0),), delay))
+    result, figures = run(
+        without_events(micrometres(7, 7, 7, 7, 7)), Policy((ReplayedCharacteristic(SHAFT, 1.0),), delay)
+    )
     assert (result.deviation * 1000).round(6).tolist() == deviations
     assert (result.amount * 1000).round(6).tolist() == amounts
     assert (figures.corrections, figures.mean_size, figures.rejects) == (1, 0.007, 0)
@@ -168,7 +172,7 @@ def test_a_step_by_hand(delay: int, deviations: list[float], amounts: list[float
 
 def test_wear_by_hand() -> None:
     # 1 µm a part, R33 = 2, k = 1: corrected by 3 at each third part.
-    policy = Policy((Lane(replace(SHAFT, zero_range=0.002, weighting_factor=1), 1.0),))
+    policy = Policy((ReplayedCharacteristic(replace(SHAFT, zero_range=0.002, weighting_factor=1), 1.0),))
     result, figures = run(without_events(np.arange(13) / 1000), policy)
     assert (result.deviation * 1000).round(6).tolist() == [0, 1, 2, 3, 1, 2, 3, 1, 2, 3, 1, 2, 3]
     assert (result.offset * 1000).round(6).tolist() == [0, 0, 0, 0, -3, -3, -3, -6, -6, -6, -9, -9, -9]
@@ -179,7 +183,7 @@ def test_wear_by_hand() -> None:
 
 
 def test_the_wrong_sign_runs_away_to_where_a_person_is_asked() -> None:
-    wrong = Policy((Lane(replace(SHAFT, factor=1.0), 1.0),))
+    wrong = Policy((ReplayedCharacteristic(replace(SHAFT, factor=1.0), 1.0),))
     result, figures = run(without_events(np.full(40, 0.006)), wrong)
     assert result.deviation[:4].tolist() == [0.006, 0.012, 0.024, 0.048]
     assert (figures.worn, figures.held) == (34, 34)
@@ -188,7 +192,7 @@ def test_the_wrong_sign_runs_away_to_where_a_person_is_asked() -> None:
 def test_what_is_held_waits_for_the_release_of_then() -> None:
     trace = without_events(np.full(5, 0.4))
     trace.marks[3] = Mark.RELEASED
-    result, figures = run(trace, Policy((Lane(SHAFT, 1.0),)))
+    result, figures = run(trace, Policy((ReplayedCharacteristic(SHAFT, 1.0),)))
     assert result.deviation.tolist() == [0.4, 0.4, 0.4, 0.0, 0.0]
     assert (figures.held, figures.corrections) == (3, 0)
 
@@ -196,7 +200,12 @@ def test_what_is_held_waits_for_the_release_of_then() -> None:
 def test_two_characteristics_of_one_tool_share_what_is_corrected() -> None:
     lane = np.array([0, 1, 0, 1, 0, 1])
     trace = without_events(micrometres(7, 1, 7, 1, 7, 1))._replace(lane=lane, part=parts_of(lane))
-    both = Policy((Lane(SHAFT, 1.0), Lane(replace(SHAFT, zero_range=0.002), 1.0, counts=False)))
+    both = Policy(
+        (
+            ReplayedCharacteristic(SHAFT, 1.0),
+            ReplayedCharacteristic(replace(SHAFT, zero_range=0.002), 1.0, counts=False),
+        )
+    )
     result, figures = run(trace, both)
     # They lie 6 µm apart, so each corrects what the other has asked for: the second of a part was cut without it.
     assert (result.deviation * 1000).round(6).tolist() == [7, 1, 6, 0, 6, 0]
@@ -217,7 +226,7 @@ def test_taking_the_corrections_out_and_running_the_same_policy_gives_what_was(
 ) -> None:
     chance = np.random.default_rng(seed)
     trace = without_events(np.arange(300) * wear + chance.normal(0, 0.001, 300).round(6))
-    policy = Policy((Lane(replace(SHAFT, factor=factor), -effect / factor),), delay)
+    policy = Policy((ReplayedCharacteristic(replace(SHAFT, factor=factor), -effect / factor),), delay)
     then, figures = run(trace, policy)
     free = rebuilt(then.deviation, then.offset, factor, effect)
     again, same = run(trace._replace(free=free), policy)
@@ -229,7 +238,7 @@ def test_taking_the_corrections_out_and_running_the_same_policy_gives_what_was(
 def test_figures_by_hand() -> None:
     trace = without_events(micrometres(1, -1, 9, -9, 400, 1200, 0.5, -0.5))
     trace.marks[7] |= Mark.LEFT_OUT
-    _result, figures = run(trace, Policy((Lane(replace(SHAFT, mode=Mode.MEASURE_ONLY), 1.0),)))
+    _result, figures = run(trace, Policy((ReplayedCharacteristic(replace(SHAFT, mode=Mode.MEASURE_ONLY), 1.0),)))
     assert (figures.readings, figures.inner, figures.rejects) == (7, 5, 3)
     assert (figures.oversize, figures.undersize, figures.worn, figures.faults, figures.alarms) == (1, 1, 1, 1, 4)
     assert figures.spread == pytest.approx(np.std(micrometres(1, -1, 9, -9, 0.5), ddof=1))
@@ -241,7 +250,7 @@ def test_ppk_is_that_of_the_statistics() -> None:
     from app.core.spc.capability import Limits, capability
 
     free = np.random.default_rng(3).normal(0.001, 0.002, 400)
-    quiet = Policy((Lane(replace(SHAFT, mode=Mode.MEASURE_ONLY), 1.0),))
+    quiet = Policy((ReplayedCharacteristic(replace(SHAFT, mode=Mode.MEASURE_ONLY), 1.0),))
     result, figures = run(without_events(free), quiet)
     expected = capability(result.deviation, Limits(-0.008, 0.008))
     assert figures.ppk == pytest.approx(expected.ppk.value, rel=1e-9)
@@ -249,7 +258,7 @@ def test_ppk_is_that_of_the_statistics() -> None:
 
 
 def test_equal_readings_have_no_ppk() -> None:
-    _result, figures = run(without_events(np.full(50, 0.0004)), Policy((Lane(SHAFT, 1.0),)))
+    _result, figures = run(without_events(np.full(50, 0.0004)), Policy((ReplayedCharacteristic(SHAFT, 1.0),)))
     assert (figures.ppk, figures.corrections) == (None, 0)
     assert figures.spread == pytest.approx(0, abs=1e-12)
 
@@ -259,7 +268,7 @@ def test_agreement_of_nothing_is_not_a_number() -> None:
 
 
 def test_a_way_without_readings_amounts_to_nothing() -> None:
-    _result, figures = run(without_events(np.zeros(0)), Policy((Lane(SHAFT, 1.0),)))
+    _result, figures = run(without_events(np.zeros(0)), Policy((ReplayedCharacteristic(SHAFT, 1.0),)))
     assert (figures.readings, figures.mean, figures.spread, figures.ppk, figures.largest) == (0, None, None, None, None)
     assert figures_of(without_events(np.zeros(0)), []) == []
     assert len(ReplayResult.room(0).deviation) == 0

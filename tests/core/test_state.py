@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from app.core.parameters import Parameters, read
-from app.core.state import Known, State, state_of
+from app.core.state import CharacteristicState, Known, state_of
 from tests.shop import PARAMETERS
 
 NOW = datetime(2026, 11, 21, 8, tzinfo=UTC)
@@ -35,30 +35,30 @@ def known(**other: Any) -> Known:
 @pytest.mark.parametrize(
     ("facts", "state"),
     [
-        ({}, State.IN_BAND),
-        ({"paused": True, "alarms": {"tool_worn"}, "corrections": {"held"}}, State.PROBE_FAULT),
-        ({"alarms": {"tool_worn", "oversize"}, "corrections": {"held"}}, State.TOOL_WORN),
-        ({"corrections": {"held", "pending"}}, State.HELD),
-        ({"readings": 0, "deviation": None}, State.NO_DATA),
-        ({"deviation": 0.0081}, State.OVERSIZE),
-        ({"deviation": -0.0081, "zone": "zero"}, State.UNDERSIZE),
-        ({"deviation": 0.008}, State.IN_BAND),
-        ({"deviation": 0.0081, "excluded": True}, State.IN_BAND),  # declared false: no part was so large
-        ({"deviation": 1.0, "zone": "probe_fault"}, State.IN_BAND),  # acknowledged: it was no size at all
-        ({"deviation": 0.9999}, State.OVERSIZE),
-        ({"deviation": 1.2, "trend": [-0.002] * 7 + [1.2]}, State.DRIFTING_DOWN),
-        ({"deviation": 0.0081, "excluded": True, "corrections": {"held"}}, State.HELD),
-        ({"corrections": {"awaiting_approval", "pending"}}, State.AWAITING_APPROVAL),
-        ({"corrections": {"pending"}}, State.CORRECTING),
-        ({"trend": [0.0011] * 7}, State.DRIFTING_UP),
-        ({"trend": [0.009] + [-0.002] * 7}, State.DRIFTING_DOWN),
-        ({"trend": [0.0011] * 6 + [0.001]}, State.IN_BAND),
-        ({"trend": [0.0011] * 6}, State.IN_BAND),
-        ({"parameters": parameters(tool_memory=0)}, State.MEASURE_ONLY),
-        ({"alarms": {"oversize"}}, State.IN_BAND),  # the part after it was good; the alarm stands beside
+        ({}, CharacteristicState.IN_BAND),
+        ({"paused": True, "alarms": {"tool_worn"}, "corrections": {"held"}}, CharacteristicState.PROBE_FAULT),
+        ({"alarms": {"tool_worn", "oversize"}, "corrections": {"held"}}, CharacteristicState.TOOL_WORN),
+        ({"corrections": {"held", "pending"}}, CharacteristicState.HELD),
+        ({"readings": 0, "deviation": None}, CharacteristicState.NO_DATA),
+        ({"deviation": 0.0081}, CharacteristicState.OVERSIZE),
+        ({"deviation": -0.0081, "zone": "zero"}, CharacteristicState.UNDERSIZE),
+        ({"deviation": 0.008}, CharacteristicState.IN_BAND),
+        ({"deviation": 0.0081, "excluded": True}, CharacteristicState.IN_BAND),  # declared false: no part was so large
+        ({"deviation": 1.0, "zone": "probe_fault"}, CharacteristicState.IN_BAND),  # acknowledged: it was no size at all
+        ({"deviation": 0.9999}, CharacteristicState.OVERSIZE),
+        ({"deviation": 1.2, "trend": [-0.002] * 7 + [1.2]}, CharacteristicState.DRIFTING_DOWN),
+        ({"deviation": 0.0081, "excluded": True, "corrections": {"held"}}, CharacteristicState.HELD),
+        ({"corrections": {"awaiting_approval", "pending"}}, CharacteristicState.AWAITING_APPROVAL),
+        ({"corrections": {"pending"}}, CharacteristicState.CORRECTING),
+        ({"trend": [0.0011] * 7}, CharacteristicState.DRIFTING_UP),
+        ({"trend": [0.009] + [-0.002] * 7}, CharacteristicState.DRIFTING_DOWN),
+        ({"trend": [0.0011] * 6 + [0.001]}, CharacteristicState.IN_BAND),
+        ({"trend": [0.0011] * 6}, CharacteristicState.IN_BAND),
+        ({"parameters": parameters(tool_memory=0)}, CharacteristicState.MEASURE_ONLY),
+        ({"alarms": {"oversize"}}, CharacteristicState.IN_BAND),  # the part after it was good; the alarm stands beside
     ],
 )
-def test_the_most_urgent_thing_is_said(facts: dict[str, Any], state: State) -> None:
+def test_the_most_urgent_thing_is_said(facts: dict[str, Any], state: CharacteristicState) -> None:
     assert state_of(known(**facts)) is state
 
 

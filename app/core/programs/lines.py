@@ -31,7 +31,7 @@ SETTING = re.compile(r"\s*INBAND\s+([A-Za-z_]+)\s*=(.*)", re.IGNORECASE)
 DESCRIBING = ("characteristic", "name", "part")
 
 
-class Verdict(StrEnum):
+class LineVerdict(StrEnum):
     """Verdict on a line."""
 
     UNDERSTOOD = "understood"
@@ -75,7 +75,7 @@ class Line(NamedTuple):
 
     number: int
     text: str
-    verdict: Verdict
+    verdict: LineVerdict
     notes: tuple[Note, ...]
 
 
@@ -162,8 +162,8 @@ def line_of(number: int, text: str, notes: Iterable[Note]) -> Line:
     line_notes = tuple(notes)
     codes = {note.code for note in line_notes}
     if codes & NOT_UNDERSTOOD:
-        return Line(number, text, Verdict.NOT_UNDERSTOOD, line_notes)
-    return Line(number, text, Verdict.UNDERSTOOD if codes & TAKEN else Verdict.IGNORED, line_notes)
+        return Line(number, text, LineVerdict.NOT_UNDERSTOOD, line_notes)
+    return Line(number, text, LineVerdict.UNDERSTOOD if codes & TAKEN else LineVerdict.IGNORED, line_notes)
 
 
 def number_in(text: str) -> float | None:

@@ -19,9 +19,9 @@ from scipy.sparse.linalg import spsolve
 from scipy.special import ndtr
 
 from app.core.spc.refusal import Floats, Reason, Refused
-from app.core.spc.rules import Kind, Rule, RuleName
+from app.core.spc.rules import Rule, RuleKind, RuleName
 
-STEPS = {Kind.TREND, Kind.ALTERNATING}
+STEPS = {RuleKind.TREND, RuleKind.ALTERNATING}
 MOST_STATES = 60_000
 
 
@@ -51,7 +51,7 @@ def per_window(rule: Rule) -> float:
     """The probability that n independent points in a row show the pattern."""
     n, inside = rule.n, float(1 - 2 * ndtr(-rule.limit))
     match rule.kind:
-        case Kind.BEYOND:
+        case RuleKind.BEYOND:
             p = float(ndtr(-rule.limit))
             above = sum(comb(n, j) * p**j * (1 - p) ** (n - j) for j in range(rule.k, n + 1))
             # Both sides at once: needs 2k <= n.
@@ -61,15 +61,15 @@ def per_window(rule: Rule) -> float:
                 for j in range(rule.k, n - i + 1)
             )
             return 2 * above - both
-        case Kind.SIDE:
+        case RuleKind.SIDE:
             return 2.0 ** (1 - n)
-        case Kind.TREND:
+        case RuleKind.TREND:
             return 2 / factorial(n)
-        case Kind.ALTERNATING:
+        case RuleKind.ALTERNATING:
             return 2 * _zigzag(n) / factorial(n)
-        case Kind.WITHIN:
+        case RuleKind.WITHIN:
             return inside**n
-        case Kind.OUTSIDE:
+        case RuleKind.OUTSIDE:
             return (1 - inside) ** n
 
 
@@ -133,7 +133,7 @@ def _after(rules: tuple[Rule, ...], state: Memory, value: float) -> Memory | Non
     """Memory of the rules after a point at `value`; None when one of them fires."""
     result = []
     for rule, (first, second) in zip(rules, state, strict=True):
-        if rule.kind is Kind.BEYOND:
+        if rule.kind is RuleKind.BEYOND:
             mask = (1 << (rule.n - 1)) - 1
             sides = []
             for bits, beyond in ((first, value > rule.limit), (second, value < -rule.limit)):
@@ -143,10 +143,10 @@ def _after(rules: tuple[Rule, ...], state: Memory, value: float) -> Memory | Non
                 sides.append(window & mask)
             result.append((sides[0], sides[1]))
             continue
-        if rule.kind is Kind.SIDE:
+        if rule.kind is RuleKind.SIDE:
             code = 1 if value > 0 else -1
         else:
-            code = int((abs(value) <= rule.limit) == (rule.kind is Kind.WITHIN))
+            code = int((abs(value) <= rule.limit) == (rule.kind is RuleKind.WITHIN))
         length = 0 if code == 0 else second + 1 if code == first else 1
         if length >= rule.n:
             return None
@@ -172,7 +172,7 @@ def _steps_length(rule: Rule, nodes: int = 24) -> float:
     total: Floats = weights / 2
     above = total - below
     turned = np.eye(nodes)[::-1]
-    goes_on, turns = (above, below @ turned) if rule.kind is Kind.TREND else (below @ turned, above)
+    goes_on, turns = (above, below @ turned) if rule.kind is RuleKind.TREND else (below @ turned, above)
     runs = rule.n - 2  # of 2 .. n - 1 points
     system = np.eye(runs * nodes)
     for k in range(runs):

@@ -35,7 +35,7 @@ from app.core.spc.scan import STATE, beyond_runs, equal_runs, painted
 from app.core.spc.shewhart import Chart, ControlChart
 
 
-class Kind(IntEnum):
+class RuleKind(IntEnum):
     """Pattern that a rule looks for."""
 
     BEYOND = 0  # k of n beyond a limit, on one side
@@ -65,14 +65,14 @@ class Rule:
     """A rule with its numbers: k of n points (k = n but for "k of n"), and the limit in sigma where it has one."""
 
     name: RuleName
-    kind: Kind
+    kind: RuleKind
     n: int
     k: int
     limit: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse numbers that have no meaning."""
-        steps = self.kind in {Kind.TREND, Kind.ALTERNATING}
+        steps = self.kind in {RuleKind.TREND, RuleKind.ALTERNATING}
         if not 1 <= self.k <= self.n <= 60 or self.limit < 0 or (steps and self.n < 2):
             raise ValueError(f"{self.name}: {self.k} of {self.n} points beyond {self.limit} sigma has no meaning")
 
@@ -80,15 +80,15 @@ class Rule:
 RULES = {
     rule.name: rule
     for rule in (
-        Rule(RuleName.NELSON_1, Kind.BEYOND, 1, 1, 3.0),
-        Rule(RuleName.NELSON_2, Kind.SIDE, 9, 9),
-        Rule(RuleName.NELSON_3, Kind.TREND, 6, 6),
-        Rule(RuleName.NELSON_4, Kind.ALTERNATING, 14, 14),
-        Rule(RuleName.NELSON_5, Kind.BEYOND, 3, 2, 2.0),
-        Rule(RuleName.NELSON_6, Kind.BEYOND, 5, 4, 1.0),
-        Rule(RuleName.NELSON_7, Kind.WITHIN, 15, 15, 1.0),
-        Rule(RuleName.NELSON_8, Kind.OUTSIDE, 8, 8, 1.0),
-        Rule(RuleName.WESTERN_4, Kind.SIDE, 8, 8),
+        Rule(RuleName.NELSON_1, RuleKind.BEYOND, 1, 1, 3.0),
+        Rule(RuleName.NELSON_2, RuleKind.SIDE, 9, 9),
+        Rule(RuleName.NELSON_3, RuleKind.TREND, 6, 6),
+        Rule(RuleName.NELSON_4, RuleKind.ALTERNATING, 14, 14),
+        Rule(RuleName.NELSON_5, RuleKind.BEYOND, 3, 2, 2.0),
+        Rule(RuleName.NELSON_6, RuleKind.BEYOND, 5, 4, 1.0),
+        Rule(RuleName.NELSON_7, RuleKind.WITHIN, 15, 15, 1.0),
+        Rule(RuleName.NELSON_8, RuleKind.OUTSIDE, 8, 8, 1.0),
+        Rule(RuleName.WESTERN_4, RuleKind.SIDE, 8, 8),
     )
 }
 NELSON = tuple(rule for rule in RULES.values() if rule.name is not RuleName.WESTERN_4)
@@ -172,7 +172,7 @@ class Signals:
 def members(run: Run, rule: Rule, z: ArrayLike) -> NDArray[np.int64]:
     """The points that make a signal: of a "k of n" those beyond the limit, else every point from start to end."""
     at = np.arange(run.start, run.end + 1)
-    if rule.kind is not Kind.BEYOND:
+    if rule.kind is not RuleKind.BEYOND:
         return at
     return at[run.side * np.asarray(z)[run.start : run.end + 1] > rule.limit]
 
@@ -243,7 +243,7 @@ def _fed(
     rule: Rule, z: Floats, offset: int, last: float, state: NDArray[np.int64], earlier: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Go on with one rule: rows of earlier runs, the last of which may grow, and of new ones."""
-    if rule.kind is Kind.BEYOND:
+    if rule.kind is RuleKind.BEYOND:
         sides = []
         for row, side in enumerate((1, -1)):
             runs = earlier[earlier[:, 0] == side]

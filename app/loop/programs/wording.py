@@ -6,17 +6,17 @@ from typing import Any
 from app.core.parameters import BY_NAME, Kind
 from app.core.programs.correction_forms import Form
 from app.core.programs.heidenhain import ANGLE, PARAMETERS
-from app.core.programs.lines import MOST_CHARACTERS, Note, ProgramError, ProgramKind, Verdict, written
+from app.core.programs.lines import MOST_CHARACTERS, LineVerdict, Note, ProgramError, ProgramKind, written
 from app.language.i18n import _
 from app.loop.characteristics.wording import choice, label
 
 
 def verdict_word(verdict: str) -> str:
     return {
-        Verdict.UNDERSTOOD: _("Understood"),
-        Verdict.IGNORED: _("Passed over"),
-        Verdict.NOT_UNDERSTOOD: _("Not understood"),
-    }[Verdict(verdict)]
+        LineVerdict.UNDERSTOOD: _("Understood"),
+        LineVerdict.IGNORED: _("Passed over"),
+        LineVerdict.NOT_UNDERSTOOD: _("Not understood"),
+    }[LineVerdict(verdict)]
 
 
 def kind_word(kind: str) -> str:

@@ -3,7 +3,7 @@
 from app.core.spc.capability import Caution
 from app.core.spc.gauge.zero_range import Governs
 from app.core.spc.refusal import Reason, Refused
-from app.core.spc.rules import Kind, Rule, RuleName, Run
+from app.core.spc.rules import Rule, RuleKind, RuleName, Run
 from app.core.spc.shewhart import Chart
 from app.core.spc.spread import Estimator
 from app.files.documents.content import Fact, count, deviation, share, width
@@ -72,21 +72,21 @@ def rule(which: Rule) -> str:
     """The pattern of a run rule, with its numbers."""
     limit = f"{which.limit:g}"
     match which.kind:
-        case Kind.BEYOND if which.n == 1:
+        case RuleKind.BEYOND if which.n == 1:
             return _("A point lies beyond {limit} sigma.").format(limit=limit)
-        case Kind.BEYOND:
+        case RuleKind.BEYOND:
             return _("{k} of {n} points in a row lie beyond {limit} sigma on the same side.").format(
                 k=which.k, n=which.n, limit=limit
             )
-        case Kind.SIDE:
+        case RuleKind.SIDE:
             return _("{n} points in a row lie on the same side of the centre.").format(n=which.n)
-        case Kind.TREND:
+        case RuleKind.TREND:
             return _("{n} points in a row rise, or fall.").format(n=which.n)
-        case Kind.ALTERNATING:
+        case RuleKind.ALTERNATING:
             return _("{n} points in a row go up and down by turns.").format(n=which.n)
-        case Kind.WITHIN:
+        case RuleKind.WITHIN:
             return _("{n} points in a row lie within {limit} sigma of the centre.").format(n=which.n, limit=limit)
-        case Kind.OUTSIDE:
+        case RuleKind.OUTSIDE:
             return _("{n} points in a row lie beyond {limit} sigma, on either side.").format(n=which.n, limit=limit)
 
 
@@ -113,7 +113,7 @@ def side(run: Run, which: Rule) -> str:
     """On which side a signal lies; empty where its rule knows none."""
     if run.side == 0:
         return ""
-    if which.kind is Kind.TREND:
+    if which.kind is RuleKind.TREND:
         return _("rising") if run.side > 0 else _("falling")
     return _("above") if run.side > 0 else _("below")
 

@@ -19,7 +19,7 @@ from app.core.decision.limits import FAULT, in_nanometres, nanometres, reaches
 from app.core.decision.loops import Mark, ProcessTrace
 from app.core.decision.step import FIRST_MOVE_TRIGGERED, IMPLAUSIBLE, REJECTED, TOOL_WORN_HELD, rounded
 from app.core.parameters import Parameters
-from app.core.replay import LONGEST_DELAY, Figures, Lane, Policy, parts_of, rebuilt
+from app.core.replay import LONGEST_DELAY, Figures, Policy, ReplayedCharacteristic, parts_of, rebuilt
 from app.core.spc.resolution import resolution_of
 from app.errors import Invalid
 from app.language.i18n import _
@@ -162,9 +162,13 @@ class ToolHistory:
         return [int(number) for number in np.unique(self.history["parameters_version"])]
 
 
-def replace_lane(lane: Lane, effect: float, parameters: Parameters, slot: int | None) -> Lane:
+def replace_lane(
+    lane: ReplayedCharacteristic, effect: float, parameters: Parameters, slot: int | None
+) -> ReplayedCharacteristic:
     """The lane with other parameters, on a machine where corrections act by this share."""
-    return Lane(parameters, lane.response * effect, lane.memory if slot is None else slot, lane.counts)
+    return ReplayedCharacteristic(
+        parameters, lane.response * effect, lane.memory if slot is None else slot, lane.counts
+    )
 
 
 def past_of(session: Session, standing: Standing, window: Window) -> ToolHistory:
@@ -209,7 +213,7 @@ def _others(session: Session, standing: Standing) -> list[Standing]:
 def _joined(
     session: Session, standing: Standing, window: Window, histories: list[tuple[Standing, History]], unknown: int
 ) -> ToolHistory:
-    lanes: list[Lane] = []
+    lanes: list[ReplayedCharacteristic] = []
     slots: dict[int, int] = {}
     columns: dict[str, list[NDArray[Any]]] = {}
     for at, (owner, history) in enumerate(histories):
@@ -218,7 +222,11 @@ def _joined(
             parameters = _version(session, owner, version)
             slots.setdefault(parameters.average_memory, len(slots))
             lane[history["parameters_version"] == version] = len(lanes)
-            lanes.append(Lane(parameters, -1 / owner.parameters.factor, slots[parameters.average_memory], at == 0))
+            lanes.append(
+                ReplayedCharacteristic(
+                    parameters, -1 / owner.parameters.factor, slots[parameters.average_memory], at == 0
+                )
+            )
         targets = np.array([known.parameters.target for known in lanes])[lane] if len(lane) else np.zeros(0)
         empirical = history["measured"] - history["deviation"] - targets
         for name, values in {
@@ -238,7 +246,9 @@ def _joined(
     trace = _trace(session, standing, joined, len(slots), [known.memory for known in lanes])
     if not lanes:
         lanes.append(
-            Lane(standing.parameters, -1 / standing.parameters.factor, slots[standing.parameters.average_memory])
+            ReplayedCharacteristic(
+                standing.parameters, -1 / standing.parameters.factor, slots[standing.parameters.average_memory]
+            )
         )
     return ToolHistory(
         standing=standing,

@@ -70,7 +70,7 @@ class CharacteristicView:
         self.now = datetime.now(UTC)
 
     @cached_property
-    def row(self) -> plant.Row:
+    def row(self) -> plant.CharacteristicRow:
         return plant.row_of(self._session, self.standing.machine.key, self.standing.characteristic.key)
 
     @cached_property

@@ -9,7 +9,7 @@ from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.core.parameters import Parameters
-from app.core.state import CALM, NEED_SOMEONE, Known, State, state_of
+from app.core.state import CALM, NEED_SOMEONE, CharacteristicState, Known, state_of
 from app.loop.machines.queries import machine_named
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Rejects
@@ -38,7 +38,7 @@ GROUP BY s.characteristic_id
 
 
 @dataclass(frozen=True)
-class Row:
+class CharacteristicRow:
     """One characteristic at a glance; lengths in mm. `average` is M, None without a memory location."""
 
     characteristic: Characteristic
@@ -49,7 +49,7 @@ class Row:
     alarms: list[tuple[int, str]]
     corrections: list[tuple[int, str, float]]
     known: Known
-    state: State
+    state: CharacteristicState
     rejects: Rejects | None = None  # since the tool was changed; None without acceptance n of m
     outlook: Outlook | None = None  # of the periodic job
     tool_paused_by: int | None = None  # the alarm that asks which offset of the tool is true
@@ -84,7 +84,7 @@ class Group(NamedTuple):
     """A machine with its characteristics; `alarms` are those of its tools."""
 
     machine: Machine
-    rows: list[Row]
+    rows: list[CharacteristicRow]
     alarms: list[tuple[int, str]]
 
 
@@ -99,7 +99,7 @@ def plant(session: Session, *, machine: str | None = None, trends: bool = True) 
     corrections = _corrections(session, only)
     courses = _trends(session, only) if trends else {}
     rejects = statistics.rejects_by_characteristic(session, only)
-    rows: dict[int, list[Row]] = defaultdict(list)
+    rows: dict[int, list[CharacteristicRow]] = defaultdict(list)
     for characteristic, stored, stream, average, offset, tool_paused_by, outlook, excluded in session.execute(
         _standing(only)
     ):
@@ -121,7 +121,7 @@ def plant(session: Session, *, machine: str | None = None, trends: bool = True) 
             excluded=excluded is not None,
         )
         rows[characteristic.machine_id].append(
-            Row(
+            CharacteristicRow(
                 characteristic,
                 parameters,
                 stream,
@@ -139,7 +139,7 @@ def plant(session: Session, *, machine: str | None = None, trends: bool = True) 
     return [Group(one, rows[one.id], tool_alarms[one.id]) for one in machines]
 
 
-def row_of(session: Session, machine: str, characteristic: str) -> Row:
+def row_of(session: Session, machine: str, characteristic: str) -> CharacteristicRow:
     """One characteristic at a glance. Raises `NotFound` for an unknown machine."""
     (group,) = plant(session, machine=machine)
     return next(row for row in group.rows if row.characteristic.key == characteristic)

@@ -9,7 +9,7 @@ from math import inf
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from app.core.state import State
+from app.core.state import CharacteristicState
 from app.jobs import queries as jobs
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.machines import Machine
@@ -18,7 +18,7 @@ from app.quality.capability import verdict_queries as verdicts
 from app.quality.capability.verdict_queries import Verdict
 from app.quality.control_charts import signals_queries as signals
 from app.views.characteristic import state_queries as plant
-from app.views.characteristic.state_queries import Row
+from app.views.characteristic.state_queries import CharacteristicRow
 from app.views.overview.ranking import AttentionInputs
 
 SHIFT = timedelta(hours=8)
@@ -40,7 +40,7 @@ class Ranked:
     """A characteristic with the inputs of its rank. signals: numbers of its open signals, the newest first."""
 
     machine: Machine
-    row: Row
+    row: CharacteristicRow
     inputs: AttentionInputs
     signals: list[int]
     verdict: Verdict  # the index, and of which readings it is
@@ -72,7 +72,7 @@ def ranking(
                 parts_left=outlook.parts if outlook is not None and outlook.towards is not None else None,
                 hunting=row.overcorrects,
                 per_shift=raised[number] / max(1.0, (now - since) / SHIFT),
-                old=row.state is not State.NO_DATA and row.is_old(now),
+                old=row.state is not CharacteristicState.NO_DATA and row.is_old(now),
                 failing=number in failing,
             )
             entries.append(Ranked(group.machine, row, inputs, list(open_signals.get(number, ())), index))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import inf
 
-from app.core.state import NEED_SOMEONE, State
+from app.core.state import NEED_SOMEONE, CharacteristicState
 
 CAPABLE = 1.33
 """Cpk or Ppk from which a process is usually called capable (ISO 22514-2; AIAG SPC asks for 1.33 or more)."""
@@ -39,7 +39,14 @@ class AttentionReason(IntEnum):
         return "loud" if self is AttentionReason.ALARM_FLOOD else self.name.lower()
 
 
-STOPPED = frozenset({State.PROBE_FAULT, State.PAUSED, State.TOOL_WORN, State.HELD})
+STOPPED = frozenset(
+    {
+        CharacteristicState.PROBE_FAULT,
+        CharacteristicState.PAUSED,
+        CharacteristicState.TOOL_WORN,
+        CharacteristicState.HELD,
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +57,7 @@ class AttentionInputs:
     failing: a periodic job fails on it.
     """
 
-    state: State
+    state: CharacteristicState
     alarms: int
     signals: int
     ppk: float | None

@@ -7,12 +7,12 @@ from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
 
 from app.access.deps import require
-from app.core.state import State
+from app.core.state import CharacteristicState
 from app.quality.wear.queries import next_event
 from app.quality.wear.wording import hunting_word
 from app.views.characteristic import state_queries as queries
 from app.views.characteristic.glance import band_picture, sparkline
-from app.views.characteristic.state_queries import Group, Row
+from app.views.characteristic.state_queries import CharacteristicRow, Group
 from app.views.characteristic.wording import state_word
 from app.web.deps import SessionDep
 from app.web.templates import page
@@ -28,7 +28,7 @@ class MachineView(NamedTuple):
     """A machine with those of its characteristics that are shown, and how many are not."""
 
     group: Group
-    rows: list[Row]
+    rows: list[CharacteristicRow]
     folded: int
 
 
@@ -86,7 +86,7 @@ def _summary(groups: list[Group]) -> dict[str, Any]:
     rows = [row for group in groups for row in group.rows]
     need = [row for row in rows if row.needs_someone]
     calm = [row for row in rows if not row.needs_someone]
-    empty = [row for row in calm if row.state is State.NO_DATA]
+    empty = [row for row in calm if row.state is CharacteristicState.NO_DATA]
     old = [row for row in calm if row.is_old(now)]
     return {
         "total": len(rows),

@@ -13,7 +13,7 @@ from app.access.deps import Caller, Viewer
 from app.core.parameters import BY_NAME, LARGEST_LENGTH
 from app.core.programs import fanuc
 from app.core.programs.heidenhain import OF_SAVING, PARAMETERS
-from app.core.programs.lines import MOST_CHARACTERS, WARNINGS, Program, ProgramKind, Verdict
+from app.core.programs.lines import MOST_CHARACTERS, WARNINGS, LineVerdict, Program, ProgramKind
 from app.errors import Invalid
 from app.language.i18n import _
 from app.loop.characteristics import actions, queries
@@ -28,7 +28,7 @@ from app.web.deps import SessionDep, texts
 from app.web.forms import by_field
 
 router = APIRouter()
-VERDICTS = tuple(verdict.value for verdict in (Verdict.NOT_UNDERSTOOD, Verdict.UNDERSTOOD, Verdict.IGNORED))
+VERDICTS = tuple(verdict.value for verdict in (LineVerdict.NOT_UNDERSTOOD, LineVerdict.UNDERSTOOD, LineVerdict.IGNORED))
 
 
 @router.get("/setup/programs")

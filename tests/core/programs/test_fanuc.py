@@ -10,7 +10,7 @@ from app.core.parameters import Axis, Parameters, read
 from app.core.programs import fanuc
 from app.core.programs.correction_forms import Form
 from app.core.programs.corrections import PendingCorrection, steps, write
-from app.core.programs.lines import Program, ProgramError, ProgramKind, ProgramText, Verdict
+from app.core.programs.lines import LineVerdict, Program, ProgramError, ProgramKind, ProgramText
 from tests.core.programs.conftest import parameter_sets
 
 # The modules of the source, as it prints them.
@@ -73,7 +73,7 @@ def step_lines(text: ProgramText) -> dict[int, list[str]]:
 
 def test_the_macro_of_the_source_is_read_step_by_step() -> None:
     text = fanuc.read(MACRO)
-    assert Verdict.NOT_UNDERSTOOD not in {line.verdict for line in text.lines}
+    assert LineVerdict.NOT_UNDERSTOOD not in {line.verdict for line in text.lines}
     assert text.programs == ()
     found = step_lines(text)
     assert [found.get(number) for number in (6, 7, 12, 13, 14, 15, 16, 26, 30)] == [
@@ -134,7 +134,7 @@ def test_the_choice_of_a_work_offset_is_no_tool() -> None:
 
 def test_the_edge_finder_macro_of_the_source_is_read() -> None:
     text = fanuc.read(EDGE_FINDER)
-    assert Verdict.NOT_UNDERSTOOD not in {line.verdict for line in text.lines}
+    assert LineVerdict.NOT_UNDERSTOOD not in {line.verdict for line in text.lines}
     (program,) = text.programs
     assert program.kind is ProgramKind.WORK_ZERO
     assert program.parameters == {
@@ -227,7 +227,7 @@ def test_results_become_the_touches_of_a_reading() -> None:
 )
 def test_what_is_not_understood_is_named(text: str, code: str) -> None:
     found = fanuc.read(text)
-    assert found.lines[0].verdict is Verdict.NOT_UNDERSTOOD
+    assert found.lines[0].verdict is LineVerdict.NOT_UNDERSTOOD
     assert code in [note.code for note in found.lines[0].notes]
 
 
@@ -274,7 +274,7 @@ def test_a_characteristic_survives_its_macro_text(parameters: Parameters, values
     text = fanuc.write_measuring(parameters, {"characteristic": "bore-d40", "name": "Bore (Ø40); 100 %"}, values)
     found = fanuc.read(text)
     assert text.isascii()
-    assert not [line for line in found.lines if line.verdict is Verdict.NOT_UNDERSTOOD]
+    assert not [line for line in found.lines if line.verdict is LineVerdict.NOT_UNDERSTOOD]
     program = program_of(text)
     assert program.about == {"characteristic": "bore-d40", "name": "Bore (Ø40); 100 %"}
     assert program.values == values

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.programs import heidenhain
-from app.core.programs.lines import Note, Program, ProgramError, ProgramKind, Verdict
+from app.core.programs.lines import LineVerdict, Note, Program, ProgramError, ProgramKind
 from app.core.rotary.axis import AXES
 from app.core.rotary.measuring_plan import AxisPlan, MeasuringPlan, faults, plan_of, positions, warnings
 
@@ -59,7 +59,7 @@ def test_the_calls_are_read_with_their_q_parameters() -> None:
     assert (call.parameters["Q407"], call.parameters["Q253"], call.parameters["Q411"]) == (12.5, "FMAX", -90.0)
     assert len(call.parameters) == 20
     assert call.notes == ()
-    assert not [line for line in text.lines if line.verdict is Verdict.NOT_UNDERSTOOD]
+    assert not [line for line in text.lines if line.verdict is LineVerdict.NOT_UNDERSTOOD]
     plan = plan_of(452, {name: value for name, value in call.parameters.items() if name != "cycle"})
     assert [axis.axis for axis in plan.order] == ["A", "C"]
     assert positions(plan.order[1]) == (-90.0, 0.0, 90.0, 180.0)
@@ -162,7 +162,7 @@ def test_a_plan_survives_its_program(plan: MeasuringPlan, memory: int) -> None:
     text = heidenhain.write_plan(plan, memory)
     found = heidenhain.read(text)
     assert text.isascii()
-    assert not [line for line in found.lines if line.verdict is Verdict.NOT_UNDERSTOOD]
+    assert not [line for line in found.lines if line.verdict is LineVerdict.NOT_UNDERSTOOD]
     saved, call = found.programs
     assert saved.parameters == {"cycle": 450, "Q410": 0.0, "Q409": memory}
     values = {name: value for name, value in call.parameters.items() if name != "cycle"}

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from app.core.parameters import Parameters, read
 from app.core.programs import sinumerik
-from app.core.programs.lines import ProgramError, ProgramKind, ProgramText, Verdict, written
+from app.core.programs.lines import LineVerdict, ProgramError, ProgramKind, ProgramText, written
 from app.core.programs.sinumerik_writing import Calibration, write_calibration, write_measuring
 from tests.core.programs.conftest import parameter_sets
 
@@ -86,7 +86,7 @@ class TestSource:
             "path_factor": 1.0,
         }
         assert "r44_for_r34" in codes(text, 3)
-        assert [line.verdict for line in text.lines] == [Verdict.UNDERSTOOD] * 5 + [Verdict.IGNORED]
+        assert [line.verdict for line in text.lines] == [LineVerdict.UNDERSTOOD] * 5 + [LineVerdict.IGNORED]
         parameters, _warnings = read(text.program.parameters | {"factor": -1})
         assert (parameters.target, parameters.tolerance_width) == (39.992, 0.016)
 
@@ -103,12 +103,12 @@ class TestSource:
 
     def test_the_part_program_around_them_is_passed_over(self) -> None:
         text = sinumerik.read("%123\nN5 G0 G53 X300 Z450\nN10 G59 Z137.5\nN150 T1030\nN155 M05\nN165 X206\nN300 M30")
-        assert {line.verdict for line in text.lines} == {Verdict.IGNORED}
+        assert {line.verdict for line in text.lines} == {LineVerdict.IGNORED}
         assert text.programs == ()
 
     def test_its_placeholders_are_named(self) -> None:
         text = sinumerik.read("N15 R11xx R21xx\nN20 R32xxx.xxx R33xx\nN10 R32*xxx.xxx")
-        assert [line.verdict for line in text.lines] == [Verdict.NOT_UNDERSTOOD] * 3
+        assert [line.verdict for line in text.lines] == [LineVerdict.NOT_UNDERSTOOD] * 3
         assert [note.data["r"] for line in text.lines for note in line.notes] == ["R11", "R21", "R32", "R33", "R32"]
 
     def test_its_explanations_are_named(self) -> None:
@@ -194,7 +194,7 @@ def test_forms_of_an_assignment(text: str, found: dict[str, Any]) -> None:
 )
 def test_what_is_not_understood_is_named_and_not_taken(text: str, code: str) -> None:
     found = sinumerik.read(text)
-    assert found.lines[0].verdict is Verdict.NOT_UNDERSTOOD
+    assert found.lines[0].verdict is LineVerdict.NOT_UNDERSTOOD
     assert code in codes(found, 1)
     assert parameters_in(text) == {}
 
@@ -256,7 +256,7 @@ def test_a_unit_that_changes_leaves_no_length_standing(text: str) -> None:
     assert found.program is not None
     assert found.program.parameters == {"tool_memory": 3}
     assert any(note.code == "unit_mixed" for line in found.lines for note in line.notes)
-    assert any(line.verdict is Verdict.NOT_UNDERSTOOD for line in found.lines)
+    assert any(line.verdict is LineVerdict.NOT_UNDERSTOOD for line in found.lines)
 
 
 def test_a_main_program_ends_with_its_unit() -> None:
@@ -324,7 +324,7 @@ def test_a_characteristic_survives_its_program_text(parameters: Parameters, name
     text = write_measuring(parameters, {"characteristic": "shaft-d40", "name": name})
     found = sinumerik.read(text)
     assert text.isascii()
-    assert not [line for line in found.lines if line.verdict is Verdict.NOT_UNDERSTOOD]
+    assert not [line for line in found.lines if line.verdict is LineVerdict.NOT_UNDERSTOOD]
     assert found.program is not None
     assert found.program.about.get("name", "") == name
     again, _warnings = read(found.program.parameters)
@@ -462,7 +462,7 @@ END: M30
 
 def test_the_edge_finder_macro_of_the_source_is_read() -> None:
     text = sinumerik.read(EDGE_FINDER)
-    assert [line.text for line in text.lines if line.verdict is Verdict.NOT_UNDERSTOOD] == []
+    assert [line.text for line in text.lines if line.verdict is LineVerdict.NOT_UNDERSTOOD] == []
     (program,) = text.programs
     assert program.kind is ProgramKind.WORK_ZERO
     assert program.parameters == {"work_offset": "G54", "axes": "XY", "tip": 6.0, "old_kept": "X R91"}

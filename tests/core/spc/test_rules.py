@@ -19,8 +19,8 @@ from app.core.spc.rules import (
     NELSON,
     RULES,
     WESTERN_ELECTRIC,
-    Kind,
     Rule,
+    RuleKind,
     RuleName,
     Scan,
     members,
@@ -38,7 +38,7 @@ POINTS = st.lists(st.integers(-14, 14).map(lambda quarter: quarter / 4), min_siz
 def fires(rule: Rule, z: list[float], at: int) -> list[tuple[int, set[int]]]:
     """The rule's definition at one point, word by word: sides on which it fires there, with the points of the pattern."""
     first = at - rule.n + 1
-    if rule.kind is Kind.BEYOND:
+    if rule.kind is RuleKind.BEYOND:
         found = []
         for side in (1, -1):
             pattern = {i for i in range(max(0, first), at + 1) if side * z[i] > rule.limit}
@@ -51,13 +51,13 @@ def fires(rule: Rule, z: list[float], at: int) -> list[tuple[int, set[int]]]:
     steps = [b - a for a, b in pairwise(window)]
     points = set(range(first, at + 1))
     match rule.kind:
-        case Kind.SIDE:
+        case RuleKind.SIDE:
             sides = [side for side in (1, -1) if all(side * value > 0 for value in window)]
-        case Kind.TREND:
+        case RuleKind.TREND:
             sides = [side for side in (1, -1) if all(side * step > 0 for step in steps)]
-        case Kind.ALTERNATING:
+        case RuleKind.ALTERNATING:
             sides = [0] if steps[0] != 0 and all(a * b < 0 for a, b in pairwise(steps)) else []
-        case Kind.WITHIN:
+        case RuleKind.WITHIN:
             sides = [0] if all(abs(value) <= rule.limit for value in window) else []
         case _:
             sides = [0] if all(abs(value) > rule.limit for value in window) else []
@@ -133,11 +133,11 @@ def test_the_compiled_loops_are_the_python_they_are_made_from() -> None:
 
 def test_a_rule_fires_at_the_last_of_its_points_and_goes_on_as_one_signal() -> None:
     for rule in NELSON:
-        if rule.kind is Kind.TREND:
+        if rule.kind is RuleKind.TREND:
             pattern = [0.1 * i for i in range(rule.n)]
-        elif rule.kind in {Kind.ALTERNATING, Kind.OUTSIDE}:
+        elif rule.kind in {RuleKind.ALTERNATING, RuleKind.OUTSIDE}:
             pattern = [1.5 * (-1) ** i for i in range(rule.n)]
-        elif rule.kind is Kind.BEYOND:
+        elif rule.kind is RuleKind.BEYOND:
             pattern = [rule.limit + 0.5] * rule.k
         else:
             pattern = [0.5] * rule.n
@@ -189,9 +189,10 @@ def test_what_is_no_number_is_refused(values: list[float]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "n", "k"), [(Kind.BEYOND, 3, 4), (Kind.SIDE, 0, 0), (Kind.TREND, 1, 1), (Kind.SIDE, 61, 61)]
+    ("kind", "n", "k"),
+    [(RuleKind.BEYOND, 3, 4), (RuleKind.SIDE, 0, 0), (RuleKind.TREND, 1, 1), (RuleKind.SIDE, 61, 61)],
 )
-def test_numbers_without_a_meaning_are_refused(kind: Kind, n: int, k: int) -> None:
+def test_numbers_without_a_meaning_are_refused(kind: RuleKind, n: int, k: int) -> None:
     with pytest.raises(ValueError, match="no meaning"):
         Rule(RuleName.NELSON_1, kind, n, k, 1.0)
 
@@ -199,10 +200,10 @@ def test_numbers_without_a_meaning_are_refused(kind: Kind, n: int, k: int) -> No
 class TestChance:
     def test_runs_of_steps_have_the_lengths_that_combinatorics_gives(self) -> None:
         # No three in a row rise or fall: alternating orders, of which there are Euler's numbers: 2 (sec 1 + tan 1) - 2.
-        trend = chance(Rule(RuleName.NELSON_3, Kind.TREND, 3, 3)).average_run_length
+        trend = chance(Rule(RuleName.NELSON_3, RuleKind.TREND, 3, 3)).average_run_length
         assert trend == pytest.approx(2 * (1 / cos(1) + tan(1)) - 2, abs=1e-12)
         # No three in a row alternate: monotone orders, two of each length: 2e - 2.
-        alternating = chance(Rule(RuleName.NELSON_4, Kind.ALTERNATING, 3, 3)).average_run_length
+        alternating = chance(Rule(RuleName.NELSON_4, RuleKind.ALTERNATING, 3, 3)).average_run_length
         assert alternating == pytest.approx(2 * e - 2, abs=1e-12)
 
     def test_runs_on_one_side_are_as_tosses_of_a_coin(self) -> None:
@@ -211,7 +212,7 @@ class TestChance:
     @pytest.mark.parametrize("rule", NELSON, ids=lambda rule: rule.name.value)
     def test_a_window_shows_a_pattern_as_often_as_it_is_counted(self, rule: Rule) -> None:
         windows = np.random.default_rng(11).normal(size=(60_000, rule.n))
-        if rule.kind is Kind.BEYOND:
+        if rule.kind is RuleKind.BEYOND:
             beyond = [(side * windows > rule.limit).sum(axis=1) >= rule.k for side in (1, -1)]
             seen = float((beyond[0] | beyond[1]).mean())
         else:
@@ -228,7 +229,7 @@ class TestChance:
             assert len(rows)
             # The run's first firing: with the n-th point of a plain run; of "k of n" with the k-th point beyond.
             start = rows[0, 1]
-            if rule.kind is Kind.BEYOND:
+            if rule.kind is RuleKind.BEYOND:
                 beyond = np.flatnonzero(rows[0, 0] * z[start:] > rule.limit)
                 firsts.append(start + beyond[rule.k - 1] + 1)
             else:
@@ -249,7 +250,10 @@ class TestChance:
     def test_steps_with_others_and_too_many_rules_are_refused(self) -> None:
         with pytest.raises(Refused):
             average_run_length(NELSON)
-        wide = [Rule(RuleName.NELSON_6, Kind.BEYOND, 30, 15, 0.5), Rule(RuleName.NELSON_5, Kind.BEYOND, 30, 15, 0.25)]
+        wide = [
+            Rule(RuleName.NELSON_6, RuleKind.BEYOND, 30, 15, 0.5),
+            Rule(RuleName.NELSON_5, RuleKind.BEYOND, 30, 15, 0.25),
+        ]
         with pytest.raises(Refused):
             average_run_length(wide)
         assert average_run_length([]) == float("inf")

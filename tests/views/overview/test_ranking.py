@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.core.state import State
+from app.core.state import CharacteristicState
 from app.views.overview.ranking import AttentionInputs, AttentionReason
 
-CALM = AttentionInputs(State.IN_BAND, 0, 0, 1.7, None, hunting=False, per_shift=0.0)
+CALM = AttentionInputs(CharacteristicState.IN_BAND, 0, 0, 1.7, None, hunting=False, per_shift=0.0)
 inputs = st.builds(
     AttentionInputs,
-    state=st.sampled_from(State),
+    state=st.sampled_from(CharacteristicState),
     alarms=st.integers(0, 3),
     signals=st.integers(0, 3),
     ppk=st.none() | st.floats(-3, 5),
@@ -29,9 +29,9 @@ inputs = st.builds(
     [
         ({}, ()),
         ({"ppk": None}, ()),
-        ({"state": State.TOOL_WORN, "alarms": 1}, (AttentionReason.STOPPED,)),
-        ({"state": State.OVERSIZE, "alarms": 1}, (AttentionReason.OUTSIDE, AttentionReason.ALARM)),
-        ({"state": State.AWAITING_APPROVAL}, (AttentionReason.OUTSIDE,)),
+        ({"state": CharacteristicState.TOOL_WORN, "alarms": 1}, (AttentionReason.STOPPED,)),
+        ({"state": CharacteristicState.OVERSIZE, "alarms": 1}, (AttentionReason.OUTSIDE, AttentionReason.ALARM)),
+        ({"state": CharacteristicState.AWAITING_APPROVAL}, (AttentionReason.OUTSIDE,)),
         ({"signals": 1, "ppk": 0.99}, (AttentionReason.SIGNAL, AttentionReason.NOT_CAPABLE)),
         ({"ppk": 1.0}, (AttentionReason.BARELY_CAPABLE,)),
         ({"ppk": 1.33}, ()),

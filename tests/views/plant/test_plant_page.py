@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Page, expect
 from sqlalchemy import event
 
-from app.core.state import State
+from app.core.state import CharacteristicState
 from app.views.characteristic import state_queries as queries
 from tests.conftest import RunServer, Server
 from tests.shop import PARAMETERS, Person, Shop
@@ -185,4 +185,4 @@ class TestWithoutConnection:
 def test_every_state_has_words() -> None:
     from app.views.characteristic.wording import state_word
 
-    assert all(state_word(state) for state in State)
+    assert all(state_word(state) for state in CharacteristicState)
