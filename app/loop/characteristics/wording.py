@@ -37,9 +37,9 @@ def label(name: str) -> str:
         "path_factor": _("Path factor"),
         "factor": _("Factor from size error to offset"),
         "accept": _("Acceptance"),
-        "rejected_may_correct": _("A rejected part may correct"),
+        "rejected_may_correct": _("Correct from rejected parts"),
         "mode": _("Mode"),
-        "wear_policy": _("Beyond the wear limit"),
+        "wear_policy": _("Correction beyond the wear limit"),
         "max_step": _("Largest step"),
         "max_total": _("Largest sum"),
         "plausible_jump": _("Largest plausible jump"),
@@ -119,8 +119,8 @@ def choice(name: str, value: str) -> str:
             "measure_only": _("Measure only"),
         },
         "wear_policy": {
-            "hold": _("Held for the operator"),
-            "release": _("Released at once"),
+            "hold": _("Hold for the operator"),
+            "release": _("Release at once"),
         },
     }.get(name, {}).get(value, value)
 

@@ -116,6 +116,7 @@ def test_a_probe_is_due_by_whatever_its_machine_measures(shop: Shop) -> None:
     address = f"/calibration/{shop.machine}/probes/32"
     assert f'href="{address}"' in operator.open(f"/alarms?machine={shop.machine}")
     assert "R10 = 32" in operator.open(address)
+    assert "due: 2 parts cut, limit 2" in operator.open(f"/calibration?machine={shop.machine}")
     ring(shop)
     assert shop.alarms() == []
 
