@@ -9,7 +9,7 @@ from app.core.programs.lines import MOST_CHARACTERS, WARNINGS, Note, Program
 from app.errors import FieldError
 from app.loop.programs import wording
 from app.loop.programs.queries import CheckedProgram, ReadableControl
-from app.web.fields import Body, Slug
+from app.web.fields import Body, Slug, answer_from
 from app.web.warnings import Warnings
 
 Verdict = Literal["understood", "ignored", "not_understood"]
@@ -94,14 +94,10 @@ def note_out(note: Note) -> NoteOut:
 
 
 def program_out(program: Program) -> ProgramOut:
-    return ProgramOut(
+    return answer_from(
+        ProgramOut,
+        program,
         kind=program.kind.value,
-        first_line=program.first_line,
-        last_line=program.last_line,
-        parameters=program.parameters,
-        about=program.about,
-        values=program.values,
-        results=program.results,
         touches=fanuc.touches(program.results),
         notes=[note_out(note) for note in program.notes],
     )

@@ -14,7 +14,7 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import queries
 from app.web.api import CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import LARGEST_ID, Moment
+from app.web.fields import LARGEST_ID, Moment, answer_from
 
 router = api_router("statistics")
 
@@ -74,25 +74,16 @@ def get_statistics(
         rejects = queries.rejects_of(session, standing.characteristic, window)
         since_change = queries.since_tool_change(session, standing.characteristic)
         of_tool = queries.rejects_of(session, standing.characteristic, since_change)
-    return StatisticsOut(
+    return answer_from(
+        StatisticsOut,
+        numbers,
         characteristic=standing.characteristic.key,
         first_sequence=window.first if window.count else None,
         last_sequence=window.last if window.count else None,
-        count=numbers.count,
-        excluded=numbers.excluded,
-        probe_faults=numbers.probe_faults,
-        mean=numbers.mean,
-        standard_deviation=numbers.standard_deviation,
-        minimum=numbers.minimum,
-        maximum=numbers.maximum,
-        in_tolerance=numbers.in_tolerance,
-        share_in_tolerance=numbers.share_in_tolerance,
-        corrections=numbers.corrections,
         rejected=rejects.parts if rejects else None,
         sections_outside=rejects.sections if rejects else None,
         rejected_since_tool_change=of_tool.parts if of_tool else None,
         sections_outside_since_tool_change=of_tool.sections if of_tool else None,
-        zones=numbers.zones,
     )
 
 

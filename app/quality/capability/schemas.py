@@ -204,12 +204,12 @@ def capability_out(study: Study) -> CapabilityOut:
     by_percentile = None if isinstance(study.by_percentile, Refused) else study.by_percentile
     model = None if isinstance(study.in_time, Refused) else study.in_time
     judged = None if isinstance(study.stability, Refused) else study.stability
-    return CapabilityOut(
+    return answer_from(
+        CapabilityOut,
+        study,
         characteristic=study.standing.characteristic.key,
         first_sequence=int(study.sequence[0]) if len(study.sequence) else None,
         last_sequence=int(study.sequence[-1]) if len(study.sequence) else None,
-        first_at=study.first_at,
-        last_at=study.last_at,
         readings=len(study.values),
         excluded=study.excluded[:MOST_NAMED],
         probe_faults=study.faults[:MOST_NAMED],
@@ -217,11 +217,9 @@ def capability_out(study: Study) -> CapabilityOut:
         lower_limit=study.limits.lower,
         upper_limit=study.limits.upper,
         versions=[InForceOut(**_fields(version)) for version in study.versions],
-        confidence=study.confidence,
         mean=result.mean if result else None,
         sigma_within=result.within.value if result else None,
         sigma_overall=result.overall.value if result else None,
-        quote=study.quote,
         quoted=_quoted(study),
         why_none=wording.why_not(study.quoting.why) if study.quote == "none" else None,
         cp=IndexOut.of(result.cp if result else None),
@@ -233,24 +231,17 @@ def capability_out(study: Study) -> CapabilityOut:
         ppm_within=FalloutOut.of(study.within),
         ppm_overall=FalloutOut.of(study.overall),
         ppm_observed=FalloutOut.of(study.fallout),
-        outside=study.outside,
         refused=statistics.refusal(study.indices) if isinstance(study.indices, Refused) else None,
-        normal=study.normal,
         normality=[
             NormalityOut.of("anderson_darling", study.anderson),
             NormalityOut.of("shapiro_wilk", study.shapiro),
         ],
-        stable=study.stable,
-        in_control=study.in_control,
-        constant_in_time=study.constant_in_time,
         stability=wording.stability(study.stability, study.baseline),
-        baseline=study.baseline,
         signals=[
             FiredOut(rule=fired.rule.value, signals=fired.signals, expected=fired.expected, p_value=fired.p_value)
             for fired in (judged.fired if judged else ())
         ],
         in_time=_in_time(study, model) if model else None,
-        compensated=study.compensated,
         without=_without(study),
         cautions=wording.cautions(study),
     )

@@ -10,7 +10,7 @@ from app.core.spc.shewhart import Chart
 from app.quality.control_charts import signals_wording as wording
 from app.quality.control_charts.signals_queries import SignalRow
 from app.quality.control_charts.signals_wording import Cause
-from app.web.fields import Body, Reason
+from app.web.fields import Body, Reason, answer_from
 
 
 class SignalOut(BaseModel):
@@ -56,25 +56,17 @@ def signal_out(row: SignalRow) -> SignalOut:
     """A signal as it is answered."""
     signal, data = row.signal, wording.data_of(row.signal)
     answered = row.alarm is not None and row.alarm.acknowledged_at is not None and signal.explained_at is None
-    return SignalOut(
-        id=signal.id,
-        state=row.state,  # type: ignore[arg-type] # never "all"
+    return answer_from(
+        SignalOut,
+        signal,
+        state=row.state,
         machine=row.machine.key,
         characteristic=row.characteristic.key,
         chart=Chart(signal.chart),
         rule=RuleName(signal.rule),
-        side=_side(signal.rule, signal.side),  # type: ignore[arg-type] # one of these
-        first_sequence=signal.first_sequence,
-        last_sequence=signal.last_sequence,
-        points=signal.points,
+        side=_side(signal.rule, signal.side),
         text=wording.sentence(data),
         baseline=signal.baseline_version,
-        rules_version=signal.rules_version,
-        at=signal.at,
-        last_at=signal.last_at,
-        alarm=signal.alarm,
-        excluded=signal.excluded,
-        withdrawn_at=signal.withdrawn_at,
         explained_at=row.alarm.acknowledged_at if row.alarm and answered else signal.explained_at,
         explained_by=row.alarm.acknowledged_by if row.alarm and answered else signal.explained_by,
         cause=Cause(signal.cause) if signal.cause else None,

@@ -11,6 +11,7 @@ from app.core.hunting import Hunting
 from app.core.wear import Fit, Forecast, Towards
 from app.quality.wear import wording
 from app.quality.wear.queries import Wear
+from app.web.fields import answer_from
 
 
 class PerPartOut(BaseModel):
@@ -133,20 +134,16 @@ def _per_part(fit: Fit | None) -> PerPartOut | None:
     if fit is None:
         return None
     low, high = fit.slope_interval
-    return PerPartOut(
+    return answer_from(
+        PerPartOut,
+        fit,
         value=fit.slope,
         low=low,
         high=high,
         standard_error=fit.slope_error,
-        is_wear=fit.is_wear,
         first_sequence=fit.first,
         last_sequence=fit.last,
         readings=fit.count,
-        left_out=fit.left_out,
-        off=fit.off,
-        level=fit.level,
-        scatter=fit.scatter,
-        correlation=fit.correlation,
     )
 
 

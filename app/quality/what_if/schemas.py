@@ -10,7 +10,7 @@ from app.core.replay import LONGEST_DELAY
 from app.quality.what_if.evidence import cell_of, evidence_of, period_of
 from app.quality.what_if.proposals import ProposalRow
 from app.quality.what_if.queries import USUAL, Map, Simulation
-from app.web.fields import LARGEST_ID, Body, Moment, Reason
+from app.web.fields import LARGEST_ID, Body, Moment, Reason, answer_from
 
 LARGEST_LENGTH = 100_000.0
 Length = Annotated[float, Field(ge=0, le=LARGEST_LENGTH, strict=True)]
@@ -246,19 +246,10 @@ class ProposalOut(BaseModel):
     def of(cls, row: ProposalRow) -> "ProposalOut":
         """As it is answered."""
         proposal = row.proposal
-        return cls(
-            id=proposal.id,
+        return answer_from(
+            cls,
+            proposal,
             characteristic=row.characteristic.key,
             machine=row.machine.key,
-            status=row.status,  # type: ignore[arg-type]
-            from_version=proposal.from_version,
-            changes=proposal.changes,
-            reason=proposal.reason,
-            proposed_by=proposal.proposed_by,
-            proposed_at=proposal.proposed_at,
-            decided_by=proposal.decided_by,
-            decided_at=proposal.decided_at,
-            decided_why=proposal.decided_why,
-            made_version=proposal.made_version,
-            evidence=proposal.evidence,
+            status=row.status,
         )

@@ -9,6 +9,7 @@ from app.core.spc.quoting import Quote
 from app.quality.capability import wording as capability
 from app.views.overview import wording
 from app.views.overview.queries import Ranked
+from app.web.fields import answer_from
 
 
 class AttentionReasonOut(BaseModel):
@@ -63,7 +64,9 @@ class Overview(BaseModel):
         """The page behind the first `after` ones."""
         return cls(
             items=[
-                RankedOut(
+                answer_from(
+                    RankedOut,
+                    entry.verdict.of,
                     characteristic=entry.row.characteristic.key,
                     name=entry.row.characteristic.name,
                     machine=entry.machine.key,
@@ -74,16 +77,10 @@ class Overview(BaseModel):
                     ],
                     ppk=entry.inputs.ppk,
                     quote=Quote(entry.verdict.of.quote).value,
-                    low=entry.verdict.of.low,
-                    high=entry.verdict.of.high,
-                    preliminary=entry.verdict.of.preliminary,
                     method=capability.method(entry.verdict.of.quote),
                     why_none=None if entry.inputs.ppk is not None else capability.why_not(entry.verdict.of.why),
-                    readings=entry.verdict.of.readings,
                     first_reading=entry.verdict.of.first,
                     last_reading=entry.verdict.of.last,
-                    first_at=entry.verdict.of.first_at,
-                    last_at=entry.verdict.of.last_at,
                     judged_at=entry.verdict.of.at,
                     now=capability.why_not(entry.verdict.now) if entry.verdict.now else None,
                     parts_left=entry.inputs.parts_left,
