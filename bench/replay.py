@@ -18,7 +18,7 @@ import psycopg
 
 from app.core.compiled import plain
 from app.core.decision import loops
-from app.core.decision.decide import State, decide
+from app.core.decision.decide import LoopState, decide
 from app.core.decision.limits import ZONES
 from app.core.decision.loops import LANE, TALLY, Mark, ProcessTrace, ReplayResult
 from app.core.decision.step import CODES, Action, effect_of, rounded
@@ -81,7 +81,7 @@ def followed(trace: ProcessTrace, policy: Policy) -> Iterator[tuple[float, float
             offset, pending = rounded(offset + amount), rounded(pending - amount)
         decision = decide(
             parameters,
-            State(averages[lane.memory] if lane.memory >= 0 else 0.0, total, bool(mark & Mark.PAUSED)),
+            LoopState(averages[lane.memory] if lane.memory >= 0 else 0.0, total, bool(mark & Mark.PAUSED)),
             rounded(free + lane.response * offset),
             outstanding=effect_of(pending, parameters.factor),
             accepted=not mark & Mark.REJECTED,

@@ -10,7 +10,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, get_args
 
-from app.core.parameters import FIELDS, Field, Kind
+from app.core.parameters import FIELDS, Field, FieldKind
 from app.errors import InbandError
 from app.loop.characteristics import wording
 from app.settings import HOUSE, Settings
@@ -119,12 +119,12 @@ def _number(value: float | None) -> str:
 
 
 def _values(field: Field) -> str:
-    if field.kind is Kind.CHOICE:
+    if field.kind is FieldKind.CHOICE:
         codes = zip_longest(field.choices, field.codes)
         return ", ".join(f"`{choice}`" + ("" if code is None else f" = {code}") for choice, code in codes)
-    if field.kind is Kind.YES_NO:
+    if field.kind is FieldKind.YES_NO:
         return "`true`, `false`"
-    unit = {Kind.LENGTH: "mm", Kind.WHOLE: "whole number"}.get(field.kind, "number")
+    unit = {FieldKind.LENGTH: "mm", FieldKind.WHOLE: "whole number"}.get(field.kind, "number")
     if field.lowest is not None and field.highest is not None:
         return f"{unit}, {_number(field.lowest)} to {_number(field.highest)}"
     return f"{unit}, from {_number(field.lowest)}" if field.lowest is not None else unit

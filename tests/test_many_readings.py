@@ -18,7 +18,7 @@ from app.core.decision.limits import Zone
 from app.db.engine import Database
 from app.jobs.actions import run_jobs
 from app.loop.characteristics import actions as characteristics
-from app.loop.characteristics import queries as standings
+from app.loop.characteristics import queries as characteristics_now
 from app.loop.characteristics.schemas import CharacteristicIn
 from app.loop.readings import exporting, queries, results
 from app.loop.readings.importing.actions import import_readings
@@ -216,7 +216,7 @@ class TestHistory:
     @pytest.mark.parametrize("count", borders(history.BLOCK)[1:])
     def test_across_the_borders_of_its_blocks(self, many_readings: Database, count: int) -> None:
         with many_readings.begin() as session:
-            here = standings.characteristic_named(session, KEY).characteristic
+            here = characteristics_now.characteristic_named(session, KEY).characteristic
             for first in (1, history.BLOCK - 1, history.BLOCK, history.BLOCK + 1):
                 found = history_of(session, here, Window(first, first + count - 1, MANY), ("deviation", "zone"))
                 assert found["sequence"].tolist() == list(range(first, first + count))
@@ -224,7 +224,7 @@ class TestHistory:
 
     def test_all_of_them(self, many_readings: Database) -> None:
         with many_readings.begin() as session:
-            here = standings.characteristic_named(session, KEY).characteristic
+            here = characteristics_now.characteristic_named(session, KEY).characteristic
             found = history_of(session, here, window_of(session, here), ("measured", "zone"))
         zones = [zone.value for zone in Zone]
         told = [

@@ -100,9 +100,9 @@ def write_program(
 
     settings = settings_from(data_dir=data_dir, database_url=database_url)
     with existing(settings) as database, database.begin() as session:
-        standing = queries.characteristic_named(session, characteristic)
-        chosen = programs.control_of(standing, control.value if control else None)
-        sys.stdout.write(programs.program_of(standing, chosen, kind.value, gauge=gauge))
+        current = queries.characteristic_named(session, characteristic)
+        chosen = programs.control_of(current, control.value if control else None)
+        sys.stdout.write(programs.program_of(current, chosen, kind.value, gauge=gauge))
 
 
 @program.command("corrections")

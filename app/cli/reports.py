@@ -130,8 +130,8 @@ def _made(database: "Database", keys: Sequence[str], bundle: "Bundle", request: 
             progress.update(task, description=key)
             try:
                 with database.begin() as session:
-                    standing = characteristics.characteristic_named(session, key)
-                    report = queries.report_of(session, standing, request, datetime.now(UTC))
+                    current = characteristics.characteristic_named(session, key)
+                    report = queries.report_of(session, current, request, datetime.now(UTC))
                     actor, subject = f"command line ({getpass.getuser()})", f"characteristic/{key}"
                     record(session, actor, "report written", subject, after={"format": bundle.form})
                 parts.append(Part(key, bundle.part(report), None))

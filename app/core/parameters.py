@@ -8,7 +8,7 @@ Lengths are mm.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from math import inf, isfinite
 from typing import Any, NamedTuple
@@ -177,7 +177,7 @@ class Parameters:
         return cls(**values, accept_n=accept["n"], accept_m=accept["m"])
 
 
-class Kind(StrEnum):
+class FieldKind(StrEnum):
     """Type of a parameter's value."""
 
     LENGTH = "length"
@@ -196,7 +196,7 @@ class Field(NamedTuple):
 
     name: str
     r: str | None
-    kind: Kind
+    kind: FieldKind
     required: bool = False
     default: Any = None
     lowest: float | None = None
@@ -210,45 +210,37 @@ def _choices(enum: type[StrEnum]) -> tuple[str, ...]:
     return tuple(member.value for member in enum)
 
 
+_location = partial(Field, kind=FieldKind.WHOLE, default=0, lowest=0, highest=MOST_LOCATIONS)
+
 FIELDS: tuple[Field, ...] = (
-    Field(
-        "tool_memory", "R10", Kind.WHOLE, default=0, lowest=0, highest=MOST_LOCATIONS, source_range=(0, TOOL_LOCATIONS)
-    ),
-    Field(
-        "average_memory",
-        "R11",
-        Kind.WHOLE,
-        default=0,
-        lowest=0,
-        highest=MOST_LOCATIONS,
-        source_range=(0, AVERAGE_LOCATIONS),
-    ),
-    Field("variant", "R25", Kind.CHOICE, default="single", choices=_choices(Variant), codes=(0, 1, 2, 3)),
-    Field("points", "R23", Kind.WHOLE, default=1, lowest=1, highest=100),
-    Field("repeats", "R27", Kind.WHOLE, default=1, lowest=1, highest=100, source_range=(1, 10)),
-    Field("index", "R26", Kind.NUMBER, lowest=-100_000, highest=100_000),
-    Field("wait", "R04", Kind.NUMBER, lowest=0, highest=3600),
-    Field("axis", "R30", Kind.CHOICE, default="X", choices=_choices(Axis), codes=(1, 2)),
-    Field("direction", "R31", Kind.CHOICE, default="positive", choices=_choices(Direction), codes=(0, 1)),
-    Field("feature", None, Kind.CHOICE, default="outside", choices=_choices(Feature)),
-    Field("nominal", "R42", Kind.LENGTH),
-    Field("upper_deviation", "R40", Kind.LENGTH),
-    Field("lower_deviation", "R41", Kind.LENGTH),
-    Field("target", "R32", Kind.LENGTH),
-    Field("tolerance_width", "R35", Kind.LENGTH, lowest=0),
-    Field("zero_range", "R33", Kind.LENGTH, required=True, lowest=0, source_range=(0, 0.1)),
-    Field("averaging_limit", "R34", Kind.LENGTH, lowest=0, source_range=(0, 0.1)),
-    Field("wear_limit", "R37", Kind.LENGTH, required=True, lowest=0, source_range=(0.3, 3)),
-    Field("confidence_limit", "R36", Kind.LENGTH, required=True, lowest=0, source_range=(1, 3)),
-    Field("weighting_factor", "R29", Kind.NUMBER, default=1.0, lowest=1, highest=1_000_000, source_range=(1, 4)),
-    Field("path_factor", "R28", Kind.NUMBER, default=1.0, lowest=0.001, highest=1000, source_range=(1, 5)),
-    Field("factor", None, Kind.NUMBER, lowest=-1000, highest=1000),
-    Field("rejected_may_correct", None, Kind.YES_NO, default=False),
-    Field("mode", None, Kind.CHOICE, default="automatic", choices=_choices(Mode)),
-    Field("wear_policy", None, Kind.CHOICE, default="hold", choices=_choices(WearPolicy)),
-    Field("max_step", None, Kind.LENGTH, lowest=0.000001),
-    Field("max_total", None, Kind.LENGTH, lowest=0),
-    Field("plausible_jump", None, Kind.LENGTH, lowest=0.000001),
+    _location("tool_memory", "R10", source_range=(0, TOOL_LOCATIONS)),
+    _location("average_memory", "R11", source_range=(0, AVERAGE_LOCATIONS)),
+    Field("variant", "R25", FieldKind.CHOICE, default="single", choices=_choices(Variant), codes=(0, 1, 2, 3)),
+    Field("points", "R23", FieldKind.WHOLE, default=1, lowest=1, highest=100),
+    Field("repeats", "R27", FieldKind.WHOLE, default=1, lowest=1, highest=100, source_range=(1, 10)),
+    Field("index", "R26", FieldKind.NUMBER, lowest=-100_000, highest=100_000),
+    Field("wait", "R04", FieldKind.NUMBER, lowest=0, highest=3600),
+    Field("axis", "R30", FieldKind.CHOICE, default="X", choices=_choices(Axis), codes=(1, 2)),
+    Field("direction", "R31", FieldKind.CHOICE, default="positive", choices=_choices(Direction), codes=(0, 1)),
+    Field("feature", None, FieldKind.CHOICE, default="outside", choices=_choices(Feature)),
+    Field("nominal", "R42", FieldKind.LENGTH),
+    Field("upper_deviation", "R40", FieldKind.LENGTH),
+    Field("lower_deviation", "R41", FieldKind.LENGTH),
+    Field("target", "R32", FieldKind.LENGTH),
+    Field("tolerance_width", "R35", FieldKind.LENGTH, lowest=0),
+    Field("zero_range", "R33", FieldKind.LENGTH, required=True, lowest=0, source_range=(0, 0.1)),
+    Field("averaging_limit", "R34", FieldKind.LENGTH, lowest=0, source_range=(0, 0.1)),
+    Field("wear_limit", "R37", FieldKind.LENGTH, required=True, lowest=0, source_range=(0.3, 3)),
+    Field("confidence_limit", "R36", FieldKind.LENGTH, required=True, lowest=0, source_range=(1, 3)),
+    Field("weighting_factor", "R29", FieldKind.NUMBER, default=1.0, lowest=1, highest=1_000_000, source_range=(1, 4)),
+    Field("path_factor", "R28", FieldKind.NUMBER, default=1.0, lowest=0.001, highest=1000, source_range=(1, 5)),
+    Field("factor", None, FieldKind.NUMBER, lowest=-1000, highest=1000),
+    Field("rejected_may_correct", None, FieldKind.YES_NO, default=False),
+    Field("mode", None, FieldKind.CHOICE, default="automatic", choices=_choices(Mode)),
+    Field("wear_policy", None, FieldKind.CHOICE, default="hold", choices=_choices(WearPolicy)),
+    Field("max_step", None, FieldKind.LENGTH, lowest=0.000001),
+    Field("max_total", None, FieldKind.LENGTH, lowest=0),
+    Field("plausible_jump", None, FieldKind.LENGTH, lowest=0.000001),
 )
 BY_NAME: dict[str, Field] = {field.name: field for field in FIELDS}
 BY_R: dict[str, str] = {field.r: field.name for field in FIELDS if field.r}
@@ -351,12 +343,12 @@ def _named(given: Mapping[str, Any], problems: list[Problem]) -> Iterator[tuple[
 
 def _checked(field: Field, value: Any, problems: list[Problem]) -> Any:
     """One value as its kind, or a problem noted (and something harmless returned)."""
-    if field.kind is Kind.YES_NO:
+    if field.kind is FieldKind.YES_NO:
         if isinstance(value, bool):
             return value
         problems.append(Problem(field.name, "not_yes_no", {}))
         return False
-    if field.kind is Kind.CHOICE:
+    if field.kind is FieldKind.CHOICE:
         if isinstance(value, str) and value in field.choices:
             return value
         if isinstance(value, int | float) and not isinstance(value, bool) and value in field.codes:
@@ -367,7 +359,7 @@ def _checked(field: Field, value: Any, problems: list[Problem]) -> Any:
     if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > 1e300 or not isfinite(value):
         problems.append(Problem(field.name, "not_a_number", {}))
         return 1
-    if field.kind is Kind.WHOLE:
+    if field.kind is FieldKind.WHOLE:
         if value != int(value):
             problems.append(Problem(field.name, "not_whole", {"value": value}))
             return 1

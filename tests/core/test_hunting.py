@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from app.core.decision.decide import State as Loop
+from app.core.decision.decide import LoopState as Loop
 from app.core.decision.decide import decide
 from app.core.hunting import (
     ALARM,

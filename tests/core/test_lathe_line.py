@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from app.core.acceptance import accepted, sections_outside
-from app.core.decision.decide import ReadingAlarm, State, decide
+from app.core.decision.decide import LoopState, ReadingAlarm, decide
 from app.core.decision.step import Action, deviation_of
 from app.core.parameters import Parameters, read
 from app.core.probing import measured_value
@@ -76,7 +76,7 @@ def test_our_corrections_make_the_same_offset_count_and_verdict() -> None:
         value, points = measured_value(parameters, [[float(section)] for section in sections])
         good = accepted(parameters, points)
         rejects += sections_outside(parameters, points)
-        decision = decide(parameters, State(), deviation_of(value, parameters.target), accepted=good)
+        decision = decide(parameters, LoopState(), deviation_of(value, parameters.target), accepted=good)
         offset += Decimal(str(decision.amount or 0.0))
         assert (good, rejects) == (part["good"], macro.v513)
         assert abs(offset - macro.offset) <= len(CASE["parts"]) * PICOMETRE
@@ -89,14 +89,14 @@ def test_without_that_setting_a_rejected_part_corrects_nothing(part: dict[str, A
     parameters = line(rejected_may_correct=False)
     value, points = measured_value(parameters, [[float(section)] for section in part["sections"]])
     decision = decide(
-        parameters, State(), deviation_of(value, parameters.target), accepted=accepted(parameters, points)
+        parameters, LoopState(), deviation_of(value, parameters.target), accepted=accepted(parameters, points)
     )
     assert (decision.action, decision.amount) == (Action.NONE, None)
 
 
 @pytest.mark.parametrize(("deviation", "zone"), [(0.0, "zero"), (0.000001, "average"), (-0.000001, "average")])
 def test_without_a_zero_range_everything_but_the_target_itself_is_corrected(deviation: float, zone: str) -> None:
-    decision = decide(line(), State(), deviation)
+    decision = decide(line(), LoopState(), deviation)
     assert (decision.zone, decision.amount) == (zone, -deviation if deviation else None)
 
 

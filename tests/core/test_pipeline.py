@@ -10,7 +10,7 @@ from collections import deque
 import numpy as np
 import pytest
 
-from app.core.decision.decide import State, decide, outstanding_effect
+from app.core.decision.decide import LoopState, decide, outstanding_effect
 from app.core.parameters import Parameters, WearPolicy
 
 PARAMETERS = Parameters(
@@ -34,7 +34,7 @@ def shift(
 ) -> tuple[int, int, float]:
     """Parts out of tolerance, corrections issued, and the standard deviation of the sizes (mm) of one shift."""
     rng = np.random.default_rng(seed)
-    state, offset, issued = State(), 0.0, 0
+    state, offset, issued = LoopState(), 0.0, 0
     pipeline: deque[tuple[float, int]] = deque()  # a deviation, and the corrections it was cut with
     amounts: list[float] = []
     deviations = []
@@ -47,7 +47,7 @@ def shift(
         deviation, had = pipeline.popleft()
         to_come = outstanding_effect(amounts[had:], PARAMETERS.factor) if aware else 0.0
         decision = decide(PARAMETERS, state, deviation, outstanding=to_come)
-        state = State(decision.average_after)
+        state = LoopState(decision.average_after)
         if decision.amount is not None:
             amounts.append(decision.amount)
             offset += decision.amount

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from app.core.decision.decide import ReadingAlarm, State, decide, outstanding_effect
+from app.core.decision.decide import LoopState, ReadingAlarm, decide, outstanding_effect
 from app.core.decision.limits import Zone
 from app.core.decision.step import Action, Code
 from app.core.parameters import Mode, Parameters, WearPolicy
@@ -88,7 +88,7 @@ def test_a_jump_never_corrects_and_leaves_the_average(deviation: float, average:
         target=40.0, tolerance_width=0.016, zero_range=0.001, averaging_limit=0.005, wear_limit=0.3, confidence_limit=1.0,
         weighting_factor=2, factor=-1, tool_memory=3, average_memory=5, plausible_jump=0.01,
     )  # fmt: skip
-    decision = decide(parameters, State(average), deviation, jump=True)
+    decision = decide(parameters, LoopState(average), deviation, jump=True)
     assert decision.action in {Action.HOLD, Action.NONE}
     assert decision.code is Code.IMPLAUSIBLE
     assert decision.average_after == average
@@ -102,7 +102,7 @@ class TestDecision:
     def test_without_a_jump_nothing_is_different(self, shaft: Made) -> None:
         guarded, plain = shaft(plausible_jump=0.01), shaft()
         for deviation in (0.0005, 0.004, 0.007, 0.02, 0.4, 1.5):
-            assert decide(guarded, State(0.001), deviation) == decide(plain, State(0.001), deviation)
+            assert decide(guarded, LoopState(0.001), deviation) == decide(plain, LoopState(0.001), deviation)
 
     @pytest.mark.parametrize(
         ("micrometres", "policy", "code", "signals"),
@@ -117,19 +117,19 @@ class TestDecision:
     def test_what_asks_a_person(
         self, shaft: Made, micrometres: float, policy: WearPolicy, code: Code, signals: set[ReadingAlarm]
     ) -> None:
-        decision = decide(shaft(wear_policy=policy.value), State(), micrometres / 1000, jump=True)
+        decision = decide(shaft(wear_policy=policy.value), LoopState(), micrometres / 1000, jump=True)
         assert (decision.code, set(decision.alarms)) == (code, signals)
 
     def test_where_nothing_is_corrected_anyway_nobody_is_asked(self, shaft: Made) -> None:
-        assert decide(shaft(), State(paused=True), 0.02, jump=True).code is Code.PAUSED
-        assert decide(shaft(), State(), 0.02, previous_tool=True, jump=True).code is Code.BEFORE_TOOL_CHANGE
-        measured = decide(shaft(mode=Mode.MEASURE_ONLY.value), State(0.001), 0.02, jump=True)
+        assert decide(shaft(), LoopState(paused=True), 0.02, jump=True).code is Code.PAUSED
+        assert decide(shaft(), LoopState(), 0.02, previous_tool=True, jump=True).code is Code.BEFORE_TOOL_CHANGE
+        measured = decide(shaft(mode=Mode.MEASURE_ONLY.value), LoopState(0.001), 0.02, jump=True)
         assert (measured.code, measured.action, measured.average_after) == (Code.IMPLAUSIBLE, Action.NONE, 0.001)
 
     def test_the_limits_of_corrections_hold_for_a_held_one(self, shaft: Made) -> None:
-        clamped = decide(shaft(max_step=0.005), State(), 0.02, jump=True)
+        clamped = decide(shaft(max_step=0.005), LoopState(), 0.02, jump=True)
         assert (clamped.amount, clamped.clamped) == (-0.005, True)
-        limited = decide(shaft(max_total=0.01), State(), 0.02, jump=True)
+        limited = decide(shaft(max_total=0.01), LoopState(), 0.02, jump=True)
         assert (limited.code, limited.amount) == (Code.OFFSET_LIMIT, None)
 
 

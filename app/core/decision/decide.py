@@ -41,7 +41,7 @@ class ReadingAlarm(StrEnum):
     IMPLAUSIBLE = "implausible"
 
 
-class State(NamedTuple):
+class LoopState(NamedTuple):
     """State that the decision needs besides the reading.
 
     average: M, the running average of this characteristic's memory location R11, mm.
@@ -85,7 +85,7 @@ def outstanding_effect(amounts: Iterable[float], factor: float) -> float:
 
 def decide(
     parameters: Parameters,
-    state: State,
+    state: LoopState,
     deviation: float,
     *,
     outstanding: float = 0.0,
@@ -109,7 +109,7 @@ def decide(
 
     >>> p = Parameters(target=10.0, tolerance_width=0.04, zero_range=0.004, averaging_limit=0.0133,
     ...                wear_limit=0.3, confidence_limit=1.0, weighting_factor=2, factor=-1, tool_memory=1, average_memory=1)
-    >>> decide(p, State(average=0.00325), 0.006).amount
+    >>> decide(p, LoopState(average=0.00325), 0.006).amount
     -0.004625
     """
     made = step(

@@ -17,7 +17,7 @@ STEPS = 50
 Values = dict[str, float]
 
 
-class Kind(StrEnum):
+class EdgeKind(StrEnum):
     """Shape that is measured to set a work zero."""
 
     BORE = "bore"
@@ -29,12 +29,12 @@ class Kind(StrEnum):
     @property
     def inside(self) -> bool:
         """True if the tip touches from within, so that the size is larger than the travel of the tip."""
-        return self in {Kind.BORE, Kind.POCKET}
+        return self in {EdgeKind.BORE, EdgeKind.POCKET}
 
     @property
     def is_round(self) -> bool:
         """True if the shape is a circle."""
-        return self in {Kind.BORE, Kind.BOSS}
+        return self in {EdgeKind.BORE, EdgeKind.BOSS}
 
 
 class Approach(StrEnum):
@@ -92,7 +92,7 @@ Solver = Callable[[Sequence[Touch], float], tuple[Values, Floats]]
 """Touches and tip to values by name and residuals."""
 
 
-def check(kind: Kind, touches: Sequence[Touch]) -> None:
+def check(kind: EdgeKind, touches: Sequence[Touch]) -> None:
     if len(touches) < 2:
         raise Unfit(Problem.TOO_FEW, have=len(touches), needed=2)
     missing = [at for at, touch in enumerate(touches, 1) if touch.approach is None]
@@ -109,7 +109,7 @@ def check(kind: Kind, touches: Sequence[Touch]) -> None:
             for sign in (-1, 1)
         )
         name = "XY"[axis]
-        if kind is Kind.CORNER:
+        if kind is EdgeKind.CORNER:
             if not lower and not upper:
                 raise Unfit(Problem.ONE_SIDE, axis=name)
             if lower and upper:
@@ -165,7 +165,7 @@ def _directions(touches: Sequence[Touch], angle: float = 0.0) -> Floats:
     return turned
 
 
-def sides(kind: Kind) -> Solver:
+def sides(kind: EdgeKind) -> Solver:
     """Centre, half sizes and rotation of a pocket or web together, by Gauss and Newton."""
     side = 1.0 if kind.inside else -1.0
 
@@ -206,7 +206,7 @@ def sides(kind: Kind) -> Solver:
     return solve
 
 
-def across(kind: Kind) -> Solver:
+def across(kind: EdgeKind) -> Solver:
     """Centre and diameter of a bore or boss from one pair of opposite touches, or two.
 
     Each pair lies on a chord. Halfway along it is the centre whatever the chord; the longer one is nearer to the diameter.

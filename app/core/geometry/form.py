@@ -44,7 +44,7 @@ from app.core.geometry.points import Degenerate, Floats, Reason, frame, points_o
 from app.core.geometry.suspect_points import SuspectPoint, SuspectPoints, in_bore, in_line, in_plane, in_section
 
 
-class Kind(StrEnum):
+class FormKind(StrEnum):
     """Characteristic of form or position."""
 
     ROUNDNESS = "roundness"

@@ -18,7 +18,7 @@ from app.core.geometry.discs import circumscribed
 from app.core.geometry.elements import Element, Point, WrongSection, axis_through, centres_of, heights_of, plane_through
 from app.core.geometry.form import (
     Form,
-    Kind,
+    FormKind,
     Method,
     ProbedFeature,
     Value,
@@ -46,7 +46,7 @@ class Task:
     nominal: where the centre should be, mm, for position. length: over which a tilt counts, mm; else over the feature.
     """
 
-    kind: Kind
+    kind: FormKind
     feature: ProbedFeature
     datum: ProbedFeature | None = None
     nominal: Point | None = None
@@ -68,19 +68,19 @@ def evaluate(task: Task) -> Form:
     >>> from app.core.geometry.elements import Section
     >>> bore = lambda x, z: Section(((x + 5.0, 0.0), (x, 5.0), (x - 5.0, 0.0)), z)
     >>> datum = ProbedFeature((bore(0.0, 0.0), bore(0.0, 20.0)))
-    >>> round(evaluate(Task(Kind.COAXIALITY, ProbedFeature((bore(0.003, 40.0),)), datum)).values[0].value, 6)
+    >>> round(evaluate(Task(FormKind.COAXIALITY, ProbedFeature((bore(0.003, 40.0),)), datum)).values[0].value, 6)
     0.006
     """
     match task.kind:
-        case Kind.ROUNDNESS:
+        case FormKind.ROUNDNESS:
             return roundness(task.feature)
-        case Kind.STRAIGHTNESS:
+        case FormKind.STRAIGHTNESS:
             return straightness(task.feature)
-        case Kind.AXIS_STRAIGHTNESS:
+        case FormKind.AXIS_STRAIGHTNESS:
             return axis_straightness(task.feature)
-        case Kind.FLATNESS:
+        case FormKind.FLATNESS:
             return flatness(task.feature)
-        case Kind.POSITION:
+        case FormKind.POSITION:
             return position(task.feature, task.nominal or (0.0, 0.0))
     datum = task.datum or ProbedFeature()
     try:
@@ -88,7 +88,7 @@ def evaluate(task: Task) -> Form:
     except (Degenerate, WrongSection) as reason:
         raise DatumRefused(reason) from None
     suspect = in_bore(datum.sections) if datum.sections else in_plane(datum.points)
-    form = coaxiality(task.feature, datum, against) if task.kind is Kind.COAXIALITY else orientation(task, against)
+    form = coaxiality(task.feature, datum, against) if task.kind is FormKind.COAXIALITY else orientation(task, against)
     return replace(form, datum=suspect)
 
 
@@ -154,7 +154,7 @@ def position(feature: ProbedFeature, nominal: Point) -> Form:
 def orientation(task: Task, datum: Element) -> Form:
     """Parallelism or perpendicularity of an axis or a plane to an axis or a plane. Raises `Degenerate`, `WrongSection`."""
     feature = _element(task.feature)
-    agree = (feature.lengthwise is datum.lengthwise) is (task.kind is Kind.PARALLELISM)
+    agree = (feature.lengthwise is datum.lengthwise) is (task.kind is FormKind.PARALLELISM)
     length = task.length or feature.length
     f, d = feature.direction, datum.direction
     if agree:

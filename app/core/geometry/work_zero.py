@@ -23,7 +23,7 @@ from app.core.decision.step import DECIMALS, rounded
 from app.core.geometry.circle import fit_circle
 from app.core.geometry.edges import (
     Approach,
-    Kind,
+    EdgeKind,
     Problem,
     Solver,
     Touch,
@@ -90,7 +90,7 @@ class Zero:
 
 
 def find_zero(
-    kind: Kind,
+    kind: EdgeKind,
     touches: Sequence[Touch],
     tip: float,
     *,
@@ -102,7 +102,7 @@ def find_zero(
     tip: its diameter. repeatability: standard deviation of one touch. Raises `Unfit`, and `Degenerate` for a circle.
 
     >>> pocket = [Touch(-47, None, Approach.MINUS_X), Touch(53, None, Approach.PLUS_X)]
-    >>> zero = find_zero(Kind.POCKET, pocket, 6.0)
+    >>> zero = find_zero(EdgeKind.POCKET, pocket, 6.0)
     >>> zero.x, zero.y, zero.length
     (3.0, None, 106.0)
     """
@@ -113,7 +113,7 @@ def find_zero(
         zero = _round_zero(kind, touches, tip, repeatability)
     else:
         check(kind, touches)
-        solve = corner if kind is Kind.CORNER else across(kind) if paired else sides(kind)
+        solve = corner if kind is EdgeKind.CORNER else across(kind) if paired else sides(kind)
         values, residuals = solve(touches, tip)
         _check_sizes(values, tip, outside=not kind.inside)
         if abs(values.get("rotation", 0.0)) > MOST_TURNED or abs(values.get("squareness", 0.0)) > MOST_TURNED:
@@ -150,14 +150,14 @@ def zero_in_z(height: Height) -> float:
     return rounded(height.touched - height.feeler - height.tool_length)
 
 
-def four_records(kind: Kind, x1: float, x2: float, y1: float, y2: float) -> list[Touch]:
+def four_records(kind: EdgeKind, x1: float, x2: float, y1: float, y2: float) -> list[Touch]:
     """The touches that the printed macros keep as R1 to R4 (#501, #502, #504, #505).
 
     For a round part they are three places: the tip goes from X2 to Y2 in Y alone, and Y1 is where it stood at X1 and
     X2. The three make a right angle, so X1Y1 and X2Y2 lie across the circle (Thales) and the printed
     ``2*SQRT(POT(R1-R15)+POT(R3-R16))`` is the diameter of the tip's path:
 
-    >>> zero = find_zero(Kind.BORE, four_records(Kind.BORE, -8, 8, -6, 6), 6.0)
+    >>> zero = find_zero(Kind.BORE, four_records(EdgeKind.BORE, -8, 8, -6, 6), 6.0)
     >>> zero.x, zero.y, zero.diameter
     (0.0, 0.0, 26.0)
     """
@@ -177,7 +177,7 @@ def four_records(kind: Kind, x1: float, x2: float, y1: float, y2: float) -> list
 # --- bore and boss
 
 
-def _round_zero(kind: Kind, touches: Sequence[Touch], tip: float, repeatability: float | None) -> Zero:
+def _round_zero(kind: EdgeKind, touches: Sequence[Touch], tip: float, repeatability: float | None) -> Zero:
     places = places_of(touches, range(len(touches)))
     circle = fit_circle(places)
     side = 1 if kind.inside else -1

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from app.core.number_text import has_printed_minus, plain
-from app.core.parameters import BY_NAME, Kind, Parameters, mean_nominal
+from app.core.parameters import BY_NAME, FieldKind, Parameters, mean_nominal
 from app.core.programs import printed_macros, unit_check
 from app.core.programs.lines import (
     DESCRIBING,
@@ -277,7 +277,7 @@ class _Reader:
             _complete(parameters, notes)
         for name, value in parameters.items():
             field = BY_NAME.get(name)
-            if field and field.kind is Kind.WHOLE and isinstance(value, float) and value == int(value):
+            if field and field.kind is FieldKind.WHOLE and isinstance(value, float) and value == int(value):
                 parameters[name] = int(value)
         return Program(kind, 1, len(self.texts), parameters, about, self.values, self.results, tuple(notes), inch)
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from app.core.decision.step import rounded
 from app.core.number_text import number_or_none, plain
-from app.core.parameters import BY_NAME, FIELDS, Field, Kind, Parameters
+from app.core.parameters import BY_NAME, FIELDS, Field, FieldKind, Parameters
 
 MOST_CHARACTERS = 65_536
 MOST_LINES = 4_000
@@ -279,9 +279,9 @@ def setting_in(comment: str) -> tuple[str, Any] | None:
 
 
 def _value(field: Field, text: str) -> Any:
-    if field.kind is Kind.CHOICE:
+    if field.kind is FieldKind.CHOICE:
         return next((choice for choice in field.choices if choice.upper() == text.upper()), None)
-    if field.kind is Kind.YES_NO:
+    if field.kind is FieldKind.YES_NO:
         return {"YES": True, "NO": False}.get(text.upper())
     return number_or_none(text)
 

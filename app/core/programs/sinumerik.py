@@ -13,7 +13,7 @@ import re
 from typing import Any
 
 from app.core.number_text import has_printed_minus, plain
-from app.core.parameters import BY_NAME, BY_R, TWO_POINT_SWITCH, Kind
+from app.core.parameters import BY_NAME, BY_R, TWO_POINT_SWITCH, FieldKind
 from app.core.programs import printed_macros
 from app.core.programs.lines import (
     LONGEST_LINE,
@@ -291,7 +291,7 @@ class _Reader:
 
 def _is_length(name: str) -> bool:
     field = BY_NAME.get(name)
-    return name in RESULT_LENGTHS or (field is not None and field.kind is Kind.LENGTH)
+    return name in RESULT_LENGTHS or (field is not None and field.kind is FieldKind.LENGTH)
 
 
 def read(text: str) -> ProgramText:

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from app.core.parameters import BY_NAME, TWO_POINT_SWITCH, Kind, Variant
+from app.core.parameters import BY_NAME, TWO_POINT_SWITCH, FieldKind, Variant
 from app.core.programs.lines import DESCRIBING, Note, Program, ProgramKind, in_mm, mixed
 
 ONLY_CALIBRATION = ("R21", "R22")
@@ -180,7 +180,7 @@ def _is_length(name: str, values: dict[str, Assigned]) -> bool:
         variant = values.get("variant")
         return variant is not None and variant.value in (3, Variant.ALONG.value)
     field = BY_NAME.get(name)
-    return name in RESULT_LENGTHS or (field is not None and field.kind is Kind.LENGTH)
+    return name in RESULT_LENGTHS or (field is not None and field.kind is FieldKind.LENGTH)
 
 
 def _plain(name: str, value: Any) -> Any:
@@ -188,9 +188,9 @@ def _plain(name: str, value: Any) -> Any:
     field = BY_NAME.get(name)
     if field is None or not isinstance(value, float) or value != int(value):
         return value
-    if field.kind is Kind.CHOICE:
+    if field.kind is FieldKind.CHOICE:
         return field.choices[field.codes.index(int(value))] if value in field.codes else int(value)
-    return int(value) if field.kind is Kind.WHOLE else value
+    return int(value) if field.kind is FieldKind.WHOLE else value
 
 
 def program_of(built: Building, notes: list[list[Note]]) -> Program:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from app.core.parameters import BY_R, FIELDS, TWO_POINT_SWITCH, Kind, Parameters, Variant
+from app.core.parameters import BY_R, FIELDS, TWO_POINT_SWITCH, FieldKind, Parameters, Variant
 from app.core.programs import unit_check
 from app.core.programs.lines import describing, settings, written
 
@@ -35,11 +35,11 @@ def _r_values(parameters: Parameters) -> dict[str, float]:
             continue
         if field.name in {"target", "tolerance_width"} and parameters.nominal is not None:
             continue
-        if field.kind is Kind.CHOICE:
+        if field.kind is FieldKind.CHOICE:
             place = field.choices.index(value)
             if place < len(field.codes):
                 values[field.r] = field.codes[place]
-        elif field.kind is not Kind.YES_NO:
+        elif field.kind is not FieldKind.YES_NO:
             values[field.r] = value
     values[TWO_POINT_SWITCH] = 1 if parameters.variant is Variant.TWO_POINT else 0
     if values.get("R23") == 1:

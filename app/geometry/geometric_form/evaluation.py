@@ -5,7 +5,7 @@ from math import dist
 from typing import Any, NamedTuple
 
 from app.core.geometry.elements import Section
-from app.core.geometry.form import Form, Kind, Method, ProbedFeature, verdict
+from app.core.geometry.form import Form, FormKind, Method, ProbedFeature, verdict
 from app.core.geometry.relations import ENGINE, Task, corrected, evaluate
 from app.core.geometry.suspect_points import SuspectPoint
 from app.core.plausibility import looks_like_inches
@@ -31,7 +31,7 @@ def task_of(kind: str, inputs: Mapping[str, Any]) -> Task:
     datum = inputs.get("datum")
     nominal = inputs.get("nominal")
     return Task(
-        Kind(kind),
+        FormKind(kind),
         _touched(inputs),
         None if datum is None else _touched(datum),
         None if nominal is None else tuple(nominal),
@@ -94,7 +94,7 @@ def warnings_of(
     """
     warnings = [_misfit(suspect) for suspect in result["suspects"]]
     nominal = inputs.get("nominal")
-    if kind == Kind.POSITION and nominal is not None:
+    if kind == FormKind.POSITION and nominal is not None:
         centres = [section["centre"] for section in result["details"]["sections"]]
         centre = [sum(coordinates) / len(centres) for coordinates in zip(*centres, strict=True)]
         off = dist(centre, nominal)

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.core.geometry.form import Kind
+from app.core.geometry.form import FormKind
 from app.core.parameters import LARGEST_LENGTH
 from app.language.i18n import _
 from app.web.fields import Body, LatelyOrNow, Length, RecordKey, Slug, Text200
@@ -19,11 +19,11 @@ NotNegative = Annotated[float, Field(strict=True, ge=0, le=LARGEST_LENGTH, allow
 Flat = Annotated[list[Length], Field(min_length=2, max_length=2, examples=[[-6.096, 24.249]])]
 Point = Annotated[list[Length], Field(min_length=2, max_length=3)]
 
-OF_SECTIONS = {Kind.ROUNDNESS, Kind.AXIS_STRAIGHTNESS, Kind.COAXIALITY, Kind.POSITION}
-OF_POINTS = {Kind.STRAIGHTNESS, Kind.FLATNESS}
-WITH_DATUM = {Kind.COAXIALITY, Kind.PARALLELISM, Kind.PERPENDICULARITY}
-WITH_LENGTH = {Kind.PARALLELISM, Kind.PERPENDICULARITY}
-ONLY_OF = {"datum": WITH_DATUM, "nominal": {Kind.POSITION}, "length": WITH_LENGTH}
+OF_SECTIONS = {FormKind.ROUNDNESS, FormKind.AXIS_STRAIGHTNESS, FormKind.COAXIALITY, FormKind.POSITION}
+OF_POINTS = {FormKind.STRAIGHTNESS, FormKind.FLATNESS}
+WITH_DATUM = {FormKind.COAXIALITY, FormKind.PARALLELISM, FormKind.PERPENDICULARITY}
+WITH_LENGTH = {FormKind.PARALLELISM, FormKind.PERPENDICULARITY}
+ONLY_OF = {"datum": WITH_DATUM, "nominal": {FormKind.POSITION}, "length": WITH_LENGTH}
 
 
 class FormSectionIn(Body):
@@ -119,7 +119,7 @@ class FormIn(Body):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        kind = Kind(self.kind)
+        kind = FormKind(self.kind)
         count = _touches(self.sections) + len(self.points)
         if self.datum is not None:
             count += _touches(self.datum.sections) + len(self.datum.points)
@@ -143,8 +143,8 @@ class FormIn(Body):
             raise PydanticCustomError("points", _("this kind needs points"), {"at": "points"})
         if kind in WITH_DATUM:
             self._with_datum()
-        _depth(self.points, 2 if kind is Kind.STRAIGHTNESS else 3, "points")
-        if kind is Kind.POSITION and self.nominal is None:
+        _depth(self.points, 2 if kind is FormKind.STRAIGHTNESS else 3, "points")
+        if kind is FormKind.POSITION and self.nominal is None:
             raise PydanticCustomError(
                 "nominal", _("position needs nominal: where the centre should be"), {"at": "nominal"}
             )
@@ -163,7 +163,7 @@ class FormIn(Body):
             raise PydanticCustomError(
                 "touched", _("this kind needs sections or points of the feature"), {"at": "sections"}
             )
-        if Kind(self.kind) is Kind.COAXIALITY and not self.datum.sections:
+        if FormKind(self.kind) is FormKind.COAXIALITY and not self.datum.sections:
             raise PydanticCustomError("datum", _("coaxiality needs a datum in sections"), {"at": "datum.sections"})
         _depth(self.datum.points, 3, "datum.points")
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from app.core.geometry.edges import Approach, Kind, Touch, Unfit
+from app.core.geometry.edges import Approach, EdgeKind, Touch, Unfit
 from app.core.geometry.plausible import zero_warnings
 from app.core.geometry.points import Degenerate
 from app.core.geometry.work_zero import Height, Zero, find_zero, four_records
@@ -30,7 +30,7 @@ def warnings_of(zero: WorkZero, machine: Machine) -> list[CodedWarning]:
 
 def _touches(kind: str, inputs: dict[str, Any]) -> list[Touch]:
     if inputs.get("records"):
-        return four_records(Kind(kind), *inputs["records"])
+        return four_records(EdgeKind(kind), *inputs["records"])
     return [
         Touch(touch.get("x"), touch.get("y"), Approach(touch["approach"]) if touch.get("approach") else None)
         for touch in inputs.get("touches") or ()
@@ -54,7 +54,9 @@ def evaluated(kind: str, inputs: dict[str, Any]) -> Zero:
     if inputs.get("z_touched") is not None:
         height = Height(inputs["z_touched"], inputs.get("feeler", 0.0), inputs.get("tool_length", 0.0))
     try:
-        return find_zero(Kind(kind), touches, inputs["tip"], height=height, repeatability=inputs.get("repeatability"))
+        return find_zero(
+            EdgeKind(kind), touches, inputs["tip"], height=height, repeatability=inputs.get("repeatability")
+        )
     except Unfit as problem:
         wrong, remedy = wording.unfit(problem)
         at = problem.at

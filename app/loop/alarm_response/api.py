@@ -7,7 +7,7 @@ from fastapi import Path, Query
 from app.access.deps import AnyCaller, Operator
 from app.loop.alarm_response import acknowledging, queries
 from app.loop.alarm_response.by_hand import ByHand
-from app.loop.alarm_response.queries import State
+from app.loop.alarm_response.queries import AlarmState
 from app.loop.alarm_response.schemas import AlarmAcknowledgeIn, AlarmOut, alarm_out
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.machines.queries import only_machine
@@ -23,7 +23,7 @@ Number = Annotated[int, Path(description="Number of the alarm.", examples=[41])]
 def list_alarms(
     session: SessionDep,
     caller: AnyCaller,
-    state: Annotated[State, Query(description="`active`, `acknowledged`, or all of them.")] = "all",
+    state: Annotated[AlarmState, Query(description="`active`, `acknowledged`, or all of them.")] = "all",
     machine: Annotated[Slug | None, Query(description="Only those of this machine.", examples=["lathe-1"])] = None,
     characteristic: Annotated[Slug | None, Query(description="Only those of this characteristic.")] = None,
     kind: Annotated[Text200 | None, Query(description="Only this kind.", examples=["tool_worn"])] = None,

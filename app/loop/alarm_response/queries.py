@@ -16,7 +16,7 @@ from app.loop.tables.readings import Reading
 from app.loop.tables.tools import OPEN, Correction, Tool
 from app.web.fields import LARGEST_ID
 
-State = Literal["active", "acknowledged", "all"]
+AlarmState = Literal["active", "acknowledged", "all"]
 
 
 class AlarmRow(NamedTuple):
@@ -72,7 +72,7 @@ def alarm(session: Session, number: int) -> AlarmRow:
 def alarms(
     session: Session,
     *,
-    state: State = "all",
+    state: AlarmState = "all",
     machine_id: int | None = None,
     characteristic: str | None = None,
     kind: str | None = None,
@@ -88,7 +88,9 @@ def alarms(
     return [AlarmRow(*row) for row in session.execute(query)]
 
 
-def _filtered(state: State, machine_id: int | None) -> Select[Alarm, Machine, Characteristic, Correction, int | None]:
+def _filtered(
+    state: AlarmState, machine_id: int | None
+) -> Select[Alarm, Machine, Characteristic, Correction, int | None]:
     query = _rows()
     if machine_id is not None:
         query = query.where(Alarm.machine_id == machine_id)

@@ -22,7 +22,7 @@ from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
 from app.language.i18n import _
 from app.loop.characteristics import queries, wording
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.schemas import CharacteristicChange, CharacteristicIn, warnings_of
 from app.loop.machines import queries as machines
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
@@ -45,7 +45,7 @@ TARGET = ("target", "tolerance_width")
 OF_LEVEL = ("target", "factor", "tool_memory", "average_memory", "plausible_jump")
 
 
-def add_characteristic(session: Session, given: CharacteristicIn, actor: str) -> Standing:
+def add_characteristic(session: Session, given: CharacteristicIn, actor: str) -> CurrentCharacteristic:
     """Set up a characteristic with version 1 of its parameters.
 
     Raises `Invalid` for parameters that cannot be used or a machine that is not there, `Conflict` for a taken key.
@@ -80,37 +80,39 @@ def add_characteristic(session: Session, given: CharacteristicIn, actor: str) ->
     after = given.model_dump(exclude={"parameters"}) | {"parameters": parameters.as_dict()}
     record(session, actor, "characteristic added", f"characteristic/{new.key}", None, after)
     publish(session, {"kind": "characteristic", "machine": machine.key, "characteristic": new.key})
-    return Standing(new, machine, version)
+    return CurrentCharacteristic(new, machine, version)
 
 
-def change_characteristic(session: Session, key: str, change: CharacteristicChange, actor: str) -> Standing:
+def change_characteristic(
+    session: Session, key: str, change: CharacteristicChange, actor: str
+) -> CurrentCharacteristic:
     """Change its name or part, or make a new version of its parameters.
 
     Raises `NotFound`; `Invalid`, also for a change of parameters without a reason; `Conflict` when somebody else has
     changed the parameters since ``parameters_version``.
     """
-    standing = queries.characteristic_named(session, key)
-    _refuse_moving(standing, change)
+    current = queries.characteristic_named(session, key)
+    _refuse_moving(current, change)
     changes: list[dict[str, Any]] = []
     if change.parameters is not None or change.parameters_version is not None:
-        machines.lock_machines(session, [standing.machine.id])
+        machines.lock_machines(session, [current.machine.id])
         session.expire_all()  # what was read before the lock may have changed while waiting for it
-        standing = queries.characteristic_named(session, key)
-        _refuse_stale(standing, change.parameters_version)
+        current = queries.characteristic_named(session, key)
+        _refuse_stale(current, change.parameters_version)
     if change.parameters is not None:
-        standing, changes = _change_parameters(session, standing, change.parameters, change.reason, actor)
+        current, changes = _change_parameters(session, current, change.parameters, change.reason, actor)
     names = change.model_dump(include={"name", "part"}, exclude_unset=True)
     if names.get("name", "") is None:
         del names["name"]
-    before = {name: getattr(standing.characteristic, name) for name in names}
+    before = {name: getattr(current.characteristic, name) for name in names}
     if names != before:
         for name, value in names.items():
-            setattr(standing.characteristic, name, value)
+            setattr(current.characteristic, name, value)
         record(session, actor, "characteristic changed", f"characteristic/{key}", before, names, change.reason)
-        changes = changes or [_changed(standing)]
+        changes = changes or [_changed(current)]
     if changes:
         publish(session, *changes)
-    return standing
+    return current
 
 
 def merged(current: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
@@ -170,11 +172,11 @@ def _refused(errors: list[FieldError]) -> Invalid:
     )
 
 
-def _refuse_moving(standing: Standing, change: CharacteristicChange) -> None:
+def _refuse_moving(current: CurrentCharacteristic, change: CharacteristicChange) -> None:
     errors = []
-    if change.key not in {None, standing.characteristic.key}:
+    if change.key not in {None, current.characteristic.key}:
         errors.append(FieldError("key", _("cannot be changed: readings and programs call the characteristic by it")))
-    if change.machine not in {None, standing.machine.key}:
+    if change.machine not in {None, current.machine.key}:
         errors.append(
             FieldError(
                 "machine", _("cannot be changed: the readings belong to it. Set up a new characteristic instead")
@@ -184,8 +186,8 @@ def _refuse_moving(standing: Standing, change: CharacteristicChange) -> None:
         raise Invalid("; ".join(f"{field}: {message}" for field, message in errors), errors=errors)
 
 
-def _refuse_stale(standing: Standing, expected: int | None) -> None:
-    version = standing.version
+def _refuse_stale(current: CurrentCharacteristic, expected: int | None) -> None:
+    version = current.version
     if expected is not None and expected != version.version:
         raise Conflict(
             _("{who} has changed the parameters meanwhile: version {now} is in force, you looked at {then}.").format(
@@ -197,15 +199,15 @@ def _refuse_stale(standing: Standing, expected: int | None) -> None:
 
 
 def _change_parameters(
-    session: Session, standing: Standing, given: Mapping[str, Any], reason: str | None, actor: str
-) -> tuple[Standing, list[dict[str, Any]]]:
+    session: Session, current: CurrentCharacteristic, given: Mapping[str, Any], reason: str | None, actor: str
+) -> tuple[CurrentCharacteristic, list[dict[str, Any]]]:
     """Under the machine's lock. Returns how things stand now, and what to tell everybody."""
-    characteristic, machine, version = standing
+    characteristic, machine, version = current
     changed = merged(version.parameters, given)
     errors = refusals(changed, machine)
-    old, new = standing.parameters, None if errors else read(changed)[0]
+    old, new = current.parameters, None if errors else read(changed)[0]
     if new == old:
-        return standing, []
+        return current, []
     if not reason:
         wrong = _("is required when parameters change: say why, for those who read it in a year")
         errors.append(FieldError("reason", wrong))
@@ -233,7 +235,7 @@ def _change_parameters(
     )
     if other_tool:
         _keep_parts(session, machine.id, old.tool_memory, parts)
-    now = Standing(characteristic, machine, new_version)
+    now = CurrentCharacteristic(characteristic, machine, new_version)
     changes = [_changed(now)]
     if (other_tool or nanometres(new.target) != nanometres(old.target)) and new.average_memory:
         _restart_average(session, machine.id, new.average_memory)
@@ -277,11 +279,11 @@ def _new_version(
     )
 
 
-def _changed(standing: Standing) -> dict[str, Any]:
+def _changed(current: CurrentCharacteristic) -> dict[str, Any]:
     return {
         "kind": "characteristic",
-        "machine": standing.machine.key,
-        "characteristic": standing.characteristic.key,
+        "machine": current.machine.key,
+        "characteristic": current.characteristic.key,
     }
 
 

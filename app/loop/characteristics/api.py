@@ -49,8 +49,8 @@ def list_characteristics(
 @router.get("/characteristics/{characteristic}", responses=problems(404))
 def get_characteristic(session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey) -> CharacteristicOut:
     """One characteristic with its parameters in force."""
-    standing = queries.characteristic_for(session, caller, characteristic, "viewer")
-    return characteristic_out(standing)
+    current = queries.characteristic_for(session, caller, characteristic, "viewer")
+    return characteristic_out(current)
 
 
 @router.patch("/characteristics/{characteristic}", responses=problems(404, 409))
@@ -58,8 +58,8 @@ def change_characteristic(
     session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, change: CharacteristicChange
 ) -> CharacteristicOut:
     """Change it. `parameters` make a new version and need a `reason`; old readings keep the version they were judged by."""
-    standing = actions.change_characteristic(session, characteristic, change, caller.name)
-    return characteristic_out(standing, queries.target_before(session, standing))
+    current = actions.change_characteristic(session, characteristic, change, caller.name)
+    return characteristic_out(current, queries.target_before(session, current))
 
 
 @router.get("/characteristics/{characteristic}/parameters", responses=problems(404))
@@ -71,6 +71,6 @@ def list_parameter_versions(
     limit: Limit = 100,
 ) -> Page[VersionOut]:
     """Every version of the parameters, newest first: who, when, why."""
-    standing = queries.characteristic_for(session, caller, characteristic, "viewer")
-    rows = queries.versions(session, standing.characteristic, before=before, limit=limit + 1)
+    current = queries.characteristic_for(session, caller, characteristic, "viewer")
+    rows = queries.versions(session, current.characteristic, before=before, limit=limit + 1)
     return page_of([version_out(row) for row in rows], limit, lambda row: row.version)

@@ -17,7 +17,7 @@ from app.loop.tables.tools import Tool
 from app.web.fields import is_slug
 
 
-class Standing(NamedTuple):
+class CurrentCharacteristic(NamedTuple):
     """A characteristic as it stands now."""
 
     characteristic: Characteristic
@@ -29,7 +29,7 @@ class Standing(NamedTuple):
         return Parameters.from_dict(self.version.parameters)
 
 
-_STANDING = (
+_CURRENT = (
     select(Characteristic, Machine, ParametersVersion)
     .join(Machine, Machine.id == Characteristic.machine_id)
     .join(Stream, (Stream.machine_id == Characteristic.machine_id) & (Stream.characteristic_id == Characteristic.id))
@@ -42,25 +42,25 @@ _STANDING = (
 )
 
 
-def characteristic_named(session: Session, key: str) -> Standing:
+def characteristic_named(session: Session, key: str) -> CurrentCharacteristic:
     """The characteristic with this key. Raises `NotFound`."""
-    row = session.execute(_STANDING.where(Characteristic.key == key)).one_or_none() if is_slug(key) else None
+    row = session.execute(_CURRENT.where(Characteristic.key == key)).one_or_none() if is_slug(key) else None
     if row is None:
         raise NotFound(
             _("There is no characteristic {key}.").format(key=repr(key[:64])),
             _("Check the key; GET /api/v1/characteristics lists them."),
         )
-    return Standing(*row)
+    return CurrentCharacteristic(*row)
 
 
-def characteristic_for(session: Session, caller: Caller, key: str, role: Role) -> Standing:
+def characteristic_for(session: Session, caller: Caller, key: str, role: Role) -> CurrentCharacteristic:
     """The characteristic with this key, for the key of its machine or somebody with the role.
 
     Raises `NotFound`, `NotAllowed`.
     """
-    standing = characteristic_named(session, key)
-    caller.must_at(standing.machine.id, role)
-    return standing
+    current = characteristic_named(session, key)
+    caller.must_at(current.machine.id, role)
+    return current
 
 
 def key_is_taken(session: Session, key: str) -> bool:
@@ -69,12 +69,12 @@ def key_is_taken(session: Session, key: str) -> bool:
 
 def characteristics(
     session: Session, *, machine_id: int | None = None, after: str = "", limit: int = 1000
-) -> list[Standing]:
+) -> list[CurrentCharacteristic]:
     """Characteristics by key, of one machine or of all."""
-    query = _STANDING.where(Characteristic.key > after).order_by(Characteristic.key).limit(limit)
+    query = _CURRENT.where(Characteristic.key > after).order_by(Characteristic.key).limit(limit)
     if machine_id is not None:
         query = query.where(Characteristic.machine_id == machine_id)
-    return [Standing(*row) for row in session.execute(query)]
+    return [CurrentCharacteristic(*row) for row in session.execute(query)]
 
 
 def versions(
@@ -93,10 +93,10 @@ def versions(
     return session.scalars(query if before is None else query.where(ParametersVersion.version < before)).all()
 
 
-def target_before(session: Session, standing: Standing) -> float | None:
+def target_before(session: Session, current: CurrentCharacteristic) -> float | None:
     """Return the target of the version before the one in force, mm; None of the first."""
-    number = standing.version.version - 1
-    before = session.get(ParametersVersion, (standing.machine.id, standing.characteristic.id, number))
+    number = current.version.version - 1
+    before = session.get(ParametersVersion, (current.machine.id, current.characteristic.id, number))
     return None if before is None else Parameters.from_dict(before.parameters).target
 
 

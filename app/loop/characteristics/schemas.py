@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, JsonValue
 
 from app.core.decision.limits import nanometres
-from app.core.parameters import FIELDS, Kind, MachineType, ParameterError, Problem, read, unusual_on
+from app.core.parameters import FIELDS, FieldKind, MachineType, ParameterError, Problem, read, unusual_on
 from app.core.plausibility import inch_warnings
 from app.loop.characteristics import queries, wording
 from app.loop.tables.characteristics import ParametersVersion
@@ -44,16 +44,16 @@ PARAMETERS: dict[str, JsonValue] = {
 def parameters_schema() -> dict[str, Any]:
     """The JSON schema of `parameters`, with R numbers."""
     types = {
-        Kind.LENGTH: "number",
-        Kind.NUMBER: "number",
-        Kind.WHOLE: "integer",
-        Kind.CHOICE: "string",
-        Kind.YES_NO: "boolean",
+        FieldKind.LENGTH: "number",
+        FieldKind.NUMBER: "number",
+        FieldKind.WHOLE: "integer",
+        FieldKind.CHOICE: "string",
+        FieldKind.YES_NO: "boolean",
     }
     properties: dict[str, Any] = {}
     for field in FIELDS:
         words = [f"{field.r}." if field.r else "", f"{wording.label(field.name)}."]
-        words += [wording.explanation(field.name) or "", "In mm." if field.kind is Kind.LENGTH else ""]
+        words += [wording.explanation(field.name) or "", "In mm." if field.kind is FieldKind.LENGTH else ""]
         properties[field.name] = {
             "type": [types[field.kind], "null"],
             "description": " ".join(word for word in words if word),
@@ -137,12 +137,12 @@ class VersionOut(BaseModel):
     parameters: Annotated[dict[str, Any], Field(json_schema_extra=parameters_schema())]
 
 
-def warnings_of(standing: queries.Standing, before: float | None = None) -> list[WarningOut]:
+def warnings_of(current: queries.CurrentCharacteristic, before: float | None = None) -> list[WarningOut]:
     """Warn of what is outside the ranges of the sources, does not fit the machine, or is finer than its probe tells.
 
     before: the target of the version before, mm; one that is the same in inches is named.
     """
-    parameters, machine = standing.parameters, standing.machine
+    parameters, machine = current.parameters, current.machine
     try:
         unusual = read(parameters.as_dict())[1]
     except ParameterError:  # made when rules were others
@@ -155,9 +155,9 @@ def warnings_of(standing: queries.Standing, before: float | None = None) -> list
     return [*warnings_out(inches, sentence), *wording.warnings(unusual)]
 
 
-def characteristic_out(standing: queries.Standing, before: float | None = None) -> CharacteristicOut:
+def characteristic_out(current: queries.CurrentCharacteristic, before: float | None = None) -> CharacteristicOut:
     """Return a characteristic as it is answered. before: the target of the version before, mm."""
-    characteristic, machine, version = standing
+    characteristic, machine, version = current
     return CharacteristicOut(
         key=characteristic.key,
         name=characteristic.name,
@@ -167,7 +167,7 @@ def characteristic_out(standing: queries.Standing, before: float | None = None) 
         parameters=wording.in_order(version.parameters),
         parameters_version=version.version,
         created_at=characteristic.created_at,
-        warnings=warnings_of(standing, before),
+        warnings=warnings_of(current, before),
     )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from app.core.parameters import BY_NAME, Field, Kind, Problem, Variant
+from app.core.parameters import BY_NAME, Field, FieldKind, Problem, Variant
 from app.errors import FieldError
 from app.language.i18n import _
 from app.language.numbers import typed_length
@@ -254,7 +254,7 @@ def order_sentence(inner: str, outer: str, smaller: str, larger: str) -> str:
 def _range(problem: Problem, name: str) -> str:
     field = BY_NAME[problem.field]
     value, lowest, highest = (problem.data[key] for key in ("value", "lowest", "highest"))
-    unit = " mm" if field.kind is Kind.LENGTH else ""
+    unit = " mm" if field.kind is FieldKind.LENGTH else ""
     values = {
         "name": name,
         "value": f"{value:.10g}{unit}" if isfinite(value) else str(value),
@@ -334,7 +334,7 @@ def _unit(name: str, field: Field | None, parameters: Mapping[str, Any]) -> str:
         return " mm" if parameters.get("variant") == Variant.ALONG else "°"
     if name == "wait":
         return " s"
-    return " mm" if field is not None and field.kind is Kind.LENGTH else ""
+    return " mm" if field is not None and field.kind is FieldKind.LENGTH else ""
 
 
 def history(versions: Sequence[Version]) -> list[tuple[Version, list[Difference]]]:

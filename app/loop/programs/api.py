@@ -57,8 +57,8 @@ def write_program(
 
     What R numbers cannot say (factor, mode, acceptance …) stands in comments such as `(INBAND FACTOR=-1)`.
     """
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    chosen = queries.control_of(standing, control)
-    text = queries.program_of(standing, chosen, kind, gauge=gauge, surface=surface, probe=probe)
-    name = queries.file_name(standing, chosen, kind)
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    chosen = queries.control_of(current, control)
+    text = queries.program_of(current, chosen, kind, gauge=gauge, surface=surface, probe=probe)
+    name = queries.file_name(current, chosen, kind)
     return download(text, name)

@@ -22,7 +22,7 @@ from app.core.programs.lines import Program, ProgramError, ProgramKind, ProgramT
 from app.core.programs.sinumerik_writing import Calibration, write_calibration, write_measuring
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.wording import field_errors
 from app.loop.characteristics.wording import warnings as as_warnings
 from app.loop.programs import wording
@@ -124,9 +124,9 @@ Kind = Literal["measuring", "calibration"]
 WRITTEN = ("sinumerik", "fanuc")
 
 
-def control_of(standing: Standing, control: str | None) -> str:
+def control_of(current: CurrentCharacteristic, control: str | None) -> str:
     """The control that was asked for, else the machine's. Raises `Invalid` where nothing is written for it."""
-    control = control or standing.machine.control
+    control = control or current.machine.control
     if control not in WRITTEN:
         raise Invalid.at(
             "control",
@@ -137,7 +137,7 @@ def control_of(standing: Standing, control: str | None) -> str:
 
 
 def program_of(
-    standing: Standing,
+    current: CurrentCharacteristic,
     control: str,
     kind: Kind = "measuring",
     *,
@@ -149,7 +149,7 @@ def program_of(
 
     gauge: size of the gauge or ring, R32 or #505, mm; without it the target stands there, and the text says so.
     """
-    characteristic, parameters = standing.characteristic, standing.parameters
+    characteristic, parameters = current.characteristic, current.parameters
     about = {"characteristic": characteristic.key, "name": characteristic.name, "part": characteristic.part or ""}
     if kind == "measuring":
         if control == "fanuc":
@@ -175,18 +175,18 @@ class ProgramView(NamedTuple):
     file: str
 
 
-def program_view(standing: Standing) -> ProgramView | None:
+def program_view(current: CurrentCharacteristic) -> ProgramView | None:
     """The measuring program for the machine's own control; None where nothing is written for it."""
-    control = standing.machine.control
+    control = current.machine.control
     if control not in WRITTEN:
         return None
-    download = f"/api/v1/characteristics/{standing.characteristic.key}/program"
-    return ProgramView(program_of(standing, control), download, file_name(standing, control, "measuring"))
+    download = f"/api/v1/characteristics/{current.characteristic.key}/program"
+    return ProgramView(program_of(current, control), download, file_name(current, control, "measuring"))
 
 
-def file_name(standing: Standing, control: str, kind: Kind) -> str:
+def file_name(current: CurrentCharacteristic, control: str, kind: Kind) -> str:
     """File name of such a program on its control, with the key in front: `shaft-d40-L15.spf`."""
-    key = re.sub(r"[^a-z0-9-]", "-", standing.characteristic.key)
+    key = re.sub(r"[^a-z0-9-]", "-", current.characteristic.key)
     if control == "fanuc":
         return f"{key}-{kind}.nc"
     return f"{key}-{'L15' if kind == 'measuring' else 'L05'}.spf"

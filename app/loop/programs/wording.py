@@ -3,7 +3,7 @@
 import re
 from typing import Any
 
-from app.core.parameters import BY_NAME, Kind
+from app.core.parameters import BY_NAME, FieldKind
 from app.core.programs.correction_forms import Form
 from app.core.programs.heidenhain import ANGLE, PARAMETERS
 from app.core.programs.lines import MOST_CHARACTERS, LineVerdict, Note, ProgramError, ProgramKind, written
@@ -264,7 +264,7 @@ def _value(name: str | None, value: Any) -> str:
         return _("yes") if value else _("no")
     if isinstance(value, int | float):
         field = BY_NAME.get(name or "")
-        return written(value) + (" mm" if field is not None and field.kind is Kind.LENGTH else "")
+        return written(value) + (" mm" if field is not None and field.kind is FieldKind.LENGTH else "")
     return choice(name or "", str(value)).lower()
 
 

@@ -66,18 +66,18 @@ def get_statistics(
     With `last` as well, of the last so many readings those that were measured from … to count.
     """
     check_order(start, end)
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    window = replace(queries.window_of(session, standing.characteristic, last=last), start=start, end=end)
-    numbers = queries.numbers_of(session, standing.characteristic, window)
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    window = replace(queries.window_of(session, current.characteristic, last=last), start=start, end=end)
+    numbers = queries.numbers_of(session, current.characteristic, window)
     rejects = of_tool = None
-    if standing.parameters.accept_m > 1:
-        rejects = queries.rejects_of(session, standing.characteristic, window)
-        since_change = queries.since_tool_change(session, standing.characteristic)
-        of_tool = queries.rejects_of(session, standing.characteristic, since_change)
+    if current.parameters.accept_m > 1:
+        rejects = queries.rejects_of(session, current.characteristic, window)
+        since_change = queries.since_tool_change(session, current.characteristic)
+        of_tool = queries.rejects_of(session, current.characteristic, since_change)
     return answer_from(
         StatisticsOut,
         numbers,
-        characteristic=standing.characteristic.key,
+        characteristic=current.characteristic.key,
         first_sequence=window.first if window.count else None,
         last_sequence=window.last if window.count else None,
         rejected=rejects.parts if rejects else None,

@@ -41,8 +41,8 @@ def get_capability(
 
     Of a compensated characteristic also what the tool did without its corrections, and what ideal ones could reach.
     """
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    return capability_out(study_of(session, standing, choice))
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    return capability_out(study_of(session, current, choice))
 
 
 @router.get(
@@ -59,7 +59,7 @@ def get_capability_figure(
     theme: Theme = "light",
 ) -> Response:
     """The histogram with its fitted curve and the limits, or the normal probability plot."""
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    chart = drawn(study_of(session, standing, choice))
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    chart = drawn(study_of(session, current, choice))
     figure = (histogram if picture == "histogram" else probability)(chart, theme=theme)
     return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})

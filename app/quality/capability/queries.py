@@ -36,7 +36,7 @@ from app.core.spc.spread import far_off
 from app.core.spc.stability import Stability
 from app.core.spc.uncompensated import Uncompensated
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import History, Window
 from app.quality.control_charts import queries as control
@@ -78,7 +78,7 @@ class Judgement:
     judge themselves.
     """
 
-    standing: Standing
+    current: CurrentCharacteristic
     window: Window
     side: Side
     confidence: float
@@ -171,28 +171,28 @@ class Study(Judgement):
     unknown: int
 
 
-def judgement_of(session: Session, standing: Standing, window: Window) -> Judgement:
+def judgement_of(session: Session, current: CurrentCharacteristic, window: Window) -> Judgement:
     """Judge the readings of the window by both limits, for the index alone. Raises `Invalid` for more than ten million."""
-    counted = _read(session, standing, window).counted
-    return Judgement(**_judged(session, standing, window, counted, "both", CONFIDENCE))
+    counted = _read(session, current, window).counted
+    return Judgement(**_judged(session, current, window, counted, "both", CONFIDENCE))
 
 
 def capability_of(
     session: Session,
-    standing: Standing,
+    current: CurrentCharacteristic,
     window: Window,
     *,
     side: Side = "both",
     confidence: float = CONFIDENCE,
 ) -> Study:
     """Judge the readings of the window. Raises `Invalid` for more than ten million."""
-    history, faulty, counted = _read(session, standing, window)
-    judged = _judged(session, standing, window, counted, side, confidence)
+    history, faulty, counted = _read(session, current, window)
+    judged = _judged(session, current, window, counted, side, confidence)
     values, limits, result = counted["deviation"], judged["limits"], judged["indices"]
     outside, fallout = _outside(counted, judged["versions"], side)
     known = None if isinstance(result, Refused) else result
     without, unknown = (
-        _without(session, standing, window, counted, limits, confidence) if judged["compensated"] else (None, 0)
+        _without(session, current, window, counted, limits, confidence) if judged["compensated"] else (None, 0)
     )
     return Study(
         **judged,
@@ -217,27 +217,27 @@ class _Readings(NamedTuple):
     counted: History
 
 
-def _read(session: Session, standing: Standing, window: Window) -> _Readings:
+def _read(session: Session, current: CurrentCharacteristic, window: Window) -> _Readings:
     columns = ("deviation", "parameters_version", "zone", "measured_at", "compensated")
-    history = statistics.history_of(session, standing.characteristic, window, columns)
+    history = statistics.history_of(session, current.characteristic, window, columns)
     faulty = history["zone"] == FAULT
     return _Readings(history, faulty, history.only(~history.excluded & ~faulty))
 
 
 def _judged(
-    session: Session, standing: Standing, window: Window, counted: History, side: Side, confidence: float
+    session: Session, current: CurrentCharacteristic, window: Window, counted: History, side: Side, confidence: float
 ) -> dict[str, Any]:
     """The fields of a `Judgement`."""
     values: Floats = counted["deviation"]
-    versions = _versions(session, standing, counted)
-    half = versions[-1].half if versions else standing.parameters.tolerance_width / 2
+    versions = _versions(session, current, counted)
+    half = versions[-1].half if versions else current.parameters.tolerance_width / 2
     limits = Limits(None if side == "upper" else -half, None if side == "lower" else half, 0.0)
-    compensated = not standing.parameters.measures_only and bool((np.nan_to_num(counted["compensated"]) != 0).any())
+    compensated = not current.parameters.measures_only and bool((np.nan_to_num(counted["compensated"]) != 0).any())
     cautions = (Caution.COMPENSATED,) if compensated else ()
-    control_verdict, baseline = _stability(session, standing, window, counted)
+    control_verdict, baseline = _stability(session, current, window, counted)
     at, far = counted["measured_at"], far_off(values)
     return {
-        "standing": standing,
+        "current": current,
         "window": window,
         "side": side,
         "confidence": confidence,
@@ -271,12 +271,12 @@ def _thinned(values: Floats) -> Floats:
     return np.asarray(values[at])
 
 
-def _versions(session: Session, standing: Standing, counted: History) -> list[InForce]:
+def _versions(session: Session, current: CurrentCharacteristic, counted: History) -> list[InForce]:
     """By which versions the readings were judged, in the order in which these came last."""
     numbers, counts = np.unique(counted["parameters_version"], return_counts=True)
     versions = []
     for number, count in zip(numbers.tolist(), counts.tolist(), strict=True):
-        p = characteristics.parameters_of(session, standing.machine.id, standing.characteristic.id, number)
+        p = characteristics.parameters_of(session, current.machine.id, current.characteristic.id, number)
         versions.append(InForce(number, p.target, p.tolerance_width / 2, count))
     if versions:  # the newest reading's last
         newest = int(counted["parameters_version"][-1])
@@ -299,12 +299,12 @@ def _outside(counted: History, versions: list[InForce], side: Side) -> tuple[int
 
 
 def _stability(
-    session: Session, standing: Standing, window: Window, counted: History
+    session: Session, current: CurrentCharacteristic, window: Window, counted: History
 ) -> tuple[Stability | Refused, int | None]:
     """By the baseline in force, if it is one of deviations and tells of these readings; else by the readings themselves."""
-    baseline = control.baseline_in_force(session, standing.characteristic)
+    baseline = control.baseline_in_force(session, current.characteristic)
     if baseline is not None and baseline.quantity == "deviation" and window.count:
-        charted = control.charted(session, standing, baseline, window)
+        charted = control.charted(session, current, baseline, window)
         if charted.chart is not None:
             inside = np.isin(charted.last, counted["sequence"])
             z, rules = charted.chart.z[inside], control.rules_of(baseline)
@@ -327,10 +327,15 @@ class _Rebuilt:
 
 
 def _without(
-    session: Session, standing: Standing, window: Window, counted: History, limits: Limits, confidence: float
+    session: Session,
+    current: CurrentCharacteristic,
+    window: Window,
+    counted: History,
+    limits: Limits,
+    confidence: float,
 ) -> tuple[Uncompensated | Refused, int]:
     """The same readings with what was corrected taken out again, tool life by tool life."""
-    rebuilt = read_series(session, standing, _Rebuilt(standing.parameters.factor), window)
+    rebuilt = read_series(session, current, _Rebuilt(current.parameters.factor), window)
     series = rebuilt.series.only(np.isin(rebuilt.series.sequence, counted["sequence"]))
     controlled = counted["deviation"][np.isin(counted["sequence"], series.sequence)]
     result = or_refused(
@@ -339,12 +344,12 @@ def _without(
     return result, len(counted) - len(series)
 
 
-def scatter_of_parts(session: Session, standing: Standing, last: int) -> tuple[float | None, int]:
+def scatter_of_parts(session: Session, current: CurrentCharacteristic, last: int) -> tuple[float | None, int]:
     """Sigma from part to part of the last readings, wear and corrections taken out, mm, and of how many; None of too few."""
-    window = statistics.window_of(session, standing.characteristic, last=last)
+    window = statistics.window_of(session, current.characteristic, last=last)
     if not window.count:
         return None, 0
-    series = read_series(session, standing, _Rebuilt(standing.parameters.factor), window).series
+    series = read_series(session, current, _Rebuilt(current.parameters.factor), window).series
     if len(series) < FEWEST_READINGS:
         return None, len(series)
     sigma = or_refused(lambda: uncompensated.scatter(series.values, series.begins))

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from app.errors import Invalid
 from app.language.i18n import _
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.quality.capability import queries
 from app.quality.capability.queries import CONFIDENCE, USUAL, Side, Study
@@ -61,19 +61,19 @@ def study_request(
 StudyRequestDep = Annotated[StudyRequest, Depends(study_request)]
 
 
-def study_of(session: Session, standing: Standing, choice: StudyRequest) -> Study:
+def study_of(session: Session, current: CurrentCharacteristic, choice: StudyRequest) -> Study:
     """Return the study of the readings that were chosen."""
     last = choice.last or (str(USUAL) if choice.start is None and choice.end is None else "all")
     window = statistics.window_of(
         session,
-        standing.characteristic,
+        current.characteristic,
         last=None if last == "all" else min(int(last), LARGEST_ID),
         start=choice.start,
         end=choice.end,
     )
     return queries.capability_of(
         session,
-        standing,
+        current,
         window,
         side=choice.side,
         confidence=choice.confidence,

@@ -207,7 +207,7 @@ def capability_out(study: Study) -> CapabilityOut:
     return answer_from(
         CapabilityOut,
         study,
-        characteristic=study.standing.characteristic.key,
+        characteristic=study.current.characteristic.key,
         first_sequence=int(study.sequence[0]) if len(study.sequence) else None,
         last_sequence=int(study.sequence[-1]) if len(study.sequence) else None,
         readings=len(study.values),

@@ -121,16 +121,16 @@ def verdicts_of(
     before: the one that is stored. It goes on to be the last, unless the tolerance has changed. Where none is, and one reading
     lies far from all others, it is that of the readings before.
     """
-    standing = characteristic_named(session, state.key)
-    window = statistics.window_of(session, standing.characteristic, last=USUAL)
-    judgement = judgement_of(session, standing, window)
+    current = characteristic_named(session, state.key)
+    window = statistics.window_of(session, current.characteristic, last=USUAL)
+    judgement = judgement_of(session, current, window)
     row = _row(judgement, state)
     if row.quotable:
         return row, row
     if before is not None and before.half == row.half:
         return row, before
     if row.why == WhyNot.FAR_OFF.value:
-        earlier = _row(judgement_of(session, standing, replace(window, last=judgement.far[0] - 1)), state)
+        earlier = _row(judgement_of(session, current, replace(window, last=judgement.far[0] - 1)), state)
         return row, earlier if earlier.quotable else None
     return row, None
 

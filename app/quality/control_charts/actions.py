@@ -8,7 +8,7 @@ from app.access.callers import Caller
 from app.db.events import publish
 from app.errors import Conflict
 from app.language.i18n import _
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.tables.characteristics import Characteristic
 from app.quality.control_charts import queries, wording
 from app.quality.control_charts.drafts import draft_of
@@ -21,28 +21,28 @@ OF_ITS_TIME = frozenset(
 )
 
 
-def freeze(session: Session, standing: Standing, given: BaselineIn, caller: Caller) -> Created[Baseline]:
+def freeze(session: Session, current: CurrentCharacteristic, given: BaselineIn, caller: Caller) -> Created[Baseline]:
     """From now on readings are judged by this period. Raises `Invalid`; `Conflict`: another was meanwhile, or by this key."""
-    _lock(session, standing)
+    _lock(session, current)
     if given.key is not None:
         before = session.scalars(
             select(Baseline).where(
-                Baseline.machine_id == standing.machine.id,
-                Baseline.characteristic_id == standing.characteristic.id,
+                Baseline.machine_id == current.machine.id,
+                Baseline.characteristic_id == current.characteristic.id,
                 Baseline.key == given.key,
             )
         ).one_or_none()
         if before is not None:
             return _sent_before(before, given)
-    newest = queries.newest_version(session, standing.characteristic)
+    newest = queries.newest_version(session, current.characteristic)
     if given.seen_version is not None and given.seen_version != newest:
         raise Conflict(
             _("Another person has frozen baseline {version} meanwhile.").format(version=newest),
             _("Look at it; freeze yours if it is still to take its place."),
         )
-    baseline = draft_of(session, standing, given).baseline
+    baseline = draft_of(session, current, given).baseline
     baseline.key, baseline.reason = given.key, given.reason
-    return Created(_keep(session, standing, baseline, caller))
+    return Created(_keep(session, current, baseline, caller))
 
 
 def _sent_before(before: Baseline, given: BaselineIn) -> Created[Baseline]:
@@ -61,11 +61,13 @@ def _sent_before(before: Baseline, given: BaselineIn) -> Created[Baseline]:
     return Created(before, again=True)
 
 
-def put_in_force(session: Session, standing: Standing, version: int, reason: str, caller: Caller) -> Baseline:
+def put_in_force(
+    session: Session, current: CurrentCharacteristic, version: int, reason: str, caller: Caller
+) -> Baseline:
     """An older baseline judges again: its numbers as a new version. Raises `NotFound`; `Conflict` if it is in force."""
-    _lock(session, standing)
-    old = queries.baseline_of(session, standing.characteristic, version)
-    now = queries.baseline_in_force(session, standing.characteristic)
+    _lock(session, current)
+    old = queries.baseline_of(session, current.characteristic, version)
+    now = queries.baseline_in_force(session, current.characteristic)
     if now is not None and version in {now.version, now.repeats}:  # sent twice, or by two at once
         raise Conflict(
             _("Baseline {version} is in force already.").format(version=version)
@@ -77,14 +79,14 @@ def put_in_force(session: Session, standing: Standing, version: int, reason: str
         )
     names = {column.key for column in inspect(Baseline).column_attrs} - OF_ITS_TIME
     again = Baseline(**{name: getattr(old, name) for name in names}, repeats=version, reason=reason)
-    return _keep(session, standing, again, caller)
+    return _keep(session, current, again, caller)
 
 
-def retire(session: Session, standing: Standing, version: int, reason: str, caller: Caller) -> Baseline:
+def retire(session: Session, current: CurrentCharacteristic, version: int, reason: str, caller: Caller) -> Baseline:
     """It judges no more, and none judges in its place. Raises `NotFound`; `Conflict` if it is not in force."""
-    _lock(session, standing)
-    baseline = queries.baseline_of(session, standing.characteristic, version)
-    now = queries.baseline_in_force(session, standing.characteristic)
+    _lock(session, current)
+    baseline = queries.baseline_of(session, current.characteristic, version)
+    now = queries.baseline_in_force(session, current.characteristic)
     if now is None or now.version != version:
         raise Conflict(
             _("Baseline {version} is not in force.").format(version=version),
@@ -92,22 +94,22 @@ def retire(session: Session, standing: Standing, version: int, reason: str, call
         )
     baseline.retired_at = session.scalars(select(func.now())).one()
     baseline.retired_by, baseline.retired_why = caller.name, reason
-    _tell(session, standing, "baseline retired", baseline, caller, reason, before=_recorded(baseline))
+    _tell(session, current, "baseline retired", baseline, caller, reason, before=_recorded(baseline))
     return baseline
 
 
-def _lock(session: Session, standing: Standing) -> None:
+def _lock(session: Session, current: CurrentCharacteristic) -> None:
     """Versions count without gaps: of two who freeze at once, one waits. Readings are not decided by baselines and go on."""
     session.execute(
         select(Characteristic.id)
-        .where(Characteristic.machine_id == standing.machine.id, Characteristic.id == standing.characteristic.id)
+        .where(Characteristic.machine_id == current.machine.id, Characteristic.id == current.characteristic.id)
         .with_for_update(key_share=True)
     )
 
 
-def _keep(session: Session, standing: Standing, baseline: Baseline, caller: Caller) -> Baseline:
-    before = queries.baseline_in_force(session, standing.characteristic)
-    baseline.version = 1 + queries.newest_version(session, standing.characteristic)
+def _keep(session: Session, current: CurrentCharacteristic, baseline: Baseline, caller: Caller) -> Baseline:
+    before = queries.baseline_in_force(session, current.characteristic)
+    baseline.version = 1 + queries.newest_version(session, current.characteristic)
     baseline.actor = caller.name
     session.add(baseline)
     session.flush()
@@ -115,7 +117,7 @@ def _keep(session: Session, standing: Standing, baseline: Baseline, caller: Call
     action = "baseline frozen" if baseline.repeats is None else "baseline put in force again"
     _tell(
         session,
-        standing,
+        current,
         action,
         baseline,
         caller,
@@ -139,7 +141,7 @@ def _recorded(baseline: Baseline) -> dict[str, object]:
 
 def _tell(
     session: Session,
-    standing: Standing,
+    current: CurrentCharacteristic,
     action: str,
     baseline: Baseline,
     caller: Caller,
@@ -148,13 +150,13 @@ def _tell(
     before: dict[str, object] | None = None,
     after: dict[str, object] | None = None,
 ) -> None:
-    key = standing.characteristic.key
+    key = current.characteristic.key
     audit(session, caller.name, action, f"characteristic/{key}", before, after, why)
     publish(
         session,
         {
             "kind": "baseline",
-            "machine": standing.machine.key,
+            "machine": current.machine.key,
             "characteristic": key,
             "version": baseline.version,
             "in_force": baseline.retired_at is None,

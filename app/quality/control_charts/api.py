@@ -10,7 +10,7 @@ from app.core.spc.quantity import Quantity
 from app.core.spc.shewhart import Chart
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.quality.control_charts import actions, charts, queries, signals_queries
 from app.quality.control_charts.answers import baseline_out, control_out, draft_out
@@ -49,15 +49,15 @@ Kind = Annotated[
 Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
 
 
-def _in_force(session: SessionDep, standing: Standing) -> int | None:
-    baseline = queries.baseline_in_force(session, standing.characteristic)
+def _in_force(session: SessionDep, current: CurrentCharacteristic) -> int | None:
+    baseline = queries.baseline_in_force(session, current.characteristic)
     return None if baseline is None else baseline.version
 
 
-def _judge(session: SessionDep, standing: Standing, version: int | None) -> Baseline | None:
+def _judge(session: SessionDep, current: CurrentCharacteristic, version: int | None) -> Baseline | None:
     if version is not None:
-        return queries.baseline_of(session, standing.characteristic, version)
-    return queries.baseline_in_force(session, standing.characteristic)
+        return queries.baseline_of(session, current.characteristic, version)
+    return queries.baseline_in_force(session, current.characteristic)
 
 
 # --- baselines
@@ -74,9 +74,9 @@ def list_baselines(
     limit: Limit = 100,
 ) -> Page[BaselineOut]:
     """Every baseline that was frozen, newest first: who, when, why, and its numbers."""
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    rows = queries.baselines(session, standing.characteristic, before=after, limit=limit + 1)
-    now = _in_force(session, standing)
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    rows = queries.baselines(session, current.characteristic, before=after, limit=limit + 1)
+    now = _in_force(session, current)
     listed = [baseline_out(row, characteristic, now) for row in rows]
     return page_of(listed, limit, lambda row: row.version)
 
@@ -93,11 +93,11 @@ def freeze_baseline(
 
     Too few readings, or all of them equal, are refused; the answer says how many are missing.
     """
-    standing = characteristics.characteristic_named(session, characteristic)
-    done = actions.freeze(session, standing, given, caller)
+    current = characteristics.characteristic_named(session, characteristic)
+    done = actions.freeze(session, current, given, caller)
     if done.again:
         response.status_code = 200
-    return baseline_out(done.row, characteristic, _in_force(session, standing))
+    return baseline_out(done.row, characteristic, _in_force(session, current))
 
 
 @router.post(
@@ -107,8 +107,8 @@ def preview_baseline(
     session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, given: PeriodIn
 ) -> DraftAnswer:
     """Preview the baseline of a period, with the cautions that a person should read before freezing it. Nothing is stored."""
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    return draft_out(draft_of(session, standing, given), characteristic)
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    return draft_out(draft_of(session, current, given), characteristic)
 
 
 @router.get("/characteristics/{characteristic}/baselines/{version}", responses=problems(404))
@@ -116,9 +116,9 @@ def get_baseline(
     session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, version: Version
 ) -> BaselineOut:
     """One baseline."""
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    baseline = queries.baseline_of(session, standing.characteristic, version)
-    return baseline_out(baseline, characteristic, _in_force(session, standing))
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    baseline = queries.baseline_of(session, current.characteristic, version)
+    return baseline_out(baseline, characteristic, _in_force(session, current))
 
 
 @router.post("/characteristics/{characteristic}/baselines/{version}/retire", responses=problems(404, 409))
@@ -126,8 +126,8 @@ def retire_baseline(
     session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, version: Version, given: BaselineWhyIn
 ) -> BaselineOut:
     """Take the baseline out of force: nothing is judged until another is frozen."""
-    standing = characteristics.characteristic_named(session, characteristic)
-    return baseline_out(actions.retire(session, standing, version, given.reason, caller), characteristic, None)
+    current = characteristics.characteristic_named(session, characteristic)
+    return baseline_out(actions.retire(session, current, version, given.reason, caller), characteristic, None)
 
 
 @router.post(
@@ -139,8 +139,8 @@ def put_baseline_in_force(
     session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, version: Version, given: BaselineWhyIn
 ) -> BaselineOut:
     """Go back to an older baseline: its numbers become a new version, which is in force."""
-    standing = characteristics.characteristic_named(session, characteristic)
-    baseline = actions.put_in_force(session, standing, version, given.reason, caller)
+    current = characteristics.characteristic_named(session, characteristic)
+    baseline = actions.put_in_force(session, current, version, given.reason, caller)
     return baseline_out(baseline, characteristic, baseline.version)
 
 
@@ -160,12 +160,12 @@ def get_control(
 
     All by the frozen baseline, never by the readings shown. Without a baseline in force: deviations and no limits.
     """
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    window = statistics.window_of(session, standing.characteristic, **choice._asdict())
-    baseline = _judge(session, standing, version)
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    window = statistics.window_of(session, current.characteristic, **choice._asdict())
+    baseline = _judge(session, current, version)
     if baseline is None:
-        return control_out(charts.unjudged(session, standing, window), characteristic, None)
-    return control_out(charts.view(session, standing, baseline, window, chart), characteristic, baseline)
+        return control_out(charts.unjudged(session, current, window), characteristic, None)
+    return control_out(charts.view(session, current, baseline, window, chart), characteristic, baseline)
 
 
 @router.get("/characteristics/{characteristic}/figures/control", responses=problems(404) | FIGURE, response_model=None)
@@ -183,21 +183,21 @@ def get_control_chart(
     width: Width = 1240,
 ) -> Response:
     """A control chart as a figure. Of more points than can be drawn the extremes and the signals of each stretch."""
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    window = statistics.window_of(session, standing.characteristic, **choice._asdict())
-    baseline = _judge(session, standing, version)
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    window = statistics.window_of(session, current.characteristic, **choice._asdict())
+    baseline = _judge(session, current, version)
     if baseline is None:
         return _answer(
-            control_figure(charts.unjudged(session, standing, window), key=characteristic, theme=theme, width=width)
+            control_figure(charts.unjudged(session, current, window), key=characteristic, theme=theme, width=width)
         )
-    view = charts.view(session, standing, baseline, window, chart)
-    marked = charts.marked_by(baseline) if signal is None else _run_of(session, standing, signal)
+    view = charts.view(session, current, baseline, window, chart)
+    marked = charts.marked_by(baseline) if signal is None else _run_of(session, current, signal)
     return _answer(control_figure(view, key=characteristic, marked=marked, theme=theme, width=width))
 
 
-def _run_of(session: SessionDep, standing: Standing, number: int) -> Marks:
+def _run_of(session: SessionDep, current: CurrentCharacteristic, number: int) -> Marks:
     row = signals_queries.signal(session, number)
-    if row.characteristic.key != standing.characteristic.key:
+    if row.characteristic.key != current.characteristic.key:
         raise signals_queries.unknown(number)
     return Marks(row.signal.first_sequence, row.signal.last_sequence, _("Signal {n}").format(n=number))
 
@@ -223,12 +223,12 @@ def get_baseline_editor(
     width: Width = 1240,
 ) -> Response:
     """The chart on which a period is chosen: the readings, the period, and the limits that it would give."""
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    window = statistics.window_of(session, standing.characteristic, **choice._asdict())
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    window = statistics.window_of(session, current.characteristic, **choice._asdict())
     picked = EditorChoice(
         quantity, chart, grouping, group_size, group_pause, settle, first_sequence, last_sequence, excluded
     )
-    view, marked = picture_of(session, standing, picked, window)
+    view, marked = picture_of(session, current, picked, window)
     return _answer(control_figure(view, key=characteristic, marked=marked, theme=theme, width=width, picks=True))
 
 

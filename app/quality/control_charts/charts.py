@@ -21,7 +21,7 @@ from app.core.spc.shewhart import Chart, ControlChart
 from app.core.spc.spread import Subgroups
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.quality.control_charts import queries
@@ -49,7 +49,7 @@ def kinds(baseline: Baseline) -> list[Chart]:
 
 def view(
     session: Session,
-    standing: Standing,
+    current: CurrentCharacteristic,
     baseline: Baseline,
     window: Window,
     kind: Chart | None = None,
@@ -67,45 +67,45 @@ def view(
             _("Choose one of its charts, or freeze a baseline for this one."),
             errors=[FieldError("chart", wrong)],
         )
-    view = _drawn(session, standing, baseline, window, kind, watched)
+    view = _drawn(session, current, baseline, window, kind, watched)
     view = replace(view, left_out=view.left_out and view.left_out.within(window.first, window.last))
     if not window.timed:
         return view
     # What a point is does not depend on the period; whether it is shown does.
-    measured = statistics.history_of(session, standing.characteristic, window, ())["sequence"]
+    measured = statistics.history_of(session, current.characteristic, window, ())["sequence"]
     view = only(view, np.isin(view.last, measured))
     return replace(view, left_out=view.left_out and view.left_out.among(measured))
 
 
 def _drawn(
     session: Session,
-    standing: Standing,
+    current: CurrentCharacteristic,
     baseline: Baseline,
     window: Window,
     kind: Chart,
     watched: Iterable[RuleName] | None,
 ) -> View:
     if kind in REMEMBERING:
-        return _remembering(session, standing, baseline, window, kind)
+        return _remembering(session, current, baseline, window, kind)
     if kind is Chart.MOVING_RANGE:
-        points = charted(session, standing, baseline, replace(window, first=max(1, window.first - NEIGHBOURS)))
+        points = charted(session, current, baseline, replace(window, first=max(1, window.first - NEIGHBOURS)))
         return _moving_ranges(points, window)
     before = replace(window, first=max(1, window.first - NEIGHBOURS * (baseline.group_size or 1)))
-    points = charted(session, standing, baseline, before)
+    points = charted(session, current, baseline, before)
     if kind in (Chart.RANGES, Chart.DEVIATIONS):
         return since(replace(_within(points, kind), settling=_settling(points, window)), window.first)
     main = _view(points, kind, points.chart, np.ones(len(points), np.bool_))
     if points.chart is None:
         return main
-    on = _switched_on(session, standing) if watched is None else set(watched)
+    on = _switched_on(session, current) if watched is None else set(watched)
     chosen = [RULES[name] for name in queries.rules_of(baseline) if name in on]
     main = replace(main, settling=_settling(points, window), signals=rules.signals_of(points.chart, chosen))
     return since(main, window.first)
 
 
-def _switched_on(session: Session, standing: Standing) -> set[RuleName]:
+def _switched_on(session: Session, current: CurrentCharacteristic) -> set[RuleName]:
     """The rules that watch the main chart."""
-    return set(rules_in_force(session, standing.characteristic).rules.get(Place.MAIN, {}))
+    return set(rules_in_force(session, current.characteristic).rules.get(Place.MAIN, {}))
 
 
 def _settling(points: Charted, window: Window) -> int:
@@ -126,10 +126,10 @@ def marked_by(baseline: Baseline) -> Marks:
     return Marks(baseline.first_sequence, baseline.last_sequence, name, excluded)
 
 
-def unjudged(session: Session, standing: Standing, window: Window) -> View:
+def unjudged(session: Session, current: CurrentCharacteristic, window: Window) -> View:
     """Deviations as they are, for a characteristic without a baseline."""
     plain = Baseline(quantity=Quantity.DEVIATION.value, excluded=[], first_sequence=1, last_sequence=0, factor=-1.0)
-    readings = read(session, standing, plain, window)
+    readings = read(session, current, plain, window)
     return replace(of_series(readings.series, Quantity.DEVIATION), left_out=readings.left_out)
 
 
@@ -202,10 +202,12 @@ def _within(points: Charted, kind: Chart) -> View:
     return _view(points, kind, judge(judged_by(points.baseline), groups), some)
 
 
-def _remembering(session: Session, standing: Standing, baseline: Baseline, window: Window, kind: Chart) -> View:
+def _remembering(
+    session: Session, current: CurrentCharacteristic, baseline: Baseline, window: Window, kind: Chart
+) -> View:
     singly = _singly(baseline)
     begin = max(1, window.first - LOOK_BACK, min(window.first, _beginning(baseline, window.first)))
-    points = charted(session, standing, singly, replace(window, first=begin))
+    points = charted(session, current, singly, replace(window, first=begin))
     series = points.series.only(points.series.sequence >= begin)  # what was read before set levels
     sequence, values = series.sequence, series.values
     monitored = sequence > baseline.last_sequence

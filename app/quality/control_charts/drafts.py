@@ -12,7 +12,7 @@ from app.core.spc.refusal import Floats, Reason, Refused
 from app.core.spc.spread import Estimator, Subgroups, summary
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.loop.summaries.wording import refusal
@@ -44,19 +44,19 @@ class Draft:
         return [(which.value, wording.caution(which, count)) for which, count in self.cautions]
 
 
-def suited(session: Session, standing: Standing) -> Quantity:
+def suited(session: Session, current: CurrentCharacteristic) -> Quantity:
     """Quantity that suits this characteristic best: its newest readings, over all their edges, show if its tool wears."""
-    if standing.parameters.measures_only:
+    if current.parameters.measures_only:
         return wording.suits(corrects=False, wears=False)
-    newest = statistics.window_of(session, standing.characteristic).newest
+    newest = statistics.window_of(session, current.characteristic).newest
     plan = Baseline(
         quantity=Quantity.WITHOUT_CORRECTIONS.value,
         excluded=[],
         first_sequence=1,
         last_sequence=0,
-        factor=standing.parameters.factor,
+        factor=current.parameters.factor,
     )
-    readings = read(session, standing, plan, Window(max(1, newest - LOOKED_AT + 1), newest, newest))
+    readings = read(session, current, plan, Window(max(1, newest - LOOKED_AT + 1), newest, newest))
     try:
         line = _line(readings.series)
     except Refused:  # nobody knows yet
@@ -64,19 +64,19 @@ def suited(session: Session, standing: Standing) -> Quantity:
     return wording.suits(corrects=True, wears=abs(line.slope) > WEARS * line.error)
 
 
-def draft_of(session: Session, standing: Standing, given: PeriodIn) -> Draft:
+def draft_of(session: Session, current: CurrentCharacteristic, given: PeriodIn) -> Draft:
     """Centre and sigma of the period. Raises `Invalid`: no such readings, too few of them, all equal, or settings that clash."""
-    newest = statistics.window_of(session, standing.characteristic).newest
+    newest = statistics.window_of(session, current.characteristic).newest
     _check(given, newest)
-    baseline = _plan(standing, given)
+    baseline = _plan(current, given)
     window = Window(given.first_sequence, given.last_sequence, newest)
-    readings = read(session, standing, baseline, window)
+    readings = read(session, current, baseline, window)
     try:
         line = _line(readings.series)
         if baseline.quantity == Quantity.WEAR_RESIDUALS:
             baseline.slope, baseline.slope_error = line.slope, line.error
-            baseline.settle = given.settle or _run_in(session, standing, baseline, readings, window)
-        _take(baseline, _estimated(session, standing, baseline, readings, window))
+            baseline.settle = given.settle or _run_in(session, current, baseline, readings, window)
+        _take(baseline, _estimated(session, current, baseline, readings, window))
     except Refused as refused:
         wrong = refusal(refused)
         raise Invalid(
@@ -86,7 +86,7 @@ def draft_of(session: Session, standing: Standing, given: PeriodIn) -> Draft:
             _("Choose a longer period, or leave out less of it."),
             errors=[FieldError("last_sequence", wrong)],
         ) from None
-    return Draft(baseline, readings.left_out, _cautions(session, standing, baseline, readings, line, window))
+    return Draft(baseline, readings.left_out, _cautions(session, current, baseline, readings, line, window))
 
 
 def _check(given: PeriodIn, newest: int) -> None:
@@ -139,16 +139,16 @@ def _check(given: PeriodIn, newest: int) -> None:
         )
 
 
-def _plan(standing: Standing, given: PeriodIn) -> Baseline:
+def _plan(current: CurrentCharacteristic, given: PeriodIn) -> Baseline:
     settings = given.model_dump(include=set(PeriodIn.model_fields) - {"excluded", "quantity"})
     return Baseline(
         **settings,
         quantity=given.quantity.value,
         excluded=[run.model_dump() for run in given.excluded],
-        factor=standing.parameters.factor,
-        parameters_version=standing.version.version,
-        machine_id=standing.machine.id,
-        characteristic_id=standing.characteristic.id,
+        factor=current.parameters.factor,
+        parameters_version=current.version.version,
+        machine_id=current.machine.id,
+        characteristic_id=current.characteristic.id,
         centre=0.0,
         sigma=1.0,
         estimator=Estimator.GIVEN.value,
@@ -158,10 +158,12 @@ def _plan(standing: Standing, given: PeriodIn) -> Baseline:
     )
 
 
-def _run_in(session: Session, standing: Standing, baseline: Baseline, series: ReadingSeries, window: Window) -> int:
+def _run_in(
+    session: Session, current: CurrentCharacteristic, baseline: Baseline, series: ReadingSeries, window: Window
+) -> int:
     """Number of readings that the edges of the period take to run in, by all of their readings."""
     lines = quantity.individuals_of(series.series, Quantity.WEAR_RESIDUALS, baseline.slope or 0.0)
-    whole = queries.read_back(session, standing, baseline, window)
+    whole = queries.read_back(session, current, baseline, window)
     return quantity.run_in(whole.series, window.first, baseline.slope or 0.0, lines.sigma.value)
 
 
@@ -172,21 +174,21 @@ def _line(series: Series) -> WearLine:
 
 
 def _estimated(
-    session: Session, standing: Standing, baseline: Baseline, series: ReadingSeries, window: Window
+    session: Session, current: CurrentCharacteristic, baseline: Baseline, series: ReadingSeries, window: Window
 ) -> shewhart.Baseline:
     which = Quantity(baseline.quantity)
     if baseline.grouping is None:
         return quantity.individuals_of(series.series, which, baseline.slope or 0.0)
-    groups = _groups(session, standing, baseline, window)
+    groups = _groups(session, current, baseline, window)
     limits = shewhart.subgroup_baseline(groups, ESTIMATORS[baseline.chart])
     if which is Quantity.WEAR_RESIDUALS:  # they are about their own edge's level: by design about 0
         return shewhart.Baseline(0.0, limits.sigma, provisional=limits.provisional)
     return limits
 
 
-def _groups(session: Session, standing: Standing, baseline: Baseline, window: Window) -> Subgroups:
+def _groups(session: Session, current: CurrentCharacteristic, baseline: Baseline, window: Window) -> Subgroups:
     """The complete subgroups that lie in the period."""
-    points = queries.charted(session, standing, baseline, window)
+    points = queries.charted(session, current, baseline, window)
     if points.groups is None:
         raise Refused(Reason.TOO_FEW_SUBGROUPS, have=0, needed=shewhart.FEWEST_SUBGROUPS)
     inside, groups = points.first >= window.first, points.groups
@@ -203,10 +205,15 @@ def _take(baseline: Baseline, baseline_limits: shewhart.Baseline) -> None:
 
 
 def _cautions(
-    session: Session, standing: Standing, baseline: Baseline, series: ReadingSeries, line: WearLine, window: Window
+    session: Session,
+    current: CurrentCharacteristic,
+    baseline: Baseline,
+    series: ReadingSeries,
+    line: WearLine,
+    window: Window,
 ) -> list[tuple[Caution, int]]:
     """Cautions against freezing it; its own signals and normality are noted in the baseline."""
-    points = queries.charted(session, standing, baseline, window)
+    points = queries.charted(session, current, baseline, window)
     values = _flat(baseline, series.series)
     baseline.signals = _signals(baseline, points)
     baseline.normal_p = _normal_p(values)
@@ -227,8 +234,8 @@ def _cautions(
     steps = int(series.series.begins[1:].sum())
     if steps and which in (Quantity.DEVIATION, Quantity.WITHOUT_CORRECTIONS):
         cautions.append((Caution.STEPS, steps))
-    if which is Quantity.DEVIATION and not standing.parameters.measures_only:
-        corrections = statistics.numbers_of(session, standing.characteristic, window).corrections
+    if which is Quantity.DEVIATION and not current.parameters.measures_only:
+        corrections = statistics.numbers_of(session, current.characteristic, window).corrections
         if corrections:
             cautions.append((Caution.CORRECTED, corrections))
     if len(series.left_out.unknown):

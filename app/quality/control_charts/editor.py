@@ -9,7 +9,7 @@ from app.core.spc.quantity import Quantity
 from app.core.spc.rules import RuleName
 from app.errors import Invalid
 from app.language.i18n import _
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries.queries import Window
 from app.quality.control_charts import charts
 from app.quality.control_charts.drafts import draft_of
@@ -61,26 +61,28 @@ class EditorChoice(NamedTuple):
         )
 
 
-def picture_of(session: Session, standing: Standing, picked: EditorChoice, window: Window) -> tuple[View, Marks | None]:
+def picture_of(
+    session: Session, current: CurrentCharacteristic, picked: EditorChoice, window: Window
+) -> tuple[View, Marks | None]:
     """The readings of the window by the baseline that would be; single values without limits while there is none."""
     marked = None
     if picked.first is not None and picked.last is not None and picked.first <= picked.last:
         marked = Marks(picked.first, picked.last, _("Period"), picked.runs)
     try:
         period = picked.period()
-        draft = None if period is None else draft_of(session, standing, period).baseline
+        draft = None if period is None else draft_of(session, current, period).baseline
     except Invalid:  # the page says it; the picture shows what there is
         draft = None
     if draft is not None:
-        return charts.view(session, standing, draft, window, watched=[RuleName.NELSON_1]), marked
+        return charts.view(session, current, draft, window, watched=[RuleName.NELSON_1]), marked
     plain = Baseline(
         quantity=picked.quantity.value,
         excluded=[],
         first_sequence=1,
         last_sequence=0,
-        factor=standing.parameters.factor,
+        factor=current.parameters.factor,
     )
-    series = read(session, standing, plain, window).series
+    series = read(session, current, plain, window).series
     if picked.quantity is Quantity.DIFFERENCES:
         return charts.of_series(quantity.differences(series), picked.quantity), marked
     # Residuals are about a line that is not known yet.

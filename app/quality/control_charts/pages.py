@@ -20,7 +20,7 @@ from app.errors import Conflict, InbandError, Invalid
 from app.jobs.queries import failures_of
 from app.jobs.wording import with_job_words
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries import wording as statistics_wording
 from app.quality.control_charts import (
@@ -61,18 +61,23 @@ class ControlPage:
     """Content of the page; each part is queried when the template comes to it."""
 
     def __init__(
-        self, session: Session, standing: Standing, choice: Choice, chart: Chart | None, judge: Baseline | None
+        self,
+        session: Session,
+        current: CurrentCharacteristic,
+        choice: Choice,
+        chart: Chart | None,
+        judge: Baseline | None,
     ) -> None:
         self._session, self._choice, self._chart = session, choice, chart
-        self.standing, self.judge = standing, judge
+        self.current, self.judge = current, judge
 
     @cached_property
     def in_force(self) -> Baseline | None:
-        return queries.baseline_in_force(self._session, self.standing.characteristic)
+        return queries.baseline_in_force(self._session, self.current.characteristic)
 
     @cached_property
     def baselines(self) -> list[Baseline]:
-        return list(queries.baselines(self._session, self.standing.characteristic, limit=VERSIONS))
+        return list(queries.baselines(self._session, self.current.characteristic, limit=VERSIONS))
 
     @cached_property
     def kinds(self) -> list[Chart]:
@@ -87,13 +92,13 @@ class ControlPage:
     def views(self) -> list[View]:
         if self.judge is None:
             return []
-        window = statistics.window_of(self._session, self.standing.characteristic, **self._choice._asdict())
-        return [charts.view(self._session, self.standing, self.judge, window, kind) for kind in self.kinds]
+        window = statistics.window_of(self._session, self.current.characteristic, **self._choice._asdict())
+        return [charts.view(self._session, self.current, self.judge, window, kind) for kind in self.kinds]
 
     @property
     def missing(self) -> str:
         """Sentence about the readings that are missing before a baseline can be frozen; empty where there are enough."""
-        have = statistics.window_of(self._session, self.standing.characteristic).newest
+        have = statistics.window_of(self._session, self.current.characteristic).newest
         if have >= FEWEST_READINGS:
             return ""
         return statistics_wording.refusal(Refused(Why.TOO_FEW_READINGS, have=have, needed=FEWEST_READINGS))
@@ -107,7 +112,7 @@ class ControlPage:
     def kept(self) -> list[SignalRow]:
         """Signals that nobody has explained yet, newest first; one more than the page lists if there are more."""
         return signals_queries.signals(
-            self._session, characteristic=self.standing.characteristic, state="open", limit=KEPT + 1
+            self._session, characteristic=self.current.characteristic, state="open", limit=KEPT + 1
         )
 
     @property
@@ -141,15 +146,15 @@ def control_page(
     x_live_part: Annotated[str | None, Header()] = None,
 ) -> Response:
     """The control charts by the baseline in force, or by an older one to compare."""
-    standing = characteristics.characteristic_named(session, characteristic)
-    return _control(request, session, caller, standing, choice, chart, baseline, x_live_part)
+    current = characteristics.characteristic_named(session, characteristic)
+    return _control(request, session, caller, current, choice, chart, baseline, x_live_part)
 
 
 def _control(
     request: Request,
     session: Session,
     caller: Caller,
-    standing: Standing,
+    current: CurrentCharacteristic,
     choice: Choice,
     chart: str | None = None,
     version: int | None = None,
@@ -157,11 +162,11 @@ def _control(
     *,
     error: InbandError | None = None,
 ) -> Response:
-    key = standing.characteristic.key
+    key = current.characteristic.key
     judge = (
-        queries.baseline_in_force(session, standing.characteristic)
+        queries.baseline_in_force(session, current.characteristic)
         if version is None
-        else queries.baseline_of(session, standing.characteristic, version)
+        else queries.baseline_of(session, current.characteristic, version)
     )
     kind = Chart(chart) if chart and judge is not None and Chart(chart) in charts.kinds(judge) else None
     chosen = _as_query(choice)
@@ -181,11 +186,11 @@ def _control(
         request,
         "control_charts/control.html",
         status=error.status if error else 200,
-        shown=ControlPage(session, standing, choice, kind, judge),
-        machine=standing.machine,
-        characteristic=standing.characteristic,
-        parameters=standing.parameters,
-        suits=suited(session, standing) if part is None else None,
+        shown=ControlPage(session, current, choice, kind, judge),
+        machine=current.machine,
+        characteristic=current.characteristic,
+        parameters=current.parameters,
+        suits=suited(session, current) if part is None else None,
         choice=choice,
         chart=kind,
         version=version,
@@ -200,7 +205,7 @@ def _control(
         most_kept=KEPT,
         proof_failing=proof.failing(),
         proof_warning=proof_wording.warning(len(proof.failing())),
-        failing=with_job_words(failures_of(session, standing.machine.id, standing.characteristic.id)),
+        failing=with_job_words(failures_of(session, current.machine.id, current.characteristic.id)),
         may_see_jobs=caller.may("engineer"),
         may_freeze=caller.may("engineer"),
         wanted=lambda name: part is None or part == name,
@@ -213,8 +218,8 @@ def freeze_page(
 ) -> Response:
     """Choose a period, see what its baseline would be, and freeze it. What is chosen is in the address."""
     del caller
-    standing = characteristics.characteristic_named(session, characteristic)
-    return _freeze(request, session, standing, choice, texts_of(request))
+    current = characteristics.characteristic_named(session, characteristic)
+    return _freeze(request, session, current, choice, texts_of(request))
 
 
 def texts_of(request: Request) -> dict[str, str]:
@@ -225,13 +230,13 @@ def texts_of(request: Request) -> dict[str, str]:
 def _freeze(
     request: Request,
     session: Session,
-    standing: Standing,
+    current: CurrentCharacteristic,
     choice: Choice,
     form: Mapping[str, str],
     error: Invalid | Conflict | None = None,
 ) -> Response:
-    key = standing.characteristic.key
-    suits = suited(session, standing)
+    key = current.characteristic.key
+    suits = suited(session, current)
     draft: Draft | None = None
     chosen = bool(form.get("first_sequence") or form.get("last_sequence"))
     typed = (
@@ -239,19 +244,19 @@ def _freeze(
     )
     if chosen:
         try:
-            draft = draft_of(session, standing, parsed(PeriodIn, form_reader.period(typed)))
+            draft = draft_of(session, current, parsed(PeriodIn, form_reader.period(typed)))
         except Invalid as wrong:
             error = error or wrong
     return page(
         request,
         "control_charts/freeze.html",
         status=error.status if error else 200,
-        machine=standing.machine,
-        characteristic=standing.characteristic,
-        parameters=standing.parameters,
+        machine=current.machine,
+        characteristic=current.characteristic,
+        parameters=current.parameters,
         choice=choice,
         draft=draft,
-        seen_version=queries.newest_version(session, standing.characteristic),
+        seen_version=queries.newest_version(session, current.characteristic),
         suits=suits,
         typed=typed,
         fields=form_reader.FIELDS,
@@ -287,16 +292,16 @@ def freeze(
     request: Request, session: SessionDep, caller: Engineer, characteristic: str, choice: Chosen, form: FormDep
 ) -> Response:
     """Freeze what was previewed, with a reason."""
-    standing = characteristics.characteristic_named(session, characteristic)
+    current = characteristics.characteristic_named(session, characteristic)
     try:
         with session.begin_nested():
             seen = form.get("seen_version", "")
             seen_version = int(seen) if seen.isdecimal() and len(seen) < 10 else None
             more = {"reason": form.get("reason"), "seen_version": seen_version}
-            actions.freeze(session, standing, parsed(BaselineIn, form_reader.period(form) | more), caller)
+            actions.freeze(session, current, parsed(BaselineIn, form_reader.period(form) | more), caller)
     except (Invalid, Conflict) as error:
-        return _freeze(request, session, standing, choice, form, error)
-    return RedirectResponse(f"/characteristics/{standing.characteristic.key}/control", 303)
+        return _freeze(request, session, current, choice, form, error)
+    return RedirectResponse(f"/characteristics/{current.characteristic.key}/control", 303)
 
 
 @router.post("/characteristics/{characteristic}/control/baselines/{version}/{what}")
@@ -310,13 +315,13 @@ def change(
     form: FormDep,
 ) -> Response:
     """Retire the baseline in force, or go back to an older one."""
-    standing = characteristics.characteristic_named(session, characteristic)
+    current = characteristics.characteristic_named(session, characteristic)
     change = actions.retire if what == "retire" else actions.put_in_force
     try:
         with session.begin_nested():
-            change(session, standing, version, checked(Reason, form.get("reason", ""), "reason"), caller)
+            change(session, current, version, checked(Reason, form.get("reason", ""), "reason"), caller)
     except InbandError as error:
         if error.status not in (409, 422):
             raise
-        return _control(request, session, caller, standing, Choice(200, None, None, None, None), error=error)
-    return RedirectResponse(f"/characteristics/{standing.characteristic.key}/control", 303)
+        return _control(request, session, caller, current, Choice(200, None, None, None, None), error=error)
+    return RedirectResponse(f"/characteristics/{current.characteristic.key}/control", 303)

@@ -16,7 +16,7 @@ from app.core.spc.shewhart import Chart, ControlChart
 from app.core.spc.spread import Estimator, Sigma, Subgroups, subgroups
 from app.errors import NotFound
 from app.language.i18n import _
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries.queries import Window
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.readings import Exclusion
@@ -124,19 +124,19 @@ class Charted:
         return len(self.last)
 
 
-def charted(session: Session, standing: Standing, baseline: Baseline, window: Window) -> Charted:
+def charted(session: Session, current: CurrentCharacteristic, baseline: Baseline, window: Window) -> Charted:
     """The points whose last reading lies in the window: what a point is does not depend on where the window begins.
 
     Streaming: ask for Window(last judged sequence + 1, newest, newest) and feed z to a `Scan` that has seen the points
     before. Only complete subgroups are points. Readings of the baseline's own period are judged too; monitoring begins at
     ``baseline.last_sequence + 1``. Raises `Invalid` for more than ten million readings.
     """
-    return points_of(baseline, read_back(session, standing, baseline, window), window)
+    return points_of(baseline, read_back(session, current, baseline, window), window)
 
 
-def read_back(session: Session, standing: Standing, baseline: Baseline, window: Window) -> ReadingSeries:
+def read_back(session: Session, current: CurrentCharacteristic, baseline: Baseline, window: Window) -> ReadingSeries:
     """The readings of the window, and those before it without which its first point would be another one."""
-    return read(session, standing, baseline, _to_read(baseline, window))
+    return read(session, current, baseline, _to_read(baseline, window))
 
 
 def _to_read(plan: Plan, window: Window) -> Window:

@@ -11,7 +11,7 @@ from app.core.spc.rules import RuleName
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
 from app.language.i18n import _
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.tables.characteristics import Characteristic
 from app.quality.control_charts import rules_wording as wording
@@ -25,7 +25,7 @@ Wanted = Mapping[Place, Mapping[RuleName, Do]]
 
 def set_rules(
     session: Session,
-    standing: Standing,
+    current: CurrentCharacteristic,
     wanted: Wanted,
     reason: str,
     caller: Caller,
@@ -38,10 +38,10 @@ def set_rules(
     look_back: the readings since the period of the baseline are judged too; they raise no alarm. seen: the version that
     was changed. Raises `Invalid` for a rule that has no sense on its chart; `Conflict` if somebody was faster.
     """
-    characteristic = standing.characteristic
+    characteristic = current.characteristic
     session.execute(  # versions count without gaps: of two who change the rules at once, one waits
         select(Characteristic.id)
-        .where(Characteristic.machine_id == standing.machine.id, Characteristic.id == characteristic.id)
+        .where(Characteristic.machine_id == current.machine.id, Characteristic.id == characteristic.id)
         .with_for_update(key_share=True)
     )
     before = rules_in_force(session, characteristic)
@@ -66,7 +66,7 @@ def set_rules(
         return before
     session.add(
         RuleSet(
-            machine_id=standing.machine.id,
+            machine_id=current.machine.id,
             characteristic_id=characteristic.id,
             version=before.version + 1,
             rules=stored_rules(rules),
@@ -83,7 +83,7 @@ def set_rules(
         wording.as_recorded(rules),
         reason,
     )
-    publish(session, {"kind": "rules", "machine": standing.machine.key, "characteristic": characteristic.key})
+    publish(session, {"kind": "rules", "machine": current.machine.key, "characteristic": characteristic.key})
     return rules_in_force(session, characteristic)
 
 

@@ -30,18 +30,18 @@ def put_rules(session: SessionDep, caller: Engineer, characteristic: Characteris
 
     Signals that were found before stay, whichever rules are on.
     """
-    standing = characteristics.characteristic_named(session, characteristic)
+    current = characteristics.characteristic_named(session, characteristic)
     watched = set_rules(
         session,
-        standing,
+        current,
         given.rules,
         given.reason,
         caller,
         look_back=given.look_back,
         seen=given.seen_version,
     )
-    baseline = baseline_in_force(session, standing.characteristic)
-    return RulesOut.of(standing.characteristic.key, watched, baseline)
+    baseline = baseline_in_force(session, current.characteristic)
+    return RulesOut.of(current.characteristic.key, watched, baseline)
 
 
 @router.get("/characteristics/{characteristic}/rules/preview", responses=problems(404))
@@ -58,7 +58,7 @@ def preview_rules(
 
     Chance: independent, normally distributed readings about the centre of the baseline, with its sigma.
     """
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    watched = rules_queries.rules_in_force(session, standing.characteristic)
-    preview = rules_queries.preview(session, standing, watched.rules, last)
-    return PreviewOut.of(standing.characteristic.key, watched, preview)
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    watched = rules_queries.rules_in_force(session, current.characteristic)
+    preview = rules_queries.preview(session, current, watched.rules, last)
+    return PreviewOut.of(current.characteristic.key, watched, preview)

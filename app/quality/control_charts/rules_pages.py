@@ -16,7 +16,7 @@ from app.core.spc.rules import NELSON, WESTERN_ELECTRIC, RuleName
 from app.core.spc.shewhart import Chart
 from app.errors import InbandError
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import wording as statistics
 from app.quality.control_charts import rules_queries
 from app.quality.control_charts import rules_wording as wording
@@ -135,27 +135,27 @@ def rules_page(
     chosen: Annotated[Set | None, Query(alias="set")] = None,
 ) -> Response:
     """The rules, what they would have said of the last readings, and which are on. A set that is chosen is tried first."""
-    standing = characteristics.characteristic_named(session, characteristic)
-    watched = rules_queries.rules_in_force(session, standing.characteristic)
+    current = characteristics.characteristic_named(session, characteristic)
+    watched = rules_queries.rules_in_force(session, current.characteristic)
     rules = watched.rules
     if chosen is not None:
-        rules = of_set(chosen, rules, baseline_in_force(session, standing.characteristic))
-    return _rules(request, session, caller, standing, watched, rules, last)
+        rules = of_set(chosen, rules, baseline_in_force(session, current.characteristic))
+    return _rules(request, session, caller, current, watched, rules, last)
 
 
 def _rules(
     request: Request,
     session: Session,
     caller: Caller,
-    standing: Standing,
+    current: CurrentCharacteristic,
     watched: Watched,
     rules: Rules,
     last: str,
     form: Mapping[str, str] | None = None,
     error: InbandError | None = None,
 ) -> Response:
-    key = standing.characteristic.key
-    preview = rules_queries.preview(session, standing, rules, None if last == "all" else int(last))
+    key = current.characteristic.key
+    preview = rules_queries.preview(session, current, rules, None if last == "all" else int(last))
     baseline = None if preview is None else preview.baseline
     failing = proof.failing()
 
@@ -166,14 +166,14 @@ def _rules(
         request,
         "control_charts/rules.html",
         status=error.status if error else 200,
-        characteristic=standing.characteristic,
-        machine=standing.machine,
+        characteristic=current.characteristic,
+        machine=current.machine,
         watched=watched,
         unsaved=rules != watched.rules,
         rows=rows_of(rules, baseline, preview),
         found=preview,
         baseline=baseline,
-        history=rules_queries.rules_history(session, standing.characteristic),
+        history=rules_queries.rules_history(session, current.characteristic),
         last=last,
         link=link,
         form=form or {},
@@ -193,13 +193,13 @@ def _rules(
 @router.post("/characteristics/{characteristic}/rules")
 def send_rules(request: Request, session: SessionDep, caller: Engineer, characteristic: str, form: FormDep) -> Response:
     """Try what is ticked (`step` = try), or switch it on. Nothing is changed unless all of it is understood."""
-    standing = characteristics.characteristic_named(session, characteristic)
+    current = characteristics.characteristic_named(session, characteristic)
     last = form.get("last", "")
     last = last if last in {"200", "1000", "all"} else "1000"
-    before = rules_queries.rules_in_force(session, standing.characteristic)
+    before = rules_queries.rules_in_force(session, current.characteristic)
     rules = typed(form, before.rules)
     if form.get("step") == "try":
-        return _rules(request, session, caller, standing, before, rules, last, form)
+        return _rules(request, session, caller, current, before, rules, last, form)
     seen = form.get("seen_version", "")
     fields = {
         "rules": ticked(form),
@@ -212,7 +212,7 @@ def send_rules(request: Request, session: SessionDep, caller: Engineer, characte
             request_body = parsed(RulesIn, fields)
             set_rules(
                 session,
-                standing,
+                current,
                 request_body.rules,
                 request_body.reason,
                 caller,
@@ -222,5 +222,5 @@ def send_rules(request: Request, session: SessionDep, caller: Engineer, characte
     except InbandError as error:
         if error.status not in {409, 422}:
             raise
-        return _rules(request, session, caller, standing, before, rules, last, form, error)
-    return RedirectResponse(f"/characteristics/{standing.characteristic.key}/rules?last={last}", 303)
+        return _rules(request, session, caller, current, before, rules, last, form, error)
+    return RedirectResponse(f"/characteristics/{current.characteristic.key}/rules?last={last}", 303)

@@ -11,7 +11,7 @@ from app.core.spc.false_alarms import FalseAlarms, by_chance
 from app.core.spc.points import Piece
 from app.core.spc.rules import RuleName
 from app.core.spc.watch import SignalSpan, Watch
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.loop.tables.characteristics import Characteristic
@@ -96,16 +96,16 @@ class Preview:
     everything: RuleTrial
 
 
-def preview(session: Session, standing: Standing, rules: Rules, last: int | None = None) -> Preview | None:
+def preview(session: Session, current: CurrentCharacteristic, rules: Rules, last: int | None = None) -> Preview | None:
     """Signals of these rules, and of every other one, on the last so many readings; None without a baseline.
 
     Of more than a million readings the last million is looked at.
     """
-    baseline = baseline_in_force(session, standing.characteristic)
+    baseline = baseline_in_force(session, current.characteristic)
     if baseline is None:
         return None
-    window = statistics.window_of(session, standing.characteristic, last=min(last or MOST_PREVIEWED, MOST_PREVIEWED))
-    points = charted(session, standing, baseline, window)
+    window = statistics.window_of(session, current.characteristic, last=min(last or MOST_PREVIEWED, MOST_PREVIEWED))
+    points = charted(session, current, baseline, window)
     tried: dict[tuple[Place, RuleName], RuleTrial] = {}
     together: dict[Place, RuleTrial] = {}
     for place in Place:

@@ -18,7 +18,7 @@ from sqlalchemy.orm import Session
 from app.core import wear
 from app.core.decision.limits import FAULT, in_nanometres
 from app.core.spc.quantity import Quantity, Series
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.loop.tables.readings import Reading
@@ -84,12 +84,12 @@ class ReadingSeries:
     left_out: LeftOut
 
 
-def read(session: Session, standing: Standing, plan: Plan, window: Window) -> ReadingSeries:
+def read(session: Session, current: CurrentCharacteristic, plan: Plan, window: Window) -> ReadingSeries:
     """The readings of the window as the plan's quantity is made of."""
     rebuilt = plan.quantity != Quantity.DEVIATION
     columns = ["deviation", "measured", "measured_at", "received_at", "zone"]
     history = statistics.history_of(
-        session, standing.characteristic, window, [*columns, "compensated"] if rebuilt else columns
+        session, current.characteristic, window, [*columns, "compensated"] if rebuilt else columns
     )
     sequence, values = history["sequence"], history["deviation"]
     by_plan = excluded_by(plan, sequence) & ~history.excluded
@@ -100,8 +100,8 @@ def read(session: Session, standing: Standing, plan: Plan, window: Window) -> Re
         unknown = np.isnan(history["compensated"]) & keep
         keep &= ~unknown
         values = wear.wear(values, history["compensated"], plan.factor)
-    begins = _begins(session, standing, history["received_at"], history["measured"] - history["deviation"])
-    labels = _labels(session, standing, window, sequence) if plan.grouping == "part" else np.zeros_like(sequence)
+    begins = _begins(session, current, history["received_at"], history["measured"] - history["deviation"])
+    labels = _labels(session, current, window, sequence) if plan.grouping == "part" else np.zeros_like(sequence)
     left_out = LeftOut(sequence[history.excluded], sequence[by_plan], sequence[faults], sequence[unknown])
     return ReadingSeries(
         Series(sequence, values, begins).only(keep), history["measured_at"][keep], labels[keep], left_out
@@ -117,17 +117,17 @@ def excluded_by(plan: Plan, sequence: Whole) -> NDArray[np.bool_]:
 
 
 def _begins(
-    session: Session, standing: Standing, received_at: Moments, reference: NDArray[np.float64]
+    session: Session, current: CurrentCharacteristic, received_at: Moments, reference: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Mask of the readings after a tool change, an offset edited by hand, or a change of target plus empirical value."""
     begins = np.ones(len(reference), np.bool_)
     begins[1:] = in_nanometres(np.diff(reference)) != 0
-    number = standing.parameters.tool_memory
+    number = current.parameters.tool_memory
     if not number or not len(reference):
         return begins
     for moment in session.scalars(
         select(ToolEvent.at).where(
-            ToolEvent.machine_id == standing.machine.id, ToolEvent.number == number, ToolEvent.kind != "correction"
+            ToolEvent.machine_id == current.machine.id, ToolEvent.number == number, ToolEvent.kind != "correction"
         )
     ):
         at = int(np.searchsorted(received_at, _naive(moment), side="right"))
@@ -140,14 +140,14 @@ def _naive(moment: datetime) -> np.datetime64:
     return np.datetime64(moment.replace(tzinfo=None), "us")
 
 
-def _labels(session: Session, standing: Standing, window: Window, sequence: Whole) -> Whole:
+def _labels(session: Session, current: CurrentCharacteristic, window: Window, sequence: Whole) -> Whole:
     """Changes of the part that readings name, as numbers that grow; 0 where none is named."""
     before = func.lag(Reading.part).over(order_by=Reading.sequence)
     named = (
         select(Reading.sequence, Reading.part, before.label("before"))
         .where(
-            Reading.machine_id == standing.machine.id,
-            Reading.characteristic_id == standing.characteristic.id,
+            Reading.machine_id == current.machine.id,
+            Reading.characteristic_id == current.characteristic.id,
             Reading.sequence.between(window.first, window.last),
         )
         .subquery()

@@ -19,7 +19,7 @@ from app.core.spc.shewhart import Chart
 from app.core.spc.watch import SignalSpan, Watch
 from app.db.events import publish
 from app.jobs.actions import PeriodicJob, Unit
-from app.loop.characteristics.queries import Standing, characteristic_named
+from app.loop.characteristics.queries import CurrentCharacteristic, characteristic_named
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.loop.tables.readings import Exclusion, Reading
@@ -77,14 +77,14 @@ def to_look_at(session: Session) -> list[Unit]:
 
 def look_at(session: Session, unit: Unit) -> None:
     """Judge the new readings of one characteristic, and raise its alarm where rules are to."""
-    standing = characteristic_named(session, str(unit.key[0]))
-    baseline = queries.baseline_in_force(session, standing.characteristic)
+    current = characteristic_named(session, str(unit.key[0]))
+    baseline = queries.baseline_in_force(session, current.characteristic)
     if baseline is None:
         return
-    result = _Pass(session, standing, baseline, rules_in_force(session, standing.characteristic)).go()
-    changes = [_news(standing, max(result.touched))] if result.touched else []
+    result = _Pass(session, current, baseline, rules_in_force(session, current.characteristic)).go()
+    changes = [_news(current, max(result.touched))] if result.touched else []
     if result.alarming:
-        changes.append(raise_alarm(session, standing, result.alarming))
+        changes.append(raise_alarm(session, current, result.alarming))
     # After the machine's lock was taken, as whoever acknowledges them takes it first.
     extend_alarms(session, result.grown)
     if changes:
@@ -94,11 +94,11 @@ def look_at(session: Session, unit: Unit) -> None:
 JOB = PeriodicJob("run_rules", to_look_at, look_at)
 
 
-def _news(standing: Standing, number: int) -> dict[str, Any]:
+def _news(current: CurrentCharacteristic, number: int) -> dict[str, Any]:
     return {
         "kind": "signal",
-        "machine": standing.machine.key,
-        "characteristic": standing.characteristic.key,
+        "machine": current.machine.key,
+        "characteristic": current.characteristic.key,
         "id": number,
     }
 
@@ -115,10 +115,10 @@ class _PassResult:
 class _Pass:
     """One pass of the periodic job over one characteristic. from_start: all readings since the baseline are judged again."""
 
-    def __init__(self, session: Session, standing: Standing, baseline: Baseline, watched: Watched) -> None:
-        self.session, self.standing, self.baseline, self.watched = session, standing, baseline, watched
+    def __init__(self, session: Session, current: CurrentCharacteristic, baseline: Baseline, watched: Watched) -> None:
+        self.session, self.current, self.baseline, self.watched = session, current, baseline, watched
         row = self.row = self._row()
-        self.newest = statistics.window_of(session, standing.characteristic).newest
+        self.newest = statistics.window_of(session, current.characteristic).newest
         self.same_baseline = row.baseline_version == baseline.version
         self.from_start = (
             not self.same_baseline or row.rules_version != watched.version or row.excluded != self._excluded(row.looked)
@@ -129,7 +129,7 @@ class _Pass:
 
     def _row(self) -> Watching:
         """Progress of a characteristic, locked: no other session watches it meanwhile."""
-        key = {"machine_id": self.standing.machine.id, "characteristic_id": self.standing.characteristic.id}
+        key = {"machine_id": self.current.machine.id, "characteristic_id": self.current.characteristic.id}
         self.session.execute(insert(Watching).values(**key).on_conflict_do_nothing())
         return self.session.get_one(Watching, key, with_for_update=True, populate_existing=True)
 
@@ -166,7 +166,7 @@ class _Pass:
         while looked < self.newest and watches:
             last = min(looked + CHUNK, self.newest)
             window = Window(max(1, pointed + 1 - NEIGHBOURS), last, last)
-            charted = queries.charted(self.session, self.standing, self.baseline, window)
+            charted = queries.charted(self.session, self.current, self.baseline, window)
             for place, watch in watches.items():
                 piece = piece_at(charted, place, looked if place.remembers else pointed)
                 if piece is not None:

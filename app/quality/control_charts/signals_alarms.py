@@ -9,7 +9,7 @@ from app.core.spc.rules import RuleName
 from app.core.spc.shewhart import Chart
 from app.loop.alarm_response import queries as alarm_queries
 from app.loop.alarms import actions as alarms
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.alarms import Alarm
 from app.quality.control_charts.alarm_kinds import SIGNAL
@@ -19,13 +19,13 @@ from app.quality.control_charts.signals_wording import data_of
 MOST = 12  # signals that one alarm names; the newest of each rule and side
 
 
-def raise_alarm(session: Session, standing: Standing, signals: list[Signal]) -> dict[str, Any]:
+def raise_alarm(session: Session, current: CurrentCharacteristic, signals: list[Signal]) -> dict[str, Any]:
     """Raise the alarm of a characteristic, or add to the one that is active; the event that tells of it.
 
     A run is one count; of the same rule it goes on with the entry that is there.
     """
-    lock_machines(session, [standing.machine.id])
-    key = standing.characteristic.key
+    lock_machines(session, [current.machine.id])
+    key = current.characteristic.key
     before = alarm_queries.alarms(session, state="active", kind=SIGNAL.name, limit=1, characteristic=key)
     entries: list[dict[str, Any]] = list(before[0].alarm.data["signals"]) if before else []
     for signal in signals:
@@ -36,9 +36,9 @@ def raise_alarm(session: Session, standing: Standing, signals: list[Signal]) -> 
     entries = entries[-MOST:]
     alarm = alarms.raise_for_characteristic(
         session,
-        standing.machine.id,
-        standing.characteristic.id,
-        standing.parameters.tool_memory,
+        current.machine.id,
+        current.characteristic.id,
+        current.parameters.tool_memory,
         SIGNAL,
         {"characteristic": key, "signals": entries, "readings": _single(entries)},
     )
@@ -48,7 +48,7 @@ def raise_alarm(session: Session, standing: Standing, signals: list[Signal]) -> 
     for signal in signals:
         signal.alarm = alarm.id
     session.flush()
-    return alarms.news(standing.machine.key, alarm) | {"characteristic": key}
+    return alarms.news(current.machine.key, alarm) | {"characteristic": key}
 
 
 def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:

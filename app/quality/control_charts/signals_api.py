@@ -8,7 +8,7 @@ from app.access.deps import AnyCaller, Engineer
 from app.loop.characteristics.queries import characteristic_for
 from app.loop.machines.queries import only_machine
 from app.quality.control_charts import signals_actions, signals_queries
-from app.quality.control_charts.signals_queries import State
+from app.quality.control_charts.signals_queries import SignalState
 from app.quality.control_charts.signals_schemas import CommentIn, SignalOut, signal_out
 from app.web.api import Before, Limit, api_router, problems
 from app.web.deps import SessionDep
@@ -24,7 +24,7 @@ def list_signals(
     caller: AnyCaller,
     characteristic: Annotated[Slug | None, Query(description="Only those of this characteristic.")] = None,
     machine: Annotated[Slug | None, Query(description="Only those of this machine.", examples=["lathe-1"])] = None,
-    state: Annotated[State, Query(description="`open`, `explained`, `withdrawn`, or all of them.")] = "all",
+    state: Annotated[SignalState, Query(description="`open`, `explained`, `withdrawn`, or all of them.")] = "all",
     before: Before = None,
     limit: Limit = 100,
 ) -> Page[SignalOut]:

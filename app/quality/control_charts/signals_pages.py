@@ -17,7 +17,7 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import wording as statistics
 from app.quality.control_charts import rules_wording, signals_actions, signals_queries
 from app.quality.control_charts import signals_wording as words
-from app.quality.control_charts.signals_queries import SignalRow, State
+from app.quality.control_charts.signals_queries import SignalRow, SignalState
 from app.quality.control_charts.signals_schemas import CommentIn
 from app.quality.control_charts.signals_wording import Cause
 from app.quality.proof import queries as proof
@@ -36,22 +36,22 @@ def signals_page(
     request: Request,
     session: SessionDep,
     characteristic: str,
-    state: Annotated[State, Query()] = "all",
+    state: Annotated[SignalState, Query()] = "all",
     before: Before = None,
 ) -> Response:
     """List the signals, newest first."""
-    standing = characteristics.characteristic_named(session, characteristic)
+    current = characteristics.characteristic_named(session, characteristic)
     rows = signals_queries.signals(
-        session, characteristic=standing.characteristic, state=state, before=before, limit=ON_PAGE + 1
+        session, characteristic=current.characteristic, state=state, before=before, limit=ON_PAGE + 1
     )
     link = partial(address, f"/characteristics/{characteristic}/signals")
     return page(
         request,
         "control_charts/signals_page.html",
-        characteristic=standing.characteristic,
-        machine=standing.machine,
+        characteristic=current.characteristic,
+        machine=current.machine,
         part=part_of(rows, ON_PAGE, before, lambda row: row.signal.id, partial(link, state=state)),
-        counts=signals_queries.counts(session, standing.characteristic),
+        counts=signals_queries.counts(session, current.characteristic),
         state=state,
         link=link,
         words=words,

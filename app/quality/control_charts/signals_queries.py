@@ -15,7 +15,7 @@ from app.loop.tables.machines import Machine
 from app.quality.control_charts.signal_tables import Signal
 from app.web.fields import LARGEST_ID
 
-State = Literal["open", "explained", "withdrawn", "all"]
+SignalState = Literal["open", "explained", "withdrawn", "all"]
 
 
 class SignalRow(NamedTuple):
@@ -27,7 +27,7 @@ class SignalRow(NamedTuple):
     alarm: Alarm | None
 
     @property
-    def state(self) -> State:
+    def state(self) -> SignalState:
         """Open until somebody has said what it was: of the signal itself, or by acknowledging its alarm."""
         if self.signal.withdrawn_at is not None:
             return "withdrawn"
@@ -36,7 +36,7 @@ class SignalRow(NamedTuple):
 
 
 _OPEN = and_(Signal.explained_at.is_(None), Signal.withdrawn_at.is_(None), Alarm.acknowledged_at.is_(None))
-_STATES: dict[State, ColumnElement[bool]] = {
+_STATES: dict[SignalState, ColumnElement[bool]] = {
     "open": _OPEN,
     "explained": and_(
         Signal.withdrawn_at.is_(None), or_(Signal.explained_at.is_not(None), Alarm.acknowledged_at.is_not(None))
@@ -79,7 +79,7 @@ def signals(
     *,
     machine_id: int | None = None,
     characteristic: Characteristic | None = None,
-    state: State = "all",
+    state: SignalState = "all",
     chart: str | None = None,
     first: int | None = None,
     through: int | None = None,
@@ -107,7 +107,7 @@ def signals(
     return [SignalRow(*row) for row in session.execute(query)]
 
 
-def counts(session: Session, characteristic: Characteristic) -> dict[State, int]:
+def counts(session: Session, characteristic: Characteristic) -> dict[SignalState, int]:
     """Number of signals of a characteristic in each state."""
     query = (
         select(*(func.count().filter(condition) for condition in _STATES.values()))

@@ -10,7 +10,7 @@ from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.machines import Machine
 from app.quality.gauge_studies import queries
@@ -30,8 +30,8 @@ def add_study(
     Raises `NotFound`; `Invalid` for what is no study of its kind; `Conflict` for a key that was used otherwise.
     """
     lock_machines(session, [machine.id])  # of two that send the same key, one waits for the other
-    standing = _served(session, machine, given.characteristic)
-    settings, rows = _settings(given, standing, source), [_row(row.model_dump()) for row in given.rows]
+    current = _served(session, machine, given.characteristic)
+    settings, rows = _settings(given, current, source), [_row(row.model_dump()) for row in given.rows]
     before = None if given.key is None else queries.by_key(session, machine, given.key)
     if before is not None:
         same = _same(before, given.kind, settings, rows)
@@ -40,7 +40,7 @@ def add_study(
     study = GaugeStudy(
         machine_id=machine.id,
         kind=given.kind,
-        characteristic_id=None if standing is None else standing.characteristic.id,
+        characteristic_id=None if current is None else current.characteristic.id,
         key=given.key,
         created_by=caller.name,
     )
@@ -49,28 +49,30 @@ def add_study(
     _keep(session, study, 1, settings, rows, caller, None)
     subject, values = f"gauge-study/{study.id}", sum(len(row["values"]) for row in rows)
     audit(session, caller.name, "gauge study entered", subject, None, {"kind": given.kind, "values": values})
-    publish(session, _news(machine, standing, study.id))
+    publish(session, _news(machine, current, study.id))
     return Created(queries.study(session, study.id))
 
 
-def take_study(session: Session, standing: Standing, given: FromReadingsIn, caller: Caller) -> Created[StudyRow]:
+def take_study(
+    session: Session, current: CurrentCharacteristic, given: FromReadingsIn, caller: Caller
+) -> Created[StudyRow]:
     """A study of readings that are stored: one part probed again and again, or the repeats of each touch.
 
     Raises `Invalid` where these readings make no study, `Conflict` for a key that was used otherwise.
     """
-    rows = rows_from_readings(session, standing, given.kind, given.first, given.through, given.take)
+    rows = rows_from_readings(session, current, given.kind, given.first, given.through, given.take)
     fields = given.model_dump(exclude={"first", "through", "take", "characteristic"})
     fields["each"] = "touch" if given.take == "touches" else "reading"
-    named = {"machine": standing.machine.key, "characteristic": standing.characteristic.key, "rows": rows}
+    named = {"machine": current.machine.key, "characteristic": current.characteristic.key, "rows": rows}
     study = parsed(StudyIn, fields | named)
-    source = source_of(session, standing, given.first, given.through, given.take)
-    return add_study(session, standing.machine, study, caller, source)
+    source = source_of(session, current, given.first, given.through, given.take)
+    return add_study(session, current.machine, study, caller, source)
 
 
-def source_of(session: Session, standing: Standing, first: int, through: int, take: str) -> dict[str, Any]:
+def source_of(session: Session, current: CurrentCharacteristic, first: int, through: int, take: str) -> dict[str, Any]:
     """From which readings values are taken, which of them were left out, and the empirical values that were taken off."""
-    missing = queries.left_out(session, standing, first, through)
-    empirical = queries.empirical_values(session, standing, first, through)
+    missing = queries.left_out(session, current, first, through)
+    empirical = queries.empirical_values(session, current, first, through)
     source = {"first": first, "through": through, "take": take, "empirical_values": empirical}
     return source | ({"left_out": missing} if missing else {})
 
@@ -87,7 +89,7 @@ def _same(before: StudyRow, kind: str, settings: dict[str, Any], rows: list[dict
 
 
 def rows_from_readings(
-    session: Session, standing: Standing, kind: str, first: int, through: int, take: str
+    session: Session, current: CurrentCharacteristic, kind: str, first: int, through: int, take: str
 ) -> list[dict[str, Any]]:
     """The rows of a study that these readings make. Raises `Invalid`."""
     if kind == "grr" and take != "touches":
@@ -96,7 +98,7 @@ def rows_from_readings(
             _("a study of parts and operators takes the touches of each reading: a reading alone has no repeats"),
             do=_("Take the touches."),
         )
-    sizes = queries.taken(session, standing, first, through, take)
+    sizes = queries.taken(session, current, first, through, take)
     if kind == "grr":
         return [{"part": str(sequence), "operator": "1", "values": values} for sequence, values in sizes]
     return [{"values": [value for _sequence, values in sizes for value in values]}]
@@ -119,8 +121,8 @@ def correct_study(session: Session, number: int, given: CorrectionIn, caller: Ca
             _("Look at it; store yours again if it is to replace it."),
             errors=[FieldError("seen_revision", wrong)],
         )
-    standing = _served(session, study.machine, study.characteristic)
-    settings = _settings(given, standing, study.settings.get("source"))
+    current = _served(session, study.machine, study.characteristic)
+    settings = _settings(given, current, study.settings.get("source"))
     rows = [_row(row.model_dump()) for row in given.rows]
     if (settings, rows) == (study.settings, study.revision.rows):
         raise Invalid.at(
@@ -132,27 +134,29 @@ def correct_study(session: Session, number: int, given: CorrectionIn, caller: Ca
     _keep(session, study.study, study.newest + 1, settings, rows, caller, given.reason)
     before, after = _changes(study, settings, rows)
     audit(session, caller.name, "gauge study corrected", f"gauge-study/{number}", before, after, given.reason)
-    publish(session, _news(study.machine, standing, number))
+    publish(session, _news(study.machine, current, number))
     return queries.study(session, number)
 
 
-def _served(session: Session, machine: Machine, key: str | None) -> Standing | None:
+def _served(session: Session, machine: Machine, key: str | None) -> CurrentCharacteristic | None:
     if key is None:
         return None
-    standing = characteristics.characteristic_named(session, key)
-    if standing.machine.id != machine.id:
+    current = characteristics.characteristic_named(session, key)
+    if current.machine.id != machine.id:
         raise Invalid.at(
             "characteristic",
-            _("belongs to machine {machine}").format(machine=standing.machine.key),
+            _("belongs to machine {machine}").format(machine=current.machine.key),
             do=_("Name one of the same machine."),
         )
-    return standing
+    return current
 
 
-def _settings(given: SettingsIn, standing: Standing | None, source: dict[str, Any] | None) -> dict[str, Any]:
+def _settings(
+    given: SettingsIn, current: CurrentCharacteristic | None, source: dict[str, Any] | None
+) -> dict[str, Any]:
     settings = {name: getattr(given, name) for name in SettingsIn.model_fields}
-    if settings["tolerance"] is None and standing is not None:
-        settings["tolerance"] = standing.parameters.tolerance_width
+    if settings["tolerance"] is None and current is not None:
+        settings["tolerance"] = current.parameters.tolerance_width
     return settings | ({} if source is None else {"source": source})
 
 
@@ -195,7 +199,7 @@ def _changes(
     return before | ({"rows": old[:20]} if old else {}), after | ({"rows": new[:20]} if new else {})
 
 
-def _news(machine: Machine, standing: Standing | None, number: int) -> dict[str, Any]:
+def _news(machine: Machine, current: CurrentCharacteristic | None, number: int) -> dict[str, Any]:
     """Event for live pages."""
     event = {"kind": "gauge_study", "machine": machine.key, "id": number}
-    return event if standing is None else event | {"characteristic": standing.characteristic.key}
+    return event if current is None else event | {"characteristic": current.characteristic.key}

@@ -14,7 +14,7 @@ from app.loop.warnings.wording import sentence
 from app.quality.gauge_studies import wording
 from app.quality.gauge_studies.evaluation import Evaluation
 from app.quality.gauge_studies.queries import Advice, StudyRow
-from app.quality.gauge_studies.schemas import Kind
+from app.quality.gauge_studies.schemas import StudyKind
 from app.web.fields import answer_from
 from app.web.warnings import Warnings, warnings_out
 
@@ -124,7 +124,7 @@ class StudyOut(BaseModel):
     """A gauge study with what it says; computed from its values whenever it is asked for."""
 
     id: int
-    kind: Kind
+    kind: StudyKind
     machine: str
     characteristic: str | None
     gauge: str

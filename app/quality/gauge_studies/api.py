@@ -36,8 +36,8 @@ def take_gauge_study(session: SessionDep, caller: AnyCaller, given: FromReadings
 
     Excluded readings are left out. The values are copied: what becomes of the readings later does not change the study.
     """
-    standing = characteristic_for(session, caller, given.characteristic, "operator")
-    result = actions.take_study(session, standing, given, caller)
+    current = characteristic_for(session, caller, given.characteristic, "operator")
+    result = actions.take_study(session, current, given, caller)
     response.status_code = 200 if result.again else 201
     return study_out(result.row, queries.advice(session, result.row))
 

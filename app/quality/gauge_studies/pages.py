@@ -47,12 +47,12 @@ def list_page(
     before: Before = None,
 ) -> Response:
     """Every study with its verdict, newest first; of a machine, or of a characteristic with what they say about its R33."""
-    standing = characteristics.characteristic_named(session, characteristic) if characteristic else None
-    chosen = standing.machine if standing else machines.find_machine(session, machine)
+    current = characteristics.characteristic_named(session, characteristic) if characteristic else None
+    chosen = current.machine if current else machines.find_machine(session, machine)
     rows = queries.studies(
         session,
         machine_id=chosen.id if chosen else None,
-        characteristic_id=standing.characteristic.id if standing else None,
+        characteristic_id=current.characteristic.id if current else None,
         before=before,
         limit=ON_PAGE + 1,
     )
@@ -67,8 +67,8 @@ def list_page(
             partial(address, "/gauges", machine=machine or None, characteristic=characteristic or None),
         ),
         machine=chosen,
-        standing=standing,
-        about=queries.latest_advice(session, standing) if standing else None,
+        current=current,
+        about=queries.latest_advice(session, current) if current else None,
         machines=machines.machines(session, limit=100_000),
         may_change=caller.may("engineer"),
         may_enter=caller.may("operator"),
@@ -93,9 +93,9 @@ def new_page(
         )
     typed = {"machine": machine, "characteristic": characteristic}
     if characteristic:
-        standing = characteristics.characteristic_named(session, characteristic)
-        p = standing.parameters
-        typed |= {"machine": standing.machine.key, "tolerance": as_typed(p.tolerance_width)}
+        current = characteristics.characteristic_named(session, characteristic)
+        p = current.parameters
+        typed |= {"machine": current.machine.key, "tolerance": as_typed(p.tolerance_width)}
         typed |= {"reference": as_typed(p.target)} if kind in {"type_one", "bias"} else {}
     return _form(request, session, kind, typed, form_reader.shape(kind, typed))
 
@@ -141,12 +141,12 @@ def _from_readings(session: Session, kind: str, typed: dict[str, str]) -> tuple[
     if not key:
         words = _("name the characteristic whose readings are to be taken")
         raise Invalid(words, errors=[FieldError("characteristic", words)])
-    standing = characteristics.characteristic_named(session, key)
+    current = characteristics.characteristic_named(session, key)
     first, through = (form_reader.whole(typed, name) for name in ("first", "through"))
-    rows = actions.rows_from_readings(session, standing, kind, first, through, take)
+    rows = actions.rows_from_readings(session, current, kind, first, through, take)
     fields, grid = form_reader.grid_of(kind, rows)
     unit = "touch" if take == "touches" else "reading"
-    return typed | fields | {"machine": standing.machine.key, "each": unit, "from": f"{first}-{through}-{take}"}, grid
+    return typed | fields | {"machine": current.machine.key, "each": unit, "from": f"{first}-{through}-{take}"}, grid
 
 
 def _source(session: Session, kind: str, typed: Mapping[str, str], given: StudyIn) -> dict[str, Any] | None:
@@ -155,16 +155,16 @@ def _source(session: Session, kind: str, typed: Mapping[str, str], given: StudyI
     through, _dash, take = rest.partition("-")
     if not given.characteristic or take not in {"readings", "touches"} or len(typed["from"]) > 60:
         return None
-    standing = characteristics.characteristic_named(session, given.characteristic)
+    current = characteristics.characteristic_named(session, given.characteristic)
     try:
         numbers = form_reader.whole({"first": first}, "first"), form_reader.whole({"through": through}, "through")
-        rows = actions.rows_from_readings(session, standing, kind, *numbers, take)
+        rows = actions.rows_from_readings(session, current, kind, *numbers, take)
     except Invalid:
         return None
     values = [[round(value, 9) for value in row["values"]] for row in rows]
     if values != [[round(value, 9) for value in row.values] for row in given.rows]:
         return None  # somebody has typed over it
-    return actions.source_of(session, standing, *numbers, take)
+    return actions.source_of(session, current, *numbers, take)
 
 
 def _grid_or_none(kind: str, typed: Mapping[str, str]) -> Grid | None:

@@ -16,7 +16,7 @@ from app.core.warning import CodedWarning
 from app.errors import Invalid, NotFound
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
 from app.loop.tables.machines import Machine
@@ -161,7 +161,7 @@ def revisions(session: Session, found: StudyRow) -> Sequence[GaugeStudyRevision]
 class Advice:
     """Advice of a study about R33 of a characteristic. repeats: R27 that counted; looked_back: readings of the process."""
 
-    standing: Standing
+    current: CurrentCharacteristic
     suggestion: Suggestion
     repeatability: float
     repeats: int
@@ -178,28 +178,26 @@ def advice(session: Session, row: StudyRow) -> Advice | Refused | None:
         return None
     if freedom + 1 < FEWEST_REPEATS:
         return Refused(Reason.TOO_FEW_READINGS, have=freedom + 1, needed=FEWEST_REPEATS)
-    standing = characteristics.characteristic_named(session, row.characteristic)
-    parameters = standing.parameters
+    current = characteristics.characteristic_named(session, row.characteristic)
+    parameters = current.parameters
     repeats = parameters.repeats if row.settings["each"] == "touch" else 1
-    process, looked_back = scatter_of_parts(session, standing, LOOKED_BACK)
+    process, looked_back = scatter_of_parts(session, current, LOOKED_BACK)
     try:
         suggestion = suggest(
             sigma,
             repeats=repeats,
-            floor=standing.machine.zero_range_floor,
+            floor=current.machine.zero_range_floor,
             process=process,
             averaging_limit=parameters.averaging_limit,
         )
     except Refused as refused:
         return refused
-    return Advice(standing, suggestion, sigma, repeats, looked_back)
+    return Advice(current, suggestion, sigma, repeats, looked_back)
 
 
-def latest_advice(session: Session, standing: Standing) -> tuple[StudyRow, Advice] | None:
+def latest_advice(session: Session, current: CurrentCharacteristic) -> tuple[StudyRow, Advice] | None:
     """The newest study for a characteristic that says something about its R33, with what it says; None of none."""
-    rows = studies(
-        session, machine_id=standing.machine.id, characteristic_id=standing.characteristic.id, limit=LOOKED_AT
-    )
+    rows = studies(session, machine_id=current.machine.id, characteristic_id=current.characteristic.id, limit=LOOKED_AT)
     for row in rows:
         result = advice(session, row)
         if isinstance(result, Advice):
@@ -207,25 +205,27 @@ def latest_advice(session: Session, standing: Standing) -> tuple[StudyRow, Advic
     return None
 
 
-def empirical_values(session: Session, standing: Standing, first: int, through: int) -> list[dict[str, float]]:
+def empirical_values(
+    session: Session, current: CurrentCharacteristic, first: int, through: int
+) -> list[dict[str, float]]:
     """The empirical values in force over these readings, mm, each with the reading from which on it was."""
     changes: list[dict[str, float]] = []
-    for sequence, value in _empirical_values(session, standing, first, through).items():
+    for sequence, value in _empirical_values(session, current, first, through).items():
         if not changes or changes[-1]["value"] != value:
             changes.append({"from": sequence, "value": value})
     return changes
 
 
-def _empirical_values(session: Session, standing: Standing, first: int, through: int) -> dict[int, float]:
+def _empirical_values(session: Session, current: CurrentCharacteristic, first: int, through: int) -> dict[int, float]:
     """By sequence: the empirical value that the deviation was computed with, measured size - target - deviation."""
     rows = session.execute(
         select(Reading.sequence, Reading.measured, Reading.deviation, Reading.parameters_version)
-        .where(*_between(standing, first, through), ~_useless())
+        .where(*_between(current, first, through), ~_useless())
         .order_by(Reading.sequence)
         .limit(MOST_TAKEN)
     ).all()
     targets = {
-        version: characteristics.parameters_of(session, standing.machine.id, standing.characteristic.id, version).target
+        version: characteristics.parameters_of(session, current.machine.id, current.characteristic.id, version).target
         for version in {row.parameters_version for row in rows}
     }
     return {
@@ -237,10 +237,10 @@ def _used(size: float, empirical_value: float) -> float:
     return round(size - empirical_value, 9)
 
 
-def _between(standing: Standing, first: int, through: int) -> tuple[ColumnElement[bool], ...]:
+def _between(current: CurrentCharacteristic, first: int, through: int) -> tuple[ColumnElement[bool], ...]:
     return (
-        Reading.machine_id == standing.machine.id,
-        Reading.characteristic_id == standing.characteristic.id,
+        Reading.machine_id == current.machine.id,
+        Reading.characteristic_id == current.characteristic.id,
         Reading.sequence.between(first, through),
     )
 
@@ -259,20 +259,22 @@ def _useless() -> ColumnElement[bool]:
     return or_(excluded, Reading.zone == Zone.PROBE_FAULT)
 
 
-def left_out(session: Session, standing: Standing, first: int, through: int) -> list[int]:
+def left_out(session: Session, current: CurrentCharacteristic, first: int, through: int) -> list[int]:
     """Numbers of the readings that a study takes no value from: excluded ones, and probe faults."""
-    query = select(Reading.sequence).where(*_between(standing, first, through), _useless()).order_by(Reading.sequence)
+    query = select(Reading.sequence).where(*_between(current, first, through), _useless()).order_by(Reading.sequence)
     return list(session.scalars(query.limit(MOST_TAKEN)))
 
 
-def taken(session: Session, standing: Standing, first: int, through: int, take: str) -> list[tuple[int, list[float]]]:
+def taken(
+    session: Session, current: CurrentCharacteristic, first: int, through: int, take: str
+) -> list[tuple[int, list[float]]]:
     """Sizes of these readings as they were decided by, or of the repeats at their first point, by sequence; see `left_out`.
 
     The empirical value in force at each reading is taken off: the measuring system is studied as it is used.
 
     Raises `Invalid` where there are none, or more than 1000.
     """
-    newest = statistics.window_of(session, standing.characteristic).newest
+    newest = statistics.window_of(session, current.characteristic).newest
     if first > through or first > newest:
         wrong = _("there is no reading yet")
         if newest and first > newest:
@@ -286,9 +288,9 @@ def taken(session: Session, standing: Standing, first: int, through: int, take: 
             _("is too far from the first: a study takes {most} readings at most").format(most=MOST_TAKEN),
             do=_("Name fewer readings."),
         )
-    here = (*_between(standing, first, through), ~_useless())
+    here = (*_between(current, first, through), ~_useless())
     sizes: list[tuple[int, list[float]]]
-    empirical = _empirical_values(session, standing, first, through)
+    empirical = _empirical_values(session, current, first, through)
     if take == "readings":
         rows = session.execute(select(Reading.sequence, Reading.measured).where(*here).order_by(Reading.sequence))
         sizes = [(sequence, [_used(measured, empirical[sequence])]) for sequence, measured in rows]

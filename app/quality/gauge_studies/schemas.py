@@ -7,7 +7,7 @@ from pydantic import Field
 from app.core.parameters import LARGEST_LENGTH
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Body, Reason, RecordKey, Slug, Text200
 
-Kind = Literal["type_one", "bias", "linearity", "grr"]
+StudyKind = Literal["type_one", "bias", "linearity", "grr"]
 Value = Annotated[float, Field(strict=True, ge=-LARGEST_LENGTH, le=LARGEST_LENGTH, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
 MOST_ROWS, MOST_IN_ROW, MOST_VALUES = 2_000, 1_000, 10_000
@@ -54,7 +54,7 @@ class SettingsIn(Body):
 class StudyIn(SettingsIn):
     """A gauge study with all its values."""
 
-    kind: Kind = Field(description="type_one: Cg, Cgk. bias. linearity. grr: repeatability and reproducibility.")
+    kind: StudyKind = Field(description="type_one: Cg, Cgk. bias. linearity. grr: repeatability and reproducibility.")
     machine: Slug = Field(examples=["lathe-1"])
     characteristic: Slug | None = Field(None, description="Which the study is to serve.", examples=["shaft-d40"])
     rows: list[RowIn] = Field(min_length=1, max_length=MOST_ROWS)

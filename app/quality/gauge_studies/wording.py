@@ -269,7 +269,7 @@ def advice(found: Advice) -> list[str]:
             sigma=plain_um(s.sigma, 3), governs=statistics.governs(s.governs)
         )
     )
-    p = found.standing.parameters
+    p = found.current.parameters
     if (
         p.average_memory and p.weighting_factor > 1
     ):  # an EWMA of chance: its variance is lambda / (2 - lambda) of one value's
@@ -286,9 +286,7 @@ def advice(found: Advice) -> list[str]:
 
 def compared(found: Advice) -> str:
     """Comparison of the suggestion with the value in force."""
-    suggested, now = (
-        nanometres(value) for value in (found.suggestion.zero_range, found.standing.parameters.zero_range)
-    )
+    suggested, now = (nanometres(value) for value in (found.suggestion.zero_range, found.current.parameters.zero_range))
     if suggested > now:
         return _("R33 is too small: chance alone reaches beyond it, so the loop corrects scatter and adds to it.")
     if suggested < now:

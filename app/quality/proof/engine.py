@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.core.decision.decide import State, decide
+from app.core.decision.decide import LoopState, decide
 from app.core.decision.step import Action, average_of
 from app.core.parameters import mean_nominal, read
 from app.core.spc import chance, constants, cusum, ewma, shewhart
@@ -25,7 +25,7 @@ def decision(given: Given) -> Got:
     average = 0.0
     reached, corrected, amounts = [], [], []
     for deviation in given["deviations_um"]:
-        decision = decide(parameters, State(average), deviation / 1000)
+        decision = decide(parameters, LoopState(average), deviation / 1000)
         error = decision.average_after if decision.size_error is None else decision.size_error
         reached.append(error * 1000)
         corrected.append(decision.action is Action.CORRECT)

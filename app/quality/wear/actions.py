@@ -16,7 +16,7 @@ from app.db.events import publish
 from app.jobs.actions import PeriodicJob, Unit
 from app.loop.alarms import actions as alarms
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.machines.queries import lock_machines
 from app.loop.summaries.queries import Window
 from app.loop.tables.characteristics import Characteristic
@@ -37,32 +37,32 @@ def to_look_ahead(session: Session) -> list[Unit]:
 
 def look_ahead(session: Session, unit: Unit) -> None:
     """Work out the outlook of one characteristic, and raise *hunting* once where its loop has begun to hunt."""
-    standing = characteristics.characteristic_named(session, str(unit.key[0]))
-    before = session.get(Outlook, (standing.machine.id, standing.characteristic.id))
+    current = characteristics.characteristic_named(session, str(unit.key[0]))
+    before = session.get(Outlook, (current.machine.id, current.characteristic.id))
     hunted = before is not None and before.hunting in queries.OVERCORRECTS
-    changed, record = _record(session, standing, before)
-    wear = queries.wear_of(session, standing, _newest(session, standing))
+    changed, record = _record(session, current, before)
+    wear = queries.wear_of(session, current, _newest(session, current))
     _note(session, replace(wear, record=record), changed)
     hunting = wear.hunting
     if hunting is not None and hunting.state.value in queries.OVERCORRECTS and not hunted:
-        lock_machines(session, [standing.machine.id])
-        publish(session, _tell(session, standing, hunting))
+        lock_machines(session, [current.machine.id])
+        publish(session, _tell(session, current, hunting))
 
 
-def _tell(session: Session, standing: Standing, hunting: Hunting) -> dict[str, Any]:
+def _tell(session: Session, current: CurrentCharacteristic, hunting: Hunting) -> dict[str, Any]:
     """Raise the alarm: under the machine's lock, as whoever acknowledges the one before it. What is told to live pages."""
     alarm = alarms.raise_for_characteristic(
         session,
-        standing.machine.id,
-        standing.characteristic.id,
-        standing.parameters.tool_memory,
+        current.machine.id,
+        current.characteristic.id,
+        current.parameters.tool_memory,
         HUNTING,
-        wording.hunting_data(hunting) | {"settings": {name: standing.version.parameters[name] for name in SAID}},
+        wording.hunting_data(hunting) | {"settings": {name: current.version.parameters[name] for name in SAID}},
     )
     return {
         "kind": "alarm",
-        "machine": standing.machine.key,
-        "characteristic": standing.characteristic.key,
+        "machine": current.machine.key,
+        "characteristic": current.characteristic.key,
         "tool": alarm.tool_memory,
         "id": alarm.id,
         "alarm": alarm.kind,
@@ -96,18 +96,18 @@ def _moved() -> Select[str, int, int]:
     )
 
 
-def _newest(session: Session, standing: Standing) -> Window:
+def _newest(session: Session, current: CurrentCharacteristic) -> Window:
     """Readings that the outlook is made of: the line needs no more."""
-    life = queries.life_of(session, standing)
+    life = queries.life_of(session, current)
     return Window(max(1, life.last - LONGEST + 1), life.last, life.newest)
 
 
-def _record(session: Session, standing: Standing, before: Outlook | None) -> tuple[int, Record | None]:
+def _record(session: Session, current: CurrentCharacteristic, before: Outlook | None) -> tuple[int, Record | None]:
     """Accuracy of the forecasts of earlier edges, and its tool change: computed once after each change."""
-    changed = queries.life_of(session, standing).first - 1
+    changed = queries.life_of(session, current).first - 1
     if before is not None and before.record_of == changed:
         return changed, queries.record_of(before)
-    record = queries.backtested(session, standing)
+    record = queries.backtested(session, current)
     return changed, record if record.tested else None
 
 
@@ -116,7 +116,7 @@ def _note(session: Session, wear: Wear, changed: int) -> None:
     finite = forecast is not None and forecast.high != float("inf")
     values = {
         "sequence": wear.window.last,
-        "parameters_version": wear.standing.version.version,
+        "parameters_version": wear.current.version.version,
         "at": func.now(),
         "towards": towards.value if towards else None,
         "parts": forecast.parts if forecast else None,
@@ -129,7 +129,7 @@ def _note(session: Session, wear: Wear, changed: int) -> None:
         "held": wear.record.held if wear.record else None,
         "widening": wear.record.widening if wear.record else None,
     }
-    where = {"machine_id": wear.standing.machine.id, "characteristic_id": wear.standing.characteristic.id}
+    where = {"machine_id": wear.current.machine.id, "characteristic_id": wear.current.characteristic.id}
     session.execute(
         insert(Outlook)
         .values(**where, **values)

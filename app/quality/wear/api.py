@@ -32,11 +32,11 @@ def get_wear(
 
     Without `last` of the present tool life. Excluded readings, probe faults and parts cut before the tool change are left out.
     """
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    window = queries.life_of(session, standing)
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    window = queries.life_of(session, current)
     if last is not None:
-        window = statistics.window_of(session, standing.characteristic, last=last, first=window.first)
-    return WearOut.of(queries.wear_of(session, standing, window))
+        window = statistics.window_of(session, current.characteristic, last=last, first=window.first)
+    return WearOut.of(queries.wear_of(session, current, window))
 
 
 @router.get("/characteristics/{characteristic}/figures/wear", responses=problems(404) | FIGURE, response_model=None)
@@ -55,8 +55,8 @@ def get_wear_figure(
     width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")] = 1240,
 ) -> Response:
     """The wear curve with its line, what the corrections took out of it, and the forecast to the limits that are near."""
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    wear = queries.wear_of(session, standing, queries.shown(session, standing, last))
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    wear = queries.wear_of(session, current, queries.shown(session, current, last))
     return Response(
         msgspec.json.encode(wear_figure(chart_of(wear), theme=theme, width=width)),
         media_type="application/json",

@@ -6,9 +6,9 @@ from app.quality.wear.queries import Curve, Wear
 
 def chart_of(wear: Wear) -> WearChart:
     """Values of the wear figure."""
-    parameters = wear.standing.parameters
+    parameters = wear.current.parameters
     return WearChart(
-        key=wear.standing.characteristic.key,
+        key=wear.current.characteristic.key,
         now=_life(wear.now),
         lives=[_life(curve) for curve in wear.lives],
         fit=wear.fit,

@@ -22,7 +22,7 @@ from app.core import hunting, wear
 from app.core.decision.limits import nanometres
 from app.core.hunting import Hunting, Settings
 from app.core.wear import Fit, Forecast, Record, Step, Towards, Values
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.loop.tables.characteristics import ParametersVersion
@@ -108,7 +108,7 @@ class Wear:
     forecasts of edges before came out; None where none was tested yet.
     """
 
-    standing: Standing
+    current: CurrentCharacteristic
     window: Window
     now: Curve
     lives: list[Curve]
@@ -135,12 +135,12 @@ class Wear:
     def limits(self) -> dict[Towards, float]:
         """Position of each limit on the wear curve, the way that it wears, mm."""
         way = self.fit.slope if self.fit is not None else 1.0
-        return wear.limits_of(self.standing.parameters, way, self.total, self.now.lifted)
+        return wear.limits_of(self.current.parameters, way, self.total, self.now.lifted)
 
     @property
     def first(self) -> tuple[Towards, Forecast] | None:
         """The limit that comes first while the loop does what it does now: a loop that corrects stays in its tolerance."""
-        corrects = not self.standing.parameters.measures_only
+        corrects = not self.current.parameters.measures_only
         coming = [
             (name, forecast)
             for name, forecast in self.forecasts.items()
@@ -149,32 +149,32 @@ class Wear:
         return min(coming, key=lambda each: each[1].parts, default=None)
 
 
-def life_of(session: Session, standing: Standing) -> Window:
+def life_of(session: Session, current: CurrentCharacteristic) -> Window:
     """The readings since the tool was changed."""
-    stream = _stream(session, standing)
+    stream = _stream(session, current)
     return Window(stream.sequence_at_tool_change + 1, stream.sequence, stream.sequence)
 
 
-def shown(session: Session, standing: Standing, last: str | None) -> Window:
+def shown(session: Session, current: CurrentCharacteristic, last: str | None) -> Window:
     """The readings that a chart is asked for: `tool` (of few, those before too), `all`, or the last so many."""
     if last in (None, "tool"):
-        life = life_of(session, standing)
-        return life if life.count >= FEW else statistics.window_of(session, standing.characteristic, last=FEW)
-    return statistics.window_of(session, standing.characteristic, last=None if last == "all" else int(last or FEW))
+        life = life_of(session, current)
+        return life if life.count >= FEW else statistics.window_of(session, current.characteristic, last=FEW)
+    return statistics.window_of(session, current.characteristic, last=None if last == "all" else int(last or FEW))
 
 
-def wear_of(session: Session, standing: Standing, window: Window, *, singly: int = MOST_READINGS) -> Wear:
+def wear_of(session: Session, current: CurrentCharacteristic, window: Window, *, singly: int = MOST_READINGS) -> Wear:
     """The wear curve over these readings, the newest `singly` of them one by one.
 
     The numbers are those of the tool that is in the machine.
     """
-    stream, parameters = _stream(session, standing), standing.parameters
-    versions = _versions(session, standing)
-    events = _events(session, standing) if parameters.tool_memory else []
+    stream, parameters = _stream(session, current), current.parameters
+    versions = _versions(session, current)
+    events = _events(session, current) if parameters.tool_memory else []
     changes = [at for kind, at, _step in events if kind == "change"]
     where = {
-        "machine": standing.machine.id,
-        "characteristic": standing.characteristic.id,
+        "machine": current.machine.id,
+        "characteristic": current.characteristic.id,
         "versions": list(versions),
         "targets": [version["target"] for version in versions.values()],
         "target": parameters.target,
@@ -182,7 +182,7 @@ def wear_of(session: Session, standing: Standing, window: Window, *, singly: int
     newest = max(window.first, window.last - singly + 1)
     earliest = max(1, min(newest, window.last - hunting.LONGEST + 1))
     read = _rows(session, _SINGLE, where | {"first": earliest, "last": window.last})
-    judged = _hunting(session, standing, versions, read)
+    judged = _hunting(session, current, versions, read)
     rows = [row for row in read if row.sequence >= newest]
     if newest > window.first:
         stride = max(GROUP, -(-(newest - window.first) // MOST_GROUPS))
@@ -215,14 +215,14 @@ def wear_of(session: Session, standing: Standing, window: Window, *, singly: int
     begins = int(np.searchsorted(sequence, stream.sequence_at_tool_change, side="right"))
     cuts = sorted({at for change in changes if (at := bisect_right(arrived, change)) < begins} | {0, begins})
     return Wear(
-        standing,
+        current,
         window,
         piece(begins, len(rows)),
         [piece(low, high) for low, high in pairwise(cuts) if high > low],
-        _total(session, standing),
+        _total(session, current),
         changes[-1] if changes else None,
         judged,
-        record_of(session.get(Outlook, (standing.machine.id, standing.characteristic.id))),
+        record_of(session.get(Outlook, (current.machine.id, current.characteristic.id))),
     )
 
 
@@ -233,13 +233,13 @@ def record_of(outlook: Outlook | None) -> Record | None:
     return Record(outlook.lives, outlook.tested, outlook.held, outlook.widening or 1.0)
 
 
-def backtested(session: Session, standing: Standing) -> Record:
+def backtested(session: Session, current: CurrentCharacteristic) -> Record:
     """Test forecasts on the tool lives among the last `LIVES_LOOKED_BACK` readings before the tool change."""
-    changed = _stream(session, standing).sequence_at_tool_change
+    changed = _stream(session, current).sequence_at_tool_change
     before = Window(max(1, changed - LIVES_LOOKED_BACK + 1), changed, changed)
     if not before.count:
         return Record(0, 0, 0, 1.0)
-    lives = wear_of(session, standing, before, singly=LIVES_LOOKED_BACK).lives
+    lives = wear_of(session, current, before, singly=LIVES_LOOKED_BACK).lives
     return wear.backtest([(life.sequence, life.worn) for life in lives])
 
 
@@ -247,31 +247,31 @@ def _rows(session: Session, statement: str, where: dict[str, Any]) -> list[_Row]
     return [_Row(*row) for row in session.execute(text(statement), where)]
 
 
-def _stream(session: Session, standing: Standing) -> Stream:
+def _stream(session: Session, current: CurrentCharacteristic) -> Stream:
     return session.scalars(
         select(Stream).where(
-            Stream.machine_id == standing.machine.id, Stream.characteristic_id == standing.characteristic.id
+            Stream.machine_id == current.machine.id, Stream.characteristic_id == current.characteristic.id
         )
     ).one()
 
 
-def _versions(session: Session, standing: Standing) -> dict[int, dict[str, Any]]:
+def _versions(session: Session, current: CurrentCharacteristic) -> dict[int, dict[str, Any]]:
     rows = session.execute(
         select(ParametersVersion.version, ParametersVersion.parameters)
         .where(
-            ParametersVersion.machine_id == standing.machine.id,
-            ParametersVersion.characteristic_id == standing.characteristic.id,
+            ParametersVersion.machine_id == current.machine.id,
+            ParametersVersion.characteristic_id == current.characteristic.id,
         )
         .order_by(ParametersVersion.version)
     )
     return {row.version: row.parameters for row in rows}
 
 
-def _events(session: Session, standing: Standing) -> list[tuple[str, datetime, float]]:
+def _events(session: Session, current: CurrentCharacteristic) -> list[tuple[str, datetime, float]]:
     """Changes of the tool, and steps of its offset that no correction asked for (mm), oldest first."""
     newest = (
         select(ToolEvent)
-        .where(ToolEvent.machine_id == standing.machine.id, ToolEvent.number == standing.parameters.tool_memory)
+        .where(ToolEvent.machine_id == current.machine.id, ToolEvent.number == current.parameters.tool_memory)
         .order_by(ToolEvent.id.desc())
         .limit(MOST_EVENTS)
         .subquery()
@@ -289,15 +289,15 @@ def _events(session: Session, standing: Standing) -> list[tuple[str, datetime, f
     return [(kind, at, step) for kind, at, step in rows]
 
 
-def _total(session: Session, standing: Standing) -> float:
+def _total(session: Session, current: CurrentCharacteristic) -> float:
     """Corrections of the tool since it was changed, those on their way included, mm."""
-    number = standing.parameters.tool_memory
+    number = current.parameters.tool_memory
     if not number:
         return 0.0
-    applied = session.scalar(select(Tool.total).where(Tool.machine_id == standing.machine.id, Tool.number == number))
+    applied = session.scalar(select(Tool.total).where(Tool.machine_id == current.machine.id, Tool.number == number))
     coming = session.scalar(
         select(func.sum(Correction.amount)).where(
-            Correction.machine_id == standing.machine.id,
+            Correction.machine_id == current.machine.id,
             Correction.tool_memory == number,
             Correction.status.in_(OUTSTANDING),
         )
@@ -315,12 +315,12 @@ def _empirical(rows: Sequence[_Row]) -> list[tuple[int, float]]:
 
 def _hunting(
     session: Session,
-    standing: Standing,
+    current: CurrentCharacteristic,
     versions: dict[int, dict[str, Any]],
     rows: Sequence[_Row],
 ) -> Hunting | None:
     """Of the newest readings judged with the settings of now; None where nothing is corrected."""
-    parameters = standing.parameters
+    parameters = current.parameters
     if parameters.measures_only:
         return None
     since = _since(versions)
@@ -330,8 +330,8 @@ def _hunting(
         sizes = session.scalars(
             select(Correction.size_error)
             .where(
-                Correction.machine_id == standing.machine.id,
-                Correction.characteristic_id == standing.characteristic.id,
+                Correction.machine_id == current.machine.id,
+                Correction.characteristic_id == current.characteristic.id,
                 Correction.sequence.between(mine[0].sequence, mine[-1].sequence),
                 Correction.status.in_(("applied", *OUTSTANDING)),
             )
@@ -347,7 +347,7 @@ def _hunting(
             parameters.weighting_factor,
             parameters.average_memory > 0,
         ),
-        floor=standing.machine.zero_range_floor,
+        floor=current.machine.zero_range_floor,
     )
 
 

@@ -111,12 +111,12 @@ class WearOut(BaseModel):
     @classmethod
     def of(cls, wear: Wear) -> "WearOut":
         """As it is answered."""
-        standing, sequence = wear.standing, wear.now.sequence
+        current, sequence = wear.current, wear.now.sequence
         return cls(
-            characteristic=standing.characteristic.key,
+            characteristic=current.characteristic.key,
             first_sequence=int(sequence[0]) if len(sequence) else None,
             last_sequence=int(sequence[-1]) if len(sequence) else None,
-            tool_memory=standing.parameters.tool_memory,
+            tool_memory=current.parameters.tool_memory,
             changed_at=wear.changed_at,
             corrections_total=rounded(wear.total),
             wear_per_part=_per_part(wear.fit),
@@ -126,7 +126,7 @@ class WearOut(BaseModel):
             ],
             first=wear.first[0].value if wear.first else None,
             record=RecordOut(**wear.record._asdict()) if wear.record else None,
-            hunting=_hunting(wear.hunting, standing.version.parameters),
+            hunting=_hunting(wear.hunting, current.version.parameters),
         )
 
 

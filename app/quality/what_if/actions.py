@@ -26,7 +26,7 @@ LONGEST_REASON = 1000
 
 def changes_of(answer: Simulation) -> dict[str, float]:
     """New values of the parameters that a what-if changes against those in force."""
-    today = answer.past.standing.parameters
+    today = answer.past.current.parameters
     return {
         name: getattr(answer.parameters, name)
         for name in SETTINGS
@@ -41,27 +41,27 @@ def propose(session: Session, answer: Simulation, reason: str, caller: Caller) -
     while it was replayed.
     """
     caller.must("operator")
-    standing = answer.past.standing
+    current = answer.past.current
     changes = changes_of(answer)
     if not changes:
         raise Invalid(
             _("These settings are already in force."),
             _("Choose other settings: k, R33, R34 or the factor."),
         )
-    evidence, before = evidence_of(answer), {name: getattr(standing.parameters, name) for name in changes}
-    machines.lock_machines(session, [standing.machine.id])  # of two who propose the same at once one is first
-    replayed = standing.version.version
+    evidence, before = evidence_of(answer), {name: getattr(current.parameters, name) for name in changes}
+    machines.lock_machines(session, [current.machine.id])  # of two who propose the same at once one is first
+    replayed = current.version.version
     session.expire_all()
-    standing = characteristics.characteristic_named(session, standing.characteristic.key)
-    if standing.version.version != replayed:
+    current = characteristics.characteristic_named(session, current.characteristic.key)
+    if current.version.version != replayed:
         raise Conflict(
             _("While this was replayed the parameters have changed: version {now} is in force.").format(
-                now=standing.version.version
+                now=current.version.version
             ),
             _("Simulate again with the current settings, and propose the result."),
-            parameters_version=standing.version.version,
+            parameters_version=current.version.version,
         )
-    for row in proposals.proposals(session, characteristic=standing.characteristic, status="open"):
+    for row in proposals.proposals(session, characteristic=current.characteristic, status="open"):
         if row.proposal.changes == changes:
             raise Conflict(
                 _("{who} has proposed the same already: proposal {number}.").format(
@@ -71,9 +71,9 @@ def propose(session: Session, answer: Simulation, reason: str, caller: Caller) -
                 proposal=row.proposal.id,
             )
     proposal = ParameterProposal(
-        machine_id=standing.machine.id,
-        characteristic_id=standing.characteristic.id,
-        from_version=standing.version.version,
+        machine_id=current.machine.id,
+        characteristic_id=current.characteristic.id,
+        from_version=current.version.version,
         changes=changes,
         evidence=evidence,
         reason=reason,
@@ -109,8 +109,8 @@ def approve(session: Session, number: int, reason: str, caller: Caller) -> Propo
     change = CharacteristicChange(
         parameters=proposal.changes, parameters_version=proposal.from_version, reason=why[:LONGEST_REASON]
     )
-    standing = change_characteristic(session, row.characteristic.key, change, caller.name)
-    return _decide(session, row, "approved", reason, caller, standing.version.version)
+    current = change_characteristic(session, row.characteristic.key, change, caller.name)
+    return _decide(session, row, "approved", reason, caller, current.version.version)
 
 
 def reject(session: Session, number: int, reason: str, caller: Caller) -> ProposalRow:

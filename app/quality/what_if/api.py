@@ -43,8 +43,8 @@ def replay_readings(session: SessionDep, characteristic: CharacteristicKey, aske
     The corrections in effect are taken out, the process without them is rebuilt, and the other policy is run in closed loop
     on it. `likeness` says how far the rebuilt loop is to be believed. At most a million readings; two replays at once.
     """
-    standing = characteristics.characteristic_named(session, characteristic)
-    return WhatIfOut.of(simulation.replayed(session, standing, asked))
+    current = characteristics.characteristic_named(session, characteristic)
+    return WhatIfOut.of(simulation.replayed(session, current, asked))
 
 
 @router.post(
@@ -55,8 +55,8 @@ def map_settings(session: SessionDep, characteristic: CharacteristicKey, asked: 
 
     At most 2500 settings, and 200 million decisions (settings times readings).
     """
-    standing = characteristics.characteristic_named(session, characteristic)
-    return MapOut.of(simulation.mapped(session, standing, asked))
+    current = characteristics.characteristic_named(session, characteristic)
+    return MapOut.of(simulation.mapped(session, current, asked))
 
 
 def asked_for(
@@ -101,8 +101,8 @@ def get_what_if_figure(
     width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")] = 1240,
 ) -> Response:
     """Deviations with today's and the other settings, and what each loop had taken out by its corrections."""
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    figure = course_figure(chart_of(simulation.replayed(session, standing, asked)), theme=theme, width=width)
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    figure = course_figure(chart_of(simulation.replayed(session, current, asked)), theme=theme, width=width)
     return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})
 
 
@@ -111,8 +111,8 @@ def propose_change(
     session: SessionDep, caller: Operator, characteristic: CharacteristicKey, proposal: ProposalIn, response: Response
 ) -> ProposalOut:
     """Propose settings as a change of the parameters; the figures side by side are kept with it as evidence."""
-    standing = characteristics.characteristic_named(session, characteristic)
-    row = actions.propose(session, simulation.replayed(session, standing, proposal), proposal.reason, caller)
+    current = characteristics.characteristic_named(session, characteristic)
+    row = actions.propose(session, simulation.replayed(session, current, proposal), proposal.reason, caller)
     response.headers["Location"] = f"/api/v1/proposals/{row.proposal.id}"
     return ProposalOut.of(row)
 
@@ -127,9 +127,9 @@ def list_proposals_of(
     limit: Limit = 100,
 ) -> Page[ProposalOut]:
     """Proposals for this characteristic, newest first."""
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     rows = proposals.proposals(
-        session, characteristic=standing.characteristic, status=status, before=before, limit=limit + 1
+        session, characteristic=current.characteristic, status=status, before=before, limit=limit + 1
     )
     return page_of([ProposalOut.of(row) for row in rows], limit, lambda row: row.id)
 

@@ -11,10 +11,10 @@ MOST_POINTS = 500  # readings drawn one by one; of more, the extremes of so many
 
 def chart_of(answer: Simulation) -> CourseChart:
     """Values of the figure; offsets as the size that they take out, mm."""
-    past, parameters = answer.past, answer.past.standing.parameters
+    past, parameters = answer.past, answer.past.current.parameters
     sequence = past.history["sequence"]
     return CourseChart(
-        key=past.standing.characteristic.key,
+        key=past.current.characteristic.key,
         today=thinned(sequence, answer.today_result.deviation[past.mine]),
         other=thinned(sequence, answer.other_result.deviation[past.mine]),
         today_taken=thinned(sequence, answer.today_result.offset[past.mine] / parameters.factor),

@@ -16,10 +16,10 @@ SETTINGS = ("weighting_factor", "zero_range", "averaging_limit", "factor")
 
 def evidence_of(answer: Simulation) -> dict[str, Any]:
     """Side by side, with the period, the assumption, and how far the replay can be believed. Lengths in mm."""
-    today = answer.past.standing.parameters
+    today = answer.past.current.parameters
     truly, replayed, other = map(quote_of, answer.quotes)
     return period_of(answer.past) | {
-        "parameters_version": answer.past.standing.version.version,
+        "parameters_version": answer.past.current.version.version,
         "delay": answer.delay,
         "effect": answer.settings.effect,
         "truly": figures_of(answer.truly) | truly,
@@ -37,7 +37,7 @@ def period_of(past: ToolHistory) -> dict[str, Any]:
     """Readings of the what-if, as a period."""
     history = past.history
     return {
-        "characteristic": past.standing.characteristic.key,
+        "characteristic": past.current.characteristic.key,
         "first_sequence": int(history["sequence"][0]),
         "last_sequence": int(history["sequence"][-1]),
         "start": f"{history['measured_at'][0]}Z",

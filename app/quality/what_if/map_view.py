@@ -48,7 +48,7 @@ def view_of(settings_map: Map, answer: Simulation, typed: Mapping[str, str], key
     known = sorted({value for value in values if value is not None}, reverse=settings_map.criterion is Criterion.PPK)
     rank = {value: at * LEVELS // max(1, len(known)) for at, value in enumerate(known)}
     wide = len(settings_map.zero_ranges)
-    today, chosen = settings_map.past.standing.parameters, answer.parameters
+    today, chosen = settings_map.past.current.parameters, answer.parameters
     at_today = _at(settings_map, today.weighting_factor, today.zero_range)
     if abs(settings_map.averaging_limit - today.averaging_limit) > 1e-9:
         at_today = None

@@ -15,7 +15,7 @@ from app.errors import Conflict, InbandError, Invalid, TooManyRequests
 from app.language.i18n import _
 from app.language.numbers import short
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.quality.what_if import actions, form_reader, map_axes, proposals, simulation, wording
@@ -42,15 +42,15 @@ VERBS = {
 @router.get("/characteristics/{characteristic}/what-if")
 def what_if_page(request: Request, session: SessionDep, caller: Viewer, characteristic: str) -> Response:
     """Today's settings and others side by side, the map, and the form to propose them."""
-    standing = characteristics.characteristic_named(session, characteristic)
-    return _what_if(request, session, caller, standing, form_reader.typed_from(request.query_params))
+    current = characteristics.characteristic_named(session, characteristic)
+    return _what_if(request, session, caller, current, form_reader.typed_from(request.query_params))
 
 
 def _what_if(
     request: Request,
     session: Session,
     caller: Caller,
-    standing: Standing,
+    current: CurrentCharacteristic,
     typed: dict[str, str],
     *,
     reason: str = "",
@@ -61,25 +61,25 @@ def _what_if(
     status, problem, errors = 200, refused, form_reader.at_fields(by_field(refused)) if refused else {}
     try:
         request_body = form_reader.request_of(typed)
-        answer, map_result = simulation.both(session, standing, request_body, form_reader.map_request(typed))
+        answer, map_result = simulation.both(session, current, request_body, form_reader.map_request(typed))
     except (Invalid, TooManyRequests) as error:
         # That a period holds nothing to replay is no mistake of who looks at it.
         status = error.status if error.errors or isinstance(error, TooManyRequests) else 200
         problem, errors = error, form_reader.at_fields(by_field(error))
-    changes = wording.changed(asdict(answer.past.standing.parameters), actions.changes_of(answer)) if answer else []
-    key, failing = standing.characteristic.key, proof.failing()
+    changes = wording.changed(asdict(answer.past.current.parameters), actions.changes_of(answer)) if answer else []
+    key, failing = current.characteristic.key, proof.failing()
     criterion = Criterion(typed["goal"]) if typed["goal"] in set(Criterion) else Criterion.PPK
     return page(
         request,
         "what_if/what_if.html",
         status=refused.status if refused else status,
-        characteristic=standing.characteristic,
-        machine=standing.machine,
-        version=standing.version.version,
-        today=standing.parameters,
+        characteristic=current.characteristic,
+        machine=current.machine,
+        version=current.version.version,
+        today=current.parameters,
         typed=typed,
         periods=form_reader.periods(typed["last"]),
-        placeholders=form_reader.placeholders(standing.parameters, answer.past.delay if answer else None),
+        placeholders=form_reader.placeholders(current.parameters, answer.past.delay if answer else None),
         errors=errors,
         problem=problem,
         answer=answer,
@@ -101,13 +101,13 @@ def _what_if(
                 form_reader.address(key, typed, r34=short(r34 * 1000)) + "#map",
                 _same(r34, answer),
             )
-            for r34 in map_axes.averaging_limits(standing.parameters)
+            for r34 in map_axes.averaging_limits(current.parameters)
         ],
         link=lambda **changes: form_reader.address(key, typed, **changes),
         figure_url=f"/api/v1/characteristics/{key}/figures/what-if?{form_reader.figure_query(request_body)}"
         if answer
         else None,
-        open_proposals=proposals.proposals(session, characteristic=standing.characteristic, status="open"),
+        open_proposals=proposals.proposals(session, characteristic=current.characteristic, status="open"),
         reason=reason,
         may_propose=caller.may("operator"),
         wording=wording,
@@ -131,18 +131,18 @@ def send_proposal(
     request: Request, session: SessionDep, caller: Operator, characteristic: str, form: FormDep
 ) -> Response:
     """Propose what was replayed; the evidence is worked out anew from the same question."""
-    standing = characteristics.characteristic_named(session, characteristic)
+    current = characteristics.characteristic_named(session, characteristic)
     typed = form_reader.typed_from(form)
     try:
         fields = form_reader.request_of(typed).model_dump(by_alias=True)
         proposal = parsed(ProposalIn, fields | {"reason": form.get("reason", "").strip()})
-        answer = simulation.replayed(session, standing, proposal)
+        answer = simulation.replayed(session, current, proposal)
         with session.begin_nested():  # what is refused lets the machine go at once
             row = actions.propose(session, answer, proposal.reason, caller)
     except (Invalid, Conflict, TooManyRequests) as error:
         session.expire_all()
-        standing = characteristics.characteristic_named(session, characteristic)
-        return _what_if(request, session, caller, standing, typed, reason=form.get("reason", ""), refused=error)
+        current = characteristics.characteristic_named(session, characteristic)
+        return _what_if(request, session, caller, current, typed, reason=form.get("reason", ""), refused=error)
     return RedirectResponse(f"/proposals/{row.proposal.id}?done=proposed", 303)
 
 

@@ -23,7 +23,7 @@ from app.core.spc.refusal import Reason, Refused
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
 from app.loop.characteristics import wording
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries.queries import Window
 from app.loop.tables.tools import Correction
 from app.quality.what_if.proposals import count_open, proposals
@@ -101,7 +101,7 @@ class Simulation:
 
         None is of readings that are too coarse: a replay only shifts them, and shifted steps look finer than they are.
         """
-        half = self.past.standing.parameters.tolerance_width / 2
+        half = self.past.current.parameters.tolerance_width / 2
         counted, mine = ~self.past.history.excluded, self.past.mine
         true = self.past.history["deviation"]
         if not self.past.resolved:
@@ -142,9 +142,9 @@ class Map:
     region: Region
 
 
-def load(session: Session, standing: Standing, window: Window) -> ToolHistory:
+def load(session: Session, current: CurrentCharacteristic, window: Window) -> ToolHistory:
     """The past, and a refusal in words where there is nothing that could be replayed. Raises `Invalid`."""
-    past = past_of(session, standing, window)
+    past = past_of(session, current, window)
     if len(past.history) < 2:
         raise Invalid(
             _("This period holds {count} readings that can be replayed; a loop needs two at least.").format(
@@ -161,7 +161,7 @@ def load(session: Session, standing: Standing, window: Window) -> ToolHistory:
 
 def side_by_side(session: Session, past: ToolHistory, settings: Settings) -> Simulation:
     """Replay today's settings and the others, and hold the replay against what truly happened."""
-    today = past.standing.parameters
+    today = past.current.parameters
     other = settings.applied_to(today)
     check_order(other, settings)
     delay = _delay(past, settings)
@@ -202,7 +202,7 @@ def map_of(
             ),
             _("Ask for fewer settings, or for a shorter period."),
         )
-    today, delay = past.standing.parameters, _delay(past, settings)
+    today, delay = past.current.parameters, _delay(past, settings)
     base = settings.applied_to(today)
     trace = past.with_effect(settings.effect)
     grid = [with_settings(base, weighting_factor=k, zero_range=r33) for k in weighting_factors for r33 in zero_ranges]
@@ -225,7 +225,7 @@ def effect_of(past: ToolHistory) -> Effect | Refused:
     try:
         usable, begins = past.steady
         deviation, compensated = past.history["deviation"][usable], past.history["compensated"][usable]
-        return measured_effect(deviation, compensated, past.standing.parameters.factor, begins)
+        return measured_effect(deviation, compensated, past.current.parameters.factor, begins)
     except Refused as refused:
         return refused
 
@@ -277,7 +277,7 @@ def truly_of(session: Session, past: ToolHistory) -> Figures:
     if spread is not None and not nanometres(spread * 1000):
         spread = 0.0
     mean = float(inner.mean()) if len(inner) else None
-    half = past.standing.parameters.tolerance_width / 2
+    half = past.current.parameters.tolerance_width / 2
     ppk = None
     if spread and mean is not None and len(inner) >= FEWEST_FOR_PPK and past.resolved:
         ppk = (half - abs(mean)) / (3 * spread)
@@ -306,8 +306,8 @@ def _mean_size(session: Session, past: ToolHistory, but: Whole) -> float | None:
     sequence = past.history["sequence"]
     return session.scalar(
         select(func.avg(func.abs(Correction.size_error))).where(
-            Correction.machine_id == past.standing.machine.id,
-            Correction.characteristic_id == past.standing.characteristic.id,
+            Correction.machine_id == past.current.machine.id,
+            Correction.characteristic_id == past.current.characteristic.id,
             Correction.sequence.between(int(sequence[0]), int(sequence[-1])),
             Correction.sequence != all_(but.tolist()),
         )

@@ -6,7 +6,7 @@ from app.core.policy_map import with_settings
 from app.core.spc.refusal import Refused
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.quality.what_if import map_axes, queries
 from app.quality.what_if.queries import Map, Settings, Simulation
@@ -15,24 +15,24 @@ from app.quality.what_if.tool_history import ToolHistory
 from app.quality.what_if.turn_limit import turn
 
 
-def replayed(session: Session, standing: Standing, given: WhatIfIn) -> Simulation:
+def replayed(session: Session, current: CurrentCharacteristic, given: WhatIfIn) -> Simulation:
     """Side by side. Raises `Invalid`, `TooManyRequests`."""
     with turn():
-        past = _past(session, standing, given)
+        past = _past(session, current, given)
         answer = queries.side_by_side(session, past, settings(past, given))
         _said = answer.effect  # worked out in turn, too
     return answer
 
 
-def mapped(session: Session, standing: Standing, given: MapIn) -> Map:
+def mapped(session: Session, current: CurrentCharacteristic, given: MapIn) -> Map:
     """The map. Raises `Invalid`, `TooManyRequests`."""
     with turn():
-        return map_of(_past(session, standing, given), given)
+        return map_of(_past(session, current, given), given)
 
 
 def map_of(past: ToolHistory, given: MapIn) -> Map:
     """The map of a past that is loaded already."""
-    today = past.standing.parameters
+    today = past.current.parameters
     r34 = today.averaging_limit if given.averaging_limit is None else given.averaging_limit
     chosen = Settings(averaging_limit=given.averaging_limit, factor=given.factor)
     queries.check_order(with_settings(chosen.applied_to(today), zero_range=0.0), chosen)
@@ -48,10 +48,12 @@ def map_of(past: ToolHistory, given: MapIn) -> Map:
     )
 
 
-def both(session: Session, standing: Standing, given: WhatIfIn, around: MapIn) -> tuple[Simulation, Map | Invalid]:
+def both(
+    session: Session, current: CurrentCharacteristic, given: WhatIfIn, around: MapIn
+) -> tuple[Simulation, Map | Invalid]:
     """Side by side, and the map of the same period, or why there is none."""
     with turn():
-        past = _past(session, standing, given)
+        past = _past(session, current, given)
         answer = queries.side_by_side(session, past, settings(past, given))
         _said = answer.effect
         try:
@@ -85,8 +87,8 @@ def settings(past: ToolHistory, given: SettingsIn) -> Settings:
     )
 
 
-def _past(session: Session, standing: Standing, given: ReplayPeriodIn) -> ToolHistory:
+def _past(session: Session, current: CurrentCharacteristic, given: ReplayPeriodIn) -> ToolHistory:
     if given.start is not None and given.end is not None and given.start > given.end:
         raise Invalid.at("from", _("is later than `to`; exchange the two moments"))
-    window = statistics.window_of(session, standing.characteristic, last=given.newest, start=given.start, end=given.end)
-    return queries.load(session, standing, window)
+    window = statistics.window_of(session, current.characteristic, last=given.newest, start=given.start, end=given.end)
+    return queries.load(session, current, window)

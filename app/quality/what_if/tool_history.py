@@ -24,7 +24,7 @@ from app.core.spc.resolution import resolution_of
 from app.errors import Invalid
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import History, Window
 from app.loop.tables.tools import ToolEvent
@@ -73,7 +73,7 @@ class ToolHistory:
     of_tool: corrections of the tool, those of the others included. baseline: version of the one in force, if it is one of deviations.
     """
 
-    standing: Standing
+    current: CurrentCharacteristic
     window: Window
     history: History
     mine: Flags
@@ -114,14 +114,14 @@ class ToolHistory:
 
     def inner(self, deviations: Values) -> Flags:
         """Tell which deviations (mm) lie within R37 of today."""
-        return ~reaches(in_nanometres(deviations), self.standing.parameters.limits.wear)
+        return ~reaches(in_nanometres(deviations), self.current.parameters.limits.wear)
 
     @cached_property
     def resolved(self) -> bool:
         """Tell whether the readings as measured are fine enough to carry an index; of none there is nothing to refuse."""
         deviation = self.history["deviation"]
         inner = deviation[self.inner(deviation) & ~self.history.excluded]
-        return not len(inner) or resolution_of(inner, self.standing.parameters.tolerance_width / 2).enough
+        return not len(inner) or resolution_of(inner, self.current.parameters.tolerance_width / 2).enough
 
     def carried(self, figures: Figures) -> Figures:
         """Figures of a replay without a Ppk, where the readings are too coarse for one: shifted steps only look finer."""
@@ -171,7 +171,7 @@ def replace_lane(
     )
 
 
-def past_of(session: Session, standing: Standing, window: Window) -> ToolHistory:
+def past_of(session: Session, current: CurrentCharacteristic, window: Window) -> ToolHistory:
     """Load it. Raises `Invalid` for more than a million readings."""
     if window.count > LARGEST:
         raise Invalid(
@@ -180,11 +180,11 @@ def past_of(session: Session, standing: Standing, window: Window) -> ToolHistory
             ),
             _("Choose a shorter period, or the last so many readings."),
         )
-    others = _others(session, standing)
+    others = _others(session, current)
     columns = (*COLUMNS, "part") if others else COLUMNS
-    whole = statistics.history_of(session, standing.characteristic, window, columns)
+    whole = statistics.history_of(session, current.characteristic, window, columns)
     own = whole.only(np.isfinite(whole["compensated"]))
-    histories = [(standing, own)]
+    histories = [(current, own)]
     if len(own):
         began, ended = (_moment(moment) for moment in (own["measured_at"].min(), own["measured_at"].max()))
         for other in others:
@@ -193,25 +193,29 @@ def past_of(session: Session, standing: Standing, window: Window) -> ToolHistory
                 continue
             history = statistics.history_of(session, other.characteristic, span, columns)
             histories.append((other, history.only(np.isfinite(history["compensated"]))))
-    return _joined(session, standing, window, histories, len(whole) - len(own))
+    return _joined(session, current, window, histories, len(whole) - len(own))
 
 
-def _others(session: Session, standing: Standing) -> list[Standing]:
+def _others(session: Session, current: CurrentCharacteristic) -> list[CurrentCharacteristic]:
     """Characteristics that correct the same tool."""
-    number = standing.parameters.tool_memory
+    number = current.parameters.tool_memory
     if not number:
         return []
     return [
         other
-        for other in characteristics.characteristics(session, machine_id=standing.machine.id)
-        if other.characteristic.id != standing.characteristic.id
+        for other in characteristics.characteristics(session, machine_id=current.machine.id)
+        if other.characteristic.id != current.characteristic.id
         and other.parameters.tool_memory == number
         and not other.parameters.measures_only
     ]
 
 
 def _joined(
-    session: Session, standing: Standing, window: Window, histories: list[tuple[Standing, History]], unknown: int
+    session: Session,
+    current: CurrentCharacteristic,
+    window: Window,
+    histories: list[tuple[CurrentCharacteristic, History]],
+    unknown: int,
 ) -> ToolHistory:
     lanes: list[ReplayedCharacteristic] = []
     slots: dict[int, int] = {}
@@ -239,19 +243,19 @@ def _joined(
             **history.columns,
         }.items():
             columns.setdefault(name, []).append(values)
-    slots.setdefault(standing.parameters.average_memory, len(slots))
+    slots.setdefault(current.parameters.average_memory, len(slots))
     joined = {name: np.concatenate(values) for name, values in columns.items()}
     order = np.lexsort((joined["whose"], joined["place"], joined["measured_at"], joined["received_at"]))
     joined = {name: values[order] for name, values in joined.items()}
-    trace = _trace(session, standing, joined, len(slots), [known.memory for known in lanes])
+    trace = _trace(session, current, joined, len(slots), [known.memory for known in lanes])
     if not lanes:
         lanes.append(
             ReplayedCharacteristic(
-                standing.parameters, -1 / standing.parameters.factor, slots[standing.parameters.average_memory]
+                current.parameters, -1 / current.parameters.factor, slots[current.parameters.average_memory]
             )
         )
     return ToolHistory(
-        standing=standing,
+        current=current,
         window=window,
         history=histories[0][1],
         mine=joined["whose"] == 0,
@@ -265,17 +269,17 @@ def _joined(
         unknown=unknown,
         others=[owner.characteristic.key for owner, _history in histories[1:]],
         delays=_delays(joined, trace.part),
-        baseline=_baseline(session, standing),
+        baseline=_baseline(session, current),
     )
 
 
-def _baseline(session: Session, standing: Standing) -> int | None:
-    baseline = control_charts.baseline_in_force(session, standing.characteristic)
+def _baseline(session: Session, current: CurrentCharacteristic) -> int | None:
+    baseline = control_charts.baseline_in_force(session, current.characteristic)
     return baseline.version if baseline is not None and baseline.quantity == "deviation" else None
 
 
-def _version(session: Session, standing: Standing, version: int) -> Parameters:
-    return characteristics.parameters_of(session, standing.machine.id, standing.characteristic.id, version)
+def _version(session: Session, current: CurrentCharacteristic, version: int) -> Parameters:
+    return characteristics.parameters_of(session, current.machine.id, current.characteristic.id, version)
 
 
 def _changed(values: Values) -> Flags:
@@ -284,11 +288,11 @@ def _changed(values: Values) -> Flags:
 
 
 def _trace(
-    session: Session, standing: Standing, joined: dict[str, NDArray[Any]], slots: int, memories: list[int]
+    session: Session, current: CurrentCharacteristic, joined: dict[str, NDArray[Any]], slots: int, memories: list[int]
 ) -> ProcessTrace:
     """The readings with what happened at each."""
-    parameters, compensated = standing.parameters, joined["compensated"]
-    begins = _beginnings(session, standing, joined["received_at"])
+    parameters, compensated = current.parameters, joined["compensated"]
+    begins = _beginnings(session, current, joined["received_at"])
     # A held correction that was let go shows as a step that no reading may ask for by itself.
     held = parameters.wear_limit if parameters.plausible_jump is None else parameters.plausible_jump
     step = np.abs(np.diff(compensated, prepend=compensated[:1])) / abs(parameters.factor)
@@ -314,7 +318,7 @@ def _trace(
     return ProcessTrace(free, joined["lane"], marks, part, offset, pending, averages)
 
 
-def _beginnings(session: Session, standing: Standing, received_at: NDArray[np.datetime64]) -> Flags:
+def _beginnings(session: Session, current: CurrentCharacteristic, received_at: NDArray[np.datetime64]) -> Flags:
     """The first reading, and the first after each tool change and each offset set by hand."""
     begins = np.zeros(len(received_at), np.bool_)
     if not len(begins):
@@ -322,8 +326,8 @@ def _beginnings(session: Session, standing: Standing, received_at: NDArray[np.da
     begins[0] = True
     rows = session.scalars(
         select(ToolEvent.at).where(
-            ToolEvent.machine_id == standing.machine.id,
-            ToolEvent.number == standing.parameters.tool_memory,
+            ToolEvent.machine_id == current.machine.id,
+            ToolEvent.number == current.parameters.tool_memory,
             ToolEvent.kind != "correction",
             ToolEvent.at >= _moment(received_at[0]),
         )

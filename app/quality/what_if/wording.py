@@ -105,7 +105,7 @@ def effect_unknown(refused: Refused, sentence: str) -> str:
 
 def cautions(past: ToolHistory) -> list[str]:
     """Limits of the replay, as far as they matter here."""
-    parameters = past.standing.parameters
+    parameters = past.current.parameters
     cautions: list[str] = []
     if parameters.measures_only:
         cautions.append(_("This characteristic only measures: no settings make a difference."))

@@ -74,9 +74,9 @@ def capability_page(
     """Indices with intervals and what they are worth, spread and shape, behaviour in time, the tool without corrections."""
     typed = {"from": start, "to": end, "timezone": timezone}
     choice, errors = _typed(typed, last, side, confidence)
-    standing = characteristics.characteristic_named(session, characteristic)
-    study = study_of(session, standing, choice)
-    path = f"/characteristics/{standing.characteristic.key}/capability"
+    current = characteristics.characteristic_named(session, characteristic)
+    study = study_of(session, current, choice)
+    path = f"/characteristics/{current.characteristic.key}/capability"
     now = _query(choice)
 
     def link(**changes: Any) -> str:
@@ -84,10 +84,10 @@ def capability_page(
         return f"{path}?{urlencode({name: value for name, value in (unchanged | changes).items() if value})}"
 
     def figure(picture: str) -> str:
-        address = f"/api/v1/characteristics/{standing.characteristic.key}/figures/capability"
+        address = f"/api/v1/characteristics/{current.characteristic.key}/figures/capability"
         return f"{address}?{urlencode(now | {'picture': picture})}"
 
-    place = {"machine_id": standing.machine.id, "characteristic_id": standing.characteristic.id}
+    place = {"machine_id": current.machine.id, "characteristic_id": current.characteristic.id}
     timed = choice.start is not None or choice.end is not None
     failing = proof.failing()
     return page(
@@ -97,9 +97,9 @@ def capability_page(
         typed=typed,
         errors=errors,
         study=study,
-        characteristic=standing.characteristic,
-        machine=standing.machine,
-        parameters=standing.parameters,
+        characteristic=current.characteristic,
+        machine=current.machine,
+        parameters=current.parameters,
         choice=choice,
         runs=[
             (_("All") if run == "all" else run, link(last=run), not timed and run == (choice.last or str(USUAL)))
@@ -119,7 +119,7 @@ def capability_page(
         wording=wording,
         words=statistics,
         gauge_studies=gauges.studies(session, **place, limit=3),
-        about_zero_range=gauges.latest_advice(session, standing),
+        about_zero_range=gauges.latest_advice(session, current),
         gauge_wording=gauge_wording,
         may_enter=caller.may("operator"),
         proof_failing=failing,

@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 from app.core.decision.limits import classify
 from app.language.i18n import _
 from app.loop.alarm_response.wording import kind_word
-from app.loop.characteristics.queries import Standing, parameters_of
+from app.loop.characteristics.queries import CurrentCharacteristic, parameters_of
 from app.loop.readings import queries as readings
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import ChartData, ChartReading, Window
@@ -72,20 +72,20 @@ def reading_link(key: str, sequence: int) -> str:
     return f"/characteristics/{key}/readings/{sequence}"
 
 
-def chart_of(session: Session, standing: Standing, window: Window) -> Chart:
+def chart_of(session: Session, current: CurrentCharacteristic, window: Window) -> Chart:
     """The zone chart of these readings: each in the zone where it lies, by the limits of now.
 
     In which zone it was decided may differ (corrections not yet in effect, other limits then); its own page says so.
     """
-    parameters, key = standing.parameters, standing.characteristic.key
-    course = statistics.chart_data_of(session, standing.characteristic, window)
+    parameters, key = current.parameters, current.characteristic.key
+    course = statistics.chart_data_of(session, current.characteristic, window)
     has_memory = parameters.average_memory > 0
-    targets = _targets(session, standing, course.readings)
-    changes = _changes(session, standing, course, window)
-    marks = [*_alarms(session, standing, window), *_change_marks(standing, window, changes)]
+    targets = _targets(session, current, course.readings)
+    changes = _changes(session, current, course, window)
+    marks = [*_alarms(session, current, window), *_change_marks(current, window, changes)]
     drawn_marks = _thinned(marks, window)
-    steps = _steps(session, standing, window, changes)
-    before = _total_before(session, standing, window, changes) if window.count else 0.0
+    steps = _steps(session, current, window, changes)
+    before = _total_before(session, current, window, changes) if window.count else 0.0
     if len(drawn_marks) < len(marks):
         steps = _added_up(steps, changes, before)
     return Chart(
@@ -118,18 +118,18 @@ def chart_of(session: Session, standing: Standing, window: Window) -> Chart:
         ],
         steps=steps,
         marks=drawn_marks,
-        hands=_hands(session, standing, window),
+        hands=_hands(session, current, window),
         total_before=before,
-        sizes=_size_axis(session, standing, course),
+        sizes=_size_axis(session, current, course),
     )
 
 
-def _hands(session: Session, standing: Standing, window: Window) -> list[HandPoint]:
+def _hands(session: Session, current: CurrentCharacteristic, window: Window) -> list[HandPoint]:
     """Deviations measured by hand, against the target: a hand gauge needs no empirical value."""
     measurements = readings.hand_measurements(
-        session, standing.machine.id, standing.characteristic.id, window.first, window.last, MOST_BY_HAND
+        session, current.machine.id, current.characteristic.id, window.first, window.last, MOST_BY_HAND
     )
-    target, key = standing.parameters.target, standing.characteristic.key
+    target, key = current.parameters.target, current.characteristic.key
     return [
         HandPoint(
             measurement.sequence,
@@ -143,12 +143,12 @@ def _hands(session: Session, standing: Standing, window: Window) -> list[HandPoi
     ]
 
 
-def run_of(session: Session, standing: Standing, window: Window) -> tuple[list[RunPoint], SizeAxis]:
+def run_of(session: Session, current: CurrentCharacteristic, window: Window) -> tuple[list[RunPoint], SizeAxis]:
     """The sizes of these readings, and their axis; of very many the last ones."""
-    key = standing.characteristic.key
+    key = current.characteristic.key
     first = max(window.first, window.last - MOST_RUN + 1)
-    course = statistics.chart_data_of(session, standing.characteristic, replace(window, first=first))
-    parameters, targets = standing.parameters, _targets(session, standing, course.readings)
+    course = statistics.chart_data_of(session, current.characteristic, replace(window, first=first))
+    parameters, targets = current.parameters, _targets(session, current, course.readings)
     points = [
         RunPoint(
             reading.sequence,
@@ -162,12 +162,12 @@ def run_of(session: Session, standing: Standing, window: Window) -> tuple[list[R
         )
         for reading in course.readings
     ]
-    return points, _size_axis(session, standing, course)
+    return points, _size_axis(session, current, course)
 
 
-def _targets(session: Session, standing: Standing, drawn: Sequence[ChartReading]) -> dict[int, float]:
+def _targets(session: Session, current: CurrentCharacteristic, drawn: Sequence[ChartReading]) -> dict[int, float]:
     """The targets (mm) that these readings were judged by, by the version of the parameters."""
-    machine_id, characteristic_id = standing.machine.id, standing.characteristic.id
+    machine_id, characteristic_id = current.machine.id, current.characteristic.id
     return {
         version: parameters_of(session, machine_id, characteristic_id, version).target
         for version in {reading.parameters_version for reading in drawn}
@@ -179,35 +179,35 @@ def _size(reading: ChartReading, targets: dict[int, float]) -> float:
     return round(targets[reading.parameters_version] + reading.deviation, 9)
 
 
-def _size_axis(session: Session, standing: Standing, course: ChartData) -> SizeAxis:
+def _size_axis(session: Session, current: CurrentCharacteristic, course: ChartData) -> SizeAxis:
     """The axis of these readings; of those in blocks the ends of each block tell the empirical value and the target."""
     drawn_readings = list(course.readings)
     if course.blocks:
         ends = [course.blocks[0].first, *(block.last for block in course.blocks)]
-        drawn_readings = sorted([*statistics.single_readings(session, standing.characteristic, ends), *drawn_readings])
-    targets, now = _targets(session, standing, drawn_readings), standing.parameters.target
+        drawn_readings = sorted([*statistics.single_readings(session, current.characteristic, ends), *drawn_readings])
+    targets, now = _targets(session, current, drawn_readings), current.parameters.target
     values = dict.fromkeys(round(reading.measured - _size(reading, targets), 9) for reading in drawn_readings)
     return SizeAxis(
-        now, tuple(values) or (empirical_value_of(session, standing),), any(at != now for at in targets.values())
+        now, tuple(values) or (empirical_value_of(session, current),), any(at != now for at in targets.values())
     )
 
 
-def empirical_value_of(session: Session, standing: Standing) -> float:
+def empirical_value_of(session: Session, current: CurrentCharacteristic) -> float:
     """EV of the memory location that this characteristic names, mm; 0 without one."""
-    location = standing.parameters.average_memory
-    memory = session.get(AverageMemory, (standing.machine.id, location)) if location else None
+    location = current.parameters.average_memory
+    memory = session.get(AverageMemory, (current.machine.id, location)) if location else None
     return memory.empirical_value if memory else 0.0
 
 
-def _change_marks(standing: Standing, window: Window, changes: Sequence[_Change]) -> list[Mark]:
-    number = standing.parameters.tool_memory
+def _change_marks(current: CurrentCharacteristic, window: Window, changes: Sequence[_Change]) -> list[Mark]:
+    number = current.parameters.tool_memory
     words = {"change": _("T{number} changed"), "edit": _("T{number} offset edited")}
     return [
         Mark(
             change.sequence,
             TOOL_CHANGE if change.kind == "change" else MANUAL_EDIT,
             words[change.kind].format(number=number),
-            f"/machines/{standing.machine.key}/tools?tool={number}#tool",
+            f"/machines/{current.machine.key}/tools?tool={number}#tool",
         )
         for change in changes
         if window.first <= change.sequence
@@ -244,18 +244,18 @@ def _added_up(steps: Sequence[Step], changes: Sequence[_Change], before: float) 
     return added
 
 
-def _alarms(session: Session, standing: Standing, window: Window) -> list[Mark]:
+def _alarms(session: Session, current: CurrentCharacteristic, window: Window) -> list[Mark]:
     rows = session.execute(
         select(Alarm.sequence, Alarm.kind, Alarm.acknowledged_at)
         .where(
-            Alarm.machine_id == standing.machine.id,
-            Alarm.characteristic_id == standing.characteristic.id,
+            Alarm.machine_id == current.machine.id,
+            Alarm.characteristic_id == current.characteristic.id,
             Alarm.sequence.between(window.first, window.last),
         )
         .order_by(Alarm.id.desc())
         .limit(MOST_ALARMS)
     )
-    key = standing.characteristic.key
+    key = current.characteristic.key
     return [
         Mark(sequence, kind, kind_word(kind), reading_link(key, sequence), active=acknowledged_at is None)
         for sequence, kind, acknowledged_at in rows
@@ -263,17 +263,17 @@ def _alarms(session: Session, standing: Standing, window: Window) -> list[Mark]:
     ]
 
 
-def _changes(session: Session, standing: Standing, course: ChartData, window: Window) -> list[_Change]:
+def _changes(session: Session, current: CurrentCharacteristic, course: ChartData, window: Window) -> list[_Change]:
     """Changes and edits of the tool, oldest first, each at the first reading that came after it.
 
     One that came before the window is kept as well, at the reading before it: from there the corrections are summed.
     """
-    number = standing.parameters.tool_memory
+    number = current.parameters.tool_memory
     if not number or not window.count:
         return []
     rows = session.execute(
         select(ToolEvent.at, ToolEvent.kind, ToolEvent.offset_after)
-        .where(ToolEvent.machine_id == standing.machine.id, ToolEvent.number == number, ToolEvent.kind != "correction")
+        .where(ToolEvent.machine_id == current.machine.id, ToolEvent.number == number, ToolEvent.kind != "correction")
         .order_by(ToolEvent.id.desc())
         .limit(MOST_CHANGES)
     ).all()
@@ -283,7 +283,7 @@ def _changes(session: Session, standing: Standing, course: ChartData, window: Wi
     if course.blocks:
         step = -(-len(course.blocks) // MOST_MOMENTS)
         sampled = [course.blocks[0].first, *(block.last for block in course.blocks[::step])]
-        moments = sorted(statistics.moments_of(session, standing.characteristic, sampled) + moments)
+        moments = sorted(statistics.moments_of(session, current.characteristic, sampled) + moments)
     arrivals = [at for _sequence, at in moments]
     changes = []
     for at, kind, offset_after in reversed(rows):
@@ -298,7 +298,7 @@ def _changes(session: Session, standing: Standing, course: ChartData, window: Wi
     return changes
 
 
-def _steps(session: Session, standing: Standing, window: Window, changes: Sequence[_Change]) -> list[Step]:
+def _steps(session: Session, current: CurrentCharacteristic, window: Window, changes: Sequence[_Change]) -> list[Step]:
     """The corrections of these readings; of too many, some spread evenly, the newest, and those that are open."""
     if not window.count:
         return []
@@ -308,13 +308,13 @@ def _steps(session: Session, standing: Standing, window: Window, changes: Sequen
             Correction.offset_after, Correction.applied_at,
         )
         .where(
-            Correction.machine_id == standing.machine.id,
-            Correction.characteristic_id == standing.characteristic.id,
+            Correction.machine_id == current.machine.id,
+            Correction.characteristic_id == current.characteristic.id,
             Correction.sequence.between(window.first, window.last),
         )
         .order_by(Correction.sequence.desc())
     )  # fmt: skip
-    key = standing.characteristic.key
+    key = current.characteristic.key
     rows = session.execute(query.limit(MOST_STEPS + 1)).all()
     if len(rows) <= MOST_STEPS:
         return [
@@ -322,15 +322,15 @@ def _steps(session: Session, standing: Standing, window: Window, changes: Sequen
             for sequence, number, amount, status, _offset, _at in reversed(rows)
         ]
     newest = rows[:20]
-    tool_memory = standing.parameters.tool_memory
+    tool_memory = current.parameters.tool_memory
     still_open = session.execute(
         query.where(Correction.status.in_(OPEN), Correction.tool_memory == tool_memory).limit(MOST_STEPS)
     ).all()
     sampled = session.execute(
         text(_SAMPLE),
         {
-            "machine": standing.machine.id,
-            "characteristic": standing.characteristic.id,
+            "machine": current.machine.id,
+            "characteristic": current.characteristic.id,
             "tool": tool_memory,
             "first": window.first,
             "last": window.last,
@@ -370,7 +370,9 @@ def _with_totals(
     return steps
 
 
-def _total_before(session: Session, standing: Standing, window: Window, changes: Sequence[_Change]) -> float:
+def _total_before(
+    session: Session, current: CurrentCharacteristic, window: Window, changes: Sequence[_Change]
+) -> float:
     """The sum of this characteristic's corrections from the last tool change to where the chart begins, mm."""
     begun = max(
         (change.at for change in changes if change.kind == "change" and change.sequence < window.first), default=None
@@ -378,8 +380,8 @@ def _total_before(session: Session, standing: Standing, window: Window, changes:
     query = (
         select(Correction.amount, Correction.created_at)
         .where(
-            Correction.machine_id == standing.machine.id,
-            Correction.characteristic_id == standing.characteristic.id,
+            Correction.machine_id == current.machine.id,
+            Correction.characteristic_id == current.characteristic.id,
             Correction.sequence < window.first,
             Correction.status.in_(sorted(COUNTED)),
         )
@@ -396,11 +398,11 @@ def _total_before(session: Session, standing: Standing, window: Window, changes:
 
 
 def results_of(
-    session: Session, standing: Standing, window: Window, name: str
+    session: Session, current: CurrentCharacteristic, window: Window, name: str
 ) -> tuple[list[ResultPoint], list[ResultRange]]:
     """Results of the variant for its chart: single readings, or blocks of very many."""
-    course = statistics.results_of(session, standing.characteristic, window, name)
-    key = standing.characteristic.key
+    course = statistics.results_of(session, current.characteristic, window, name)
+    key = current.characteristic.key
     return (
         [
             ResultPoint(

@@ -13,7 +13,7 @@ from app.core.parameters import Parameters
 from app.core.probing import sections_of
 from app.errors import NotFound
 from app.language.i18n import _
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.readings import queries as readings
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import ParametersVersion
@@ -64,24 +64,26 @@ class Decision:
         return [sum(point) / len(point) for point in self.touches or () if point]
 
 
-def decisions(session: Session, standing: Standing, *, before: int | None = None, limit: int = 25) -> list[Decision]:
+def decisions(
+    session: Session, current: CurrentCharacteristic, *, before: int | None = None, limit: int = 25
+) -> list[Decision]:
     """The decisions before a reading's number (or the last ones), newest first."""
-    entry = readings.entry_of(session, standing.characteristic.key)
+    entry = readings.entry_of(session, current.characteristic.key)
     assert entry is not None
     answers = readings.answers(session, entry, readings.latest(session, entry, before, limit))
-    return _complete(session, standing, answers)
+    return _complete(session, current, answers)
 
 
-def decision(session: Session, standing: Standing, sequence: int) -> Decision:
+def decision(session: Session, current: CurrentCharacteristic, sequence: int) -> Decision:
     """The decision on one reading. Raises `NotFound`."""
-    entry = readings.entry_of(session, standing.characteristic.key)
+    entry = readings.entry_of(session, current.characteristic.key)
     assert entry is not None
-    (only,) = _complete(session, standing, [readings.detail(session, entry, sequence)])
+    (only,) = _complete(session, current, [readings.detail(session, entry, sequence)])
     return only
 
 
-def _complete(session: Session, standing: Standing, answers: Sequence[dict[str, Any]]) -> list[Decision]:
-    machine_id, characteristic_id = standing.machine.id, standing.characteristic.id
+def _complete(session: Session, current: CurrentCharacteristic, answers: Sequence[dict[str, Any]]) -> list[Decision]:
+    machine_id, characteristic_id = current.machine.id, current.characteristic.id
     numbers = [answer["correction"]["number"] for answer in answers if answer["correction"]]
     corrections: dict[int, Correction] = {}
     if numbers:
@@ -115,9 +117,9 @@ def _complete(session: Session, standing: Standing, answers: Sequence[dict[str, 
     ]
 
 
-def version_of(session: Session, standing: Standing, version: int) -> ParametersVersion:
+def version_of(session: Session, current: CurrentCharacteristic, version: int) -> ParametersVersion:
     """The version of the parameters that a reading was judged by. Raises `NotFound`."""
-    characteristic = standing.characteristic
+    characteristic = current.characteristic
     row = session.get(ParametersVersion, (characteristic.machine_id, characteristic.id, version))
     if row is None:
         raise NotFound(

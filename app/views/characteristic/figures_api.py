@@ -8,7 +8,7 @@ from fastapi import Query, Response
 from app.access.deps import AnyCaller
 from app.core.variants import yielded_by
 from app.loop.characteristics import queries
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.wording import result_label
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
@@ -25,9 +25,11 @@ ResultName = Literal["run_out", "out_of_roundness", "taper", "repeat_range", "re
 Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
 
 
-def _found(session: SessionDep, caller: AnyCaller, characteristic: str, choice: Choice) -> tuple[Standing, Window]:
-    standing = queries.characteristic_for(session, caller, characteristic, "viewer")
-    return standing, statistics.window_of(session, standing.characteristic, **choice._asdict())
+def _found(
+    session: SessionDep, caller: AnyCaller, characteristic: str, choice: Choice
+) -> tuple[CurrentCharacteristic, Window]:
+    current = queries.characteristic_for(session, caller, characteristic, "viewer")
+    return current, statistics.window_of(session, current.characteristic, **choice._asdict())
 
 
 def _answer(figure: dict[str, object]) -> Response:
@@ -52,12 +54,12 @@ def get_zone_chart(
 
     Of more readings than can be drawn, blocks with their extremes: no extreme is ever thinned away.
     """
-    standing, window = _found(session, caller, characteristic, choice)
-    chart = chart_of(session, standing, window)
+    current, window = _found(session, caller, characteristic, choice)
+    chart = chart_of(session, current, window)
     return _answer(
         zone_chart(
             chart.points,
-            standing.parameters,
+            current.parameters,
             blocks=chart.blocks,
             steps=chart.steps,
             marks=chart.marks,
@@ -82,9 +84,9 @@ def get_run_chart(
     width: Width = 1240,  # noqa: ARG001 - every chart is asked with its width
 ) -> Response:
     """Sizes over time, corrected by the empirical value of each reading; of more than 2 000 readings the last 2 000."""
-    standing, window = _found(session, caller, characteristic, choice)
-    points, sizes = run_of(session, standing, window)
-    return _answer(run_figure(points, standing.parameters, sizes=sizes, theme=theme))
+    current, window = _found(session, caller, characteristic, choice)
+    points, sizes = run_of(session, current, window)
+    return _answer(run_figure(points, current.parameters, sizes=sizes, theme=theme))
 
 
 @router.get("/characteristics/{characteristic}/figures/results", responses=problems(404) | FIGURE, response_model=None)
@@ -103,9 +105,9 @@ def get_result_chart(
 
     Of more readings than can be drawn, blocks with their extremes; of more than 500 000 the last ones.
     """
-    standing, window = _found(session, caller, characteristic, choice)
-    name: str = result or next(iter(yielded_by(standing.parameters)), "repeat_range")
-    points, ranges = results_of(session, standing, window, name)
+    current, window = _found(session, caller, characteristic, choice)
+    name: str = result or next(iter(yielded_by(current.parameters)), "repeat_range")
+    points, ranges = results_of(session, current, window, name)
     return _answer(result_figure(name, result_label(name), points, ranges, theme=theme))
 
 
@@ -121,7 +123,7 @@ def get_histogram(
     width: Width = 300,  # noqa: ARG001 - every chart is asked with its width
 ) -> Response:
     """Histogram of the deviations, without excluded readings and probe faults; of more than 100 000 the last 100 000."""
-    standing, window = _found(session, caller, characteristic, choice)
-    parameters = standing.parameters
-    counts = statistics.histogram_of(session, standing.characteristic, window, counting_edges(parameters))
+    current, window = _found(session, caller, characteristic, choice)
+    parameters = current.parameters
+    counts = statistics.histogram_of(session, current.characteristic, window, counting_edges(parameters))
     return _answer(histogram_figure(counts, parameters, theme=theme))

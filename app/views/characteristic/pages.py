@@ -26,7 +26,7 @@ from app.language.i18n import _
 from app.loop.alarm_response.wording import action_word
 from app.loop.calibration import queries as calibrations
 from app.loop.characteristics import queries
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.wording import history, in_order, label, result_label, worded
 from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
@@ -63,31 +63,31 @@ class CharacteristicView:
     """Content of the page of a characteristic, each part queried when the template comes to it."""
 
     def __init__(
-        self, session: Session, standing: Standing, choice: Choice, before: int | None, edge: str = "tool"
+        self, session: Session, current: CurrentCharacteristic, choice: Choice, before: int | None, edge: str = "tool"
     ) -> None:
         self._session, self._choice, self._before, self._edge = session, choice, before, edge
-        self.standing = standing
+        self.current = current
         self.now = datetime.now(UTC)
 
     @cached_property
     def row(self) -> plant.CharacteristicRow:
-        return plant.row_of(self._session, self.standing.machine.key, self.standing.characteristic.key)
+        return plant.row_of(self._session, self.current.machine.key, self.current.characteristic.key)
 
     @cached_property
     def empirical_value(self) -> float:
-        return chart.empirical_value_of(self._session, self.standing)
+        return chart.empirical_value_of(self._session, self.current)
 
     @cached_property
     def last(self) -> dict[str, Any] | None:
         """The last reading, as it was answered."""
-        entry = reading_queries.entry_of(self._session, self.standing.characteristic.key)
+        entry = reading_queries.entry_of(self._session, self.current.characteristic.key)
         assert entry is not None
         newest = reading_queries.answers(self._session, entry, reading_queries.latest(self._session, entry, None, 1))
         return newest[0] if newest else None
 
     @cached_property
     def window(self) -> Window:
-        return statistics.window_of(self._session, self.standing.characteristic, **self._choice._asdict())
+        return statistics.window_of(self._session, self.current.characteristic, **self._choice._asdict())
 
     @property
     def counted(self) -> Window:
@@ -98,9 +98,9 @@ class CharacteristicView:
     @cached_property
     def facts(self) -> list[Fact]:
         """Numbers of the counted readings; with acceptance n of m parts and sections outside too, also of this tool."""
-        session, characteristic = self._session, self.standing.characteristic
+        session, characteristic = self._session, self.current.characteristic
         numbers = statistics.numbers_of(session, characteristic, self.counted)
-        if self.standing.parameters.accept_m == 1:
+        if self.current.parameters.accept_m == 1:
             return statistics_wording.facts(numbers)
         windows = self.counted, statistics.since_tool_change(session, characteristic)
         return statistics_wording.facts(
@@ -110,15 +110,15 @@ class CharacteristicView:
     @cached_property
     def wear(self) -> Wear:
         """Of the tool in the machine."""
-        return wear.wear_of(self._session, self.standing, wear.shown(self._session, self.standing, self._edge))
+        return wear.wear_of(self._session, self.current, wear.shown(self._session, self.current, self._edge))
 
     @cached_property
     def decisions(self) -> list[Decision]:
-        return decisions(self._session, self.standing, before=self._before, limit=DECISIONS_ON_PAGE + 1)
+        return decisions(self._session, self.current, before=self._before, limit=DECISIONS_ON_PAGE + 1)
 
     @cached_property
     def history(self) -> list[Any]:
-        versions = queries.versions(self._session, self.standing.characteristic, limit=VERSIONS + 1)
+        versions = queries.versions(self._session, self.current.characteristic, limit=VERSIONS + 1)
         return history(versions)[:VERSIONS]
 
 
@@ -136,8 +136,8 @@ def characteristic_page(
     x_live_part: Annotated[str | None, Header()] = None,
 ) -> Response:
     """The zone chart, the numbers, the decisions and the parameters of one characteristic."""
-    standing = queries.characteristic_named(session, characteristic)
-    path = f"/characteristics/{standing.characteristic.key}"
+    current = queries.characteristic_named(session, characteristic)
+    path = f"/characteristics/{current.characteristic.key}"
     chosen = _as_query(choice)
 
     def link(**changes: Any) -> str:
@@ -151,26 +151,26 @@ def characteristic_page(
         usual = {("scale", "zones"), ("edge", "tool")}
         return f"{path}?{urlencode({name: v for name, v in values.items() if (name, v) not in usual})}"
 
-    yielded = yielded_by(standing.parameters)
+    yielded = yielded_by(current.parameters)
     drawn_result = result if result in yielded else next(iter(yielded), None)
     figure = "run" if scale == "time" else "zones"
     chart_query = chosen if scale == "time" else chosen | {"scale": scale}
     return page(
         request,
         "characteristics/characteristic.html",
-        shown=CharacteristicView(session, standing, choice, before, edge),
+        shown=CharacteristicView(session, current, choice, before, edge),
         edge=edge,
         wear_url=f"/api/v1{path}/figures/wear?{urlencode({'last': edge})}",
         wear_words=WearWords,
         wanted=lambda part: x_live_part is None or x_live_part == part,
-        failing=with_job_words(failures_of(session, standing.machine.id, standing.characteristic.id)),
+        failing=with_job_words(failures_of(session, current.machine.id, current.characteristic.id)),
         may_see_jobs=caller.may("engineer"),
-        characteristic=standing.characteristic,
-        machine=standing.machine,
-        parameters=standing.parameters,
-        travel=start_and_end(standing.parameters),
-        in_force=standing.version,
-        table=parameter_table(standing.version.parameters),
+        characteristic=current.characteristic,
+        machine=current.machine,
+        parameters=current.parameters,
+        travel=start_and_end(current.parameters),
+        in_force=current.version,
+        table=parameter_table(current.version.parameters),
         choice=choice,
         scale=scale,
         before=before,
@@ -226,7 +226,7 @@ def send_measured_by_hand(
     request: Request, session: SessionDep, caller: Operator, characteristic: str, sequence: Sequence_, form: FormDep
 ) -> Response:
     """Enter what was measured by hand on this part."""
-    standing = queries.characteristic_named(session, characteristic)
+    current = queries.characteristic_named(session, characteristic)
     entry = reading_queries.entry_of(session, characteristic)
     assert entry is not None
     try:
@@ -235,7 +235,7 @@ def send_measured_by_hand(
         if error.status == 404:
             raise
         session.expire_all()
-        return _reading(request, session, caller, standing, sequence, status=error.status, typed=form, problem=error)
+        return _reading(request, session, caller, current, sequence, status=error.status, typed=form, problem=error)
     return RedirectResponse(chart.reading_link(characteristic, sequence), 303)
 
 
@@ -244,7 +244,7 @@ def send_exclusion(
     request: Request, session: SessionDep, caller: Operator, characteristic: str, sequence: Sequence_, form: FormDep
 ) -> Response:
     """Take the reading out of the statistics."""
-    standing = queries.characteristic_named(session, characteristic)
+    current = queries.characteristic_named(session, characteristic)
     entry = reading_queries.entry_of(session, characteristic)
     assert entry is not None
     try:
@@ -254,7 +254,7 @@ def send_exclusion(
         if error.status == 404:
             raise
         session.expire_all()
-        return _reading(request, session, caller, standing, sequence, status=error.status, typed=form, problem=error)
+        return _reading(request, session, caller, current, sequence, status=error.status, typed=form, problem=error)
     return RedirectResponse(chart.reading_link(characteristic, sequence), 303)
 
 
@@ -262,20 +262,20 @@ def _reading(
     request: Request,
     session: Session,
     caller: Caller,
-    standing: Standing,
+    current: CurrentCharacteristic,
     sequence: int,
     *,
     status: int = 200,
     typed: Mapping[str, str] | None = None,
     problem: InbandError | None = None,
 ) -> Response:
-    shown_decision = decision(session, standing, sequence)
-    version = version_of(session, standing, shown_decision.reading["parameters_version"])
+    shown_decision = decision(session, current, sequence)
+    version = version_of(session, current, shown_decision.reading["parameters_version"])
     limits = queries.parameters_of(
-        session, standing.machine.id, standing.characteristic.id, shown_decision.reading["parameters_version"]
+        session, current.machine.id, current.characteristic.id, shown_decision.reading["parameters_version"]
     )
-    newest = statistics.window_of(session, standing.characteristic).newest
-    key = standing.characteristic.key
+    newest = statistics.window_of(session, current.characteristic).newest
+    key = current.characteristic.key
     around = {"first": max(1, sequence - AROUND), "through": min(newest, sequence + AROUND), "ringed": sequence}
     return page(
         request,
@@ -283,11 +283,11 @@ def _reading(
         status=status,
         decision=shown_decision,
         reading=shown_decision.reading,
-        characteristic=standing.characteristic,
-        machine=standing.machine,
+        characteristic=current.characteristic,
+        machine=current.machine,
         judged_by=version,
         origin=calibrations.origin(
-            session, standing.machine, limits.average_memory, shown_decision.reading["received_at"]
+            session, current.machine, limits.average_memory, shown_decision.reading["received_at"]
         )
         if "empirical_value" in shown_decision.reading["reason"]["notes"]
         else None,

@@ -13,7 +13,7 @@ from app.errors import InbandError, Invalid
 from app.files.documents.content import Paper
 from app.language.i18n import _, current_language
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.views.reports import actions, queries
@@ -137,11 +137,11 @@ def _page(
     )
 
 
-def _by_machine(session: Session) -> list[tuple[str, list[Standing]]]:
+def _by_machine(session: Session) -> list[tuple[str, list[CurrentCharacteristic]]]:
     """Characteristics under their machines."""
-    by_machine: dict[str, list[Standing]] = {}
-    for standing in characteristics.characteristics(session, limit=MOST_SHOWN):
-        by_machine.setdefault(standing.machine.name, []).append(standing)
+    by_machine: dict[str, list[CurrentCharacteristic]] = {}
+    for current in characteristics.characteristics(session, limit=MOST_SHOWN):
+        by_machine.setdefault(current.machine.name, []).append(current)
     return sorted(by_machine.items())
 
 

@@ -35,32 +35,32 @@ def report_page(
     section: Annotated[list[str] | None, Query()] = None,
 ) -> Response:
     """The report as it is printed, and its files."""
-    standing = characteristics.characteristic_named(session, characteristic)
+    current = characteristics.characteristic_named(session, characteristic)
     typed_fields = {name: request.query_params.get(name, "")[:100] for name in FIELDS}
     try:
         report_request, problem = typed(typed_fields, section or ()), None
     except Invalid as error:
         report_request, problem = ReportRequest(), error
-    report = None if problem else queries.report_of(session, standing, report_request, datetime.now(UTC))
+    report = None if problem else queries.report_of(session, current, report_request, datetime.now(UTC))
     failing = proof.failing()
     return page(
         request,
         "reports/report.html",
         status=problem.status if problem else 200,
-        characteristic=standing.characteristic,
-        machine=standing.machine,
+        characteristic=current.characteristic,
+        machine=current.machine,
         report=report,
         report_request=report_request,
         given=typed_fields,
         errors=_errors(problem),
         sections=[(name.value, queries.title_of(name), name in report_request.sections) for name in SectionName],
         papers=[(Paper.A4.value, "A4"), (Paper.LETTER.value, "Letter")],
-        runs=_runs(standing.characteristic.key, typed_fields, report_request),
+        runs=_runs(current.characteristic.key, typed_fields, report_request),
         files=[
             (
                 form.value,
                 form.value.upper(),
-                f"/api/v1/characteristics/{standing.characteristic.key}/report.{form.value}?{_query(report_request)}",
+                f"/api/v1/characteristics/{current.characteristic.key}/report.{form.value}?{_query(report_request)}",
             )
             for form in Format
         ],

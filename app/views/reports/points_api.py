@@ -69,23 +69,23 @@ def get_control_points(
 
     Without a baseline in force: deviations and no limits.
     """
-    standing = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    window = statistics.window_of(session, standing.characteristic, **choice._asdict())
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    window = statistics.window_of(session, current.characteristic, **choice._asdict())
     baseline = (
-        queries.baseline_in_force(session, standing.characteristic)
+        queries.baseline_in_force(session, current.characteristic)
         if version is None
-        else queries.baseline_of(session, standing.characteristic, version)
+        else queries.baseline_of(session, current.characteristic, version)
     )
     view = (
-        charts.unjudged(session, standing, window)
+        charts.unjudged(session, current, window)
         if baseline is None
-        else charts.view(session, standing, baseline, window, chart)
+        else charts.view(session, current, baseline, window, chart)
     )
     file = io.StringIO(newline="")
     writer = csv.writer(file, lineterminator="\r\n")
     writer.writerow(COLUMNS)
     writer.writerows(_rows(view, "" if baseline is None else baseline.version))
-    name = f"control-{standing.characteristic.key}-{view.kind.value}.csv"
+    name = f"control-{current.characteristic.key}-{view.kind.value}.csv"
     return download(("\ufeff" + file.getvalue()).encode(), name, MEDIA_TYPES[Format.CSV])
 
 

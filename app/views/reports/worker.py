@@ -123,8 +123,8 @@ class ReportWorker:
         content, trouble = None, None
         try:
             with self._database.begin() as session:
-                standing = characteristics.characteristic_named(session, key)
-                report = queries.report_of(session, standing, bundle.request, datetime.now(UTC))
+                current = characteristics.characteristic_named(session, key)
+                report = queries.report_of(session, current, bundle.request, datetime.now(UTC))
             content = bundle.part(report)
         except InbandError as error:
             trouble = f"{error.detail} {error.what_to_do or ''}".strip()

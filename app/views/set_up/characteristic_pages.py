@@ -44,7 +44,7 @@ def characteristics_page(
         "characteristics.html",
         caller,
         "characteristics",
-        part=part_of(rows, ON_PAGE, after, lambda standing: standing.characteristic.key, link, "after"),
+        part=part_of(rows, ON_PAGE, after, lambda current: current.characteristic.key, link, "after"),
         machines=machines.machines(session, limit=100_000),
         machine=chosen,
         mode_words=lambda mode: parameter_form.choice("mode", mode.value),
@@ -57,10 +57,10 @@ def new_characteristic_page(
 ) -> Response:
     typed = parameter_form.typed_defaults() | {"machine": machine}
     if like:
-        standing = queries.characteristic_named(session, like)
-        typed = parameter_form.typed_from(standing.version.parameters) | {
-            "machine": standing.machine.key,
-            "part": standing.characteristic.part or "",
+        current = queries.characteristic_named(session, like)
+        typed = parameter_form.typed_from(current.version.parameters) | {
+            "machine": current.machine.key,
+            "part": current.characteristic.part or "",
         }
     return _new(request, session, caller, typed, {})
 
@@ -111,12 +111,12 @@ def prefilled_new(request: Request, session: Session, caller: Caller, typed: Map
 @router.get("/setup/characteristics/{characteristic}")
 def characteristic_page(request: Request, session: SessionDep, caller: Viewer, characteristic: str) -> Response:
     """Parameters named in the address (`?zero_range=0.0012&reason=…`) are typed into the form; nothing is changed by it."""
-    standing = queries.characteristic_named(session, characteristic)
+    current = queries.characteristic_named(session, characteristic)
     suggested = {name: text[:1000] for name, text in request.query_params.items() if name in {*BY_NAME, "reason"}}
     if not suggested:
-        return _characteristic(request, session, caller, standing)
-    typed = parameter_form.typed_from(standing.version.parameters) | suggested
-    return prefilled_change(request, session, caller, standing, typed)
+        return _characteristic(request, session, caller, current)
+    typed = parameter_form.typed_from(current.version.parameters) | suggested
+    return prefilled_change(request, session, caller, current, typed)
 
 
 @router.post("/setup/characteristics/{characteristic}")
@@ -125,8 +125,8 @@ def send_characteristic(
 ) -> Response:
     version = form.get("parameters_version", "")
     looked_at = int(version) if version.isascii() and version.isdigit() and len(version) < 10 else None
-    standing = queries.characteristic_named(session, characteristic)
-    before = (standing.version.version, standing.characteristic.name, standing.characteristic.part)
+    current = queries.characteristic_named(session, characteristic)
+    before = (current.version.version, current.characteristic.name, current.characteristic.part)
     try:
         change = parsed(
             CharacteristicChange,
@@ -139,7 +139,7 @@ def send_characteristic(
         )
         part = parsed(CharacteristicChange, {"part": form.get("part", "").strip()}).part
         change = change.model_copy(update={"part": part})
-        standing = actions.change_characteristic(session, characteristic, change, caller.name)
+        current = actions.change_characteristic(session, characteristic, change, caller.name)
     except InbandError as error:
         if not error.errors and error.status != Conflict.status:
             raise
@@ -154,33 +154,33 @@ def send_characteristic(
             errors=by_field(error),
             problem=error if error.status == Conflict.status else None,
         )
-    after = (standing.version.version, standing.characteristic.name, standing.characteristic.part)
+    after = (current.version.version, current.characteristic.name, current.characteristic.part)
     done = "same" if before == after else "changed"
     return RedirectResponse(f"/setup/characteristics/{quote(characteristic)}?done={done}", 303)
 
 
 def prefilled_change(
-    request: Request, session: Session, caller: Caller, standing: queries.Standing, typed: Mapping[str, str]
+    request: Request, session: Session, caller: Caller, current: queries.CurrentCharacteristic, typed: Mapping[str, str]
 ) -> Response:
     """The form of a characteristic with other parameters typed into it; nothing is changed until it is sent."""
-    names = {"name": standing.characteristic.name, "part": standing.characteristic.part or ""}
-    return _characteristic(request, session, caller, standing, typed=names | dict(typed))
+    names = {"name": current.characteristic.name, "part": current.characteristic.part or ""}
+    return _characteristic(request, session, caller, current, typed=names | dict(typed))
 
 
 def _characteristic(
     request: Request,
     session: Session,
     caller: Caller,
-    standing: queries.Standing,
+    current: queries.CurrentCharacteristic,
     *,
     status: int = 200,
     typed: Mapping[str, str] | None = None,
     errors: Mapping[str, str] | None = None,
     problem: InbandError | None = None,
 ) -> Response:
-    characteristic = standing.characteristic
+    characteristic = current.characteristic
     if typed is None:
-        typed = parameter_form.typed_from(standing.version.parameters) | {
+        typed = parameter_form.typed_from(current.version.parameters) | {
             "name": characteristic.name,
             "part": characteristic.part or "",
         }
@@ -191,25 +191,25 @@ def _characteristic(
         "characteristics",
         status=status,
         characteristic=characteristic,
-        machine=standing.machine,
-        version=standing.version,
+        machine=current.machine,
+        version=current.version,
         problem=problem,
-        warnings=actions.warnings_of(standing, queries.target_before(session, standing)),
+        warnings=actions.warnings_of(current, queries.target_before(session, current)),
         history=history(queries.versions(session, characteristic)),
-        program=programs.program_view(standing),
+        program=programs.program_view(current),
         proposals=[
             (row, wording.proposed(row))
             for row in what_if.proposals(session, characteristic=characteristic, status="open")
         ],
-        suggested_jump=_suggested_jump(session, standing),
+        suggested_jump=_suggested_jump(session, current),
         **_form(typed, errors or {}),
     )
 
 
-def _suggested_jump(session: Session, standing: queries.Standing) -> float | None:
+def _suggested_jump(session: Session, current: queries.CurrentCharacteristic) -> float | None:
     """Largest plausible jump that the last readings suggest, mm."""
-    factor = standing.parameters.factor
-    characteristic = standing.characteristic
+    factor = current.parameters.factor
+    characteristic = current.characteristic
     return suggested_jump(
         readings.course_of(session, characteristic.machine_id, characteristic.id, factor, LOOKED_BACK)
     )

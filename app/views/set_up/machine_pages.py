@@ -61,8 +61,8 @@ def signal_paths() -> list[tuple[str, str]]:
 @router.get("/setup/machines")
 def machines_page(request: Request, session: SessionDep, caller: Viewer) -> Response:
     counts: dict[int, int] = {}
-    for standing in characteristics.characteristics(session, limit=100_000):
-        counts[standing.machine.id] = counts.get(standing.machine.id, 0) + 1
+    for current in characteristics.characteristics(session, limit=100_000):
+        counts[current.machine.id] = counts.get(current.machine.id, 0) + 1
     return setup_page(
         request,
         "machines.html",

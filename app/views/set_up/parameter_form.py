@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from app.core.number_text import number_or_none, plain
-from app.core.parameters import BY_NAME, FIELDS, Field, Kind, mean_nominal
+from app.core.parameters import BY_NAME, FIELDS, Field, FieldKind, mean_nominal
 from app.core.programs.lines import written
 from app.language.i18n import _
 from app.language.numbers import short, um_limit
@@ -45,7 +45,7 @@ def _input(field: Field) -> Input:
         field.r,
         label(field.name),
         explanation(field.name),
-        "mm" if field.kind is Kind.LENGTH else units.get(field.name),
+        "mm" if field.kind is FieldKind.LENGTH else units.get(field.name),
         not field.required and field.default is None and field.name not in {*DRAWING, *DIRECT, "factor"},
         [(value, choice(field.name, value)) for value in field.choices],
     )
@@ -126,9 +126,9 @@ def parameters_from(form: Mapping[str, str]) -> dict[str, Any]:
     parameters: dict[str, Any] = {}
     for field in FIELDS:
         text = form.get(field.name, "").strip()
-        if field.kind is Kind.YES_NO:
+        if field.kind is FieldKind.YES_NO:
             parameters[field.name] = text == "true"
-        elif field.kind is Kind.CHOICE:
+        elif field.kind is FieldKind.CHOICE:
             parameters[field.name] = text or None
         else:
             parameters[field.name] = number(text)

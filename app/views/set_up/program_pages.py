@@ -64,10 +64,10 @@ def _sent(request: Request, session: Session, caller: Caller, typed: dict[str, s
         if do == "create":
             return characteristic_pages.prefilled_new(request, session, caller, _typed_new(session, examined.program))
         key = typed.get("characteristic", "")
-        standing = queries.characteristic_named(session, key)
-        merged = actions.merged(standing.version.parameters, examined.program.parameters)
+        current = queries.characteristic_named(session, key)
+        merged = actions.merged(current.version.parameters, examined.program.parameters)
         return characteristic_pages.prefilled_change(
-            request, session, caller, standing, parameter_form.typed_partly(merged) | {"reason": _("From program text")}
+            request, session, caller, current, parameter_form.typed_partly(merged) | {"reason": _("From program text")}
         )
     return _page(request, session, caller, typed, examined)
 
@@ -201,14 +201,14 @@ def program_page(
     probe: Annotated[str, Query(max_length=40)] = "axial",
 ) -> Response:
     """The measuring or calibration program of a characteristic, to copy and download."""
-    standing = queries.characteristic_named(session, characteristic)
-    chosen = control if control in programs.WRITTEN else standing.machine.control
+    current = queries.characteristic_named(session, characteristic)
+    chosen = control if control in programs.WRITTEN else current.machine.control
     if chosen not in programs.WRITTEN:
         chosen = programs.WRITTEN[0]
     kind = kind if kind in get_args(programs.Kind) else "measuring"
     options = {"surface": surface if surface == "groove" else "free", "probe": probe if probe == "radial" else "axial"}
     size, wrong = _gauge(gauge)
-    text = programs.program_of(standing, chosen, kind, gauge=size, **options)  # type: ignore[arg-type]
+    text = programs.program_of(current, chosen, kind, gauge=size, **options)  # type: ignore[arg-type]
     download_query = {"control": chosen, "kind": kind}
     if kind == "calibration":
         download_query |= options | ({"gauge": gauge} if size is not None else {})
@@ -217,7 +217,7 @@ def program_page(
         "program.html",
         caller,
         "characteristics",
-        standing=standing,
+        current=current,
         text=text,
         control=chosen,
         kind=kind,
@@ -225,9 +225,9 @@ def program_page(
         gauge=gauge,
         errors={"gauge": wrong} if wrong else {},
         controls=[("sinumerik", "Sinumerik"), ("fanuc", "Fanuc")],
-        download=f"/api/v1/characteristics/{standing.characteristic.key}/program?{urlencode(download_query)}",
-        file=programs.file_name(standing, chosen, kind),  # type: ignore[arg-type]
-        address=lambda **query: f"/setup/characteristics/{standing.characteristic.key}/program?{urlencode(query)}",
+        download=f"/api/v1/characteristics/{current.characteristic.key}/program?{urlencode(download_query)}",
+        file=programs.file_name(current, chosen, kind),  # type: ignore[arg-type]
+        address=lambda **query: f"/setup/characteristics/{current.characteristic.key}/program?{urlencode(query)}",
     )
 
 

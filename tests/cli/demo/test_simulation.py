@@ -4,7 +4,7 @@ import pytest
 
 from app.cli.demo import plant
 from app.cli.demo.simulation import Machine, Probe
-from app.core.decision.decide import State, decide
+from app.core.decision.decide import LoopState, decide
 from app.core.decision.step import deviation_of
 from app.core.parameters import read
 
@@ -89,13 +89,13 @@ def final_deviation(effect: plant.Effect, factor: float, parts: int = 25) -> flo
     machine = Machine(spec, 1)
     machine.edges[1].bias = 0.015
     parameters = replace(read(feature.parameters)[0], confidence_limit=1e6, wear_limit=1e5)
-    state, deviations = State(), []
+    state, deviations = LoopState(), []
     for number in range(parts):
         machine.cut()
         (probe,) = machine.measure()
         deviation = deviation_of(probe.size, parameters.target)
         decision = decide(parameters, state, deviation)
-        state = State(decision.average_after)
+        state = LoopState(decision.average_after)
         if decision.amount is not None:
             machine.edges[1].correct(number + 1, decision.amount)
         deviations.append(abs(deviation))

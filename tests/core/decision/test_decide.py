@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.core.decision.decide import ReadingAlarm, State, decide, outstanding_effect
+from app.core.decision.decide import LoopState, ReadingAlarm, decide, outstanding_effect
 from app.core.decision.limits import Zone
 from app.core.decision.step import Action, Code, average_of, deviation_of
 from app.core.parameters import Mode, Parameters, WearPolicy, read
@@ -60,7 +60,7 @@ def test_the_table_of_zones(
     shaft: Made, row: tuple[float, float, Zone, Action, Code, float | None, float, tuple[ReadingAlarm, ...]]
 ) -> None:
     deviation, before, zone, action, code, size_error, after, signals = row
-    decision = decide(shaft(), State(before / 1000), deviation / 1000)
+    decision = decide(shaft(), LoopState(before / 1000), deviation / 1000)
     assert (decision.zone, decision.action, decision.code, decision.alarms) == (zone, action, code, signals)
     assert decision.average_after == pytest.approx(after / 1000)
     if size_error is None:
@@ -96,7 +96,7 @@ def test_a_correction_brings_the_next_part_to_the_target(
         }
         return 39.992 + error + move[surface]
 
-    decision = decide(shaft(factor=factor), State(), deviation_of(size(0.0), 39.992))
+    decision = decide(shaft(factor=factor), LoopState(), deviation_of(size(0.0), 39.992))
     assert decision.amount is not None
     assert size(decision.amount) == pytest.approx(39.992, abs=1e-9)
 
@@ -104,15 +104,15 @@ def test_a_correction_brings_the_next_part_to_the_target(
 def test_without_a_memory_location_k_damps_to_a_kth(shaft: Made) -> None:
     """R11 = 0: M_old is always 0."""
     parameters = shaft(average_memory=0, weighting_factor=2)
-    decision = decide(parameters, State(0.9), 0.004)
+    decision = decide(parameters, LoopState(0.9), 0.004)
     assert decision.average_before == 0.0
     assert decision.size_error == pytest.approx(0.002)
-    kept = decide(parameters, State(0.9), 0.0015)
+    kept = decide(parameters, LoopState(0.9), 0.0015)
     assert (kept.code, kept.average_after) == (Code.AVERAGE_KEPT, 0.0)
 
 
 def test_while_paused_it_is_judged_but_nothing_is_corrected(shaft: Made) -> None:
-    decision = decide(shaft(), State(0.0012, paused=True), 0.009)
+    decision = decide(shaft(), LoopState(0.0012, paused=True), 0.009)
     assert (decision.zone, decision.action, decision.code) == (Zone.OVERSIZE, Action.NONE, Code.PAUSED)
     assert decision.amount is None
     assert decision.average_after == 0.0012
@@ -120,14 +120,14 @@ def test_while_paused_it_is_judged_but_nothing_is_corrected(shaft: Made) -> None
 
 def test_measure_only_runs_the_average_and_alarms_but_never_corrects(shaft: Made) -> None:
     for parameters in (shaft(mode=Mode.MEASURE_ONLY.value), shaft(tool_memory=0)):
-        decision = decide(parameters, State(0.0), 0.009)
+        decision = decide(parameters, LoopState(0.0), 0.009)
         assert (decision.action, decision.amount, decision.code) == (Action.NONE, None, Code.MEASURE_ONLY)
         assert decision.average_after == pytest.approx(0.0045)
         assert decision.alarms == (ReadingAlarm.OVERSIZE,)
 
 
 def test_wear_may_be_released_at_once(shaft: Made) -> None:
-    decision = decide(shaft(wear_policy=WearPolicy.RELEASE.value), State(0.0012), 0.4)
+    decision = decide(shaft(wear_policy=WearPolicy.RELEASE.value), LoopState(0.0012), 0.4)
     assert (decision.action, decision.code) == (Action.CORRECT, Code.TOOL_WORN_RELEASED)
     assert decision.amount == pytest.approx(-0.4)
     assert decision.average_after == 0.0012
@@ -137,7 +137,7 @@ def test_wear_may_be_released_at_once(shaft: Made) -> None:
 def test_no_step_is_larger_than_max_step(size: float, factor: float, max_step: float) -> None:
     parameters = read(SHAFT | {"factor": factor, "max_step": max_step, "weighting_factor": 1})[0]
     for deviation in (size, -size):
-        decision = decide(parameters, State(), round(deviation, 6))
+        decision = decide(parameters, LoopState(), round(deviation, 6))
         assert decision.amount is not None
         assert abs(decision.amount) <= max_step + 1e-9
         assert copysign(1, decision.amount) == copysign(1, factor * deviation)
@@ -147,13 +147,13 @@ def test_no_step_is_larger_than_max_step(size: float, factor: float, max_step: f
 
 def test_beyond_max_total_the_tool_is_not_corrected_any_more(shaft: Made) -> None:
     parameters = shaft(max_total=0.02)
-    assert decide(parameters, State(total=-0.0139), 0.0061).action is Action.CORRECT
-    stopped = decide(parameters, State(total=-0.014), 0.0061)
+    assert decide(parameters, LoopState(total=-0.0139), 0.0061).action is Action.CORRECT
+    stopped = decide(parameters, LoopState(total=-0.014), 0.0061)
     assert (stopped.action, stopped.amount, stopped.code) == (Action.NONE, None, Code.OFFSET_LIMIT)
     assert ReadingAlarm.OFFSET_LIMIT in stopped.alarms
-    back = decide(parameters, State(total=-0.0199), -0.0061)
+    back = decide(parameters, LoopState(total=-0.0199), -0.0061)
     assert back.action is Action.CORRECT
-    lowered = decide(parameters, State(total=-0.05), -0.0061)
+    lowered = decide(parameters, LoopState(total=-0.05), -0.0061)
     assert lowered.action is Action.CORRECT, "towards zero is allowed even from beyond"
 
 
@@ -167,8 +167,8 @@ def test_a_part_cut_with_the_old_offset_is_decided_as_if_it_had_the_new_one(
 ) -> None:
     parameters = read(SHAFT | {"factor": factor})[0]
     effect = outstanding_effect(issued, factor)
-    decision = decide(parameters, State(), deviation, outstanding=effect)
-    as_if = decide(parameters, State(), round(deviation + effect, 9))
+    decision = decide(parameters, LoopState(), deviation, outstanding=effect)
+    as_if = decide(parameters, LoopState(), round(deviation + effect, 9))
     assert decision.deviation == deviation, "the raw deviation is what is stored"
     assert (decision.zone, decision.action, decision.amount, decision.average_after) == (
         as_if.zone,
@@ -181,41 +181,41 @@ def test_a_part_cut_with_the_old_offset_is_decided_as_if_it_had_the_new_one(
 def test_the_same_error_seen_again_before_the_correction_took_effect_corrects_nothing(shaft: Made) -> None:
     for factor in (-1.0, -0.5, 0.5):
         parameters = shaft(factor=factor)
-        first = decide(parameters, State(), 0.0061)
+        first = decide(parameters, LoopState(), 0.0061)
         assert first.amount is not None
-        again = decide(parameters, State(), 0.0061, outstanding=outstanding_effect([first.amount], factor))
+        again = decide(parameters, LoopState(), 0.0061, outstanding=outstanding_effect([first.amount], factor))
         assert (again.decided, again.zone, again.action) == (0.0, Zone.ZERO, Action.NONE)
 
 
 def test_a_bad_part_is_told_even_when_its_error_has_been_corrected_since(shaft: Made) -> None:
-    decision = decide(shaft(), State(), 0.0095, outstanding=-0.0095)
+    decision = decide(shaft(), LoopState(), 0.0095, outstanding=-0.0095)
     assert (decision.zone, decision.action, decision.good) == (Zone.ZERO, Action.NONE, False)
     assert decision.alarms == (ReadingAlarm.OVERSIZE,)
 
 
 def test_a_good_part_is_not_called_bad_because_of_a_correction_still_to_come(shaft: Made) -> None:
-    decision = decide(shaft(), State(), -0.0017, outstanding=0.02)
+    decision = decide(shaft(), LoopState(), -0.0017, outstanding=0.02)
     assert (decision.zone, decision.action, decision.good) == (Zone.OVERSIZE, Action.CORRECT, True)
     assert decision.alarms == ()
 
 
 def test_a_probe_fault_is_told_by_the_raw_deviation(shaft: Made) -> None:
-    decision = decide(shaft(), State(), 1.0, outstanding=-0.9)
+    decision = decide(shaft(), LoopState(), 1.0, outstanding=-0.9)
     assert (decision.zone, decision.action) == (Zone.PROBE_FAULT, Action.STOP)
 
 
 def test_a_part_of_the_tool_before_says_nothing_about_this_one(shaft: Made) -> None:
     for deviation in (0.0061, 0.009, 0.4):
-        decision = decide(shaft(), State(0.0012), deviation, previous_tool=True)
+        decision = decide(shaft(), LoopState(0.0012), deviation, previous_tool=True)
         assert (decision.action, decision.amount, decision.average_after) == (Action.NONE, None, 0.0012)
         assert decision.code is Code.BEFORE_TOOL_CHANGE
 
 
 def test_a_rejected_part_corrects_nothing_unless_it_may(shaft: Made) -> None:
-    decision = decide(shaft(), State(), 0.009, accepted=False)
+    decision = decide(shaft(), LoopState(), 0.009, accepted=False)
     assert (decision.action, decision.code) == (Action.NONE, Code.REJECTED)
     assert ReadingAlarm.ACCEPTANCE in decision.alarms
-    allowed = decide(shaft(rejected_may_correct=True), State(), 0.009, accepted=False)
+    allowed = decide(shaft(rejected_may_correct=True), LoopState(), 0.009, accepted=False)
     assert allowed.action is Action.CORRECT
 
 
@@ -224,7 +224,7 @@ def test_the_decisions_are_those_of_the_mirrored_deviations_mirrored(sizes_nm: l
     parameters = read(SHAFT | {"weighting_factor": k})[0]
     one = other = 0.0
     for size in sizes_nm:
-        a, b = decide(parameters, State(one), size / 1e6), decide(parameters, State(other), -size / 1e6)
+        a, b = decide(parameters, LoopState(one), size / 1e6), decide(parameters, LoopState(other), -size / 1e6)
         assert a.action is b.action
         assert (a.amount is None) == (b.amount is None)
         if a.amount is not None and b.amount is not None:

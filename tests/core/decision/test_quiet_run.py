@@ -6,7 +6,7 @@ import hypothesis.strategies as st
 import numpy as np
 from hypothesis import given, settings
 
-from app.core.decision.decide import State, decide
+from app.core.decision.decide import LoopState, decide
 from app.core.decision.limits import ZONES
 from app.core.decision.loops import FARTHEST, Quiet, Series, quiet_run, rows_of
 from app.core.decision.step import CODES, Action, deviation_of
@@ -56,7 +56,7 @@ def test_what_it_decides_is_what_decide_decides(readings: list[tuple[float, int]
             break
         parameters, empirical_value, outstanding, stream, memory, _quiet = SERIES[which]
         deviation = deviation_of(value, parameters.target, empirical_value)
-        d = decide(parameters, State(kept[memory]), deviation, outstanding=outstanding)
+        d = decide(parameters, LoopState(kept[memory]), deviation, outstanding=outstanding)
         if i == end:
             assert d.action is not Action.NONE or d.alarms or d.zone not in ZONES[:3] or abs(value) > FARTHEST / 2
             break

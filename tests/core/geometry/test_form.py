@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.core.geometry.elements import Section, WrongSection
-from app.core.geometry.form import Form, Kind, Method, ProbedFeature, Verdict, printed_straightness, verdict
+from app.core.geometry.form import Form, FormKind, Method, ProbedFeature, Verdict, printed_straightness, verdict
 from app.core.geometry.points import Degenerate, Reason
 from app.core.geometry.relations import DatumRefused, Task, corrected, evaluate
 from app.core.geometry.suspect_points import in_bore
@@ -48,13 +48,13 @@ RING = ((10.0, 0.0), (0.0, 10.0), (-10.0, 0.0))
 @pytest.mark.parametrize(
     ("kind", "feature"),
     [
-        (Kind.ROUNDNESS, ProbedFeature((Section((*RING, RING[0])),))),
-        (Kind.FLATNESS, ProbedFeature(points=((0, 0, 0), (9, 0, 0.1), (0, 9, 0), (0, 9, 0)))),
-        (Kind.STRAIGHTNESS, ProbedFeature(points=((0, 0), (9, 0.1), (9, 0.1)))),
-        (Kind.AXIS_STRAIGHTNESS, ProbedFeature((Section(RING, 0.0), Section(RING, 20.0), Section(RING, 0.0)))),
+        (FormKind.ROUNDNESS, ProbedFeature((Section((*RING, RING[0])),))),
+        (FormKind.FLATNESS, ProbedFeature(points=((0, 0, 0), (9, 0, 0.1), (0, 9, 0), (0, 9, 0)))),
+        (FormKind.STRAIGHTNESS, ProbedFeature(points=((0, 0), (9, 0.1), (9, 0.1)))),
+        (FormKind.AXIS_STRAIGHTNESS, ProbedFeature((Section(RING, 0.0), Section(RING, 20.0), Section(RING, 0.0)))),
     ],
 )
-def test_a_touch_that_was_copied_is_no_further_touch(kind: Kind, feature: ProbedFeature) -> None:
+def test_a_touch_that_was_copied_is_no_further_touch(kind: FormKind, feature: ProbedFeature) -> None:
     """Three points lie on a circle and a plane, two on a line: the same again would make a perfect form."""
     with pytest.raises((Degenerate, WrongSection)) as refused:
         evaluate(Task(kind, feature))
@@ -68,90 +68,92 @@ def test_touches_in_a_row_are_no_surface() -> None:
     aside = (0.0004, -0.0003, 0.0005, -0.0005, 0.0001, 0.0002)
     row = tuple((20.0 * at, 5.0 + y, 0.05 * (at / 2.5 - 1) ** 2) for at, y in enumerate(aside))
     tasks = (
-        Task(Kind.FLATNESS, ProbedFeature(points=row)),
-        Task(Kind.PARALLELISM, ProbedFeature(points=row), ProbedFeature(points=plate())),
-        Task(Kind.PERPENDICULARITY, ProbedFeature(points=plate()), ProbedFeature(points=row)),
+        Task(FormKind.FLATNESS, ProbedFeature(points=row)),
+        Task(FormKind.PARALLELISM, ProbedFeature(points=row), ProbedFeature(points=plate())),
+        Task(FormKind.PERPENDICULARITY, ProbedFeature(points=plate()), ProbedFeature(points=row)),
     )
     for task in tasks:
         with pytest.raises((Degenerate, DatumRefused), match="collinear"):
             evaluate(task)
     rail = tuple((x, y, z) for x, _y, z in row for y in (0.0, 2.0))
-    assert by(evaluate(Task(Kind.FLATNESS, ProbedFeature(points=rail))))[Method.MINIMUM_ZONE] == pytest.approx(0.048)
+    assert by(evaluate(Task(FormKind.FLATNESS, ProbedFeature(points=rail))))[Method.MINIMUM_ZONE] == pytest.approx(
+        0.048
+    )
 
 
 class TestByHand:
     def test_an_oval(self) -> None:
         oval = ProbedFeature((Section(((10.01, 0.0), (0.0, 9.99), (-10.01, 0.0), (0.0, -9.99))),))
-        assert by(evaluate(Task(Kind.ROUNDNESS, oval))) == pytest.approx(
+        assert by(evaluate(Task(FormKind.ROUNDNESS, oval))) == pytest.approx(
             dict.fromkeys([Method.MINIMUM_ZONE, Method.LEAST_SQUARES, Method.INSCRIBED, Method.CIRCUMSCRIBED], 0.02)
         )
 
     def test_of_several_sections_the_worst_counts(self) -> None:
         bad = Section(((10.03, 0.0), (0.0, 9.99), (-10.03, 0.0), (0.0, -9.99)), 20.0)
-        found = evaluate(Task(Kind.ROUNDNESS, ProbedFeature((section(0, 0, 0.0), bad, section(0, 0, 40.0)))))
+        found = evaluate(Task(FormKind.ROUNDNESS, ProbedFeature((section(0, 0, 0.0), bad, section(0, 0, 40.0)))))
         assert by(found)[Method.MINIMUM_ZONE] == pytest.approx(0.04)
         assert found.details["sections"][1]["minimum_zone"] == pytest.approx(0.04)
 
     def test_a_profile_in_a_bow(self) -> None:
         """Heights 0, 0.01, 0.01, 0: the strip is 0.01 wide, and so is the range about the fitted line."""
         found = evaluate(
-            Task(Kind.STRAIGHTNESS, ProbedFeature(points=((0.0, 0.0), (10.0, 0.01), (20.0, 0.01), (30.0, 0.0))))
+            Task(FormKind.STRAIGHTNESS, ProbedFeature(points=((0.0, 0.0), (10.0, 0.01), (20.0, 0.01), (30.0, 0.0))))
         )
         assert by(found) == pytest.approx({Method.MINIMUM_ZONE: 0.01, Method.LEAST_SQUARES: 0.01})
 
     def test_a_saddle(self) -> None:
         """Corners up, corners down: two opposite corners on either plane."""
         corners = ((0.0, 0.0, 0.02), (10.0, 0.0, 0.0), (0.0, 10.0, 0.0), (10.0, 10.0, 0.02))
-        found = evaluate(Task(Kind.FLATNESS, ProbedFeature(points=corners)))
+        found = evaluate(Task(FormKind.FLATNESS, ProbedFeature(points=corners)))
         assert by(found) == pytest.approx({Method.MINIMUM_ZONE: 0.02, Method.LEAST_SQUARES: 0.02})
 
     def test_a_bent_axis(self) -> None:
         """Centres 0, 0.01, 0 at equal distances: least squares takes 2/3 of the bow as the greatest distance."""
-        found = by(evaluate(Task(Kind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0.01, 0, 30), (0, 0, 60)]))))
+        found = by(evaluate(Task(FormKind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0.01, 0, 30), (0, 0, 60)]))))
         assert found[Method.MINIMUM_ZONE] == pytest.approx(0.01, rel=1e-6)
         assert found[Method.LEAST_SQUARES] == pytest.approx(2 * 0.01 * 2 / 3, rel=1e-6)
 
     def test_heights_matter_where_the_printed_method_ignores_them(self) -> None:
         """An axis bent in the plane of X and Z alone: seen from above all centres lie on one line."""
-        found = by(evaluate(Task(Kind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0.02, 0, 30), (0.01, 0, 60)]))))
+        found = by(evaluate(Task(FormKind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0.02, 0, 30), (0.01, 0, 60)]))))
         assert found[Method.PRINTED] == pytest.approx(0, abs=1e-9)
         assert found[Method.MINIMUM_ZONE] == pytest.approx(0.015, rel=1e-6)
-        tilted = by(evaluate(Task(Kind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0.02, 0, 30), (0.04, 0, 60)]))))
+        tilted = by(evaluate(Task(FormKind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0.02, 0, 30), (0.04, 0, 60)]))))
         assert tilted[Method.LEAST_SQUARES] == pytest.approx(0, abs=1e-9)
 
     def test_coaxiality_and_position_are_diameters(self) -> None:
         datum, off = bore([(0, 0, 0), (0, 0, 50)]), bore([(0.003, 0.004, 80)])
-        assert evaluate(Task(Kind.COAXIALITY, off, datum)).values[0].value == pytest.approx(0.01)
+        assert evaluate(Task(FormKind.COAXIALITY, off, datum)).values[0].value == pytest.approx(0.01)
         leaning = bore([(0, 0, 0), (0.01, 0, 50)])  # carried on to 100 the datum axis is 0.02 off
-        assert evaluate(Task(Kind.COAXIALITY, bore([(0, 0, 100)]), leaning)).values[0].value == pytest.approx(
+        assert evaluate(Task(FormKind.COAXIALITY, bore([(0, 0, 100)]), leaning)).values[0].value == pytest.approx(
             0.04, rel=1e-6
         )
-        placed = Task(Kind.POSITION, bore([(30.003, -9.996, None)]), nominal=(30.0, -10.0))
+        placed = Task(FormKind.POSITION, bore([(30.003, -9.996, None)]), nominal=(30.0, -10.0))
         assert evaluate(placed).values[0].value == pytest.approx(0.01)
 
     @pytest.mark.parametrize(
         ("kind", "feature", "datum"),
         [
-            (Kind.PARALLELISM, ProbedFeature(points=plate(1e-4)), ProbedFeature(points=plate())),
-            (Kind.PARALLELISM, bore([(0, 0, 0), (0.01, 0, 100)]), bore([(50, 0, 0), (50, 0, 100)])),
+            (FormKind.PARALLELISM, ProbedFeature(points=plate(1e-4)), ProbedFeature(points=plate())),
+            (FormKind.PARALLELISM, bore([(0, 0, 0), (0.01, 0, 100)]), bore([(50, 0, 0), (50, 0, 100)])),
             (
-                Kind.PERPENDICULARITY,
+                FormKind.PERPENDICULARITY,
                 bore([(0, 0, 0), (0.01, 0, 100)]),
                 ProbedFeature(points=plate()),
             ),
             (
-                Kind.PERPENDICULARITY,
+                FormKind.PERPENDICULARITY,
                 ProbedFeature(points=plate(1e-4)),
                 bore([(0, 0, 0), (0, 0, 100)]),
             ),
             (
-                Kind.PERPENDICULARITY,
+                FormKind.PERPENDICULARITY,
                 ProbedFeature(points=tuple((1e-4 * z, y, z) for y in (0.0, 50.0, 100.0) for z in (0.0, 50.0, 100.0))),
                 ProbedFeature(points=plate()),
             ),
         ],
     )
-    def test_a_tilt_of_a_tenth_per_metre(self, kind: Kind, feature: ProbedFeature, datum: ProbedFeature) -> None:
+    def test_a_tilt_of_a_tenth_per_metre(self, kind: FormKind, feature: ProbedFeature, datum: ProbedFeature) -> None:
         found = evaluate(Task(kind, feature, datum))
         assert found.values[0].value == pytest.approx(0.01, rel=1e-4)
         assert found.details["angle"] == pytest.approx(np.degrees(1e-4), rel=1e-4)
@@ -161,20 +163,22 @@ class TestByHand:
     def test_an_axis_lying_along_a_plane(self) -> None:
         """An axis upright, a plane upright: parallel; tilted towards the plane by 0.02 on 100."""
         wall = ProbedFeature(points=tuple((0.0, y, z) for y in (0.0, 40.0, 80.0) for z in (0.0, 50.0, 100.0)))
-        found = evaluate(Task(Kind.PARALLELISM, bore([(30, 0, 0), (30.02, 0.5, 100)]), wall))
+        found = evaluate(Task(FormKind.PARALLELISM, bore([(30, 0, 0), (30.02, 0.5, 100)]), wall))
         assert found.values[0].value == pytest.approx(0.02, rel=1e-3)
 
 
 class TestPrinted:
     def test_the_table_gives_0_1555_by_its_own_method(self) -> None:
-        found = evaluate(Task(Kind.AXIS_STRAIGHTNESS, ProbedFeature(tuple(Section(touches) for touches in PRINTED))))
+        found = evaluate(
+            Task(FormKind.AXIS_STRAIGHTNESS, ProbedFeature(tuple(Section(touches) for touches in PRINTED)))
+        )
         assert round(by(found)[Method.PRINTED], 4) == 0.1555
         assert verdict(by(found)[Method.PRINTED], 0.005, None) is Verdict.BAD
 
     @pytest.mark.parametrize("heights", [None, (0.0, 20.0, 40.0, 60.0), (0.0, 5.0, 40.0, 90.0)])
     def test_and_is_seen_through(self, heights: tuple[float, ...] | None) -> None:
         sections = tuple(Section(touches, heights[at] if heights else None) for at, touches in enumerate(PRINTED))
-        task = Task(Kind.AXIS_STRAIGHTNESS, ProbedFeature(sections))
+        task = Task(FormKind.AXIS_STRAIGHTNESS, ProbedFeature(sections))
         found = evaluate(task)
         (suspect,) = found.suspicion.suspects
         assert (suspect.section, suspect.touch, suspect.given) == (2, 1, (23.99, -7.346))
@@ -187,7 +191,9 @@ class TestPrinted:
 
     def test_with_23_896_nothing_is_suspected(self) -> None:
         repaired = ((PRINTED[0]), ((23.896, -7.346), *PRINTED[1][1:]), *PRINTED[2:])
-        found = evaluate(Task(Kind.AXIS_STRAIGHTNESS, ProbedFeature(tuple(Section(touches) for touches in repaired))))
+        found = evaluate(
+            Task(FormKind.AXIS_STRAIGHTNESS, ProbedFeature(tuple(Section(touches) for touches in repaired)))
+        )
         assert found.suspicion.suspects == ()
         assert by(found)[Method.PRINTED] < 0.01
 
@@ -223,8 +229,8 @@ class TestMoved:
         turn, shift = rotation(random), np.array([far, far / 2, -far])
         points = np.column_stack([random.uniform(-80, 80, (9, 2)), random.normal(0, 0.01, 9)])
         moved = tuple(map(tuple, (points @ turn.T + shift).tolist()))
-        here = by(evaluate(Task(Kind.FLATNESS, ProbedFeature(points=tuple(map(tuple, points.tolist()))))))
-        assert by(evaluate(Task(Kind.FLATNESS, ProbedFeature(points=moved)))) == pytest.approx(here, abs=1e-8)
+        here = by(evaluate(Task(FormKind.FLATNESS, ProbedFeature(points=tuple(map(tuple, points.tolist()))))))
+        assert by(evaluate(Task(FormKind.FLATNESS, ProbedFeature(points=moved)))) == pytest.approx(here, abs=1e-8)
 
     @settings(max_examples=8)
     @given(seeds, st.floats(0, 360), st.floats(-3000, 3000))
@@ -247,7 +253,7 @@ class TestMoved:
             (float(x), float(y), 25.0 * at) for at, (x, y) in enumerate(random.normal(0, 0.01, (4, 2)))
         ]
         feature, datum = bore(centres), bore([(0, 0, 150), (0.01, 0.02, 250)])
-        for kind in (Kind.AXIS_STRAIGHTNESS, Kind.ROUNDNESS, Kind.COAXIALITY, Kind.PARALLELISM):
+        for kind in (FormKind.AXIS_STRAIGHTNESS, FormKind.ROUNDNESS, FormKind.COAXIALITY, FormKind.PARALLELISM):
             here = evaluate(Task(kind, feature, datum))
             there = evaluate(Task(kind, moved(feature), moved(datum)))
             for method, value in by(here).items():
@@ -277,16 +283,16 @@ class TestUncertainty:
         )
         twisted = tuple((x, y, 5e-6 * (x - 50) * (y - 50)) for x, y, _z in plate())
         for task in (
-            Task(Kind.ROUNDNESS, ProbedFeature((Section(oval),))),
-            Task(Kind.FLATNESS, ProbedFeature(points=twisted)),
-            Task(Kind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0.05, 0, 30), (0, 0, 60)])),
-            Task(Kind.PERPENDICULARITY, bore([(0, 0, 0), (0.05, 0, 60)]), ProbedFeature(points=plate())),
+            Task(FormKind.ROUNDNESS, ProbedFeature((Section(oval),))),
+            Task(FormKind.FLATNESS, ProbedFeature(points=twisted)),
+            Task(FormKind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0.05, 0, 30), (0, 0, 60)])),
+            Task(FormKind.PERPENDICULARITY, bore([(0, 0, 0), (0.05, 0, 60)]), ProbedFeature(points=plate())),
         ):
             assert 0.88 < self.covered(task, method) <= 1.0, task.kind
 
     def test_it_grows_with_the_scatter_and_shrinks_with_more_touches(self) -> None:
         few, many = (
-            evaluate(Task(Kind.POSITION, bore([(0.01, 0, None)], count), nominal=(0.0, 0.0))).values[0]
+            evaluate(Task(FormKind.POSITION, bore([(0.01, 0, None)], count), nominal=(0.0, 0.0))).values[0]
             for count in (4, 16)
         )
         one, two = few.uncertainty(0.001), few.uncertainty(0.002)
@@ -324,7 +330,7 @@ def _felt(touch: tuple[float, ...], section: Section, off: float) -> tuple[float
 class TestSuspicion:
     def test_good_touches_are_seldom_suspected(self) -> None:
         random, suspected = np.random.default_rng(3), 0
-        task = Task(Kind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0, 0, 30), (0, 0, 60)]))
+        task = Task(FormKind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0, 0, 30), (0, 0, 60)]))
         for _ in range(200):
             suspected += bool(in_bore(scattered(task, 0.001, random).feature.sections).suspects)
         assert suspected <= 7  # one in a hundred is promised
@@ -332,13 +338,13 @@ class TestSuspicion:
     @pytest.mark.parametrize(
         ("kind", "feature"),
         [
-            (Kind.ROUNDNESS, bore([(0, 0, 0)], 12)),
-            (Kind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0, 0, 30), (0, 0, 60)])),
-            (Kind.FLATNESS, ProbedFeature(points=plate())),
-            (Kind.POSITION, bore([(0, 0, 0)], 8)),
+            (FormKind.ROUNDNESS, bore([(0, 0, 0)], 12)),
+            (FormKind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0, 0, 30), (0, 0, 60)])),
+            (FormKind.FLATNESS, ProbedFeature(points=plate())),
+            (FormKind.POSITION, bore([(0, 0, 0)], 8)),
         ],
     )
-    def test_a_chip_of_30_um_is_named(self, kind: Kind, feature: ProbedFeature) -> None:
+    def test_a_chip_of_30_um_is_named(self, kind: FormKind, feature: ProbedFeature) -> None:
         random, named = np.random.default_rng(5), 0
         for _ in range(30):
             task = scattered(Task(kind, feature, nominal=(0.0, 0.0)), 0.001, random)
@@ -361,12 +367,12 @@ class TestSuspicion:
             point[2] += random.normal(0, 0.001)
         points[5][2] += 0.05
         datum = ProbedFeature(points=tuple(map(tuple, points)))
-        found = evaluate(Task(Kind.PARALLELISM, ProbedFeature(points=plate()), datum))
+        found = evaluate(Task(FormKind.PARALLELISM, ProbedFeature(points=plate()), datum))
         assert [each.touch for each in found.datum.suspects] == [6]
         assert found.suspicion.suspects == ()
 
     def test_three_touches_alone_cannot_tell(self) -> None:
-        found = evaluate(Task(Kind.POSITION, bore([(0, 0, 0)], 3), nominal=(0.0, 0.0)))
+        found = evaluate(Task(FormKind.POSITION, bore([(0, 0, 0)], 3), nominal=(0.0, 0.0)))
         assert not found.suspicion.tested
 
 
@@ -374,16 +380,16 @@ class TestRefused:
     @pytest.mark.parametrize(
         ("task", "reason"),
         [
-            (Task(Kind.ROUNDNESS, ProbedFeature()), Reason.TOO_FEW),
-            (Task(Kind.STRAIGHTNESS, ProbedFeature(points=((0.0, 0.0), (1.0, 0.0)))), Reason.TOO_FEW),
-            (Task(Kind.FLATNESS, ProbedFeature(points=((0.0, 0.0, 0.0),) * 3)), Reason.TOO_FEW),
+            (Task(FormKind.ROUNDNESS, ProbedFeature()), Reason.TOO_FEW),
+            (Task(FormKind.STRAIGHTNESS, ProbedFeature(points=((0.0, 0.0), (1.0, 0.0)))), Reason.TOO_FEW),
+            (Task(FormKind.FLATNESS, ProbedFeature(points=((0.0, 0.0, 0.0),) * 3)), Reason.TOO_FEW),
             (
-                Task(Kind.FLATNESS, ProbedFeature(points=tuple((float(x), 0.0, 0.0) for x in range(5)))),
+                Task(FormKind.FLATNESS, ProbedFeature(points=tuple((float(x), 0.0, 0.0) for x in range(5)))),
                 Reason.COLLINEAR,
             ),
-            (Task(Kind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0, 0, 10)])), Reason.TOO_FEW),
-            (Task(Kind.AXIS_STRAIGHTNESS, bore([(0, 0, 5), (0, 0, 5), (0, 0, 5)])), Reason.COINCIDENT),
-            (Task(Kind.POSITION, ProbedFeature(), nominal=(0.0, 0.0)), Reason.TOO_FEW),
+            (Task(FormKind.AXIS_STRAIGHTNESS, bore([(0, 0, 0), (0, 0, 10)])), Reason.TOO_FEW),
+            (Task(FormKind.AXIS_STRAIGHTNESS, bore([(0, 0, 5), (0, 0, 5), (0, 0, 5)])), Reason.COINCIDENT),
+            (Task(FormKind.POSITION, ProbedFeature(), nominal=(0.0, 0.0)), Reason.TOO_FEW),
         ],
     )
     def test_with_a_reason(self, task: Task, reason: Reason) -> None:
@@ -395,12 +401,16 @@ class TestRefused:
         line = Section(((0.0, 0.0), (1.0, 1.0), (2.0, 2.0)), 30.0)
         good = bore([(0, 0, 0), (0, 0, 20)])
         with pytest.raises(WrongSection) as refused:
-            evaluate(Task(Kind.AXIS_STRAIGHTNESS, ProbedFeature((*good.sections, line))))
+            evaluate(Task(FormKind.AXIS_STRAIGHTNESS, ProbedFeature((*good.sections, line))))
         assert (refused.value.number, refused.value.reason.reason) == (3, Reason.COLLINEAR)
         with pytest.raises(DatumRefused) as datum:
-            evaluate(Task(Kind.COAXIALITY, good, ProbedFeature((good.sections[0], line))))
+            evaluate(Task(FormKind.COAXIALITY, good, ProbedFeature((good.sections[0], line))))
         assert isinstance(datum.value.reason, WrongSection)
         with pytest.raises(DatumRefused):
             evaluate(
-                Task(Kind.PARALLELISM, good, ProbedFeature(points=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))))
+                Task(
+                    FormKind.PARALLELISM,
+                    good,
+                    ProbedFeature(points=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))),
+                )
             )

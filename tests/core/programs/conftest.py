@@ -4,7 +4,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from app.core.parameters import FIELDS, Feature, Field, Kind, Parameters, read
+from app.core.parameters import FIELDS, Feature, Field, FieldKind, Parameters, read
 
 ORDERED = ("zero_range", "averaging_limit", "wear_limit", "confidence_limit")
 SIZE = ("nominal", "upper_deviation", "lower_deviation", "target", "tolerance_width")
@@ -16,13 +16,13 @@ def _length(lowest: float = 0.0, highest: float = 1000.0) -> st.SearchStrategy[f
 
 
 def _value(field: Field) -> st.SearchStrategy[Any]:
-    if field.kind is Kind.CHOICE:
+    if field.kind is FieldKind.CHOICE:
         return st.sampled_from(field.choices)
-    if field.kind is Kind.YES_NO:
+    if field.kind is FieldKind.YES_NO:
         return st.booleans()
     lowest = -1000.0 if field.lowest is None else max(field.lowest, -1000.0)
     highest = 1000.0 if field.highest is None else min(field.highest, 1000.0)
-    if field.kind is Kind.WHOLE:
+    if field.kind is FieldKind.WHOLE:
         return st.integers(int(lowest), int(highest))
     return _length(lowest, highest)
 

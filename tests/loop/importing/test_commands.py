@@ -13,7 +13,7 @@ from sqlalchemy import select, text
 
 from app.access.audit.tables import AuditEntry
 from app.cli import main
-from app.core.decision.decide import State, decide
+from app.core.decision.decide import LoopState, decide
 from app.core.parameters import read
 from app.db.engine import Database
 from tests.loop.importing.test_history import set_up
@@ -222,10 +222,10 @@ def test_replay_decides_as_the_core_does_whatever_the_file_says_of_corrections(t
     parameters.write_text(json.dumps({"key": "x", "parameters": given}))
     done = inband("replay", file, "--parameters", parameters, "--json", folder=tmp_path)
     assert done.returncode == 0, done.stderr
-    state, expected = State(), []
+    state, expected = LoopState(), []
     for deviation in deviations:
         decision = decide(read(given)[0], state, deviation)
-        state = State(decision.average_after)
+        state = LoopState(decision.average_after)
         expected.append((decision.zone.value, decision.action.value, decision.amount))
     decisions = [json.loads(line) for line in done.stdout.splitlines()]
     assert [(d["zone"], d["action"], d["correction"] and d["correction"]["amount"]) for d in decisions] == expected

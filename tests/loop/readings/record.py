@@ -7,7 +7,7 @@ from typing import Any
 import psycopg
 import pytest
 
-from app.core.decision.decide import Decision, State, decide, outstanding_effect
+from app.core.decision.decide import Decision, LoopState, decide, outstanding_effect
 from app.core.decision.limits import Zone
 from app.core.decision.step import deviation_of
 from app.core.parameters import Parameters
@@ -165,7 +165,7 @@ def replay(parameters: Parameters, stored: Iterable[dict[str, Any]]) -> list[tup
             outstanding = [number for number in issued if number > in_effect]
         decision = decide(
             parameters,
-            State(average),
+            LoopState(average),
             deviation_of(reading["measured"], parameters.target),
             outstanding=outstanding_effect((issued[number] for number in outstanding), parameters.factor),
         )

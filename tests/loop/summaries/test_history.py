@@ -42,9 +42,9 @@ def filled(server: Server) -> str:
 
 
 def rows_of(session: Session, key: str, window: Window) -> list[Reading]:
-    standing = characteristics.characteristic_named(session, key)
+    current = characteristics.characteristic_named(session, key)
     query = select(Reading).where(
-        Reading.characteristic_id == standing.characteristic.id, Reading.sequence.between(window.first, window.last)
+        Reading.characteristic_id == current.characteristic.id, Reading.sequence.between(window.first, window.last)
     )
     return list(session.scalars(query.order_by(Reading.sequence)))
 

@@ -15,7 +15,7 @@ from sqlalchemy import text
 from sqlalchemy.orm import Session
 
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries
 from app.loop.summaries.queries.chart_data import MOST_BLOCKS, MOST_READINGS, plan
 from app.loop.summaries.queries.pyramid import BASE_LEVEL
@@ -32,14 +32,14 @@ BEGUN = datetime(2026, 1, 5, 6, tzinfo=UTC)  # the generator's; one reading a se
 
 class Large(NamedTuple):
     session: Session
-    standing: Standing
+    current: CurrentCharacteristic
     extremes: dict[int, float]
 
     def window(self, **chosen: Any) -> Window:
-        return queries.window_of(self.session, self.standing.characteristic, **chosen)
+        return queries.window_of(self.session, self.current.characteristic, **chosen)
 
     def numbers(self, window: Window) -> queries.Numbers:
-        return queries.numbers_of(self.session, self.standing.characteristic, window)
+        return queries.numbers_of(self.session, self.current.characteristic, window)
 
 
 @pytest.fixture(scope="module")
@@ -56,13 +56,13 @@ def large(server: Server) -> Iterator[Large]:
         extremes = fill(connection, "large", COUNT)
         connection.execute("VACUUM ANALYZE")
     with server.database.begin() as session:
-        standing = characteristics.characteristic_named(session, "large")
+        current = characteristics.characteristic_named(session, "large")
         for sequence in (1, 77, 100_000, COUNT):
             session.execute(
                 text("INSERT INTO exclusion VALUES (:m, :c, :s, now(), 'tests', 'to see whether it is left out')"),
-                {"m": standing.machine.id, "c": standing.characteristic.id, "s": sequence},
+                {"m": current.machine.id, "c": current.characteristic.id, "s": sequence},
             )
-        yield Large(session, standing, extremes)
+        yield Large(session, current, extremes)
 
 
 @given(first=st.integers(1, 40_000_000), count=st.one_of(st.integers(1, 5_000), st.integers(1, 40_000_000)))
@@ -84,7 +84,7 @@ def test_the_plan_reads_every_reading_once_and_not_many_rows(first: int, count: 
 
 class TestCourse:
     def test_it_is_every_reading_once(self, large: Large) -> None:
-        course = queries.chart_data_of(large.session, large.standing.characteristic, large.window())
+        course = queries.chart_data_of(large.session, large.current.characteristic, large.window())
         assert course.blocks
         assert course.readings
         assert sum(block.count for block in course.blocks) + len(course.readings) == COUNT
@@ -92,13 +92,13 @@ class TestCourse:
         assert course.excluded == {COUNT}
 
     def test_no_extreme_is_lost(self, large: Large) -> None:
-        course = queries.chart_data_of(large.session, large.standing.characteristic, large.window())
+        course = queries.chart_data_of(large.session, large.current.characteristic, large.window())
         for sequence, deviation in large.extremes.items():
             (block,) = [block for block in course.blocks if block.first <= sequence <= block.last]
             assert deviation in {block.minimum, block.maximum}
 
     def test_the_means_are_of_the_parts_alone(self, large: Large) -> None:
-        course = queries.chart_data_of(large.session, large.standing.characteristic, large.window())
+        course = queries.chart_data_of(large.session, large.current.characteristic, large.window())
         rows = large.session.execute(
             text(
                 "SELECT b.first, avg(deviation) FILTER (WHERE counts), count(*) FILTER (WHERE NOT counts) "
@@ -109,7 +109,7 @@ class TestCourse:
                 "GROUP BY b.first ORDER BY b.first"
             ),
             {
-                "c": large.standing.characteristic.id,
+                "c": large.current.characteristic.id,
                 "firsts": [block.first for block in course.blocks],
                 "lasts": [block.last for block in course.blocks],
             },
@@ -124,7 +124,7 @@ class TestCourse:
 
     def test_a_window_between_blocks(self, large: Large) -> None:
         window = large.window(first=12_345, through=56_789)
-        course = queries.chart_data_of(large.session, large.standing.characteristic, window)
+        course = queries.chart_data_of(large.session, large.current.characteristic, window)
         places = [(b.first, b.last) for b in course.blocks] + [(r.sequence, r.sequence) for r in course.readings]
         places.sort()
         assert (places[0][0], places[-1][1]) == (12_345, 56_789)
@@ -185,7 +185,7 @@ class TestNumbers:
                 "(SELECT FROM exclusion e WHERE e.characteristic_id = r.characteristic_id AND e.sequence = r.sequence)"
             ),
             {
-                "c": large.standing.characteristic.id,
+                "c": large.current.characteristic.id,
                 "start": bounds.get("start", BEGUN),
                 "end": bounds.get("end", BEGUN + timedelta(days=1000)),
             },
@@ -212,14 +212,14 @@ class TestNumbers:
 
 
 def test_the_histogram_is_that_of_the_readings(large: Large) -> None:
-    limits = large.standing.parameters
+    limits = large.current.parameters
     window = large.window(last=60_000)
-    counts = queries.histogram_of(large.session, large.standing.characteristic, window, counting_edges(limits))
+    counts = queries.histogram_of(large.session, large.current.characteristic, window, counting_edges(limits))
     deviations = large.session.scalars(
         text(
             "SELECT deviation FROM reading WHERE characteristic_id = :c AND sequence BETWEEN :f AND :l AND abs(deviation) < 1"
         ),
-        {"c": large.standing.characteristic.id, "f": window.first, "l": COUNT - 1},  # the last is excluded
+        {"c": large.current.characteristic.id, "f": window.first, "l": COUNT - 1},  # the last is excluded
     ).all()
     assert sum(counts) == len(deviations)
     assert counts == histogram_counts(deviations, limits)
@@ -235,8 +235,8 @@ def test_the_writer_summarises_what_it_stores(server: Server) -> None:
         batch = readings[start : start + 250] if start == 0 else readings[start:]
         assert shop.admin.post("/api/v1/readings/batch", json=batch).status_code == 201
     with server.database.begin() as session:
-        standing = characteristics.characteristic_named(session, shop.characteristic)
-        where = {"c": standing.characteristic.id}
+        current = characteristics.characteristic_named(session, shop.characteristic)
+        where = {"c": current.characteristic.id}
         levels = session.execute(
             text("SELECT level, count(*) FROM reading_summary WHERE characteristic_id = :c GROUP BY 1 ORDER BY 1"),
             where,

@@ -155,8 +155,8 @@ class TestSister:
         }
         assert (shop.average(5), shop.average(6)) == (0.0, 0.0)
         for key in (shop.characteristic, other):
-            standing = shop.call("GET", f"/characteristics/{key}")
-            assert standing["parameters"]["tool_memory"] == 13
+            current = shop.call("GET", f"/characteristics/{key}")
+            assert current["parameters"]["tool_memory"] == 13
         answer = shop.read(20.0)
         assert answer["correction"]["tool_memory"] == 13
         assert answer["parameters_version"] == 2

@@ -209,8 +209,8 @@ def test_figures_have_limits_and_every_reading(shop: Shop, picture: str) -> None
 
 def verdict_for_overview(server: Server, key: str) -> Verdict:
     with server.database.begin() as session:
-        standing = characteristic_named(session, key)
-        return verdicts_by_characteristic(session, standing.machine.id)[standing.characteristic.id]
+        current = characteristic_named(session, key)
+        return verdicts_by_characteristic(session, current.machine.id)[current.characteristic.id]
 
 
 def judge(server: Server, key: str) -> None:

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from app.core.spc.quantity import Quantity
 from app.core.spc.rules import RULES, RuleName, signals
 from app.core.spc.shewhart import Chart
-from app.loop.characteristics.queries import Standing, characteristic_named
+from app.loop.characteristics.queries import CurrentCharacteristic, characteristic_named
 from app.loop.summaries.queries import Window
 from app.quality.control_charts import charts
 from app.quality.control_charts.downsampling import MOST_POINTS, STRETCHES, thinned
@@ -57,24 +57,24 @@ def shop(server: Server) -> Shop:
 
 
 @pytest.fixture(params=BASELINES, ids=NAMES, scope="module")
-def by(request: pytest.FixtureRequest, shop: Shop) -> Iterator[tuple[Session, Standing, Baseline]]:
+def by(request: pytest.FixtureRequest, shop: Shop) -> Iterator[tuple[Session, CurrentCharacteristic, Baseline]]:
     body = {"quantity": "deviation"} | request.param
     frozen(shop, 11, 200, excluded=[{"first": 60, "last": 64, "reason": "Chip"}], **body)
     with shop.server.database.begin() as session:
-        standing = characteristic_named(session, shop.characteristic)
-        baseline = baseline_in_force(session, standing.characteristic)
+        current = characteristic_named(session, shop.characteristic)
+        baseline = baseline_in_force(session, current.characteristic)
         assert baseline is not None
-        yield session, standing, baseline
+        yield session, current, baseline
 
 
 @given(cuts=st.lists(st.integers(1, 400), max_size=6))
-def test_streaming_equals_batch(by: tuple[Session, Standing, Baseline], cuts: list[int]) -> None:
-    session, standing, baseline = by
-    whole = charted(session, standing, baseline, Window(1, 400, 400))
+def test_streaming_equals_batch(by: tuple[Session, CurrentCharacteristic, Baseline], cuts: list[int]) -> None:
+    session, current, baseline = by
+    whole = charted(session, current, baseline, Window(1, 400, 400))
     assert whole.chart is not None
     pointed, pieces = 0, []
     for high in sorted({*cuts, 400}):
-        piece = charted(session, standing, baseline, Window(pointed + 1, high, high))
+        piece = charted(session, current, baseline, Window(pointed + 1, high, high))
         if piece.chart is not None:
             pieces.append(piece)
             pointed = int(piece.last[-1])
@@ -86,13 +86,13 @@ def test_streaming_equals_batch(by: tuple[Session, Standing, Baseline], cuts: li
 
 @given(first=st.integers(1, 400), last=st.integers(1, 400))
 def test_every_chart_is_the_same_through_any_window(
-    by: tuple[Session, Standing, Baseline], first: int, last: int
+    by: tuple[Session, CurrentCharacteristic, Baseline], first: int, last: int
 ) -> None:
-    session, standing, baseline = by
+    session, current, baseline = by
     first, last = sorted((first, last))
     for kind in charts.kinds(baseline):
-        whole = charts.view(session, standing, baseline, Window(11, 400, 400), kind)
-        part = charts.view(session, standing, baseline, Window(max(first, 11), last, 400), kind)
+        whole = charts.view(session, current, baseline, Window(11, 400, 400), kind)
+        part = charts.view(session, current, baseline, Window(max(first, 11), last, 400), kind)
         inside = (whole.last >= max(first, 11)) & (whole.last <= last)
         assert part.last.tolist() == whole.last[inside].tolist(), kind
         assert part.points == pytest.approx(whole.points[inside], abs=1e-12), kind
@@ -106,11 +106,11 @@ def test_every_chart_is_the_same_through_any_window(
 def test_what_is_excluded_is_no_point_and_a_tool_begins_anew(shop: Shop) -> None:
     frozen(shop, 11, 200, excluded=[{"first": 60, "last": 64, "reason": "Chip"}], quantity="without_corrections")
     with shop.server.database.begin() as session:
-        standing = characteristic_named(session, shop.characteristic)
-        baseline = baseline_in_force(session, standing.characteristic)
+        current = characteristic_named(session, shop.characteristic)
+        baseline = baseline_in_force(session, current.characteristic)
         assert baseline is not None
-        points = charted(session, standing, baseline, Window(1, 400, 400))
-        ranges = charts.view(session, standing, baseline, Window(1, 400, 400), Chart.MOVING_RANGE)
+        points = charted(session, current, baseline, Window(1, 400, 400))
+        ranges = charts.view(session, current, baseline, Window(1, 400, 400), Chart.MOVING_RANGE)
     gone = {3, 130, 131, 132, 290, 399, *range(60, 65)}
     assert points.last.tolist() == [n for n in range(1, 401) if n not in gone]
     assert points.last[points.begins].tolist() == [1, 251]

@@ -39,25 +39,25 @@ def decide(shop: Shop, number: int, verb: str, status: int = 200, **who: Any) ->
     return shop.call("POST", f"/proposals/{number}/{verb}", status, reason="Looked at the evidence", **who)
 
 
-def standing(shop: Shop) -> dict[str, Any]:
+def current(shop: Shop) -> dict[str, Any]:
     found: dict[str, Any] = shop.call("GET", f"/characteristics/{shop.characteristic}")
     return found
 
 
 def test_a_proposal_changes_nothing_until_it_is_approved(shop: Shop) -> None:
-    before = standing(shop)
+    before = current(shop)
     made = propose(shop)
     assert (made["status"], made["from_version"], made["reason"]) == ("open", 2, WHY)
     assert made["changes"] == {"zero_range": 0.0025, "weighting_factor": 2.0}
     evidence = made["evidence"]
     assert evidence["other"]["corrections"] < evidence["today"]["corrections"]
     assert evidence["measured_effect"]["text"]
-    assert standing(shop) == before
+    assert current(shop) == before
 
     approved = decide(shop, made["id"], "approve")
     assert (approved["status"], approved["made_version"]) == ("approved", 3)
     assert approved["evidence"] == evidence
-    after = standing(shop)
+    after = current(shop)
     assert (after["parameters_version"], after["parameters"]["zero_range"]) == (3, 0.0025)
     audit = shop.call("GET", f"/audit?subject=characteristic/{shop.characteristic}")["items"]
     reasons = {each["action"]: each["why"] for each in reversed(audit)}
@@ -82,7 +82,7 @@ def test_changed_parameters_make_it_outdated(shop: Shop) -> None:
     shop.call("PATCH", path, parameters={"zero_range": 0.0005}, reason="Meanwhile")
     assert shop.call("GET", f"/proposals/{made['id']}")["status"] == "outdated"
     assert "version 3 is in force" in decide(shop, made["id"], "approve", 409)["detail"]
-    assert standing(shop)["parameters"]["zero_range"] == 0.0005
+    assert current(shop)["parameters"]["zero_range"] == 0.0005
     assert shop.call("GET", "/proposals?status=outdated&limit=1")["items"][0]["id"] == made["id"]
     assert decide(shop, made["id"], "reject")["status"] == "rejected"
 
@@ -93,7 +93,7 @@ def test_it_is_decided_once(shop: Shop, verb: str) -> None:
     assert decide(shop, made["id"], verb)["decided_why"] == "Looked at the evidence"
     for again in ("approve", "reject", "withdraw"):
         assert "already" in decide(shop, made["id"], again, 409)["detail"]
-    assert standing(shop)["parameters_version"] == (3 if verb == "approve" else 2)
+    assert current(shop)["parameters_version"] == (3 if verb == "approve" else 2)
 
 
 def test_who_may_do_what(shop: Shop, server: Server) -> None:
@@ -123,7 +123,7 @@ def test_of_two_at_once_one_is_first(shop: Shop, server: Server) -> None:
         at = f"/api/v1/proposals/{made}/approve"
         decided = list(pool.map(lambda client: client.post(at, json={"reason": "Yes"}), clients))
     assert sorted(each.status_code for each in decided) == [200, 409, 409, 409]
-    assert standing(shop)["parameters_version"] == 3
+    assert current(shop)["parameters_version"] == 3
 
 
 def test_what_one_approves_another_cannot_reject_at_the_same_moment(shop: Shop, server: Server) -> None:
@@ -143,7 +143,7 @@ def test_what_one_approves_another_cannot_reject_at_the_same_moment(shop: Shop, 
         answers = [each.result() for each in sent]
     assert sorted(answers) == [200, 409, 409, 409]
     found = shop.call("GET", f"/proposals/{made['id']}")
-    assert (found["status"] == "approved") == (standing(shop)["parameters_version"] == found["from_version"] + 1)
+    assert (found["status"] == "approved") == (current(shop)["parameters_version"] == found["from_version"] + 1)
 
 
 def test_a_form_keeps_what_was_typed(shop: Shop, server: Server) -> None:
@@ -158,7 +158,7 @@ def test_a_form_keeps_what_was_typed(shop: Shop, server: Server) -> None:
     made = propose(shop)
     page = engineer.send(f"/proposals/{made['id']}", 422, do="approve", reason=" ")
     assert "Approve</button>" in page
-    assert standing(shop)["parameters_version"] == 2
+    assert current(shop)["parameters_version"] == 2
     assert "approve, reject or withdraw" in engineer.send(f"/proposals/{made['id']}", 422, do="", reason="x")
 
 
@@ -216,7 +216,7 @@ def test_from_the_map_to_a_new_version(shop: Shop, server: Server, page: Page) -
     expect(page.get_by_text("in force as a new version")).to_be_visible()
     page.get_by_role("link", name="version 3").click()
     expect(page.locator("#versions")).to_contain_text("Agreed with the shop floor")
-    assert standing(shop)["parameters"]["weighting_factor"] == 2.0
+    assert current(shop)["parameters"]["weighting_factor"] == 2.0
 
 
 def test_no_cell_needs_a_script(shop: Shop, server: Server) -> None:

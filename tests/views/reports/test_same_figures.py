@@ -243,9 +243,9 @@ def test_a_failing_proof_stands_above_everything(shop: Shop, failing: None) -> N
     from app.views.reports.request import ReportRequest, SectionName
 
     with shop.server.database.begin() as session:
-        standing = characteristic_named(session, shop.characteristic)
+        current = characteristic_named(session, shop.characteristic)
         made = queries.report_of(
-            session, standing, ReportRequest(sections=(SectionName.NUMBERS,)), datetime(2026, 11, 22, tzinfo=UTC)
+            session, current, ReportRequest(sections=(SectionName.NUMBERS,)), datetime(2026, 11, 22, tzinfo=UTC)
         )
     warning = "1 published example does not come out as published"
     assert made.warnings[0].startswith(warning)

@@ -15,7 +15,7 @@ from psycopg import Connection, Cursor, RawCursor
 from sqlalchemy.orm import Session
 
 from app.access.audit import actions as audit
-from app.core.decision.decide import State, decide
+from app.core.decision.decide import LoopState, decide
 from app.core.decision.limits import Zone
 from app.core.decision.step import Code, deviation_of
 from app.core.parameters import Mode, Parameters
@@ -25,7 +25,7 @@ from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.machines import queries as machines
 from app.loop.readings.importing.lines import Flaw, Line
 from app.loop.readings.records import Entry
@@ -158,7 +158,7 @@ class _Judge:
                 return Flaw(line.number, "touches", "", touch_problem(error))
         decision = decide(
             parameters,
-            State(self.average),
+            LoopState(self.average),
             deviation_of(measured, parameters.target, self.empirical_value),
             accepted=results is None or not results.rejected,
         )
@@ -187,8 +187,8 @@ def store_history(
     Raises `Flawed` naming the lines that cannot be taken, `Invalid` when the whole file is of something else, and
     `Conflict` when the parameters change meanwhile.
     """
-    standing = characteristics.characteristic_named(session, entry.characteristic)
-    judge = _judge(session, standing)
+    current = characteristics.characteristic_named(session, entry.characteristic)
+    judge = _judge(session, current)
     conn = _driver(session)
     with conn.cursor() as cursor:
         cursor.execute("SET LOCAL statement_timeout = 0; SET LOCAL idle_in_transaction_session_timeout = 0")
@@ -199,9 +199,9 @@ def store_history(
         machines.lock_machines(session, [entry.machine_id])
         session.expire_all()
         now = characteristics.characteristic_named(session, entry.characteristic)
-        _refuse_change(standing, now)
+        _refuse_change(current, now)
         _refuse_new_empirical_value(judge.empirical_value, _empirical_value(session, now))
-        _move_over(cursor, entry, standing.version.version, judge.now, summary)
+        _move_over(cursor, entry, current.version.version, judge.now, summary)
     if summary.stored:
         counted = {"file": source, "readings": summary.stored, "first": summary.first_sequence}
         audit.record(session, actor, "readings imported", f"characteristic/{entry.characteristic}", None, counted)
@@ -210,16 +210,16 @@ def store_history(
     return summary
 
 
-def _judge(session: Session, standing: Standing) -> _Judge:
-    parameters = replace(standing.parameters, mode=Mode.MEASURE_ONLY)
-    return _Judge(parameters, _empirical_value(session, standing), datetime.now(UTC))
+def _judge(session: Session, current: CurrentCharacteristic) -> _Judge:
+    parameters = replace(current.parameters, mode=Mode.MEASURE_ONLY)
+    return _Judge(parameters, _empirical_value(session, current), datetime.now(UTC))
 
 
-def _empirical_value(session: Session, standing: Standing) -> float:
-    location = standing.parameters.average_memory
+def _empirical_value(session: Session, current: CurrentCharacteristic) -> float:
+    location = current.parameters.average_memory
     if not location:
         return 0.0
-    return session.get_one(AverageMemory, (standing.machine.id, location), populate_existing=True).empirical_value
+    return session.get_one(AverageMemory, (current.machine.id, location), populate_existing=True).empirical_value
 
 
 def _driver(session: Session) -> Connection[Any]:
@@ -275,7 +275,7 @@ def _refuse_something_else(summary: Summary, parameters: Parameters) -> None:
     )
 
 
-def _refuse_change(then: Standing, now: Standing) -> None:
+def _refuse_change(then: CurrentCharacteristic, now: CurrentCharacteristic) -> None:
     if then.version.version != now.version.version:
         raise Conflict(
             _("{who} has changed the parameters of this characteristic while the file was read.").format(

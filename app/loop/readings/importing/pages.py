@@ -48,9 +48,9 @@ def _done(
 ) -> dict[str, Any] | None:
     if stored is None:
         return None
-    standing = characteristics.characteristic_named(session, characteristic)
+    current = characteristics.characteristic_named(session, characteristic)
     last = first + stored - 1 if first and stored else None
-    return {"to": standing.characteristic, "stored": stored, "repeated": repeated or 0, "first": first, "last": last}
+    return {"to": current.characteristic, "stored": stored, "repeated": repeated or 0, "first": first, "last": last}
 
 
 def _start(
@@ -67,8 +67,8 @@ def _start(
         "imports/start.html",
         status=status,
         choices=[
-            (standing.characteristic.key, f"{standing.characteristic.name} · {standing.machine.name}")
-            for standing in characteristics.characteristics(session, limit=100_000)
+            (current.characteristic.key, f"{current.characteristic.name} · {current.machine.name}")
+            for current in characteristics.characteristics(session, limit=100_000)
         ],
         chosen=characteristic,
         error=error,
@@ -115,7 +115,7 @@ def _preview(
     status: int = 200,
 ) -> Response:
     upload = uploads.find(settings, caller.name, token)
-    standing = characteristics.characteristic_named(session, characteristic)
+    current = characteristics.characteristic_named(session, characteristic)
     session.commit()  # nothing is kept open while the file is read
     layout: Layout | None = None
     preview_result: Preview | None = None
@@ -139,7 +139,7 @@ def _preview(
         status=status,
         upload=upload,
         size=upload.path.stat().st_size,
-        to=standing,
+        to=current,
         layout=layout,
         found=preview_result,
         trouble=trouble,

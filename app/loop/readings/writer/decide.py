@@ -8,7 +8,7 @@ are decided by the same lines. A reading that is refused moves nothing.
 from collections.abc import Sequence
 from datetime import UTC, datetime
 
-from app.core.decision.decide import Decision, ReadingAlarm, State, decide, needs_approval, outstanding_effect
+from app.core.decision.decide import Decision, LoopState, ReadingAlarm, decide, needs_approval, outstanding_effect
 from app.core.decision.step import DECIMALS, Action, Code, deviation_of
 from app.core.parameters import Parameters
 from app.core.plausibility import is_jump, moved, uncorrected
@@ -80,7 +80,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     paused_by = stream.paused_by if tool is None or stream.paused_by is not None else tool.paused_by
     decision = decide(
         parameters,
-        State(
+        LoopState(
             average.average if average else 0.0,
             issued_total(pending, tool) if parameters.max_total is not None else 0.0,
             paused_by is not None,

@@ -15,7 +15,7 @@ FEW = 100  # of a million: more than these are told without decimals
 
 def capability(frame: Frame) -> Section:
     """Cp, Cpk, Pp, Ppk and Cpm with intervals; of a corrected process also of the tool without corrections."""
-    study = capabilities.capability_of(frame.session, frame.standing, frame.window)
+    study = capabilities.capability_of(frame.session, frame.current, frame.window)
     title = _("Capability")
     if isinstance(study.indices, Refused):
         why = _("No capability: {why}").format(why=statistics.refusal(study.indices))

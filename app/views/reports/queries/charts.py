@@ -16,7 +16,7 @@ def chart(frame: Frame) -> Section | None:
     """The zone chart; nothing where there are no readings."""
     if not frame.window.count:
         return None
-    content = chart_of(frame.session, frame.standing, frame.window)
+    content = chart_of(frame.session, frame.current, frame.window)
     figure = zone_chart(
         content.points,
         frame.parameters,

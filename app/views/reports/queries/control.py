@@ -45,18 +45,18 @@ def control(frame: Frame) -> Section | None:
     """The charts by the frozen baseline, and their signals; nothing where there are no readings."""
     if not frame.window.count:
         return None
-    title, session, standing = _("Control chart and signals"), frame.session, frame.standing
-    baseline = controls.baseline_in_force(session, standing.characteristic)
+    title, session, current = _("Control chart and signals"), frame.session, frame.current
+    baseline = controls.baseline_in_force(session, current.characteristic)
     if baseline is None:
         why = _(
             "No baseline is in force, so there are no limits and no signals: nothing is judged by its own readings."
         )
         return Section("control", title, warnings=(why,))
     kinds = [kind for kind in charts.kinds(baseline) if kind not in charts.REMEMBERING]
-    views = [charts.view(session, standing, baseline, frame.window, kind) for kind in kinds]
+    views = [charts.view(session, current, baseline, frame.window, kind) for kind in kinds]
     on_record = signals_queries.signals(
         session,
-        characteristic=standing.characteristic,
+        characteristic=current.characteristic,
         first=frame.window.first,
         through=frame.window.last,
         limit=MOST_SIGNALS,
@@ -245,7 +245,7 @@ def _record_cells(on_record: SignalRow | None) -> tuple[Value, Value, Value, Val
 def _picture(frame: Frame, baseline: Baseline, view: View) -> Picture:
     name = wording.chart_name(view.kind)
     figure = control_figure(
-        view, key=frame.standing.characteristic.key, marked=charts.marked_by(baseline), width=WIDE[0]
+        view, key=frame.current.characteristic.key, marked=charts.marked_by(baseline), width=WIDE[0]
     )
     says = _("{chart} of readings {first} to {last}, with centre and limits of baseline {version}.").format(
         chart=name, first=int(view.first[0]), last=int(view.last[-1]), version=baseline.version

@@ -11,7 +11,7 @@ from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from app.core.parameters import Parameters
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import History, Numbers, Window
 from app.loop.tables.characteristics import ParametersVersion
@@ -35,32 +35,32 @@ class Frame:
     """One characteristic and one period. `now` is when the report is made."""
 
     session: Session
-    standing: Standing
+    current: CurrentCharacteristic
     request: ReportRequest
     now: datetime
 
     @property
     def parameters(self) -> Parameters:
         """In force now: the charts of the pages judge by them too."""
-        return self.standing.parameters
+        return self.current.parameters
 
     @cached_property
     def window(self) -> Window:
         """The readings measured in the period."""
         request = self.request
         return statistics.window_of(
-            self.session, self.standing.characteristic, last=request.newest, start=request.start, end=request.end
+            self.session, self.current.characteristic, last=request.newest, start=request.start, end=request.end
         )
 
     @cached_property
     def numbers(self) -> Numbers:
-        return statistics.numbers_of(self.session, self.standing.characteristic, self.window)
+        return statistics.numbers_of(self.session, self.current.characteristic, self.window)
 
     @cached_property
     def history(self) -> History:
         """The deviations of the period and their zones, without excluded ones. Raises `Invalid` for more than ten million."""
         return statistics.history_of(
-            self.session, self.standing.characteristic, self.window, ("deviation", "zone")
+            self.session, self.current.characteristic, self.window, ("deviation", "zone")
         ).counted
 
     def holds(self, sequence: InstrumentedAttribute[int] | InstrumentedAttribute[int | None]) -> ColumnElement[bool]:
@@ -72,8 +72,8 @@ class Frame:
             inside
             & select(Reading.sequence)
             .where(
-                Reading.machine_id == self.standing.machine.id,
-                Reading.characteristic_id == self.standing.characteristic.id,
+                Reading.machine_id == self.current.machine.id,
+                Reading.characteristic_id == self.current.characteristic.id,
                 Reading.sequence == sequence,
                 self.window.in_time,
             )
@@ -92,8 +92,8 @@ class Frame:
     def _end(self, sequence: int) -> End:
         row = self.session.execute(
             select(Reading.sequence, Reading.measured_at, Reading.received_at, Reading.parameters_version).where(
-                Reading.machine_id == self.standing.machine.id,
-                Reading.characteristic_id == self.standing.characteristic.id,
+                Reading.machine_id == self.current.machine.id,
+                Reading.characteristic_id == self.current.characteristic.id,
                 Reading.sequence == sequence,
             )
         ).one()
@@ -113,12 +113,12 @@ class Frame:
     @cached_property
     def versions(self) -> Sequence[ParametersVersion]:
         """All versions of the parameters, newest first; of very many the last ones."""
-        return characteristics.versions(self.session, self.standing.characteristic, limit=MOST_VERSIONS)
+        return characteristics.versions(self.session, self.current.characteristic, limit=MOST_VERSIONS)
 
     @cached_property
     def versions_used(self) -> list[ParametersVersion]:
         """Those that the readings of the period were judged by, newest first; without readings the one in force."""
         if self.ends is None:
-            return [self.standing.version]
+            return [self.current.version]
         low, high = sorted((self.ends[0].version, self.ends[1].version))
         return [parameters_version for parameters_version in self.versions if low <= parameters_version.version <= high]

@@ -11,7 +11,7 @@ from app.errors import InbandError
 from app.files.documents.content import Fact, Report, Section, count, deviation, moment, size, width, words
 from app.language.i18n import _
 from app.language.times import in_zone
-from app.loop.characteristics.queries import Standing
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.views.reports.queries import capability, charts, control, loop, numbers, record
@@ -33,19 +33,19 @@ GATHERED: dict[SectionName, Callable[[Frame], Section | None]] = {
 }
 
 
-def report_of(session: Session, standing: Standing, request: ReportRequest, now: datetime) -> Report:
+def report_of(session: Session, current: CurrentCharacteristic, request: ReportRequest, now: datetime) -> Report:
     """Report on a characteristic and a period. `now`: the time of creation printed on it.
 
     A section that cannot be made – too many readings at once – says so in words; the others stand.
     """
-    frame = Frame(session, standing, request, now)
+    frame = Frame(session, current, request, now)
     with in_zone(ZoneInfo(request.zone)):
         sections = [_section(frame, name) for name in request.sections]
     return Report(
-        key=standing.characteristic.key,
-        name=standing.characteristic.name,
-        machine=standing.machine.name,
-        part=standing.characteristic.part or "",
+        key=current.characteristic.key,
+        name=current.characteristic.name,
+        machine=current.machine.name,
+        part=current.characteristic.part or "",
         period=_period(frame),
         zone=request.zone,
         made_at=moment(now),
@@ -102,7 +102,7 @@ def _period(frame: Frame) -> str:
 
 
 def _head(frame: Frame) -> list[Fact]:
-    characteristic, machine, parameters = frame.standing.characteristic, frame.standing.machine, frame.parameters
+    characteristic, machine, parameters = frame.current.characteristic, frame.current.machine, frame.parameters
     facts = [
         Fact("characteristic", _("Characteristic"), words(characteristic.key)),
         Fact("machine", _("Machine"), words(f"{machine.name} ({machine.key})")),

@@ -21,8 +21,8 @@ WIDE = (940, 420)
 def corrections(frame: Frame) -> Section:
     """The corrections that readings of the period asked for, newest first."""
     here = (
-        Correction.machine_id == frame.standing.machine.id,
-        Correction.characteristic_id == frame.standing.characteristic.id,
+        Correction.machine_id == frame.current.machine.id,
+        Correction.characteristic_id == frame.current.characteristic.id,
         frame.holds(Correction.sequence),
     )
     grouped = frame.session.execute(select(Correction.status, func.count()).where(*here).group_by(Correction.status))
@@ -78,7 +78,7 @@ def tools(frame: Frame) -> Section | None:
     rows = frame.session.scalars(
         select(ToolEvent)
         .where(
-            ToolEvent.machine_id == frame.standing.machine.id,
+            ToolEvent.machine_id == frame.current.machine.id,
             ToolEvent.number.in_(numbers),
             ToolEvent.kind != "correction",
             ToolEvent.at.between(*frame.span),
@@ -122,7 +122,7 @@ def wear(frame: Frame) -> Section | None:
     """Wear per part, what it foretells, and whether the loop hunts; nothing where there are no readings."""
     if not frame.window.count:
         return None
-    study = wears.wear_of(frame.session, frame.standing, frame.window)
+    study = wears.wear_of(frame.session, frame.current, frame.window)
     text = WearWords(study.fit, study.forecasts, study.first, study.hunting, frame.parameters, study.record)
     facts = []
     if study.fit is not None and study.fit.is_wear:

@@ -20,7 +20,7 @@ def numbers(frame: Frame) -> Section:
     figures = frame.numbers
     rejects = None
     if frame.parameters.accept_m > 1:
-        rejects = statistics.rejects_of(frame.session, frame.standing.characteristic, frame.window)
+        rejects = statistics.rejects_of(frame.session, frame.current.characteristic, frame.window)
     facts = statistics_wording.facts(figures, rejects)
     facts += [
         Fact(

@@ -21,13 +21,13 @@ MOST_DECISIONS = 50
 def alarms(frame: Frame) -> Section:
     """Alarms of the readings of the period, and of their tool in that time, with what was said to them; newest first."""
     tools = {int(version.parameters.get("tool_memory") or 0) for version in frame.versions_used} - {0}
-    own = (Alarm.characteristic_id == frame.standing.characteristic.id) & frame.holds(Alarm.sequence)
+    own = (Alarm.characteristic_id == frame.current.characteristic.id) & frame.holds(Alarm.sequence)
     which = [own]
     if frame.span is not None:
         in_time = Alarm.raised_at.between(*frame.span)
-        which.append((Alarm.characteristic_id == frame.standing.characteristic.id) & Alarm.sequence.is_(None) & in_time)
+        which.append((Alarm.characteristic_id == frame.current.characteristic.id) & Alarm.sequence.is_(None) & in_time)
         which.append(Alarm.characteristic_id.is_(None) & Alarm.tool_memory.in_(tools) & in_time)
-    here = (Alarm.machine_id == frame.standing.machine.id, or_(*which))
+    here = (Alarm.machine_id == frame.current.machine.id, or_(*which))
     total = frame.session.scalar(select(func.count()).select_from(Alarm).where(*here)) or 0
     waiting = frame.session.scalar(
         select(func.count()).select_from(Alarm).where(*here, Alarm.acknowledged_at.is_(None))
@@ -72,7 +72,7 @@ def alarms(frame: Frame) -> Section:
 
 def parameters(frame: Frame) -> Section:
     """The set in force, and what was changed while the period lasted, by whom and why."""
-    in_force = wording.in_order(frame.standing.version.parameters)
+    in_force = wording.in_order(frame.current.version.parameters)
     facts = [
         Fact(
             name,
@@ -114,7 +114,7 @@ def parameters(frame: Frame) -> Section:
             for version, differences in changed
         ),
     )
-    sentences = [_("In force now: version {version}.").format(version=frame.standing.version.version)]
+    sentences = [_("In force now: version {version}.").format(version=frame.current.version.version)]
     if not changed:
         sentences.append(_("Nothing was changed in this period."))
     return Section(
@@ -135,8 +135,8 @@ def excluded(frame: Frame) -> Section | None:
             & (Reading.sequence == Exclusion.sequence),
         )
         .where(
-            Exclusion.machine_id == frame.standing.machine.id,
-            Exclusion.characteristic_id == frame.standing.characteristic.id,
+            Exclusion.machine_id == frame.current.machine.id,
+            Exclusion.characteristic_id == frame.current.characteristic.id,
             frame.holds(Exclusion.sequence),
         )
     )
@@ -166,7 +166,7 @@ def decisions(frame: Frame) -> Section | None:
     """The newest decisions of the period; nothing where there are no readings."""
     if not frame.window.count:
         return None
-    entry = readings.entry_of(frame.session, frame.standing.characteristic.key)
+    entry = readings.entry_of(frame.session, frame.current.characteristic.key)
     assert entry is not None
     records = readings.latest(
         frame.session, entry, frame.window.last + 1, MOST_DECISIONS,
