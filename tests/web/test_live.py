@@ -24,6 +24,7 @@ from app.db.engine import Database
 from app.loop.machines import keys
 from app.web.live import HEARTBEAT, MOST_MISSED, Access, Live
 from tests.conftest import RunServer, Server
+from tests.loops import run
 from tests.shop import Shop
 
 
@@ -145,7 +146,7 @@ def test_a_page_opened_during_the_check_of_accesses_stays_open(database: Databas
         finally:
             await live.stop()
 
-    asyncio.run(check())
+    run(check())
 
 
 def test_what_people_set_up_is_told(shop: Shop) -> None:
