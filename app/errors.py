@@ -10,6 +10,7 @@
     ├── Invalid            422  the payload; `errors` names each field
     ├── TooManyRequests    429  with Retry-After
     ├── DatabaseAway       503  with Retry-After; nothing was stored
+    ├── ServerEnding       503  it does not wait for this request any longer
     ├── OutcomeUnknown     503  the database went away during the commit; send again with the same key
     └── Unexpected         500  an unhandled error; its trace is in the log under the id of the request
 
@@ -22,6 +23,9 @@ from typing import Any, NamedTuple, Self
 
 from app.language.i18n import _
 from app.logs import REQUEST
+
+PROBLEM_JSON = "application/problem+json"
+"""Media type of RFC 9457."""
 
 
 class FieldError(NamedTuple):
@@ -171,6 +175,21 @@ class DatabaseAway(InbandError):
             detail or "The database cannot be reached at the moment. Nothing of this request was stored.",
             "Send the request again, with the same key, after the time in Retry-After.",
             retry_after=2,
+        )
+
+
+class ServerEnding(InbandError):
+    """The server ends, and did not wait for this request any longer. A change may have been stored all the same."""
+
+    status = 503
+    kind = "server-ending"
+    title = "The server is ending"
+
+    def __init__(self) -> None:
+        super().__init__(
+            "The server is ending and cannot wait for this request any longer.",
+            "Send it again, with the same key, after the time in Retry-After.",
+            retry_after=5,
         )
 
 

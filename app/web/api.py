@@ -7,6 +7,7 @@ from fastapi.routing import APIRoute
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from app.errors import (
+    PROBLEM_JSON,
     Conflict,
     DatabaseAway,
     FieldError,
@@ -20,7 +21,6 @@ from app.errors import (
 )
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Slug, one_line
 from app.web.json_bodies import JsonRoute
-from app.web.problems import PROBLEM_JSON
 from app.web.theme import ThemeName
 
 BASE = "/api/v1"

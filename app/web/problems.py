@@ -18,6 +18,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.errors import (
+    PROBLEM_JSON,
     Conflict,
     DatabaseAway,
     InbandError,
@@ -40,7 +41,6 @@ from app.web.validation import field_errors
 
 log = logging.getLogger("inband")
 
-PROBLEM_JSON = "application/problem+json"
 FOR_PROGRAMS = ("/api/", "/health/", "/metrics")
 ALREADY_TAKEN = "23505"
 BAD_DATA = "22"

@@ -1,5 +1,6 @@
 """Every request has an id; those that fail, are refused or take long have a line in the log."""
 
+import asyncio
 import itertools
 import logging
 import re
@@ -7,9 +8,10 @@ import secrets
 from http import HTTPStatus
 from time import perf_counter
 
+from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.errors import InbandError
+from app.errors import PROBLEM_JSON, InbandError, ServerEnding
 from app.logs import REQUEST, without_secrets
 
 log = logging.getLogger(__name__)
@@ -46,6 +48,12 @@ class RequestLog:
 
         try:
             await self.app(scope, receive, sending)
+        except asyncio.CancelledError:  # nothing else cancels a request
+            if status:
+                raise
+            error = ServerEnding()
+            note_reason(scope, error)
+            await JSONResponse(error.as_problem(), error.status, error.headers, PROBLEM_JSON)(scope, receive, sending)
         finally:
             seconds = perf_counter() - begun
             if status >= HTTPStatus.BAD_REQUEST or (seconds >= self.slow and scope["path"] not in STREAMS):

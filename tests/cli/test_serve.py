@@ -5,7 +5,9 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import mkdtemp
@@ -98,6 +100,21 @@ def test_open_live_pages_neither_delay_the_end_nor_leave_a_traceback(run_server:
         said = server.stderr.read_text()
         assert "Traceback" not in said
         assert "Cancel" not in said
+
+
+def test_a_request_that_the_end_does_not_wait_for_is_told_so(run_server: RunServer) -> None:
+    with run_server(workers=1) as server, psycopg.connect(server.database.dsn) as holding:
+        client = server.client(server.key("viewer"))
+        holding.execute("LOCK TABLE machine")
+        with ThreadPoolExecutor(1) as pool:
+            asking = pool.submit(client.get, "/api/v1/machines")
+            while not holding.execute("SELECT count(*) FROM pg_locks WHERE NOT granted").fetchall()[0][0]:
+                time.sleep(0.02)
+            server.process.send_signal(signal.SIGTERM)
+            answer = asking.result(30)
+        assert (answer.status_code, answer.headers["Retry-After"]) == (503, "5")
+        assert answer.json()["type"] == "urn:inband:problem:server-ending"
+        assert server.process.wait(20) == 0
 
 
 STUBBORN = {
