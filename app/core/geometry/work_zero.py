@@ -157,7 +157,7 @@ def four_records(kind: EdgeKind, x1: float, x2: float, y1: float, y2: float) -> 
     X2. The three make a right angle, so X1Y1 and X2Y2 lie across the circle (Thales) and the printed
     ``2*SQRT(POT(R1-R15)+POT(R3-R16))`` is the diameter of the tip's path:
 
-    >>> zero = find_zero(Kind.BORE, four_records(EdgeKind.BORE, -8, 8, -6, 6), 6.0)
+    >>> zero = find_zero(EdgeKind.BORE, four_records(EdgeKind.BORE, -8, 8, -6, 6), 6.0)
     >>> zero.x, zero.y, zero.diameter
     (0.0, 0.0, 26.0)
     """
