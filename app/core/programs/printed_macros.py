@@ -14,26 +14,6 @@ from app.core.programs.lines import NUMBER, Note, number_in
 
 TARGET_ANGLE, TARGET_SHORTER = 12.5, 1.0  # degrees and mm of the printed probing target
 AXES = "XYZ"
-STEPS = (
-    "touch",
-    "touch_any",
-    "centre",
-    "old_kept",
-    "offset_set",
-    "z_zero",
-    "size",
-    "limit_size",
-    "measured",
-    "probing_target",
-    "not_a_bore",
-    "compared",
-    "corrected",
-    "modal_kept",
-    "modal_restored",
-    "alarm",
-    "message",
-    "jump",
-)
 
 
 class _Step(NamedTuple):

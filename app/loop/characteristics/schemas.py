@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, JsonValue
+from pydantic import BaseModel, Field
 
 from app.core.decision.limits import nanometres
 from app.core.parameters import FIELDS, FieldKind, MachineType, ParameterError, Problem, read, unusual_on
@@ -13,32 +13,6 @@ from app.loop.tables.characteristics import ParametersVersion
 from app.loop.warnings.wording import sentence
 from app.web.fields import Body, Reason, Slug, Text200
 from app.web.warnings import WarningOut, Warnings, warnings_out
-
-PARAMETERS: dict[str, JsonValue] = {
-    "tool_memory": 3,
-    "average_memory": 5,
-    "variant": "single",
-    "points": 1,
-    "repeats": 1,
-    "axis": "X",
-    "direction": "positive",
-    "nominal": 40.0,
-    "upper_deviation": 0.0,
-    "lower_deviation": -0.016,
-    "zero_range": 0.001,
-    "averaging_limit": 0.0053,
-    "wear_limit": 0.3,
-    "confidence_limit": 1.0,
-    "weighting_factor": 2,
-    "path_factor": 1,
-    "factor": -1,
-    "accept": {"n": 1, "m": 1},
-    "mode": "automatic",
-    "wear_policy": "hold",
-    "max_step": None,
-    "max_total": None,
-    "plausible_jump": None,
-}
 
 
 def parameters_schema() -> dict[str, Any]:

@@ -1,13 +1,12 @@
 """The alarm kind of a fault that the machine has reported."""
 
-from typing import Literal, get_args
+from typing import Literal
 
 from app.language.i18n import _
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.tables.alarms import Alarm
 
 Fault = Literal["battery_low", "receiver", "probe_not_ready", "other"]
-FAULTS: tuple[Fault, ...] = get_args(Fault)
 
 
 def _sentence(alarm: Alarm) -> str:

@@ -26,7 +26,7 @@ from app.core.programs.corrections import (
 )
 from app.db.events import publish
 from app.errors import Conflict, Invalid
-from app.language.i18n import _, ngettext
+from app.language.i18n import _
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.characteristics import ParametersVersion
 from app.loop.tables.machines import Machine
@@ -256,17 +256,3 @@ def _place(correction: Correction) -> tuple[bool, datetime, int]:
 def must_not_be_in(correction: Correction, machine: Machine) -> str:
     """Said of one that was to be confirmed and may not be in."""
     return " ".join(wording.refused(correction, machine.key, "applied"))
-
-
-def summed_up(done: Confirmed) -> list[str]:
-    """The result of confirming, in sentences."""
-    sentences = []
-    if done.now:
-        numbers = ", ".join(map(str, done.now))
-        sentences.append(
-            ngettext("Correction {n} is applied.", "Corrections {n} are applied.", len(done.now)).format(n=numbers)
-        )
-    if done.already:
-        numbers = ", ".join(map(str, done.already))
-        sentences.append(_("Confirmed before: {n}.").format(n=numbers))
-    return sentences

@@ -8,7 +8,6 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
 
-STATES = ("queued", "running", "done", "failed", "cancelled")
 OPEN = ("queued", "running")
 
 

@@ -20,7 +20,7 @@ from app.access.callers import Caller
 from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from app.loop.characteristics import actions as characteristics
-from app.loop.characteristics.schemas import PARAMETERS, CharacteristicIn
+from app.loop.characteristics.schemas import CharacteristicIn
 from app.loop.machines import actions as machines
 from app.loop.machines import queries as machine_queries
 from app.loop.machines.schemas import MachineIn
@@ -30,8 +30,11 @@ from app.loop.readings.importing.history import Flawed, Summary
 from app.loop.readings.importing.layout import Wishes, look
 from app.loop.tools import actions as offsets
 from app.settings import HOUSE
+from app.web.openapi import example_of
 from tests.conftest import RunServer
 from tests.loops import in_thread
+
+PARAMETERS = example_of("CharacteristicIn")["parameters"]
 
 
 @pytest.fixture
