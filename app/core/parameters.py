@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 from app.core.decision.limits import Limits, nanometres
 from app.core.decision.step import Rules
+from app.core.fits import with_fit
 
 LARGEST_LENGTH = 100_000.0  # mm; no machine tool is a hundred metres long
 
@@ -54,8 +55,7 @@ class MachineType(StrEnum):
     OTHER = "other"
 
 
-TOOL_LOCATIONS, AVERAGE_LOCATIONS = 32, 20
-"""Of the control that the sources describe (R10, R11); a machine has numbers of its own."""
+TOOL_LOCATIONS, AVERAGE_LOCATIONS = 32, 20  # of the control in the sources (R10, R11); a machine has its own
 MOST_LOCATIONS = 999
 
 
@@ -288,12 +288,12 @@ def default_averaging_limit(tolerance_width: float) -> float:
 
 
 def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
-    """Make parameters of what was sent, under names or R numbers; return them with the warnings.
+    """Make parameters of what was sent, under names or R numbers; R42 may be a fit, `40 h6`. Return them with the warnings.
 
     ``accept`` is ``{"n": 2, "m": 3}``. Raises `ParameterError` with everything that is wrong.
     """
     problems: list[Problem] = []
-    values = dict(_named(given, problems))
+    values = dict(_named(with_fit(given), problems))
     accept = values.pop("accept", None)
     values = {name: value for name, value in values.items() if value is not None}
     for field in FIELDS:

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.core.fits import fit_of
 from app.core.parameters import BY_R, FIELDS, ParameterError, Parameters, Variant, read
 from tests.core.conftest import SHAFT
 
@@ -39,6 +40,29 @@ def test_target_with_width_stands_in_place_of_nominal_and_deviations() -> None:
     assert problems(drawing | {"target": 39.992}) == {"tolerance_width": "required"}
     assert problems(SHAFT | {"target": 39.9}) == {"target": "target_twice"}
     assert read(SHAFT | {"target": 39.992, "tolerance_width": 0.016})[0].target == 39.992
+
+
+def test_a_tolerance_class_stands_in_place_of_nominal_and_deviations() -> None:
+    others = {name: value for name, value in SHAFT.items() if not name.endswith("_deviation")}
+    for name in ("nominal", "R42"):
+        parameters, _warnings = read(
+            {key: value for key, value in others.items() if key != "nominal"} | {name: "Ø40 h6"}
+        )
+        assert (parameters.nominal, parameters.upper_deviation, parameters.lower_deviation) == (40, 0, -0.016)
+    # With deviations of its own, or a class that is not in the tables, nothing is guessed.
+    assert problems(SHAFT | {"nominal": "40 g6"}) == {"nominal": "not_a_number"}
+    for text in ("40 q6", "40 h19", "501 h6", "40h", "h6", "40 H7/h6", "0 h6", "40 j8"):
+        assert problems(others | {"nominal": text})["nominal"] == "not_a_number"
+
+
+@given(st.floats(0.5, 500), st.sampled_from("abcdefghjkmnprsuxz"), st.integers(1, 18))
+def test_shaft_and_hole_of_one_letter_mirror_each_other(nominal: float, letter: str, grade: int) -> None:
+    """ISO 286-1: the general rule, except for the letters and grades that have one of their own."""
+    shaft, hole = fit_of(f"{nominal:.3f} {letter}{grade}"), fit_of(f"{nominal:.3f} {letter.upper()}{grade}")
+    if letter in "jkmn" or hole is None or shaft is None or (letter in "prsuxz" and grade <= 7):
+        return
+    assert (hole.upper_deviation, hole.lower_deviation) == (-shaft.lower_deviation, -shaft.upper_deviation)
+    assert shaft.upper_deviation - shaft.lower_deviation > 0
 
 
 def test_the_averaging_limit_is_two_thirds_of_half_the_tolerance_by_default() -> None:

@@ -165,7 +165,7 @@ PAGES = {
 }
 SIGNED_OUT = {"/sign-in", "/invitation/{token}"}
 OPENED_ELSEWHERE = {"/import/{token}"}  # needs a file that was sent; tests/loop/importing
-PARTS = {"/plant-summary", "/alarms/count", "/corrections/count"}  # only ever fetched into a page
+PARTS = {"/plant-summary", "/alarms/count", "/corrections/count", "/setup/fit"}  # only ever fetched into a page
 
 
 def routes_of(router: Any) -> Iterator[APIRoute]:

@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
 from app.core.decision.limits import nanometres
+from app.core.fits import with_fit
 from app.core.parameters import (
     BY_R,
     TWO_POINT_SWITCH,
@@ -121,7 +122,7 @@ def merged(current: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, An
     Nominal with deviations, or target with width: what is given replaces what was said the other way. R34 at its default
     follows R35.
     """
-    changed = dict(current)
+    changed, given = dict(current), with_fit(given)
     names = {raw: _name_of(raw) for raw in given}
     named = {names[raw] for raw, value in given.items() if value is not None}
     if named & set(DRAWING):

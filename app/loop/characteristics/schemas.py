@@ -36,6 +36,7 @@ def parameters_schema() -> dict[str, Any]:
             **({"enum": [*field.choices, None]} if field.choices else {}),
             **({"default": field.default} if field.default is not None else {}),
         }
+    properties["nominal"]["type"] = ["number", "string", "null"]  # a fit of ISO 286
     properties["accept"] = {
         "type": ["object", "null"],
         "description": "Acceptance: n of m sections must be inside the tolerance.",

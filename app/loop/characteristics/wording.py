@@ -59,6 +59,7 @@ def explanation(name: str) -> str | None:
             "The part from outside or inside (with the direction it says where the probe starts), or the tool itself: its length "
             "or radius tells its wear."
         ),
+        "nominal": _("As on the drawing. With a tolerance class, 40 h6 (ISO 286), the deviations follow from it."),
         "target": _("Aimed at: the middle of the tolerance."),
         "tolerance_width": _("Upper minus lower limit."),
         "zero_range": _("Up to here a deviation is scatter: nothing is corrected."),
@@ -180,9 +181,7 @@ def sentence(problem: Problem) -> str:
         "twice": _("{name} is said twice, also as {other}; say it once").format(
             name=problem.field[:64], other=data.get("other")
         ),
-        "not_a_number": _("{name} must be a finite number, in mm with a decimal point where it is a length").format(
-            name=name
-        ),
+        "not_a_number": _not_a_number(problem, name),
         "not_whole": _("{name} must be a whole number").format(name=name),
         "not_a_choice": _("{name} must be one of {choices}").format(
             name=name, choices=", ".join(data.get("choices", ()))
@@ -226,6 +225,15 @@ def sentence(problem: Problem) -> str:
         ).format(name=name, points=data.get("points"), sections=data.get("sections")),
         "accept": _('Acceptance must be {"n": n, "m": m} with whole numbers, 1 ≤ n ≤ m ≤ 100, for example 2 of 3'),
     }.get(problem.code, problem.code)
+
+
+def _not_a_number(problem: Problem, name: str) -> str:
+    if problem.field == "nominal":
+        return _(
+            "{name} must be a number in mm, or a size with a tolerance class of ISO 286 such as 40 h6 (up to 500 mm); "
+            "R40 and R41 stay empty then"
+        ).format(name=name)
+    return _("{name} must be a finite number, in mm with a decimal point where it is a length").format(name=name)
 
 
 def order_sentence(inner: str, outer: str, smaller: str, larger: str) -> str:

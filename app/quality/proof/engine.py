@@ -6,6 +6,7 @@ import numpy as np
 
 from app.core.decision.decide import LoopState, decide
 from app.core.decision.step import Action, average_of
+from app.core.fits import fit_of
 from app.core.parameters import mean_nominal, read
 from app.core.spc import chance, constants, cusum, ewma, shewhart
 from app.core.spc.capability import Limits, capability, of_percentiles, percentile, ppk_of, spread_index, target_index
@@ -37,6 +38,12 @@ def decision(given: Given) -> Got:
 def nominal(given: Given) -> Got:
     target, width = mean_nominal(given["nominal"], given["upper_deviation"], given["lower_deviation"])
     return {"target": target, "tolerance_width": width}
+
+
+def fits(given: Given) -> Got:
+    found = [fit_of(text) for text in given["sizes"]]
+    deviations = [(fit.upper_deviation * 1000, fit.lower_deviation * 1000) for fit in found if fit is not None]
+    return {"upper_um": [upper for upper, _lower in deviations], "lower_um": [lower for _upper, lower in deviations]}
 
 
 def running_average(given: Given) -> Got:
@@ -258,6 +265,7 @@ def following(given: Given) -> Got:
 ENGINE: dict[str, Callable[[Given], Got]] = {
     "decision": decision,
     "mean_nominal": nominal,
+    "fits": fits,
     "running_average": running_average,
     "signal_path": signal_path,
     "summary": summed_up,

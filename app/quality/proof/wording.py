@@ -8,7 +8,10 @@ from app.quality.proof.queries import Check
 def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
     """Topics that sort the examples on the page: a heading and the kinds below it."""
     return {
-        "decision": (_("Decision and measuring"), ("decision", "mean_nominal", "running_average", "signal_path")),
+        "decision": (
+            _("Decision and measuring"),
+            ("decision", "mean_nominal", "fits", "running_average", "signal_path"),
+        ),
         "summary": (_("Mean, spread, autocorrelation"), ("summary",)),
         "charts": (
             _("Control charts"),

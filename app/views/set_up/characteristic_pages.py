@@ -2,14 +2,15 @@
 
 from collections.abc import Mapping
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import quote
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
-from app.access.deps import Caller, Engineer, Viewer
+from app.access.deps import Caller, Engineer, Viewer, require
+from app.core.fits import fit_of
 from app.core.parameters import BY_NAME
 from app.core.plausibility import suggested_jump
 from app.errors import Conflict, InbandError, Invalid
@@ -204,6 +205,13 @@ def _characteristic(
         suggested_jump=_suggested_jump(session, current),
         **_form(typed, errors or {}),
     )
+
+
+@router.get("/setup/fit", response_model=None, dependencies=[require("viewer")])
+def fit(size: Annotated[str, Query(max_length=40)]) -> dict[str, str]:
+    """Nominal and deviations of a size with a tolerance class (`40 h6`), as they are typed; empty for any other text."""
+    found = fit_of(size)
+    return {} if found is None else {name: f"{value:.10g}" for name, value in found._asdict().items()}
 
 
 def _suggested_jump(session: Session, current: queries.CurrentCharacteristic) -> float | None:

@@ -6,6 +6,7 @@ What people type stays text until the core has looked at it, so that nothing typ
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from app.core.fits import fit_of
 from app.core.number_text import number_or_none, plain
 from app.core.parameters import BY_NAME, FIELDS, Field, FieldKind, mean_nominal
 from app.core.programs.lines import written
@@ -170,7 +171,8 @@ class Diagram(NamedTuple):
 
 def diagram(typed: Mapping[str, str]) -> Diagram:
     """The limits that were typed, as far as they are numbers. mm."""
-    values = {name: _length(typed.get(name, "")) for name in BY_NAME}
+    fit = fit_of(typed.get("nominal", ""))
+    values = {name: _length(typed.get(name, "")) for name in BY_NAME} | (fit._asdict() if fit else {})
     target, width = values["target"], values["tolerance_width"]
     drawing = [values[name] for name in DRAWING]
     if all(value is not None for value in drawing):

@@ -2,6 +2,7 @@
 //
 // The server has drawn it; bands are equally tall, so what follows the typing is words alone. With every key it
 //   – writes deviation and size at each limit, target and width (L75), and the µm beside each length ([data-um]);
+//   – writes a tolerance class typed with the nominal size, 40 h6, as nominal and deviations once the field is left;
 //   – marks a limit that breaks R33 < R34 ≤ R35/2 ≤ R37 ≤ R36, and says why at the field, in the server's own sentences.
 // The server checks the same again when the form is sent; without this script nothing is lost but the immediacy.
 
@@ -33,11 +34,28 @@ customElements.define("zone-diagram", class extends HTMLElement {
       this.draw();
     };
     this.form.addEventListener("input", this.typing);
+    this.leaving = (event) => event.target.name === "nominal" && this.fit(event.target.value);
+    this.form.addEventListener("change", this.leaving);
+    this.draw();
+  }
+
+  /** The server knows the tables of ISO 286. A class that it does not know is refused in words when the form is sent. */
+  async fit(size) {
+    if (!/[a-z]/i.test(size)) return;
+    const answer = await fetch(`/setup/fit?${new URLSearchParams({ size: size.slice(0, 40) })}`).catch(() => null);
+    const numbers = answer?.ok ? await answer.json() : {};
+    if (this.form.elements.nominal.value !== size) return;
+    this.unknown = "nominal" in numbers ? null : size;
+    for (const [name, value] of Object.entries(numbers)) {
+      this.form.elements[name].value = value;
+      this.forget(this.form.elements[name]);
+    }
     this.draw();
   }
 
   disconnectedCallback() {
     this.form.removeEventListener("input", this.typing);
+    this.form.removeEventListener("change", this.leaving);
   }
 
   /** What the server said about a field is about what was sent, not about what is typed now. */
@@ -86,7 +104,9 @@ customElements.define("zone-diagram", class extends HTMLElement {
 
   explain(values, limits) {
     const said = new Map();
-    for (const name of NAMES) if (Number.isNaN(values[name])) said.set(name, this.dataset.notANumber);
+    const size = this.form.elements.nominal.value;
+    const typing = /[a-z]/i.test(size) && size !== this.unknown; // a class, until the server has looked at it
+    for (const name of NAMES) if (Number.isNaN(values[name]) && !(typing && name === "nominal")) said.set(name, this.dataset.notANumber);
     const wrong = new Set();
     ORDER.slice(1).forEach((outer, index) => {
       const [smaller, larger] = [limits[ORDER[index]], limits[outer]];

@@ -176,6 +176,15 @@ class TestChange:
             "new probe",
         )
 
+    def test_a_tolerance_class_in_place_of_the_nominal_size(self, server: Any) -> None:
+        shop = Shop(server)
+        after = shop.call("PATCH", path(shop), parameters={"nominal": "40 g6"}, reason="new drawing")["parameters"]
+        assert (after["nominal"], after["upper_deviation"], after["lower_deviation"]) == (40, -0.009, -0.025)
+        assert after["target"] == 39.983
+        (error,) = shop.call("PATCH", path(shop), 422, parameters={"R42": "40 q6"}, reason="typed wrong")["errors"]
+        assert error["field"] == "parameters.nominal"
+        assert "ISO 286" in error["message"]
+
     def test_without_a_reason_nothing_changes(self, shop: Shop) -> None:
         for reason in ({}, {"reason": None}, {"reason": "   "}):
             problem = shop.call("PATCH", path(shop), 422, parameters={"R33": 0.002}, **reason)

@@ -56,6 +56,23 @@ def test_the_diagram_follows_the_typing(engineer: Page, shop: Shop) -> None:
     assert page.locator(".limit.wrong").count() == 0
 
 
+def test_a_tolerance_class_becomes_deviations_when_the_field_is_left(engineer: Page, shop: Shop) -> None:
+    page = engineer
+    page.goto("/setup/characteristics/new")
+    told = page.locator('.field[data-field="nominal"] .error')
+    page.fill("[name=nominal]", "40 h")
+    expect(told).to_have_count(0)  # it is still being typed
+    page.fill("[name=nominal]", "Ø40 h6")
+    page.press("[name=nominal]", "Tab")
+    expect(page.locator("[name=lower_deviation]")).to_have_value("-0.016")
+    assert (page.input_value("[name=nominal]"), page.input_value("[name=upper_deviation]")) == ("40", "0")
+    assert page.locator('[data-size="target"]').text_content() == "39.9920 mm"
+    page.fill("[name=nominal]", "40 q6")
+    page.press("[name=nominal]", "Tab")
+    expect(told).to_have_count(1)
+    assert page.input_value("[name=lower_deviation]") == "-0.016"
+
+
 def test_a_refused_order_is_told_at_once_in_the_words_of_the_server(
     engineer: Page, shop: Shop, complaints: list[str]
 ) -> None:
