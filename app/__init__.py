@@ -10,6 +10,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
 
     views            pages that compose several rooms
         reports          a characteristic and a period as page, PDF, spreadsheet; many at once in the background
+        search           readings and parts across characteristics, one field for everything
         overview         every characteristic ranked by what needs attention, with the reasons
         approvals        corrections that wait for a person
         plant            the first page: every machine and characteristic at a glance

@@ -88,6 +88,7 @@ from app.views.reports import jobs_pages as report_job_pages
 from app.views.reports import pages as report_pages
 from app.views.reports import points_api as report_points
 from app.views.reports.worker import ReportWorker
+from app.views.search import readings_api as reading_list
 from app.views.set_up import pages as setup_pages
 from app.web import api_docs, health
 from app.web.limits import BodyLimit
@@ -120,6 +121,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     what_if.router,
     signals_api.router,
     readings.push,
+    reading_list.router,
     readings.router,
     by_hand.router,
     offsets.router,

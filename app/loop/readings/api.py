@@ -15,7 +15,7 @@ from app.db.engine import Database
 from app.errors import FieldError, NotFound, TooLarge
 from app.language.i18n import _
 from app.loop.readings import actions, queries
-from app.loop.readings.answers import ReadingAnswer, ReadingDetail, ReadingRow
+from app.loop.readings.answers import ReadingAnswer, ReadingDetail
 from app.loop.readings.door import Directory, answer_of, store_reading
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn, decode_many, decode_one
@@ -23,9 +23,9 @@ from app.loop.readings.writer.batch import store_batch
 from app.loop.readings.writer.columnar import ColumnarReadings, Outcome
 from app.loop.readings.writer.group_commit import Writer
 from app.loop.readings.writer.pending import Stored, Verdict
-from app.web.api import BASE, CharacteristicKey, Limit, api_router, problems
+from app.web.api import BASE, CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import Body, Page, Reason, page_of
+from app.web.fields import Body, Reason
 from app.web.openapi import example_of
 
 MOST_IN_BATCH = 10_000
@@ -193,7 +193,8 @@ def _with_decisions(outcomes: list[Outcome], database: Database) -> bytes:
     return msgspec.json.encode(_counts(outcomes) | {"items": items})
 
 
-def _entry(session: SessionDep, caller: AnyCaller, characteristic: str) -> Entry:
+def entry_for(session: SessionDep, caller: AnyCaller, characteristic: str) -> Entry:
+    """The place of a characteristic, for somebody who may look at it. Raises `NotFound`, `NotAllowed`."""
     entry = queries.entry_of(session, characteristic)
     if entry is None:
         raise NotFound(
@@ -204,26 +205,12 @@ def _entry(session: SessionDep, caller: AnyCaller, characteristic: str) -> Entry
     return entry
 
 
-@router.get("/readings", responses=problems(404))
-def list_readings(
-    session: SessionDep,
-    caller: AnyCaller,
-    characteristic: Annotated[str, Query(description="The key of the characteristic.", examples=["shaft-d40"])],
-    after: Annotated[int, Query(ge=0, le=2**63 - 1, description="Cursor: readings after this number.")] = 0,
-    limit: Limit = 100,
-) -> Page[ReadingRow]:
-    """The readings of a characteristic in the order of their arrival."""
-    entry = _entry(session, caller, characteristic)
-    rows = queries.answers(session, entry, queries.page(session, entry, after, limit + 1))
-    return page_of([ReadingRow.model_validate(row) for row in rows], limit, lambda row: row.sequence)
-
-
 @router.get("/readings/{characteristic}/{sequence}", responses=problems(404))
 def get_reading(
     session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, sequence: Sequence
 ) -> ReadingDetail:
     """One reading with its touches and the full reason."""
-    entry = _entry(session, caller, characteristic)
+    entry = entry_for(session, caller, characteristic)
     return ReadingDetail.model_validate(queries.detail(session, entry, sequence))
 
 
@@ -232,6 +219,6 @@ def exclude_reading(
     session: SessionDep, caller: Operator, characteristic: CharacteristicKey, sequence: Sequence, exclusion: ExcludeIn
 ) -> ReadingDetail:
     """Take a reading out of the statistics, never out of the record."""
-    entry = _entry(session, caller, characteristic)
+    entry = entry_for(session, caller, characteristic)
     actions.exclude(session, entry, sequence, caller.name, exclusion.reason)
     return ReadingDetail.model_validate(queries.detail(session, entry, sequence))

@@ -281,21 +281,6 @@ def hand_measurements(
     return by_hand.between(session, machine_id, characteristic_id, first, last, limit)
 
 
-def page(session: Session, entry: Entry, after: int, limit: int) -> list[Record]:
-    """Readings after a sequence number, oldest first."""
-    rows = session.execute(
-        select(*COLUMNS)
-        .where(
-            Reading.machine_id == entry.machine_id,
-            Reading.characteristic_id == entry.characteristic_id,
-            Reading.sequence > after,
-        )
-        .order_by(Reading.sequence)
-        .limit(limit)
-    )
-    return [Record(*row) for row in rows]
-
-
 def latest(
     session: Session, entry: Entry, before: int | None, limit: int, *of_those: ColumnElement[bool]
 ) -> list[Record]:

@@ -67,6 +67,15 @@ class Reading(Base):
             unique=True,
             postgresql_where=text("key IS NOT NULL"),
         ),
+        # Parts by name or its beginning, under any collation; the time gives the newest first without sorting.
+        Index(
+            "reading_part_idx",
+            "part",
+            "received_at",
+            postgresql_ops={"part": "text_pattern_ops"},
+            postgresql_where=text("part IS NOT NULL"),
+        ),
+        Index("reading_received_idx", "machine_id", "received_at"),
     )
 
     machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)

@@ -78,7 +78,7 @@ def stored(database: Database, characteristic: str = "shaft-d40") -> list[dict[s
     with database.begin() as session:
         entry = queries.entry_of(session, characteristic)
         assert entry is not None
-        return queries.answers(session, entry, queries.page(session, entry, 0, 1000))
+        return queries.answers(session, entry, queries.latest(session, entry, None, 1000)[::-1])
 
 
 VALUES = [39.992, 39.9935, 39.9981, 40.004, 40.35, 41.2, 39.9925]

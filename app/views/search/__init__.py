@@ -1,0 +1,1 @@
+"""Search: readings across characteristics and machines, everything measured on a part, and one field for all that has a name."""
