@@ -13,6 +13,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         search           readings and parts across characteristics, one field for everything
         overview         every characteristic ranked by what needs attention, with the reasons
         approvals        corrections that wait for a person
+        station          one machine on the tablet beside it, readable from two metres
         plant            the first page: every machine and characteristic at a glance
         characteristic   one characteristic: zone chart, decisions, capability
         set_up           machines, characteristics, people, programs, the record, background jobs

@@ -90,6 +90,7 @@ from app.views.reports import points_api as report_points
 from app.views.reports.worker import ReportWorker
 from app.views.search import readings_api as reading_list
 from app.views.set_up import pages as setup_pages
+from app.views.station import pages as station_pages
 from app.web import api_docs, health
 from app.web.limits import BodyLimit
 from app.web.live import Live
@@ -143,6 +144,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     health.router,
     api_docs.router,
     plant_pages.router,
+    station_pages.router,
     overview_pages.router,
     characteristic_pages.router,
     control_pages.router,

@@ -26,6 +26,9 @@ PAGES = {
     "/": ["/", "/?show=attention"],
     "/overview": ["/overview", "/overview?by=ppk&machine={machine}"],
     "/plant/{machine}": ["/plant/{machine}"],
+    "/station/{machine}": ["/station/{machine}", "/station/{machine}?tool=3"],
+    "/station/{machine}/alarms/{number}": ["/station/{machine}/alarms/{alarm}?action=noted"],
+    "/station/{machine}/tools/{number}/change": ["/station/{machine}/tools/3/change"],
     "/characteristics/{characteristic}": [
         "/characteristics/{characteristic}",
         "/characteristics/{characteristic}?last=50&scale=true",

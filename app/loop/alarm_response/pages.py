@@ -9,14 +9,13 @@ from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Operator, Viewer, require
 from app.errors import Conflict, Invalid
-from app.loop.alarm_response import acknowledging, queries, wording
-from app.loop.alarm_response.by_hand import ByHand
+from app.loop.alarm_response import queries, wording
+from app.loop.alarm_response.form_reader import acknowledge_as_typed
 from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
-from app.loop.alarm_response.schemas import AlarmAcknowledgeIn
 from app.loop.machines import queries as machines
 from app.web.deps import FormDep, Number, SessionDep, Word
-from app.web.forms import by_field, length, parsed, words
+from app.web.forms import by_field
 from app.web.paging import address, part_of
 from app.web.templates import page
 
@@ -124,30 +123,7 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
     """The second touch. Sent twice, or after somebody else, it changes nothing and says so."""
     machine = form.get("machine") or None
     try:
-        offset = length(form.get("offset"))
-        if form.get("true") in {"reported", "expected"}:
-            offset = queries.alarm(session, number).alarm.data.get(form["true"])
-        acknowledgement = parsed(
-            AlarmAcknowledgeIn,
-            {
-                "action": form.get("action"),
-                "comment": words(form, "comment"),
-                "offset": offset,
-                "changed_by": form.get("changed_by"),
-                "hand_measured": length(form.get("hand_measured")),
-                "hand_verdict": form.get("hand_verdict"),
-            },
-        )
-        acknowledging.acknowledge(
-            session,
-            number,
-            acknowledgement.action,
-            acknowledgement.comment,
-            caller,
-            offset=acknowledgement.offset,
-            changed_by=acknowledgement.changed_by,
-            hand=ByHand(acknowledgement.hand_measured, acknowledgement.hand_verdict),
-        )
+        acknowledge_as_typed(session, number, form, caller)
     except Conflict:
         alarm = queries.alarm(session, number).alarm
         again = alarm.acknowledged_by == caller.name and alarm.action == form.get("action")

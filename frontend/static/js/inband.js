@@ -9,6 +9,7 @@
 
 import "./live-status.js";
 import "./live-part.js";
+import "./alarm-signal.js";
 import "./theme-switch.js";
 import "./times.js";
 import "./plotly-chart.js";

@@ -1,0 +1,54 @@
+"""One machine as its station shows it. Never writes."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from sqlalchemy.orm import Session
+
+from app.core.state import CharacteristicState
+from app.loop.alarm_response import queries as alarms
+from app.loop.alarm_response.queries import AlarmRow
+from app.loop.tables.machines import Machine
+from app.views.characteristic import state_queries
+from app.views.characteristic.state_queries import CharacteristicRow
+
+MOST_ALARMS = 20
+URGENCY = {state: place for place, state in enumerate(CharacteristicState)}
+
+
+class Station(NamedTuple):
+    """Content of the station of a machine: `first` in giant digits, the `others` small; active alarms, the first one first.
+
+    tools: the tools that its characteristics are cut with.
+    """
+
+    machine: Machine
+    first: CharacteristicRow | None
+    others: Sequence[CharacteristicRow]
+    alarms: Sequence[AlarmRow]
+    active: int
+    tools: Sequence[int]
+
+
+def station(session: Session, machine: str) -> Station:
+    """The machine as it stands. Raises `NotFound`."""
+    (group,) = state_queries.plant(session, machine=machine, trends=False)
+    rows = sorted(group.rows, key=_place)
+    first = rows[0] if rows else None
+    active = alarms.alarms(session, state="active", machine_id=group.machine.id, limit=MOST_ALARMS)
+    number = first.characteristic.id if first else None
+    return Station(
+        group.machine,
+        first,
+        rows[1:],
+        sorted(active, key=lambda row: row.alarm.characteristic_id != number),
+        alarms.active_count(session, group.machine.id),
+        sorted({row.parameters.tool_memory for row in rows if row.parameters.tool_memory}),
+    )
+
+
+def _place(row: CharacteristicRow) -> tuple[bool, int, float]:
+    """Order: those that need someone first, the most urgent of them before; then what was measured last."""
+    last = row.stream.last_received_at
+    measured = 0.0 if last is None else last.timestamp()
+    return (not row.needs_someone, URGENCY[row.state] if row.needs_someone else 0, -measured)

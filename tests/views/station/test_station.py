@@ -1,0 +1,182 @@
+"""The station of a machine: what it says, how large it says it, what is done there, and how it calls."""
+
+import re
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.shop import Person, Shop
+
+TABLET = {"width": 800, "height": 1280}
+TABLETS = [TABLET, {"width": 1280, "height": 800}]
+LETTERS = "e => parseFloat(getComputedStyle(e).fontSize)"
+TONES = """document.addEventListener("alarmsound", () => {
+  const page = document.documentElement.dataset;
+  page.tones = Number(page.tones ?? 0) + 1;
+})"""
+
+
+class TestWithoutScripts:
+    def test_who_needs_someone_first_is_in_giant_digits(self, shop: Shop, viewer: Person) -> None:
+        other = f"{shop.characteristic}-calm"
+        shop.add(other, tool_memory=4)
+        shop.read(12.5)
+        shop.read(0.4, other)
+        text = viewer.open(f"/station/{shop.machine}")
+        giant, rest = text.split('class="station-next"')
+        assert '+12.5<span class="unit">µm' in giant
+        assert "Oversize" in giant
+        assert '+0.4<span class="unit">µm' in rest
+        assert "Set the part aside" in rest
+
+    @pytest.mark.parametrize(
+        ("deviation", "action"),
+        [(0.4, "Nothing to do"), (350.0, "Check tool 3"), (1200.0, "Check the probe and the part")],
+    )
+    def test_next_action(self, shop: Shop, viewer: Person, deviation: float, action: str) -> None:
+        shop.read(deviation)
+        assert f'<p class="station-action">{action}</p>' in viewer.open(f"/station/{shop.machine}")
+
+    def test_without_readings_the_first_part_is_next(self, shop: Shop, viewer: Person) -> None:
+        assert "Measure the first part" in viewer.open(f"/station/{shop.machine}")
+
+    def test_a_correction_awaits_approval(self, shop: Shop, viewer: Person) -> None:
+        key = f"{shop.characteristic}-approval"
+        shop.add(key, mode="approval", tool_memory=4, average_memory=6)
+        shop.read(6.0, key)
+        assert "Approve the correction of −6.0" in viewer.open(f"/station/{shop.machine}")
+
+    def test_an_alarm_is_acknowledged_in_the_name_of_who_is_signed_in(self, shop: Shop, operator: Person) -> None:
+        shop.read(12.0)
+        alarm = shop.alarms()[0]["id"]
+        here = f"/station/{shop.machine}"
+        assert f"{here}/alarms/{alarm}?action=noted" in operator.open(here)
+        assert "Nothing else changes." in operator.open(f"{here}/alarms/{alarm}?action=noted")
+        text = operator.send(f"{here}/alarms/{alarm}", action="noted", comment="Seen")
+        assert f"Oversize: Noted, {operator.name}." in text
+        assert shop.alarms() == []
+
+    def test_who_comes_second_is_told_who_was_first(self, shop: Shop, operator: Person) -> None:
+        shop.read(12.0)
+        alarm = shop.alarms()[0]["id"]
+        shop.acknowledge(alarm, "noted")
+        here = f"/station/{shop.machine}/alarms/{alarm}"
+        assert "Already acknowledged by somebody else" in operator.send(here, action="tool_replaced", comment="New")
+        assert "Already acknowledged by somebody else" in operator.open(f"{here}?action=noted")
+
+    def test_what_is_missing_is_asked_again(self, shop: Shop, operator: Person) -> None:
+        shop.read(12.0)
+        alarm = shop.alarms()[0]["id"]
+        here = f"/station/{shop.machine}/alarms/{alarm}"
+        text = operator.send(here, 422, action="measured_by_hand", comment="Micrometer")
+        assert "say the size in mm" in text
+        assert f'action="{here}"' in text
+        assert len(shop.alarms()) == 1
+
+    def test_a_tool_is_changed(self, shop: Shop, operator: Person) -> None:
+        shop.read(6.0)
+        here = f"/station/{shop.machine}/tools/3/change"
+        assert "Tool 3 was changed?" in operator.open(here)
+        assert "Offset" in operator.send(here, 422, offset="wide", reason="New insert")
+        assert "Tool 3 starts a new life" in operator.send(here, offset="0,01", reason="New insert")
+        assert shop.tool()["offset"] == 0.01
+
+    def test_a_viewer_looks_and_no_more(self, shop: Shop, viewer: Person) -> None:
+        shop.read(12.0)
+        alarm = shop.alarms()[0]["id"]
+        here = f"/station/{shop.machine}"
+        text = viewer.open(here)
+        assert "Acknowledging needs the role operator" in text
+        assert "data-confirm" not in text
+        viewer.open(f"{here}/alarms/{alarm}?action=noted", 403)
+        viewer.send(f"{here}/alarms/{alarm}", 403, action="noted", comment="Seen")
+        viewer.send(f"{here}/tools/3/change", 403, offset="0", reason="New")
+
+    def test_what_is_not_of_this_machine_is_not_there(self, shop: Shop, operator: Person) -> None:
+        other = Shop(shop.server)
+        shop.read(12.0)
+        alarm = shop.alarms()[0]["id"]
+        operator.open(f"/station/{other.machine}/alarms/{alarm}?action=noted", 404)
+        operator.send(f"/station/{other.machine}/alarms/{alarm}", 404, action="noted", comment="Seen")
+        operator.open(f"/station/{shop.machine}/alarms/{alarm}?action=dance", 404)
+        operator.open("/station/nowhere", 404)
+        assert len(shop.alarms()) == 1
+
+
+@pytest.mark.parametrize("size", TABLETS, ids=["upright", "across"])
+@pytest.mark.parametrize("deviation", [-12.5, 1234.5])
+def test_it_is_read_from_two_metres(page: Page, shop: Shop, operator: Person, size: Any, deviation: float) -> None:
+    """On ten inches 60 px are letters of 7 mm."""
+    page.set_viewport_size(size)
+    shop.add(f"{shop.characteristic}-calm", tool_memory=4)
+    shop.read(deviation)
+    operator.sign_in(page)
+    page.goto(f"/station/{shop.machine}")
+    value = page.locator(".station-deviation .value")
+    assert value.evaluate(LETTERS) >= 120
+    for part in (".station-now .badge", ".station-action", ".station-alarm h2"):
+        assert page.locator(part).first.evaluate(LETTERS) >= 59, part
+    box = value.bounding_box()
+    assert box is not None
+    assert box["x"] + box["width"] <= size["width"]
+    assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+    first = page.locator(".station-alarm").first.bounding_box()
+    assert first is not None
+    assert first["y"] < size["height"] * 0.75  # seen without scrolling
+    for button in page.locator(".actions .button").all():
+        place = button.bounding_box()
+        assert place is not None
+        assert place["height"] >= 64
+
+
+def test_by_touch_live_with_two_touches(page: Page, shop: Shop, operator: Person) -> None:
+    page.set_viewport_size(TABLET)  # type: ignore[arg-type]
+    operator.sign_in(page)
+    page.goto(f"/station/{shop.machine}")
+    expect(page.locator("live-status")).to_have_attribute("state", "live")
+    shop.read(12.5)
+    expect(page.locator(".station-deviation")).to_contain_text("+12.5")
+    expect(page.locator(".station-alarm h2")).to_contain_text("Oversize")
+    page.get_by_role("link", name="Noted").click()
+    page.get_by_role("dialog").get_by_role("button", name="Noted").click()
+    expect(page.get_by_role("status").filter(has_text="Oversize: Noted")).to_be_visible()
+    assert shop.alarms("acknowledged")[0]["acknowledged_by"] == operator.name
+
+
+def test_it_says_plainly_that_live_data_is_lost(
+    page: Page, shop: Shop, operator: Person, complaints: list[str]
+) -> None:
+    page.set_viewport_size(TABLET)  # type: ignore[arg-type]
+    shop.read(0.4)
+    operator.sign_in(page)
+    page.route("**/api/v1/events", lambda route: route.abort())
+    page.goto(f"/station/{shop.machine}")
+    status = page.locator("live-status")
+    expect(status).to_contain_text("No connection")
+    assert status.evaluate(LETTERS) >= 24
+    expect(page.locator(".station-now").get_by_text("Old data")).to_be_visible()
+    expect(page.locator(".station-now").get_by_text("In band")).to_be_hidden()
+    page.unroute("**/api/v1/events")
+    expect(status).to_have_attribute("state", "live")
+    complaints.clear()  # the browser notes every attempt that failed
+
+
+def test_sound_and_title_when_an_alarm_comes(page: Page, shop: Shop, operator: Person) -> None:
+    operator.sign_in(page)
+    page.add_init_script(TONES)
+    page.goto(f"/station/{shop.machine}")
+    expect(page.locator("live-status")).to_have_attribute("state", "live")
+    expect(page).to_have_title(re.compile(r"^Lathe"))
+    switch = page.get_by_role("button", name="Sound at an alarm")
+    expect(switch).to_have_attribute("aria-pressed", "false")
+    switch.click()
+    expect(switch).to_have_text("Sound on")
+    expect(page.locator("html")).to_have_attribute("data-tones", "1")  # so that the person knows it
+    page.evaluate("localStorage.removeItem('inband_alarm_sounded')")
+    shop.read(12.0)
+    expect(page.locator("html")).to_have_attribute("data-tones", "2")
+    expect(page).to_have_title(re.compile(r"^\(1\) Lathe"))
+    page.goto("/alarms")
+    expect(page).to_have_title(re.compile(r"^\([1-9]\d*\) Alarms"))
+    expect(page.get_by_role("button", name="Sound at an alarm")).to_have_attribute("aria-pressed", "true")
