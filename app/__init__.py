@@ -2,7 +2,7 @@
 
 The map of the house, from the top floor down. A room knows only rooms of the floors below it, and of its own floor those that
 stand lower in this list; import-linter holds that. Inside a room: tables (columns), queries (SELECT only), actions (load,
-decide in core, save), schemas (JSON), api and pages (routes), wording (sentences), figures (pure, charts as dicts). Rooms meet
+decide in core, save), schemas (JSON), api and pages (routes), wording (sentences), figures (pure: values in, charts out). Rooms meet
 only through each other's queries and actions. frontend/ and migrations/ lie beside this folder.
 
     cli              the command `inband`, and the demonstration plant that talks to the public API like real machines
@@ -46,6 +46,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
 
     web              the browser kit: templates, problem pages, live events
     files            file formats in and out; reports as picture, PDF, spreadsheet, CSV, JSON
+    charts           what a chart shows, described once; drawn in the browser and on paper
     jobs             periodic background jobs, once a minute: run, retried, and those that fail
     db               PostgreSQL: engine, column types, migrations, the embedded server
     language         translation, and the writing of numbers, units and times

@@ -9,6 +9,7 @@ import app
 
 WINGS = {"loop", "quality", "geometry", "views"}  # floors that hold several rooms
 KITS = {
+    "charts",
     "cli",
     "core",
     "db",

@@ -2,10 +2,12 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Query
+import msgspec
+from fastapi import APIRouter, Path, Query, Response
 from fastapi.routing import APIRoute
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from app.charts import Chart, ThemeName, to_plotly
 from app.errors import (
     PROBLEM_JSON,
     Conflict,
@@ -21,7 +23,6 @@ from app.errors import (
 )
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Slug, one_line
 from app.web.json_bodies import JsonRoute
-from app.web.theme import ThemeName
 
 BASE = "/api/v1"
 MachineKey = Annotated[str, Path(description="The key of the machine.", examples=["lathe-1"])]
@@ -44,6 +45,12 @@ FIGURE: dict[int | str, dict[str, Any]] = {
         "content": {"application/json": {"example": {"data": [], "layout": {}}}},
     }
 }
+
+
+def chart_answer(chart: Chart, theme: ThemeName) -> Response:
+    """A chart for the browser; thousands of numbers: written at once, not walked through by a validator first."""
+    body = msgspec.json.encode(to_plotly(chart, theme))
+    return Response(body, media_type="application/json", headers={"Cache-Control": "no-store"})
 
 
 class WrongField(BaseModel):

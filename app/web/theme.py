@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import Any, Literal
+from typing import Any, cast
 
+from app import charts
+from app.charts import BANDS, Role
+from app.charts import ThemeName as ThemeName  # noqa: PLC0414
 from app.language.times import on_axis, plant_zone
 from app.web.states import tone_of, word_of
 
-ThemeName = Literal["light", "dark"]
 FONT = '"IBM Plex Sans", "Segoe UI", Roboto, "Noto Sans", "Liberation Sans", system-ui, sans-serif'
 
 
@@ -38,36 +40,11 @@ class Palette:
 
 
 PALETTES: dict[ThemeName, Palette] = {
-    "light": Palette(
-        surface="#fbfbfa",
-        ink="#1d2328",
-        quiet="#5a646c",
-        faint="#8d979e",
-        grid="#dfe3e5",
-        steady="#4a5560",
-        average="#1d2328",
-        attention="#a84b00",
-        wear="#8a2a8c",
-        stop="#c00f1e",
-        waiting="#155fa8",
-        correction="#155fa8",
-        bands=("#fbfbfa", "#f0f2f2", "#e4e7e8", "#f7efe6", "#f3ebf4", "#f8e9e9"),
-    ),
-    "dark": Palette(
-        surface="#1b2024",
-        ink="#eceff1",
-        quiet="#a7b1b8",
-        faint="#6c777f",
-        grid="#2c3338",
-        steady="#b3bdc4",
-        average="#ffffff",
-        attention="#ffa94d",
-        wear="#e08be2",
-        stop="#ff6b6b",
-        waiting="#74b6f2",
-        correction="#74b6f2",
-        bands=("#1b2024", "#22282d", "#2b3238", "#2e2820", "#2b2330", "#322224"),
-    ),
+    theme: Palette(
+        **{role: colour for role, colour in colours.items() if "-" not in role and role != "mended"},
+        bands=tuple(colours[role] for role in BANDS),  # type: ignore[arg-type]
+    )
+    for theme, colours in charts.PALETTES.items()
 }
 
 # The same shapes for Plotly (its symbols) and for badges and small pictures (paths in a 24 × 24 box).
@@ -100,6 +77,11 @@ def zone_colour(zone: str, colours: Palette) -> str:
     """Grey inside the tolerance; a colour where someone is needed."""
     tone: str = getattr(colours, tone_of(zone))
     return tone
+
+
+def zone_role(zone: str) -> Role:
+    """Grey inside the tolerance; a colour where someone is needed."""
+    return cast("Role", tone_of(zone))
 
 
 def palette(theme: ThemeName) -> Palette:

@@ -16,6 +16,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
 
+from app.charts import to_plotly
 from app.core.decision.limits import Limits, classify
 from app.loop.tools.figures import OffsetChange, offset_figure
 from app.views.characteristic import figures as charts
@@ -144,7 +145,6 @@ def showcase(stage: Stage | None = None) -> Starlette:
         common: dict[str, Any] = {
             "limits": LIMITS,
             "scale": query.get("scale", "zones"),
-            "theme": "dark" if query.get("theme") == "dark" else "light",
             "sizes": charts.SizeAxis(39.992),
             "width": int(query.get("width", 1240)),
         }
@@ -156,10 +156,10 @@ def showcase(stage: Stage | None = None) -> Starlette:
             made = charts.zone_chart([], blocks=thinned(), **common)
         elif request.path_params["name"] == "histogram":
             counts = charts.histogram_counts([p.deviation for p in points], LIMITS)
-            made = charts.histogram_figure(counts, LIMITS, theme=common["theme"])
+            made = charts.histogram_figure(counts, LIMITS)
         elif request.path_params["name"] == "run":
             run = [charts.RunPoint(p.sequence, p.at, p.deviation, p.zone, p.excluded) for p in points[:90] if p.at]
-            made = charts.run_figure(run, LIMITS, sizes=common["sizes"], theme=common["theme"])
+            made = charts.run_figure(run, LIMITS, sizes=common["sizes"])
         else:
             total, changes = 0.0, []
             for step in steps:
@@ -168,8 +168,8 @@ def showcase(stage: Stage | None = None) -> Starlette:
                     OffsetChange(START + timedelta(minutes=step.sequence), total, "correction", f"no. {step.number}")
                 )
             changes.insert(30, OffsetChange(changes[30].at, 0.0, "change", "worn"))
-            made = offset_figure(changes, theme=common["theme"])
-        return JSONResponse(made)
+            made = offset_figure(changes)
+        return JSONResponse(to_plotly(made, "dark" if query.get("theme") == "dark" else "light"))
 
     async def events(request: Request) -> Response:
         while stage.silent and not stage.over:  # noqa: ASYNC110 - as behind a pulled cable; set by another thread

@@ -12,6 +12,7 @@ from math import floor, isfinite
 from typing import Any, Literal
 from zoneinfo import ZoneInfo
 
+from app.charts import Chart
 from app.language.i18n import _
 from app.language.numbers import MINUS, NO_BREAK_SPACE, NOTHING, signed
 from app.language.times import written
@@ -196,7 +197,7 @@ class Picture:
     key: str
     title: str
     says: str
-    figure: dict[str, Any]
+    figure: Chart | dict[str, Any]
     width: int
     height: int
     data: Callable[[], Table]

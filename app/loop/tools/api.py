@@ -1,8 +1,8 @@
 """JSON routes: tool memory (R10), average memory (R11), and the life of corrections."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
-from fastapi import Path, Query
+from fastapi import Path, Query, Response
 
 from app.access.deps import AnyCaller, Operator
 from app.core.parameters import MOST_LOCATIONS
@@ -30,7 +30,7 @@ from app.loop.tools.schemas import (
     tool_out,
     tool_set,
 )
-from app.web.api import FIGURE, Limit, MachineKey, SerialAfter, Theme, api_router, problems
+from app.web.api import FIGURE, Limit, MachineKey, SerialAfter, Theme, api_router, chart_answer, problems
 from app.web.deps import SessionDep
 from app.web.fields import Page, page_of
 
@@ -99,13 +99,13 @@ def tool_figure(
     tool: R10,
     theme: Theme = "light",
     limit: Limit = 500,
-) -> dict[str, Any]:
+) -> Response:
     """The history of the offset as a Plotly figure: `{"data", "layout"}`."""
     machine_row = machine_for(session, caller, machine, "viewer")
     queries.tool(session, machine_row, tool)
     steps = reversed(queries.offset_history(session, machine_row, tool, limit=limit))
     changes = [OffsetChange(step.event.at, step.event.offset_after, step.kind, wording.step(step)) for step in steps]
-    return offset_figure(changes, theme=theme)
+    return chart_answer(offset_figure(changes), theme)
 
 
 # --- average memory

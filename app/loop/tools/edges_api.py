@@ -1,6 +1,6 @@
 """JSON routes: what is in a location of the tool memory, the lives of its edges, its sister tool."""
 
-from typing import Any
+from fastapi import Response
 
 from app.access.deps import AnyCaller, Operator
 from app.loop.machines.queries import machine_for, machine_named
@@ -12,7 +12,7 @@ from app.loop.tools.figures import LifeBar, lives_figure
 from app.loop.tools.lives import lives
 from app.loop.tools.schemas import ToolOut, tool_out
 from app.loop.tools.sisters import switch_to_sister
-from app.web.api import FIGURE, MachineKey, Theme, api_router, problems
+from app.web.api import FIGURE, MachineKey, Theme, api_router, chart_answer, problems
 from app.web.deps import SessionDep
 
 router = api_router("offsets")
@@ -36,18 +36,15 @@ def tool_lives(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool
 @router.get("/machines/{machine}/tools/{tool}/lives/figure", responses=problems(404) | FIGURE)
 def tool_lives_figure(
     session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, theme: Theme = "light"
-) -> dict[str, Any]:
+) -> Response:
     """Parts cut and corrections summed per edge as a Plotly figure: `{"data", "layout"}`."""
     machine_row = machine_for(session, caller, machine, "viewer")
     known = lives(session, machine_row, tool, limit=20)
     bars = [LifeBar(life.parts, life.total, life.ended_at, life.edge) for life in reversed(known.lives)]
-    return lives_figure(
-        bars,
-        usual=known.usual,
-        planned_parts=known.tool.planned_parts,
-        planned_total=known.tool.planned_total,
-        theme=theme,
+    chart = lives_figure(
+        bars, usual=known.usual, planned_parts=known.tool.planned_parts, planned_total=known.tool.planned_total
     )
+    return chart_answer(chart, theme)
 
 
 @router.post("/machines/{machine}/tools/{tool}/switch", responses=problems(404, 409))

@@ -2,7 +2,6 @@
 
 from typing import Annotated, Literal
 
-import msgspec
 from fastapi import Query, Response
 
 from app.access.deps import AnyCaller
@@ -14,7 +13,7 @@ from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.views.characteristic.chart import chart_of, results_of, run_of
 from app.views.characteristic.figures import counting_edges, histogram_figure, result_figure, run_figure, zone_chart
-from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, problems
+from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
 from app.web.choice import Choice, Chosen
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID
@@ -32,11 +31,6 @@ def _found(
     return current, statistics.window_of(session, current.characteristic, **choice._asdict())
 
 
-def _answer(figure: dict[str, object]) -> Response:
-    # Thousands of numbers: written at once, not walked through by a validator first.
-    return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})
-
-
 @router.get("/characteristics/{characteristic}/figures/zones", responses=problems(404) | FIGURE, response_model=None)
 def get_zone_chart(
     session: SessionDep,
@@ -52,11 +46,11 @@ def get_zone_chart(
 ) -> Response:
     """The zone chart: readings in their zones, running average, corrections, tool changes, alarms.
 
-    Of more readings than can be drawn, blocks with their extremes: no extreme is ever thinned away.
+    Of more readings than can be chart_answer, blocks with their extremes: no extreme is ever thinned away.
     """
     current, window = _found(session, caller, characteristic, choice)
     chart = chart_of(session, current, window)
-    return _answer(
+    return chart_answer(
         zone_chart(
             chart.points,
             current.parameters,
@@ -65,12 +59,12 @@ def get_zone_chart(
             marks=chart.marks,
             hands=chart.hands,
             scale=scale,
-            theme=theme,
             sizes=chart.sizes,
             total_before=chart.total_before,
             width=width,
             ringed=ringed or ("newest" if window.reaches_now else None),
-        )
+        ),
+        theme,
     )
 
 
@@ -86,7 +80,7 @@ def get_run_chart(
     """Sizes over time, corrected by the empirical value of each reading; of more than 2 000 readings the last 2 000."""
     current, window = _found(session, caller, characteristic, choice)
     points, sizes = run_of(session, current, window)
-    return _answer(run_figure(points, current.parameters, sizes=sizes, theme=theme))
+    return chart_answer(run_figure(points, current.parameters, sizes=sizes), theme)
 
 
 @router.get("/characteristics/{characteristic}/figures/results", responses=problems(404) | FIGURE, response_model=None)
@@ -103,12 +97,12 @@ def get_result_chart(
 ) -> Response:
     """Results of the measuring variant beside the value: run-out, out-of-roundness, taper, repeatability.
 
-    Of more readings than can be drawn, blocks with their extremes; of more than 500 000 the last ones.
+    Of more readings than can be chart_answer, blocks with their extremes; of more than 500 000 the last ones.
     """
     current, window = _found(session, caller, characteristic, choice)
     name: str = result or next(iter(yielded_by(current.parameters)), "repeat_range")
     points, ranges = results_of(session, current, window, name)
-    return _answer(result_figure(name, result_label(name), points, ranges, theme=theme))
+    return chart_answer(result_figure(name, result_label(name), points, ranges), theme)
 
 
 @router.get(
@@ -126,4 +120,4 @@ def get_histogram(
     current, window = _found(session, caller, characteristic, choice)
     parameters = current.parameters
     counts = statistics.histogram_of(session, current.characteristic, window, counting_edges(parameters))
-    return _answer(histogram_figure(counts, parameters, theme=theme))
+    return chart_answer(histogram_figure(counts, parameters), theme)

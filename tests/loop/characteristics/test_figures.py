@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.charts import to_plotly
 from app.core.decision.limits import Limits, classify
+from app.views.characteristic import figures
 from app.views.characteristic.figures import (
     Block,
     Mark,
@@ -19,8 +21,6 @@ from app.views.characteristic.figures import (
     bands,
     histogram_counts,
     histogram_edges,
-    histogram_figure,
-    zone_chart,
 )
 from app.views.characteristic.glance import band_picture, sparkline
 
@@ -37,6 +37,14 @@ limits = st.lists(st.integers(1, 3_000_000), min_size=5, max_size=5).map(sorted)
     )
 )  # fmt: skip
 deviations = st.floats(-10, 10, allow_nan=False)
+
+
+def zone_chart(*what: Any, theme: Any = "light", **more: Any) -> dict[str, Any]:
+    return to_plotly(figures.zone_chart(*what, **more), theme)
+
+
+def histogram_figure(*what: Any) -> dict[str, Any]:
+    return to_plotly(figures.histogram_figure(*what))
 
 
 def traces(figure: dict[str, Any], meta: str) -> list[dict[str, Any]]:

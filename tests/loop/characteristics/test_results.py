@@ -7,6 +7,7 @@ import pytest
 from playwright.sync_api import Page
 from sqlalchemy import text
 
+from app.charts import to_plotly
 from app.core.parameters import Parameters, read
 from app.views.characteristic.figures import (
     HandPoint,
@@ -28,29 +29,33 @@ def bore(**more: Any) -> Parameters:
     return read({"R32": 40.0, "R35": 0.016, "R33": 0, "R37": 0.3, "R36": 1.0} | more)[0]
 
 
+def figure_of(*what: Any) -> dict[str, Any]:
+    return to_plotly(result_figure(*what))
+
+
 class TestFigures:
     def test_results_are_drawn_in_micrometres_and_excluded_ones_hollow(self) -> None:
         points = [ResultPoint(1, 0.004), ResultPoint(2, 0.006, excluded=True, link="/x")]
-        figure = result_figure("run_out", "Run-out", points)
+        figure = figure_of("run_out", "Run-out", points)
         (trace,) = figure["data"]
         assert (trace["x"], trace["y"]) == ([1, 2], [4.0, 6.0])
         assert trace["marker"]["symbol"] == ["circle", "circle-open"]
         assert trace["customdata"] == [None, "/x"]
         assert figure["layout"]["yaxis"]["rangemode"] == "tozero"
-        assert result_figure("taper", "Taper", points)["layout"]["yaxis"]["rangemode"] == "normal"
+        assert figure_of("taper", "Taper", points)["layout"]["yaxis"]["rangemode"] == "normal"
 
     def test_of_very_many_every_extreme_is_drawn(self) -> None:
         blocks = [ResultRange(1, 500, 0.001, 0.02, 0.003), ResultRange(501, 1000, 0.0, 0.004, 0.002)]
-        lower, upper, mean = result_figure("run_out", "Run-out", [], blocks)["data"]
+        lower, upper, mean = figure_of("run_out", "Run-out", [], blocks)["data"]
         assert (lower["y"], upper["y"], mean["y"]) == ([1.0, 0.0], [20.0, 4.0], [3.0, 2.0])
 
     def test_without_results_the_chart_says_so(self) -> None:
-        figure = result_figure("run_out", "Run-out", [])
+        figure = figure_of("run_out", "Run-out", [])
         assert "Nothing yet" in figure["layout"]["annotations"][0]["text"]
 
     def test_the_hand_has_a_mark_of_its_own(self) -> None:
         hands = [HandPoint(3, 0.002, True, "ana"), HandPoint(4, 0.02, False, "ana")]
-        figure = zone_chart([], bore(), hands=hands)
+        figure = to_plotly(zone_chart([], bore(), hands=hands))
         (trace,) = [trace for trace in figure["data"] if trace.get("meta") == "by-hand"]
         assert trace["marker"]["symbol"] == ["star", "star-open"]
         assert "scrap" in trace["text"][1]

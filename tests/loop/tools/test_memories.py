@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from app.charts import to_plotly
 from app.loop.tools.figures import OffsetChange, offset_figure
 from tests.shop import Shop
 
@@ -182,7 +183,7 @@ class TestAverages:
 def test_what_is_told_late_draws_no_line_back_in_time() -> None:
     noon = datetime(2026, 11, 22, 12, tzinfo=UTC)
     changes = [OffsetChange(noon + timedelta(hours=hour), hour / 1000, "correction") for hour in (0, 2, 1)]
-    line = offset_figure(changes)["data"][0]
+    line = to_plotly(offset_figure(changes))["data"][0]
     assert line["x"] == sorted(line["x"])
     assert line["y"] == [0.0, 0.001, 0.002]
 

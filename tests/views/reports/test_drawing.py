@@ -1,24 +1,16 @@
-"""Figures of the pages on paper: what the legend shows is what is drawn."""
+"""Charts on paper: what the legend shows is what is drawn."""
 
-from app.files.documents.drawing.axes import Axis
-from app.files.documents.drawing.marks import Area
-from app.files.documents.drawing.plot import drawing_of
+from app.charts import Axis, Chart, Dots, Panel, Pen, Series, to_drawing
+from app.charts.marks import Area
+from app.charts.scales import Scale
 
 
 def test_a_hollow_marker_is_seen_in_the_legend() -> None:
-    marker = {"symbol": "square", "size": 9, "color": "#ffffff", "line": {"color": "#1a7a3c", "width": 2}}
-    trace = {
-        "type": "scatter",
-        "mode": "lines+markers",
-        "name": "optimised",
-        "x": [0, 90],
-        "y": [1, 2],
-        "marker": marker,
-    }
-    drawn = drawing_of({"data": [trace], "layout": {"showlegend": True}}, 400, 200)
+    dots = Dots("square", 9, "surface", "mended", 2)
+    chart = Chart([Panel([Series([0, 90], [1, 2], Pen("mended"), dots, name="optimised")])])
     squares = [
         mark
-        for group in drawn.groups
+        for group in to_drawing(chart, 400, 200).groups
         for mark in group.marks
         if isinstance(mark, Area) and mark.fill == "#ffffff" and len(mark.places) == 4
     ]
@@ -27,12 +19,9 @@ def test_a_hollow_marker_is_seen_in_the_legend() -> None:
 
 
 def test_ticks_say_what_they_say_on_the_page() -> None:
-    angles = {"tickvals": [-90.0, 0.0, 22.5], "range": [-100, 100]}
-    assert [text for _at, text in Axis(-100, 100, 0, 400, angles).ticks()] == ["−90", "0", "22.5"]
-    assert [text for _at, text in Axis(-10, 10, 0, 400, {"tickformat": "+.3~g", "dtick": 10}).ticks()] == [
-        "−10",
-        "+0",
-        "+10",
-    ]
-    of_many_angles = Axis(-10, 10, 0, 400, {"tickvals": None, "dtick": 10})
-    assert [text for _at, text in of_many_angles.ticks()] == ["−10", "0", "10"]
+    def said(axis: Axis, low: float, high: float) -> list[str]:
+        return [text for _at, text in Scale(axis, low, high, 0, 400).ticks()]
+
+    assert said(Axis(at=[-90.0, 0.0, 22.5]), -100, 100) == ["−90", "0", "22.5"]
+    assert said(Axis(format="+.3~g", every=10), -10, 10) == ["−10", "+0", "+10"]
+    assert said(Axis(every=10), -10, 10) == ["−10", "0", "10"]

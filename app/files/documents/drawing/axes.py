@@ -7,7 +7,7 @@ from itertools import pairwise
 from math import ceil, floor, isfinite, log10
 from typing import Any
 
-from app.files.documents.drawing.marks import Box
+from app.charts.marks import Box
 from app.language.numbers import MINUS
 from app.language.times import plant_zone
 

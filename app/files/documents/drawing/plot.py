@@ -9,8 +9,9 @@ from html import unescape
 from itertools import groupby
 from typing import Any, Literal
 
+from app.charts import Chart, to_drawing
+from app.charts.marks import Anchor, Area, Box, Drawing, Group, Line, Mark, Place, Words, symbol
 from app.files.documents.drawing.axes import Axis, axis_of, position, spread
-from app.files.documents.drawing.marks import Anchor, Area, Box, Drawing, Group, Line, Mark, Place, Words, symbol
 
 INK, QUIET = "#1d2328", "#5a646c"
 LEGEND_GAP = 24  # between two entries, pixels
@@ -20,8 +21,10 @@ ANCHORS: dict[str, Anchor] = {"left": "start", "right": "end", "center": "middle
 Figure = Mapping[str, Any]
 
 
-def drawing_of(figure: Figure, width: float, height: float) -> Drawing:
+def drawing_of(figure: Figure | Chart, width: float, height: float) -> Drawing:
     """The figure, drawn into so many pixels."""
+    if isinstance(figure, Chart):
+        return to_drawing(figure, width, height)
     return _Plot(figure, width, height).drawn()
 
 

@@ -1,4 +1,4 @@
-"""Pictures of a characteristic. Pure: values in, Plotly figures as plain dicts (or small SVG pictures) out; lengths in mm.
+"""Pictures of a characteristic. Pure: values in, charts (or small SVG pictures) out; lengths in mm.
 
 zone_chart(…)        the face of the product: readings in their zones, average, corrections, tool changes, alarms
 histogram_figure(…)  how the deviations are spread, beside the limits
@@ -12,6 +12,7 @@ from app.views.characteristic.figures.by_hand import HandPoint
 from app.views.characteristic.figures.distribution import (
     RunPoint,
     counting_edges,
+    histogram_centres,
     histogram_counts,
     histogram_edges,
     histogram_figure,
@@ -39,6 +40,7 @@ __all__ = [
     "angle_of",
     "bands",
     "counting_edges",
+    "histogram_centres",
     "histogram_counts",
     "histogram_edges",
     "histogram_figure",

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from app.charts import Dots, Series
 from app.language.i18n import _
 from app.language.numbers import um
 from app.views.characteristic.figures.scale import Scale
-from app.web.theme import Palette
 
 
 @dataclass(frozen=True)
@@ -23,32 +22,24 @@ class HandPoint:
     link: str | None = None
 
 
-def hand_marks(points: Sequence[HandPoint], ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+def hand_marks(points: Sequence[HandPoint], ruler: Scale) -> list[Series]:
     """A star for each, hollow where the verdict is scrap; words in the legend and when pointed at."""
     if not points:
         return []
     verdicts = {True: _("part is good"), False: _("part is scrap"), None: _("no verdict")}
+    stars = ["star-open" if point.good is False else "star" for point in points]
     return [
-        {
-            "type": "scatter",
-            "mode": "markers",
-            "name": _("Measured by hand"),
-            "meta": "by-hand",
-            "x": [point.sequence for point in points],
-            "y": [ruler.position(point.deviation) for point in points],
-            "marker": {
-                "symbol": ["star-open" if point.good is False else "star" for point in points],
-                "size": 15,
-                "color": colours.waiting,
-                "line": {"width": 1.5, "color": colours.waiting},
-            },
-            "customdata": [point.link for point in points],
-            "text": [
+        Series(
+            [point.sequence for point in points],
+            [ruler.position(point.deviation) for point in points],
+            dots=Dots(stars, 15, "waiting", edge="waiting"),
+            meta="by-hand",
+            name=_("Measured by hand"),
+            hover=[
                 f"<b>{_('Reading {n}, by hand').format(n=point.sequence)}</b><br>{um(point.deviation)} · "
                 f"{verdicts[point.good]}<br>{point.by}"
                 for point in points
             ],
-            "hovertemplate": "%{text}<extra></extra>",
-            "cliponaxis": False,
-        }
+            links=[point.link for point in points],
+        )
     ]

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.charts import Axis, Bars, Chart, Dots, Note, Panel, Pen, Room, Rule, Series, empty, time_axis
 from app.core.decision.limits import HasLimits, Limits, in_nanometres
 from app.language.i18n import _
 from app.language.numbers import um
-from app.language.times import on_axis
+from app.views.characteristic.figures.labels import LIMIT, TARGET, TOLERANCE
 from app.views.characteristic.figures.scale import TrueScale
 from app.views.characteristic.figures.sizes import SizeAxis, size_lines
-from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, date_axis, layout, palette, zone_colour, zone_name
+from app.web.theme import ZONE_SYMBOLS, zone_name, zone_role
 
 Floats = NDArray[np.float64]
 
@@ -56,6 +56,13 @@ def counting_edges(limits: HasLimits) -> list[float]:
     return edges
 
 
+def histogram_centres(limits: HasLimits) -> list[float]:
+    """Centres of the bars, µm; the two open ones as if they were as wide as the others."""
+    edges = [edge * 1000 for edge in histogram_edges(limits)]
+    half = (edges[1] - edges[0]) / 2
+    return [edges[0] - half, *(edge + half for edge in edges)]
+
+
 def histogram_counts(deviations: Sequence[float] | Floats, limits: HasLimits) -> list[int]:
     """Number of deviations (mm) in each bar; one bar more than there are edges."""
     edges = counting_edges(limits)
@@ -63,12 +70,11 @@ def histogram_counts(deviations: Sequence[float] | Floats, limits: HasLimits) ->
     return [int(count) for count in np.bincount(bars, minlength=len(edges) + 1)]
 
 
-def histogram_figure(counts: Sequence[int], limits: HasLimits, *, theme: ThemeName = "light") -> dict[str, Any]:
+def histogram_figure(counts: Sequence[int], limits: HasLimits) -> Chart:
     """The spread, lying beside the zone chart: deviation upward (µm), bars to the right; the limits drawn in."""
-    colours = palette(theme)
     edges = [edge * 1000 for edge in histogram_edges(limits)]
     width = edges[1] - edges[0]
-    centres = [edges[0] - width / 2, *(edge + width / 2 for edge in edges)]
+    centres = histogram_centres(limits)
     half = limits.tolerance_width * 500
     total = sum(counts)
     names = [_("{low} to {high} µm").format(low=f"{c - width / 2:+.1f}", high=f"{c + width / 2:+.1f}") for c in centres]
@@ -77,153 +83,85 @@ def histogram_figure(counts: Sequence[int], limits: HasLimits, *, theme: ThemeNa
         _("above {high} µm").format(high=f"{edges[-1]:+.1f}"),
     )
     extent = edges[-1] + width
+    bars = Bars(
+        counts,
+        centres,
+        ["attention" if abs(c) > half else "steady" for c in centres],
+        width * 0.9,
+        lying=True,
+        meta="histogram",
+        hover=[
+            f"<b>{name}</b><br>"
+            + _("{n} readings, {share}").format(n=count, share=f"{count / total:.1%}" if total else "–")
+            for name, count in zip(names, counts, strict=True)
+        ],
+    )
     lines = [
-        {
-            "type": "line",
-            "xref": "paper",
-            "x0": 0,
-            "x1": 1,
-            "y0": sign * limit,
-            "y1": sign * limit,
-            "line": {"color": colour, "width": thickness, "dash": dash},
-        }
-        for limit, colour, thickness, dash in (
-            (half, colours.ink, 1.75, "solid"),
-            (limits.averaging_limit * 1000, colours.faint, 1, "solid"),
-            (limits.zero_range * 1000, colours.faint, 1, "solid"),
-            (0.0, colours.quiet, 1, "4px,4px"),
+        Rule(pen, sign * limit)
+        for limit, pen in (
+            (half, TOLERANCE),
+            (limits.averaging_limit * 1000, LIMIT),
+            (limits.zero_range * 1000, LIMIT),
+            (0.0, TARGET),
         )
         for sign in ((1, -1) if limit else (1,))
         if limit <= extent
     ]
-    return {
-        "data": [
-            {
-                "type": "bar",
-                "orientation": "h",
-                "name": _("Readings"),
-                "meta": "histogram",
-                "x": list(counts),
-                "y": centres,
-                "width": width * 0.9,
-                "marker": {
-                    "color": [colours.attention if abs(c) > half else colours.steady for c in centres],
-                    "line": {"width": 0},
-                },
-                "text": [
-                    f"<b>{name}</b><br>"
-                    + _("{n} readings, {share}").format(n=count, share=f"{count / total:.1%}" if total else "–")
-                    for name, count in zip(names, counts, strict=True)
-                ],
-                "textposition": "none",
-                "hovertemplate": "%{text}<extra></extra>",
-            }
-        ],
-        "layout": layout(
-            theme,
-            bargap=0,
-            xaxis={"rangemode": "tozero", "tickformat": "d", "showgrid": True, "fixedrange": True}
-            | ({"nticks": 4} if max(counts) > FEW else {"dtick": 1})
-            | _title(_("Readings"), colours),
-            yaxis={
-                "range": [-extent, extent],
-                "fixedrange": True,
-                "showgrid": False,
-                "tickmode": "array",
-                "tickvals": [-half, 0, half],
-                "ticktext": [um(-half / 1000).replace("\xa0µm", ""), "0", um(half / 1000).replace("\xa0µm", "")],
-            }
-            | _title(_("Deviation, µm"), colours),
-            shapes=lines,
-            annotations=[] if total else [_nothing(colours)],
-        ),
-    }
+    deviation = Axis(
+        _("Deviation, µm"),
+        reach=(-extent, extent),
+        at=[-half, 0, half],
+        words=[um(-half / 1000).replace("\xa0µm", ""), "0", um(half / 1000).replace("\xa0µm", "")],
+        grid=False,
+        fixed=True,
+    )
+    many = max(counts) > FEW
+    return Chart(
+        [Panel([bars, *lines, *([] if total else [empty(_("No readings yet"))])], deviation)],
+        Axis(_("Readings"), ticks=4, every=None if many else 1, from_zero=True, format="d", fixed=True),
+    )
 
 
-def run_figure(
-    points: Sequence[RunPoint], limits: HasLimits, *, sizes: SizeAxis, theme: ThemeName = "light"
-) -> dict[str, Any]:
+def run_figure(points: Sequence[RunPoint], limits: HasLimits, *, sizes: SizeAxis) -> Chart:
     """Corrected sizes (mm) over time, with target and tolerance as the drawing has them.
 
     What lies far outside the tolerance stands at the edge with its deviation: one probe fault would press all else into a line.
     """
-    colours = palette(theme)
     half, target = limits.tolerance_width / 2, sizes.target
     scale = TrueScale.of(limits, [point.deviation for point in points])
     reach = scale.extent / 1000
-    return {
-        "data": [
-            {
-                "type": "scatter",
-                "mode": "lines+markers",
-                "name": _("Size"),
-                "meta": "run",
-                "x": [on_axis(point.at) for point in points],
-                "y": [round(target + scale.position(point.deviation) / 1000, 9) for point in points],
-                "line": {"width": 1, "color": colours.faint},
-                "marker": {
-                    "symbol": [ZONE_SYMBOLS.get(p.zone, "circle") + ("-open" if p.excluded else "") for p in points],
-                    "size": [6 if p.zone in ("zero", "average", "full") else 10 for p in points],
-                    "color": [zone_colour(p.zone, colours) for p in points],
-                },
-                "customdata": [point.link for point in points],
-                "text": [
-                    "<br>".join(
-                        (
-                            f"<b>{_('Reading {n}').format(n=p.sequence)}</b>",
-                            f"{um(p.deviation)} · {zone_name(p.zone)}",
-                            *size_lines(p.size, p.measured),
-                        )
-                    )
-                    for p in points
-                ],
-                "hovertemplate": "%{text}<extra></extra>",
-            }
-        ],
-        "layout": layout(
-            theme,
-            margin={"l": 92, "r": 110},
-            xaxis=date_axis(),
-            yaxis={"tickformat": ".4f", "nticks": 6, "range": [target - 1.08 * reach, target + 1.08 * reach]}
-            | _title(sizes.title, colours),
-            shapes=[
-                {
-                    "type": "line",
-                    "layer": "below",
-                    "xref": "paper",
-                    "x0": 0,
-                    "x1": 1,
-                    "y0": y,
-                    "y1": y,
-                    "line": {"color": colour, "width": width, "dash": dash},
-                }
-                for y, colour, width, dash in (
-                    (target + half, colours.ink, 1.75, "solid"),
-                    (target - half, colours.ink, 1.75, "solid"),
-                    (target, colours.quiet, 1, "4px,4px"),
-                )
-            ],
-            annotations=[
-                {
-                    "xref": "paper",
-                    "x": 1,
-                    "xanchor": "left",
-                    "xshift": 8,
-                    "y": y,
-                    "yanchor": "middle",
-                    "text": f"{y:.4f}",
-                    "showarrow": False,
-                    "font": {"size": 12, "color": colours.quiet},
-                }
-                for y in (target + half, target, target - half)
-            ]
-            + _at_the_edge(points, scale, target, colours)
-            + ([] if points else [_nothing(colours)]),
+    course = Series(
+        [point.at for point in points],
+        [round(target + scale.position(point.deviation) / 1000, 9) for point in points],
+        Pen("faint", 1),
+        Dots(
+            [ZONE_SYMBOLS.get(p.zone, "circle") + ("-open" if p.excluded else "") for p in points],
+            [6 if p.zone in ("zero", "average", "full") else 10 for p in points],
+            [zone_role(p.zone) for p in points],
         ),
-    }
+        meta="run",
+        hover=[
+            "<br>".join(
+                (
+                    f"<b>{_('Reading {n}').format(n=p.sequence)}</b>",
+                    f"{um(p.deviation)} · {zone_name(p.zone)}",
+                    *size_lines(p.size, p.measured),
+                )
+            )
+            for p in points
+        ],
+        links=[point.link for point in points],
+    )
+    lines = [
+        Rule(pen, y, words=f"{y:.4f}")
+        for y, pen in ((target + half, TOLERANCE), (target, TARGET), (target - half, TOLERANCE))
+    ]
+    said = _at_the_edge(points, scale, target) if points else [empty(_("No readings yet"))]
+    height = Axis(sizes.title, format=".4f", ticks=6, reach=(target - 1.08 * reach, target + 1.08 * reach))
+    return Chart([Panel([*lines, course, *said], height)], time_axis(), Room(left=92, right=110))
 
 
-def _at_the_edge(points: Sequence[RunPoint], scale: TrueScale, target: float, colours: Palette) -> list[dict[str, Any]]:
+def _at_the_edge(points: Sequence[RunPoint], scale: TrueScale, target: float) -> list[Note]:
     """The deviations of the readings that are drawn at the edge, the newest first, as many as there is room for."""
     apart = (points[-1].at - points[0].at) / 12 if points else timedelta()
     labelled: list[RunPoint] = []
@@ -231,29 +169,12 @@ def _at_the_edge(points: Sequence[RunPoint], scale: TrueScale, target: float, co
         if not scale.fits(point.deviation) and (not labelled or labelled[-1].at - point.at > apart):
             labelled.append(point)
     return [
-        {
-            "x": on_axis(point.at),
-            "y": target + scale.position(point.deviation) / 1000,
-            "yshift": -14 if point.deviation > 0 else 14,
-            "text": f"<b>{um(point.deviation, 0)}</b>",
-            "showarrow": False,
-            "font": {"size": 12, "color": zone_colour(point.zone, colours)},
-        }
+        Note(
+            f"<b>{um(point.deviation, 0)}</b>",
+            point.at,
+            target + scale.position(point.deviation) / 1000,
+            shift=(0, -14 if point.deviation > 0 else 14),
+            colour=zone_role(point.zone),
+        )
         for point in labelled
     ]
-
-
-def _title(text: str, colours: Palette) -> dict[str, Any]:
-    return {"title": {"text": text, "font": {"size": 13, "color": colours.quiet}, "standoff": 6}}
-
-
-def _nothing(colours: Palette) -> dict[str, Any]:
-    return {
-        "xref": "paper",
-        "yref": "paper",
-        "x": 0.5,
-        "y": 0.5,
-        "text": f"<b>{_('No readings yet')}</b>",
-        "showarrow": False,
-        "font": {"size": 15, "color": colours.quiet},
-    }

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from app.charts import BANDS, Ground, Note, Pen, Role, Rule, Share
 from app.core.decision.limits import HasLimits
 from app.language.i18n import _
 from app.language.numbers import MINUS, NO_BREAK_SPACE, NOTHING, um_limit
 from app.views.characteristic.figures.scale import Band, Scale, ZoneScale, bands
-from app.web.theme import Palette
 
 # In the linear scale close limits would write over each other: the least distance as a share of the whole height.
 LEAST_DISTANCE = 0.046
 TWO_THIRDS = 0.0005  # from ⅔ at most, to be called so: 5.333 µm of 8 µm are
+TOLERANCE, LIMIT, TARGET = Pen("ink", 1.75), Pen("faint", 1), Pen("quiet", 1, "4px,4px")
 
 
 def limit_title(limit: str, limits: HasLimits) -> str:
@@ -49,56 +48,34 @@ def band_text(band: Band, sign: int) -> str:
     }[band.name]
 
 
-def band_shapes(limits: HasLimits, ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+def band_grounds(limits: HasLimits, ruler: Scale) -> list[Ground]:
     """Backgrounds of the bands: grey inside the tolerance, a light colour outside."""
     return [
-        {
-            "type": "rect",
-            "layer": "below",
-            "xref": "paper",
-            "x0": 0,
-            "x1": 1,
-            "yref": "y",
-            "y0": sign * _edge(band.lower, ruler),
-            "y1": sign * (ruler.extent if band.upper is None else _edge(band.upper, ruler)),
-            "fillcolor": colours.bands[band.number],
-            "line": {"width": 0},
-        }
+        Ground(
+            BANDS[band.number],
+            (
+                sign * _edge(band.lower, ruler),
+                sign * (ruler.extent if band.upper is None else _edge(band.upper, ruler)),
+            ),
+        )
         for band in bands(limits)
         for sign in (1, -1)
         if _edge(band.lower, ruler) < ruler.extent
     ]
 
 
-def limit_lines(limits: HasLimits, ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+def limit_lines(limits: HasLimits, ruler: Scale) -> list[Rule]:
     """The limits, the tolerance the strongest, and the target, dashed."""
-    lines = [_line(0, colours.quiet, 1, "4px,4px")]
+    lines = [Rule(TARGET, 0)]
     for band in bands(limits):
         if not band.limits or not band.lower or not ruler.fits(band.lower):
             continue  # a limit of 0 is the target
-        colour, width = (colours.ink, 1.75) if "R35/2" in band.limits else (colours.faint, 1.0)
         edge = _edge(band.lower, ruler)
-        lines += [_line(y, colour, width, "solid") for y in (edge, -edge)]
+        lines += [Rule(TOLERANCE if "R35/2" in band.limits else LIMIT, y) for y in (edge, -edge)]
     return lines
 
 
-def _line(y: float, colour: str, width: float, dash: str) -> dict[str, Any]:
-    return {
-        "type": "line",
-        "layer": "below",
-        "xref": "paper",
-        "x0": 0,
-        "x1": 1,
-        "yref": "y",
-        "y0": y,
-        "y1": y,
-        "line": {"color": colour, "width": width, "dash": dash},
-    }
-
-
-def limit_labels(
-    limits: HasLimits, ruler: Scale, colours: Palette, size: int, *, brief: bool = False
-) -> list[dict[str, Any]]:
+def limit_labels(limits: HasLimits, ruler: Scale, size: int, *, brief: bool = False) -> list[Note]:
     """At the right: on each limit its name, value and title; in each band what happens there.
 
     brief: names and values of the limits only.
@@ -109,9 +86,7 @@ def limit_labels(
     if all_bands[0].limits:  # R33 = 0 lies on the target: one label for both sides
         middle.append(f"{' = '.join(all_bands[0].limits)}  0{NO_BREAK_SPACE}µm")
     title = f"  {limit_title(all_bands[0].limits[-1], limits)}" if all_bands[0].limits and not brief else ""
-    notes: list[dict[str, Any]] = [
-        _note(0, f"<b>{' = '.join(middle)}</b>{title}" if middle else "", colours.quiet, size)
-    ]
+    notes: list[Note] = [_note(0, f"<b>{' = '.join(middle)}</b>{title}" if middle else "", "quiet", size)]
     for sign in (1, -1):
         written = 0.0 if not isinstance(ruler, ZoneScale) else -height
         for band in all_bands:
@@ -122,7 +97,7 @@ def limit_labels(
                 written = place
                 names = " = ".join(band.limits)
                 title = "" if brief else f"  {limit_title(band.limits[-1], limits)}"
-                ink = colours.ink if strong else colours.quiet
+                ink: Role = "ink" if strong else "quiet"
                 notes.append(
                     _note(sign * place, f"<b>{names}  {_signed_limit(sign * band.lower)}</b>{title}", ink, size)
                 )
@@ -134,30 +109,18 @@ def limit_labels(
             room = (upper - max(lower, written)) / height
             if isinstance(ruler, ZoneScale):
                 if band.number > 0:
-                    notes.append(_note(sign * (lower + upper) / 2, band_text(band, sign), colours.quiet, size))
+                    notes.append(_note(sign * (lower + upper) / 2, band_text(band, sign), "quiet", size))
                 elif sign > 0:
-                    notes.append(_note(0, band_text(band, sign), colours.quiet, size))
+                    notes.append(_note(0, band_text(band, sign), "quiet", size))
             elif room > 1.6 * LEAST_DISTANCE and band.number > 0:
                 place = max((max(lower, written) + upper) / 2, written + LEAST_DISTANCE * height)
                 written = place
-                notes.append(_note(sign * place, band_text(band, sign), colours.quiet, size))
-    return [note for note in notes if note["text"]]
+                notes.append(_note(sign * place, band_text(band, sign), "quiet", size))
+    return [note for note in notes if note.text]
 
 
-def _note(y: float, text: str, colour: str, size: int) -> dict[str, Any]:
-    return {
-        "xref": "paper",
-        "x": 1,
-        "xanchor": "left",
-        "xshift": 8,
-        "yref": "y",
-        "y": y,
-        "yanchor": "middle",
-        "text": text,
-        "showarrow": False,
-        "align": "left",
-        "font": {"size": size, "color": colour},
-    }
+def _note(y: float, text: str, colour: Role, size: int) -> Note:
+    return Note(text, Share(1), y, "left", shift=(8, 0), size=size, colour=colour)
 
 
 def _signed_limit(deviation: float) -> str:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import Any
 
+from app.charts import Dots, Note, Pen, Role, Rule, Series, Share
 from app.language.i18n import _
 from app.language.numbers import um
 from app.loop.tools.wording import status_word
-from app.web.theme import ZONE_SYMBOLS, Palette
+from app.web.theme import ZONE_SYMBOLS
 
 TOOL_CHANGE = "tool_change"
 MANUAL_EDIT = "manual_edit"
@@ -58,14 +58,12 @@ class Mark:
     active: bool = False
 
 
-def _alarm_colour(kind: str, colours: Palette) -> str:
+def _alarm_colour(kind: str) -> Role:
     if kind == "probe_fault":
-        return colours.stop
+        return "stop"
     if kind == "tool_worn":
-        return colours.wear
-    if kind in (TOOL_CHANGE, MANUAL_EDIT):
-        return colours.correction
-    return colours.attention
+        return "wear"
+    return "correction" if kind in (TOOL_CHANGE, MANUAL_EDIT) else "attention"
 
 
 def _alarm_symbol(kind: str) -> str:
@@ -96,67 +94,40 @@ def _rows(marks: Sequence[Mark], span: tuple[float, float], pixels: int) -> list
     return places
 
 
-def event_lane(
-    marks: Sequence[Mark], span: tuple[float, float], pixels: int, colours: Palette
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]], list[dict[str, Any]]]:
-    """Traces, words and vertical lines (tool changes, edits) of the events. A word is left out where it would not fit."""
-    marks = [mark for mark in marks if span[0] <= mark.sequence <= span[1]]
-    if not marks:
-        return [], [], []
-    places = _rows(marks, span, pixels)
+def event_lane(marks: Sequence[Mark], span: tuple[float, float], pixels: int) -> list[Series | Rule | Note]:
+    """Marks, words and vertical lines (tool changes, edits) of the events. A word is left out where it would not fit."""
+    places = _rows([mark for mark in marks if span[0] <= mark.sequence <= span[1]], span, pixels)
+    if not places:
+        return []
     marks = [mark for mark, _row, _written in places]
-    trace = {
-        "type": "scatter",
-        "mode": "markers",
-        "name": _("Alarm or tool change"),
-        "meta": "events",
-        "showlegend": False,
-        "x": [mark.sequence for mark in marks],
-        "y": [row for _mark, row, _written in places],
-        "yaxis": "y2",
-        "marker": {
-            "symbol": [_alarm_symbol(mark.kind) for mark in marks],
-            "size": 12,
-            "color": [_alarm_colour(mark.kind, colours) for mark in marks],
-            "line": {"width": 1.5, "color": [_alarm_colour(mark.kind, colours) for mark in marks]},
-        },
-        "customdata": [mark.link for mark in marks],
-        "text": [f"<b>{mark.text}</b><br>{_('Reading {n}').format(n=mark.sequence)}" for mark in marks],
-        "hovertemplate": "%{text}<extra></extra>",
-        "cliponaxis": False,
-    }
-    words = [
-        {
-            "xref": "x",
-            "x": mark.sequence,
-            "xanchor": "left",
-            "xshift": 9,
-            "yref": "y2",
-            "y": row,
-            "yanchor": "middle",
-            "text": f"<b>{mark.text}</b>" if mark.active else mark.text,
-            "showarrow": False,
-            "font": {"size": 12, "color": _alarm_colour(mark.kind, colours)},
-        }
-        for mark, row, written in places
-        if written
+    colours = [_alarm_colour(mark.kind) for mark in marks]
+    return [
+        *(
+            Rule(Pen("correction", 1.25, "dot"), x=mark.sequence, upto=0.94)
+            for mark in marks
+            if mark.kind in (TOOL_CHANGE, MANUAL_EDIT)
+        ),
+        Series(
+            [mark.sequence for mark in marks],
+            [row for _mark, row, _written in places],
+            dots=Dots([_alarm_symbol(mark.kind) for mark in marks], 12, colours, edge=colours),
+            meta="events",
+            hover=[f"<b>{mark.text}</b><br>{_('Reading {n}').format(n=mark.sequence)}" for mark in marks],
+            links=[mark.link for mark in marks],
+        ),
+        *(
+            Note(
+                f"<b>{mark.text}</b>" if mark.active else mark.text,
+                mark.sequence,
+                row,
+                "left",
+                shift=(9, 0),
+                colour=_alarm_colour(mark.kind),
+            )
+            for mark, row, written in places
+            if written
+        ),
     ]
-    lines = [
-        {
-            "type": "line",
-            "layer": "below",
-            "xref": "x",
-            "x0": mark.sequence,
-            "x1": mark.sequence,
-            "yref": "paper",
-            "y0": 0,
-            "y1": 0.94,
-            "line": {"color": colours.correction, "width": 1.25, "dash": "dot"},
-        }
-        for mark in marks
-        if mark.kind in (TOOL_CHANGE, MANUAL_EDIT)
-    ]
-    return [trace], words, lines
 
 
 def offset_lane(
@@ -164,10 +135,9 @@ def offset_lane(
     marks: Sequence[Mark],
     span: tuple[float, float],
     total_before: float,
-    colours: Palette,
     *,
     brief: bool = False,
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+) -> list[Series | Note]:
     """The sum of the corrections since the tool was changed as steps; each correction a mark by its status.
 
     brief: beside it the sum alone, without the newest correction.
@@ -194,61 +164,30 @@ def offset_lane(
             at.append((step, round(total * 1000, 6)))
     x.append(span[1])
     y.append(y[-1])
-    colour = colours.correction
-    course = {
-        "type": "scatter",
-        "mode": "lines",
-        "name": _("Sum of corrections"),
-        "meta": "offset",
-        "x": x,
-        "y": y,
-        "yaxis": "y3",
-        "line": {"width": 2, "color": colour, "shape": "hv"},
-        "hoverinfo": "skip",
-    }
-    dots = {
-        "type": "scatter",
-        "mode": "markers",
-        "name": _("Correction"),
-        "meta": "corrections",
-        "showlegend": False,
-        "x": [step.sequence for step, _total in at],
-        "y": [value for _step, value in at],
-        "yaxis": "y3",
-        "marker": {
-            "symbol": [STEP_SYMBOLS.get(step.status, "circle") for step, _total in at],
-            "size": 8 if len(at) <= 30 else 6,
-            "color": [colours.wear if step.status == "held" else colour for step, _total in at],
-            "line": {"width": 1.5, "color": [colours.wear if step.status == "held" else colour for step, _total in at]},
-        },
-        "customdata": [step.link for step, _total in at],
-        "text": [
-            f"<b>{_('Correction {n}').format(n=step.number)}</b><br>{um(step.amount)} · {status_word(step.status)}"
-            f"<br>{_('Reading {n}').format(n=step.sequence)}"
-            for step, _total in at
-        ],
-        "hovertemplate": "%{text}<extra></extra>",
-        "cliponaxis": False,
-    }
-    notes: list[dict[str, Any]] = []
-    if at:
-        newest, value = at[-1]
-        words = _("correction {n}: {amount}, {status}").format(
-            n=newest.number, amount=um(newest.amount), status=status_word(newest.status)
+    marked: list[Series | Note] = [
+        Series(x, y, Pen("correction", 2, steps="hv"), meta="offset", name=_("Sum of corrections"))
+    ]
+    if not at:
+        return marked
+    colours: list[Role] = ["wear" if step.status == "held" else "correction" for step, _total in at]
+    symbols = [STEP_SYMBOLS.get(step.status, "circle") for step, _total in at]
+    marked.append(
+        Series(
+            [step.sequence for step, _total in at],
+            [value for _step, value in at],
+            dots=Dots(symbols, 8 if len(at) <= 30 else 6, colours, edge=colours),
+            meta="corrections",
+            hover=[
+                f"<b>{_('Correction {n}').format(n=step.number)}</b><br>{um(step.amount)} · {status_word(step.status)}"
+                f"<br>{_('Reading {n}').format(n=step.sequence)}"
+                for step, _total in at
+            ],
+            links=[step.link for step, _total in at],
         )
-        notes.append(
-            {
-                "xref": "paper",
-                "x": 1,
-                "xanchor": "left",
-                "xshift": 8,
-                "yref": "y3 domain",
-                "y": 0.5,
-                "yanchor": "middle",
-                "align": "left",
-                "showarrow": False,
-                "text": f"<b>Σ {um(value / 1000)}</b>" + ("" if brief else f"<br>{words}"),
-                "font": {"size": 12, "color": colour},
-            }
-        )
-    return [course, *([dots] if at else [])], notes
+    )
+    newest, value = at[-1]
+    words = _("correction {n}: {amount}, {status}").format(
+        n=newest.number, amount=um(newest.amount), status=status_word(newest.status)
+    )
+    text = f"<b>Σ {um(value / 1000)}</b>" + ("" if brief else f"<br>{words}")
+    return [*marked, Note(text, Share(1), Share(0.5, inside=True), "left", shift=(8, 0), colour="correction")]

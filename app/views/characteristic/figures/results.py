@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from app.charts import Axis, Chart, Dots, Mark, Panel, Pen, Room, Series, band, empty
 from app.language.i18n import _
 from app.language.numbers import NO_BREAK_SPACE, signed
-from app.views.characteristic.figures.blocks import see_through
-from app.web.theme import Palette, ThemeName, layout, palette
+from app.views.characteristic.figures.blocks import BETWEEN, EDGE
 
 SIGNED = frozenset({"taper"})  # the others are sizes without a sign
 
@@ -36,40 +35,25 @@ class ResultRange:
     link: str | None = None
 
 
-def result_figure(
-    name: str,
-    title: str,
-    points: Sequence[ResultPoint],
-    ranges: Sequence[ResultRange] = (),
-    *,
-    theme: ThemeName = "light",
-) -> dict[str, Any]:
+def result_figure(name: str, title: str, points: Sequence[ResultPoint], ranges: Sequence[ResultRange] = ()) -> Chart:
     """The course of one result; `title` is what it is called. Of very many readings each block with its extremes."""
-    colours = palette(theme)
-    empty = not points and not ranges
-    return {
-        "data": _envelope(name, ranges, colours) if ranges else _points(name, points, colours),
-        "layout": layout(
-            theme,
-            margin={"l": 78, "r": 20, "t": 12, "b": 48},
-            xaxis={
-                "title": {"text": _("Reading number"), "font": {"size": 13, "color": colours.quiet}, "standoff": 6},
-                "tickformat": "d",
-                "showgrid": False,
-                "showline": True,
-                "nticks": 9,
-            },
-            yaxis={
-                "title": {"text": f"{title}, µm", "font": {"size": 13, "color": colours.quiet}, "standoff": 6},
-                "fixedrange": True,
-                "nticks": 5,
-                "rangemode": "normal" if name in SIGNED else "tozero",
-                "zeroline": name in SIGNED,
-                "zerolinecolor": colours.faint,
-            },
-            annotations=[_nothing(colours)] if empty else [],
-        ),
-    }
+    marks: list[Mark] = [*_envelope(name, ranges)] if ranges else [*_points(name, points)]
+    return Chart(
+        [
+            Panel(
+                marks or [empty(_("Nothing yet"))],
+                Axis(
+                    f"{title}, µm",
+                    ticks=5,
+                    from_zero=name not in SIGNED,
+                    zero="faint" if name in SIGNED else None,
+                    fixed=True,
+                ),
+            )
+        ],
+        Axis(_("Reading number"), format="d", ticks=9, grid=False, line=True),
+        Room(left=78, right=20, top=12, bottom=48),
+    )
 
 
 def worded(name: str, value: float) -> str:
@@ -78,37 +62,32 @@ def worded(name: str, value: float) -> str:
     return f"{text}{NO_BREAK_SPACE}µm"
 
 
-def _points(name: str, points: Sequence[ResultPoint], colours: Palette) -> list[dict[str, Any]]:
+def _points(name: str, points: Sequence[ResultPoint]) -> list[Series]:
     if not points:
-        # Without a trace plotly would draw no axes.
-        return [{"type": "scatter", "x": [1], "y": [0], "opacity": 0, "hoverinfo": "skip"}]
+        return []
+    few = len(points) <= 400
+    symbols = ["circle-open" if point.excluded else "circle" for point in points]
     return [
-        {
-            "type": "scatter",
-            "mode": "lines+markers" if len(points) <= 400 else "markers",
-            "meta": "results",
-            "x": [point.sequence for point in points],
-            "y": [point.value * 1000 for point in points],
-            "line": {"width": 1, "color": colours.faint},
-            "marker": {
-                "symbol": ["circle-open" if point.excluded else "circle" for point in points],
-                "size": 7 if len(points) <= 400 else 4,
-                "color": colours.steady,
-            },
-            "customdata": [point.link for point in points],
-            "text": [
+        Series(
+            [point.sequence for point in points],
+            [point.value * 1000 for point in points],
+            Pen("faint", 1) if few else None,
+            Dots(symbols, 7 if few else 4),
+            meta="results",
+            hover=[
                 f"<b>{_('Reading {n}').format(n=point.sequence)}</b><br>{worded(name, point.value)}"
                 + (f"<br>{_('excluded from statistics')}" if point.excluded else "")
                 for point in points
             ],
-            "hovertemplate": "%{text}<extra></extra>",
-            "cliponaxis": False,
-        }
+            links=[point.link for point in points],
+        )
     ]
 
 
-def _envelope(name: str, ranges: Sequence[ResultRange], colours: Palette) -> list[dict[str, Any]]:
-    text = [
+def _envelope(name: str, ranges: Sequence[ResultRange]) -> list[Series]:
+    x = [(block.first + block.last) / 2 for block in ranges]
+    links = [block.link for block in ranges]
+    said = [
         "<br>".join(
             (
                 f"<b>{_('Readings {first} to {last}').format(first=block.first, last=block.last)}</b>",
@@ -119,41 +98,6 @@ def _envelope(name: str, ranges: Sequence[ResultRange], colours: Palette) -> lis
         )
         for block in ranges
     ]
-    common = {
-        "type": "scatter",
-        "mode": "lines",
-        "x": [(block.first + block.last) / 2 for block in ranges],
-        "customdata": [block.link for block in ranges],
-        "text": text,
-        "hovertemplate": "%{text}<extra></extra>",
-    }
-    edge = {"width": 1, "color": see_through(colours.steady, 0.5)}
-    return [
-        common | {"meta": "minimum", "y": [block.minimum * 1000 for block in ranges], "line": edge},
-        common
-        | {
-            "meta": "maximum",
-            "y": [block.maximum * 1000 for block in ranges],
-            "line": edge,
-            "fill": "tonexty",
-            "fillcolor": see_through(colours.steady),
-        },
-        common
-        | {
-            "meta": "mean",
-            "y": [block.mean * 1000 for block in ranges],
-            "line": {"width": 1.5, "color": colours.average},
-        },
-    ]
-
-
-def _nothing(colours: Palette) -> dict[str, Any]:
-    return {
-        "xref": "paper",
-        "yref": "paper",
-        "x": 0.5,
-        "y": 0.5,
-        "text": f"<b>{_('Nothing yet')}</b>",
-        "showarrow": False,
-        "font": {"size": 15, "color": colours.quiet},
-    }
+    low, high, mean = ([getattr(block, which) * 1000 for block in ranges] for which in ("minimum", "maximum", "mean"))
+    edges = band(x, low, high, BETWEEN, metas=("minimum", "maximum"), pen=Pen(EDGE, 1), hover=said, links=links)
+    return [*edges, Series(x, mean, Pen("average"), meta="mean", hover=said, links=links)]

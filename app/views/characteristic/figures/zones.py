@@ -12,26 +12,28 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Literal
+from typing import Literal
 
+from app.charts import Axis, Chart, Dots, Note, Panel, Pen, Room, Series, empty
+from app.charts import Mark as Drawn
 from app.core.decision.limits import HasLimits, Limits
 from app.language.i18n import _
 from app.language.numbers import um
 from app.language.times import plant_zone, written
 from app.views.characteristic.figures.blocks import Block, envelope
 from app.views.characteristic.figures.by_hand import HandPoint, hand_marks
-from app.views.characteristic.figures.labels import band_shapes, limit_labels, limit_lines, size_ticks
+from app.views.characteristic.figures.labels import band_grounds, limit_labels, limit_lines, size_ticks
 from app.views.characteristic.figures.lanes import Mark, Step, event_lane, offset_lane
 from app.views.characteristic.figures.scale import Scale, ScaleName, TrueScale, ZoneScale
 from app.views.characteristic.figures.sizes import SizeAxis, size_lines
-from app.web.theme import ZONE_SYMBOLS, Palette, ThemeName, layout, legend, palette, zone_colour, zone_name
+from app.web.theme import ZONE_SYMBOLS, zone_name, zone_role
 
 __all__ = ["Block", "Mark", "Point", "Step", "zone_chart"]
 
 WIDE = 1500  # pixels from which on there is room for a larger font
 NARROW = 640  # pixels below which there is room for the name and value of a limit only
 WORD = 70  # pixels that a value in the chart takes
-EVENTS, READINGS, OFFSETS = [0.915, 1.0], [0.18, 0.91], [0.0, 0.14]  # of the height, from the bottom
+EVENTS, READINGS, OFFSETS = (0.915, 1.0), (0.18, 0.91), (0.0, 0.14)  # of the height, from the bottom
 
 
 @dataclass(frozen=True)
@@ -61,13 +63,12 @@ def zone_chart(
     marks: Sequence[Mark] = (),
     hands: Sequence[HandPoint] = (),
     scale: ScaleName = "zones",
-    theme: ThemeName = "light",
     sizes: SizeAxis | None = None,
     total_before: float = 0.0,
     width: int = 1240,
     ringed: int | Literal["newest"] | None = "newest",
-) -> dict[str, Any]:
-    """The figure.
+) -> Chart:
+    """The chart: readings, below them the lane of the corrections, above them that of the events.
 
     points: readings by ascending sequence. blocks: older ones, thinned; every block's extremes are drawn.
     steps: corrections by ascending sequence of the reading that caused them; total_before: their sum before the first (mm).
@@ -75,7 +76,6 @@ def zone_chart(
     width: of the chart in pixels, about: decides which words have room.
     ringed: the number of the reading with a ring about it; `newest` is the last one.
     """
-    colours = palette(theme)
     ruler: Scale
     if scale == "zones":
         ruler = ZoneScale.of(limits)
@@ -83,120 +83,68 @@ def zone_chart(
         ends = [end for block in blocks for end in (block.minimum, block.maximum)]
         ruler = TrueScale.of(limits, [*(point.deviation for point in points), *ends])
     # Room at the right for the longest words in the font of any system (Liberation Sans and 5 % more).
-    font_size, left, right = (14, 104, 342) if width >= WIDE else (12, 92, 292) if width >= NARROW else (12, 64, 104)
+    letters, left, right = (14, 104, 342) if width >= WIDE else (12, 92, 292) if width >= NARROW else (12, 64, 104)
+    brief = width < NARROW
     first = min([block.first for block in blocks] + [point.sequence for point in points], default=1)
     last = max([block.last for block in blocks] + [point.sequence for point in points], default=first + 9)
     room = max((last - first) * 0.02, 0.6)
     span = (first - room, last + max(room * 1.5, 1.2))  # what came after the last reading stands at the next number
-
-    traces = [
-        *envelope(blocks, ruler, Limits.of(limits), colours),
-        *_average(blocks, points, ruler, colours),
-        *_readings(points, ruler, colours),
-        *_ring(points, ringed, ruler, colours),
-        *hand_marks(hands, ruler, colours),
-    ]
     pixels = max(width - left - right, 200)
-    events, event_notes, event_lines = event_lane(marks, span, pixels, colours)
-    brief = width < NARROW
-    offsets, offset_notes = offset_lane(steps, marks, span, total_before, colours, brief=brief)
-    notes = [
-        *limit_labels(limits, ruler, colours, font_size, brief=brief),
-        *event_notes,
-        *offset_notes,
-        *_beyond(points, ruler, span, pixels, colours),
+    readings: list[Drawn] = [
+        *band_grounds(limits, ruler),
+        *limit_lines(limits, ruler),
+        *envelope(blocks, ruler, Limits.of(limits)),
+        *_average(blocks, points, ruler),
+        *_readings(points, ruler),
+        *_ring(points, ringed, ruler),
+        *hand_marks(hands, ruler),
+        *limit_labels(limits, ruler, letters, brief=brief),
+        *_beyond(points, ruler, span, pixels),
+        *([] if points or blocks else [empty(_("No readings yet"))]),
     ]
-    if not points and not blocks:
-        traces.append(_invisible(first))
-        notes.append(_no_readings(colours))
-    return {
-        "data": [*traces, *events, *offsets],
-        "layout": layout(
-            theme,
-            margin={"l": left, "r": right, "t": 34, "b": 48},
-            hoverdistance=24,
-            showlegend=True,
-            legend=legend(theme, y=1.008, bgcolor="rgba(0,0,0,0)"),
-            xaxis={
-                "range": list(span),
-                "anchor": "y3",
-                "title": {"text": _("Reading number"), "font": {"size": 13, "color": colours.quiet}, "standoff": 6},
-                "tickformat": "d",
-                "showgrid": False,
-                "showline": True,
-                **({"dtick": 1} if last - first <= 12 else {"nticks": 9}),
-            },
-            yaxis=_size_axis(limits, ruler, sizes, colours, font_size, brief=brief),
-            yaxis2=_lane(EVENTS, [-1, 1], colours, showticklabels=False),
-            yaxis3=_lane(
-                OFFSETS,
-                None,
-                colours,
-                nticks=3,
-                tickformat="+.1f",
-                gridcolor=colours.grid,
-                showgrid=True,
-                zeroline=True,
-                zerolinecolor=colours.faint,
-                title={
-                    "text": "" if brief else _("Σ correction, µm"),
-                    "font": {"size": 12, "color": colours.quiet},
-                    "standoff": 4,
-                },
-            ),
-            shapes=[*band_shapes(limits, ruler, colours), *limit_lines(limits, ruler, colours), *event_lines],
-            annotations=notes,
+    offsets = offset_lane(steps, marks, span, total_before, brief=brief)
+    total = Axis(
+        "" if brief else _("Σ correction, µm"),
+        ticks=3,
+        format="+.1f",
+        zero="faint",
+        fixed=True,
+        letters=11,
+        title_letters=12,
+    )
+    hidden = Axis(reach=(-1, 1), grid=False, labelled=False, fixed=True)
+    return Chart(
+        [
+            Panel(readings, _size_axis(limits, ruler, sizes, letters, brief=brief), READINGS),
+            Panel(event_lane(marks, span, pixels), hidden, EVENTS),
+            Panel(offsets, total, OFFSETS),
+        ],
+        Axis(
+            _("Reading number"),
+            reach=span,
+            format="d",
+            ticks=9,
+            every=1 if last - first <= 12 else None,
+            grid=False,
+            line=True,
         ),
-    }
+        Room(left, right, 48),
+    )
 
 
-def _size_axis(
-    limits: HasLimits, ruler: Scale, sizes: SizeAxis | None, colours: Palette, font_size: int, *, brief: bool
-) -> dict[str, Any]:
+def _size_axis(limits: HasLimits, ruler: Scale, sizes: SizeAxis | None, letters: int, *, brief: bool) -> Axis:
     ticks, words = size_ticks(limits, ruler, None if sizes is None else sizes.target)
     title = _("Deviation") if sizes is None else sizes.title
-    return {
-        "domain": READINGS,
-        "range": [-ruler.extent, ruler.extent],
-        "fixedrange": True,
-        "showgrid": False,
-        "tickmode": "array",
-        "tickvals": ticks,
-        "ticktext": words,
-        "tickfont": {"size": font_size, "color": colours.quiet},
-        "title": {"text": "" if brief else title, "font": {"size": 12, "color": colours.quiet}, "standoff": 4},
-    }
-
-
-def _invisible(x: int) -> dict[str, Any]:
-    """Return a trace that shows nothing: without one Plotly would not know where the axis of the readings is."""
-    return {"type": "scatter", "x": [x], "y": [0], "opacity": 0, "showlegend": False, "hoverinfo": "skip"}
-
-
-def _no_readings(colours: Palette) -> dict[str, Any]:
-    return {
-        "xref": "paper",
-        "yref": "y",
-        "x": 0.5,
-        "y": 0,
-        "text": f"<b>{_('No readings yet')}</b>",
-        "showarrow": False,
-        "bgcolor": colours.surface,
-        "borderpad": 6,
-        "font": {"size": 15, "color": colours.quiet},
-    }
-
-
-def _lane(domain: list[float], extent: list[float] | None, colours: Palette, **more: Any) -> dict[str, Any]:
-    lane: dict[str, Any] = {
-        "domain": domain,
-        "fixedrange": True,
-        "color": colours.quiet,
-        "anchor": "x",
-        "zeroline": False,
-    }
-    lane |= {"showgrid": False, "ticks": "", "tickfont": {"size": 11}}
-    return lane | ({"range": extent} if extent else {}) | more
+    return Axis(
+        "" if brief else title,
+        reach=(-ruler.extent, ruler.extent),
+        at=ticks,
+        words=words,
+        grid=False,
+        fixed=True,
+        letters=letters,
+        title_letters=12,
+    )
 
 
 def _hover(point: Point) -> str:
@@ -211,48 +159,36 @@ def _hover(point: Point) -> str:
     return "<br>".join(lines)
 
 
-def _readings(points: Sequence[Point], ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+def _readings(points: Sequence[Point], ruler: Scale) -> list[Series]:
     """Every reading: the shape of its zone; hollow if excluded; at the edge with its value if it lies beyond."""
     if not points:
         return []
     small = 9 if len(points) <= 120 else 7 if len(points) <= 400 else 4
     calm = {"zero", "average", "full"}
-    colour = [zone_colour(point.zone, colours) for point in points]
+    colours = [zone_role(point.zone) for point in points]
+    dots = Dots(
+        [ZONE_SYMBOLS.get(point.zone, "circle") + ("-open" if point.excluded else "") for point in points],
+        [small if point.zone in calm else max(small + 4, 12) for point in points],
+        colours,
+        [colour if point.excluded else "surface" for colour, point in zip(colours, points, strict=True)],
+        [1.5 if point.excluded else 0.75 for point in points],
+    )
     return [
-        {
-            "type": "scatter",
-            "mode": "lines+markers" if len(points) <= 120 else "markers",  # a line through many only hides them
-            "name": _("Reading"),
-            "meta": "readings",
-            "legendrank": 1,
-            "x": [point.sequence for point in points],
-            "y": [ruler.position(point.deviation) for point in points],
-            "line": {"width": 1, "color": colours.faint},
-            "marker": {
-                "symbol": [
-                    ZONE_SYMBOLS.get(point.zone, "circle") + ("-open" if point.excluded else "") for point in points
-                ],
-                "size": [small if point.zone in calm else max(small + 4, 12) for point in points],
-                "color": colour,
-                "line": {
-                    "width": [1.5 if point.excluded else 0.75 for point in points],
-                    "color": [
-                        c if point.excluded else colours.surface for c, point in zip(colour, points, strict=True)
-                    ],
-                },
-                "opacity": 1,
-            },
-            "customdata": [point.link for point in points],
-            "text": [_hover(point) for point in points],
-            "hovertemplate": "%{text}<extra></extra>",
-            "cliponaxis": False,
-        }
+        Series(
+            [point.sequence for point in points],
+            [ruler.position(point.deviation) for point in points],
+            Pen("faint", 1) if len(points) <= 120 else None,  # a line through many only hides them
+            dots,
+            meta="readings",
+            name=_("Reading"),
+            hover=[_hover(point) for point in points],
+            links=[point.link for point in points],
+            first=True,
+        )
     ]
 
 
-def _beyond(
-    points: Sequence[Point], ruler: Scale, span: tuple[float, float], pixels: int, colours: Palette
-) -> list[dict[str, Any]]:
+def _beyond(points: Sequence[Point], ruler: Scale, span: tuple[float, float], pixels: int) -> list[Note]:
     """The values of readings drawn at the edge because they lie further out; of those too close together the newest."""
     apart = (span[1] - span[0]) * WORD / pixels
     labelled: list[Point] = []
@@ -261,47 +197,36 @@ def _beyond(
         if not ruler.fits(point.deviation) and all(other.sequence - point.sequence > apart for other in near):
             labelled.append(point)
     return [
-        {
-            "x": point.sequence,
-            "y": ruler.position(point.deviation),
-            "yshift": -14 if point.deviation > 0 else 14,
-            "text": f"<b>{um(point.deviation, 0)}</b>",
-            "showarrow": False,
-            "font": {"size": 12, "color": zone_colour(point.zone, colours)},
-        }
+        Note(
+            f"<b>{um(point.deviation, 0)}</b>",
+            point.sequence,
+            ruler.position(point.deviation),
+            shift=(0, -14 if point.deviation > 0 else 14),
+            colour=zone_role(point.zone),
+        )
         for point in labelled
     ]
 
 
-def _ring(
-    points: Sequence[Point], ringed: int | Literal["newest"] | None, ruler: Scale, colours: Palette
-) -> list[dict[str, Any]]:
+def _ring(points: Sequence[Point], ringed: int | Literal["newest"] | None, ruler: Scale) -> list[Series]:
     """A ring about the newest reading, or about the one that the page is about, found from two metres away."""
     sequence = points[-1].sequence if ringed == "newest" and points else ringed
     point = next((point for point in points if point.sequence == sequence), None)
     if point is None:
         return []
+    colour = zone_role(point.zone)
     return [
-        {
-            "type": "scatter",
-            "mode": "markers",
-            "name": _("Newest") if ringed == "newest" else _("This reading"),
-            "meta": "newest",
-            "x": [point.sequence],
-            "y": [ruler.position(point.deviation)],
-            "marker": {
-                "symbol": "circle-open",
-                "size": 20,
-                "color": zone_colour(point.zone, colours),
-                "line": {"width": 2.5},
-            },
-            "hoverinfo": "skip",
-            "cliponaxis": False,
-        }
+        Series(
+            [point.sequence],
+            [ruler.position(point.deviation)],
+            dots=Dots("circle-open", 20, colour, colour, 2.5),
+            meta="newest",
+            name=_("Newest") if ringed == "newest" else _("This reading"),
+        )
     ]
 
 
-def _average(blocks: Sequence[Block], points: Sequence[Point], ruler: Scale, colours: Palette) -> list[dict[str, Any]]:
+def _average(blocks: Sequence[Block], points: Sequence[Point], ruler: Scale) -> list[Series]:
     """M, as it stood after each reading; a gap where there was no memory."""
     # Of very many readings M at the end of each block would be noise: the mean of the block says more.
     course = [(block.middle, block.average) for block in blocks if len(blocks) <= 150] + [
@@ -310,14 +235,11 @@ def _average(blocks: Sequence[Block], points: Sequence[Point], ruler: Scale, col
     if all(value is None for _x, value in course):
         return []
     return [
-        {
-            "type": "scatter",
-            "mode": "lines",
-            "name": _("Running average M"),
-            "meta": "average",
-            "x": [x for x, _value in course],
-            "y": [None if value is None else ruler.position(value) for _x, value in course],
-            "line": {"width": 1.75, "color": colours.average, "shape": "hv" if len(course) <= 400 else "linear"},
-            "hoverinfo": "skip",
-        }
+        Series(
+            [x for x, _value in course],
+            [None if value is None else ruler.position(value) for _x, value in course],
+            Pen("average", 1.75, steps="hv" if len(course) <= 400 else "linear"),
+            meta="average",
+            name=_("Running average M"),
+        )
     ]

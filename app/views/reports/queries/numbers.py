@@ -1,14 +1,14 @@
 """The numbers of the readings, and how they are spread."""
 
+from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 from app.core.decision.limits import FAULT, Zone
 from app.files.documents.content import Column, Fact, Picture, Section, Table, count, deviation
 from app.language.i18n import _, ngettext
 from app.loop.summaries import queries as statistics
 from app.loop.summaries import wording as statistics_wording
-from app.views.characteristic.figures import histogram_counts, histogram_figure
+from app.views.characteristic.figures import histogram_centres, histogram_counts, histogram_figure
 from app.views.reports.queries.frame import Frame
 from app.web.theme import zone_name
 
@@ -59,13 +59,13 @@ def numbers(frame: Frame) -> Section:
         counts = histogram_counts(deviations, frame.parameters)
         figure = histogram_figure(counts, frame.parameters)
         says = _("Histogram of {n} deviations, with tolerance, R34 and R33.").format(n=sum(counts))
-        data = partial(_bars, figure["data"][0])
+        data = partial(_bars, histogram_centres(frame.parameters), counts)
         pictures = (Picture("histogram", _("Histogram"), says, figure, *HISTOGRAM, data),)
     return Section("numbers", _("Numbers"), warnings=tuple(warnings), facts=tuple(facts), pictures=pictures)
 
 
-def _bars(drawn: dict[str, Any]) -> Table:
+def _bars(centres: Sequence[float], counts: Sequence[int]) -> Table:
     """The bars as they are drawn: deviation in the middle of each, and how many."""
     columns = (Column("deviation", _("Deviation")), Column("readings", _("Readings")))
-    rows = zip(drawn["y"], drawn["x"], strict=True)
+    rows = zip(centres, counts, strict=True)
     return Table(columns, tuple((deviation(centre / 1000, 2), count(many)) for centre, many in rows))

@@ -2,7 +2,7 @@
 
 from html import escape
 
-from app.files.documents.drawing.marks import Area, Dot, Drawing, Line, Mark, Words
+from app.charts.marks import Area, Dot, Drawing, Line, Mark, Words
 
 
 def svg(drawing: Drawing, says: str, name: str) -> str:
