@@ -54,22 +54,6 @@ def test_all_words_beside_the_bands_are_whole(open_page: OpenPage, figure: str, 
         assert "tolerance" in words
 
 
-def test_a_point_opens_its_reading(open_page: OpenPage) -> None:
-    with open_page("/chart") as page:
-        until(page, DRAWN)
-        place = page.evaluate(
-            """() => {
-              const plot = document.querySelector("#zones .plot"), box = plot.getBoundingClientRect();
-              const { xaxis, yaxis } = plot._fullLayout, readings = plot.data.find((trace) => trace.meta === "readings");
-              return [box.x + xaxis._offset + xaxis.d2p(60), box.y + yaxis._offset + yaxis.d2p(readings.y[59])];
-            }"""
-        )
-        page.route("**/readings/60", lambda route: route.fulfill(body="reading 60"))
-        page.mouse.move(*place)
-        page.mouse.click(*place)
-        page.wait_for_url("**/readings/60")
-
-
 def test_the_chart_follows_the_readings(open_page: OpenPage, show: Show) -> None:
     show.stage.readings = 120
     with open_page("/chart?live=1") as page:

@@ -221,6 +221,15 @@ def reading_page(
     return _reading(request, session, caller, queries.characteristic_named(session, characteristic), sequence)
 
 
+@router.get("/characteristics/{characteristic}/readings/{sequence}/panel")
+def reading_panel(
+    request: Request, session: SessionDep, caller: Viewer, characteristic: str, sequence: Sequence_
+) -> Response:
+    """One reading as a fragment, beside the cursor of a chart."""
+    current = queries.characteristic_named(session, characteristic)
+    return _reading(request, session, caller, current, sequence, template="characteristics/panel.html")
+
+
 @router.post("/characteristics/{characteristic}/readings/{sequence}/by-hand")
 def send_measured_by_hand(
     request: Request, session: SessionDep, caller: Operator, characteristic: str, sequence: Sequence_, form: FormDep
@@ -265,6 +274,7 @@ def _reading(
     current: CurrentCharacteristic,
     sequence: int,
     *,
+    template: str = "characteristics/reading.html",
     status: int = 200,
     typed: Mapping[str, str] | None = None,
     problem: InbandError | None = None,
@@ -279,7 +289,7 @@ def _reading(
     around = {"first": max(1, sequence - AROUND), "through": min(newest, sequence + AROUND), "ringed": sequence}
     return page(
         request,
-        "characteristics/reading.html",
+        template,
         status=status,
         decision=shown_decision,
         reading=shown_decision.reading,

@@ -138,14 +138,24 @@ class TestInTheBrowser:
         assert time.monotonic() - begun < 5
         assert page.evaluate("window.untouched")
 
-    def test_a_click_on_a_point_opens_its_reading(self, shop: Shop, viewer: Person, page: Page) -> None:
-        for deviation in (0.4, 3.0, -2.0):
-            shop.read(deviation)
+    def test_a_click_on_a_point_shows_its_reading_and_the_link_opens_it(
+        self, shop: Shop, viewer: Person, page: Page
+    ) -> None:
+        shop.read(0.4, part="SN-17")
+        number = shop.read(6.1, part="SN-18")["correction"]["number"]
         viewer.sign_in(page)
         page.goto(path(shop))
-        eventually(page, f"{PLOT}.data?.length > 0")
+        eventually(page, "document.querySelector('plotly-chart.zones').tabIndex === 0")
         page.locator("plotly-chart.zones .scatterlayer .trace .points path").nth(1).click(force=True)
-        page.wait_for_url(f"**{path(shop, '/readings/')}*")
+        panel = page.locator("plotly-chart.zones .chart-panel")
+        expect(panel).to_contain_text("beyond the averaging limit 5.0 µm: corrected in full.")
+        expect(panel).to_contain_text(f"Correction {number}")
+        expect(panel).to_contain_text("SN-18")
+        panel.get_by_role("link", name="Reading before").click()
+        expect(panel).to_contain_text("SN-17")
+        expect(panel).to_contain_text("version 1")
+        panel.get_by_role("link", name="Open reading 1").click()
+        page.wait_for_url("**/readings/1")
 
     def test_an_opened_decision_stays_open_when_a_new_one_arrives(self, shop: Shop, viewer: Person, page: Page) -> None:
         shop.read(6.1)
