@@ -158,7 +158,11 @@ PAGES = {
     ],
     "/setup/machines": ["/setup/machines"],
     "/setup/machines/new": ["/setup/machines/new"],
-    "/setup/machines/{machine}": ["/setup/machines/{machine}"],
+    "/setup/machines/{machine}": ["/setup/machines/{machine}", "/setup/machines/new?like={machine}"],
+    "/setup/parameters": [
+        "/setup/parameters",
+        "/setup/parameters?parameter=zero_range&value=0.002&on={characteristic}",
+    ],
     "/setup/people": ["/setup/people"],
     "/setup/audit": ["/setup/audit"],
     "/account": ["/account"],

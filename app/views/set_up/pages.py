@@ -4,7 +4,15 @@ from fastapi import APIRouter, Response
 from starlette.responses import RedirectResponse
 
 from app.access.deps import require
-from app.views.set_up import audit_pages, characteristic_pages, job_pages, machine_pages, people_pages, program_pages
+from app.views.set_up import (
+    audit_pages,
+    characteristic_pages,
+    job_pages,
+    machine_pages,
+    many_pages,
+    people_pages,
+    program_pages,
+)
 
 router = APIRouter(include_in_schema=False)
 
@@ -14,5 +22,5 @@ def setup() -> Response:
     return RedirectResponse("/setup/characteristics", 303)
 
 
-for part in (machine_pages, characteristic_pages, program_pages, people_pages, audit_pages, job_pages):
+for part in (machine_pages, characteristic_pages, many_pages, program_pages, people_pages, audit_pages, job_pages):
     router.include_router(part.router)
