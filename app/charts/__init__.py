@@ -7,6 +7,7 @@ paper        in reports: lines, areas and words (scales, marks), for PDF and SVG
 """
 
 from app.charts.description import (
+    Across,
     Axis,
     Bars,
     Chart,
@@ -36,6 +37,7 @@ from app.charts.svg import svg
 __all__ = [
     "BANDS",
     "PALETTES",
+    "Across",
     "Axis",
     "Bars",
     "Chart",

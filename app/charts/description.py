@@ -114,6 +114,7 @@ class Rule:
     """A line across the panel at `y`, or up through all panels at `x`, and its words: beside the panel, or on the line.
 
     Words of a line upward stand above it. raised: of the words, pixels. upto: share of the height that a line upward takes.
+    front: before what is drawn, not behind it.
     """
 
     pen: Pen
@@ -124,6 +125,7 @@ class Rule:
     colour: Colour = "quiet"
     raised: float = 0
     upto: float = 1
+    front: bool = False
 
 
 @dataclass(frozen=True)
@@ -179,7 +181,7 @@ class Axis:
     words: Sequence[str] | None = None
     format: str = ""
     grid: bool = True
-    line: bool = False
+    line: bool = True
     zero: Colour | None = None
     fixed: bool = False
     hidden: bool = False
@@ -245,7 +247,7 @@ def time_axis(moments: Sequence[datetime] = (), *, hidden: bool = False) -> Axis
     close = bool(known) and known[-1] - known[0] <= timedelta(hours=1)
     reach = (known[0] - half, known[-1] + half) if close else None
     zone = plant_zone().key
-    return Axis(zone, "time", reach, grid=False, line=True, hidden=hidden, title_letters=12)
+    return Axis(zone, "time", reach, grid=False, hidden=hidden, title_letters=12)
 
 
 def band(
@@ -279,8 +281,8 @@ def words_of(rule: Rule) -> Note:
 
 
 def empty(words: str) -> Note:
-    """Words in the middle of a chart with nothing in it."""
-    return Note(f"<b>{words}</b>", Share(0.5), Share(0.5), size=15, ground=True)
+    """Words in the middle of a panel with nothing in it."""
+    return Note(f"<b>{words}</b>", Share(0.5), Share(0.5, inside=True), size=15, ground=True)
 
 
 def nothing(words: str) -> Chart:

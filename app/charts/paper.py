@@ -80,14 +80,17 @@ class _Paper:
 
     def drawn(self) -> Drawing:
         marks = [(mark, laid) for laid in self.panels for mark in laid.panel.marks]
-        before = [(mark, laid) for mark, laid in marks if _is_behind(mark, laid)]
-        for mark, laid in before:
-            self._add(self.box, self._across(mark, laid))
+        for mark, laid in marks:
+            if isinstance(mark, Ground):
+                self._add(self.box, self._across(mark, laid))
         own = [laid for laid in self.panels if laid.panel.x is not None]
         for scale in [*(laid.x for laid in own), *([] if len(own) == len(self.panels) else [self._shared()])]:
             self._add(None, self._axis(scale, flat=True))
         for laid in self.panels:
             self._add(None, self._axis(laid.y, flat=False))
+        for mark, laid in marks:
+            if isinstance(mark, Rule) and not mark.front:
+                self._add(self.box, self._across(mark, laid))
         for laid in self.panels:
             course: list[Place] = []
             for mark in laid.panel.marks:
@@ -96,7 +99,7 @@ class _Paper:
                 elif isinstance(mark, Series):
                     course = self._series(mark, laid, course)
         for mark, laid in marks:
-            if isinstance(mark, Rule | Ground) and not _is_behind(mark, laid):
+            if isinstance(mark, Rule) and mark.front:
                 self._add(self.box, self._across(mark, laid))
         for mark, laid in marks:
             if isinstance(mark, Rule) and mark.words:
@@ -125,8 +128,8 @@ class _Paper:
                 ends = ((at, box.top), (at, box.bottom)) if flat else ((box.left, at), (box.right, at))
                 marks.append(Line(ends, _ink("grid"), 0.75))
         if axis.line:
-            foot = box.bottom if flat else max(scale.start, scale.end)
-            ends = ((box.left, foot), (box.right, foot)) if flat else ((box.left, box.top), (box.left, foot))
+            ends = ((scale.start, box.bottom), (scale.end, box.bottom))
+            ends = ends if flat else ((box.left, scale.start), (box.left, scale.end))
             marks.append(Line(ends, _ink("faint"), 1))
         if axis.zero and (zero := scale.place(0)) is not None and not flat:
             marks.append(Line(((box.left, zero), (box.right, zero)), _ink(axis.zero), 0.75))
@@ -176,7 +179,7 @@ class _Paper:
             self._add(None, [mark for at, place in enumerate(places) for mark in _label(series, at, place)])
         return course
 
-    def _across(self, mark: object, laid: _Laid) -> list[Mark]:
+    def _across(self, mark: Rule | Ground, laid: _Laid) -> list[Mark]:
         """A rule or a ground, across the panel or up through all of them."""
         box = self.box
         if isinstance(mark, Rule):
@@ -187,8 +190,6 @@ class _Paper:
                 place = laid.x.place(mark.x)
                 ends = ((place or 0, box.bottom), (place or 0, box.bottom - mark.upto * box.height))
             return [] if place is None else [_line(ends, mark.pen)]
-        if not isinstance(mark, Ground):
-            return []
         scale = laid.x if mark.y is None else laid.y
         low, high = (scale.place(value) or 0.0 for value in mark.y or mark.x or (0.0, 0.0))
         corners = ((low, box.top), (high, box.top), (high, box.bottom), (low, box.bottom))
@@ -235,13 +236,6 @@ class _Paper:
             marks.append(Words((x + 24, y), mark.name, size, _ink("quiet")))
             x += 24 + len(mark.name) * size * LETTER + LEGEND_GAP
         return marks
-
-
-def _is_behind(mark: object, laid: _Laid) -> bool:
-    """Grounds, and rules unless there are bars, which would hide them."""
-    return isinstance(mark, Ground) or (
-        isinstance(mark, Rule) and not any(isinstance(other, Bars) for other in laid.panel.marks)
-    )
 
 
 def _ink(colour: Colour) -> str:
@@ -306,7 +300,7 @@ def _label(series: Series, number: int, place: tuple[float | None, float | None]
     if labels is None or x is None or y is None or not labels.texts[number]:
         return []
     upward, _space, across = _word(labels.at, number).partition(" ")
-    reach = 7.0 if series.dots else 2.0
+    reach = _size(series.dots.size, number) / 2 + 4 if series.dots else 2
     x += {"right": reach, "left": -reach}.get(across, 0)
     y += labels.size * 0.36 + {"top": -reach - 4, "bottom": reach + 6}.get(upward, 0)
     anchor: Anchor = "start" if across == "right" else "end" if across == "left" else "middle"

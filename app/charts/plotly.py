@@ -71,9 +71,8 @@ class _Figure:
             axes[f"yaxis{y[1:]}"] = upward
             if panel.x:
                 axes[f"xaxis{x[1:]}"] = self._axis(panel.x) | {"domain": list(panel.across), "anchor": y}
-            in_front = any(isinstance(mark, Bars) for mark in panel.marks)
             for mark in panel.marks:
-                self._mark(mark, x, y, in_front=in_front)
+                self._mark(mark, x, y)
         if not self.data and not chart.x.hidden:  # without a point plotly would draw no axes
             start = chart.x.reach[0] if chart.x.reach else 1
             self.data.append(
@@ -158,17 +157,18 @@ class _Figure:
             "tickformat": axis.format or None,
             "tickvals": None if axis.at is None else list(axis.at),
             "ticktext": None if axis.words is None else list(axis.words),
+            "tickangle": None if axis.words is None else 0,
         }
         return written | {key: value for key, value in ticks.items() if value is not None}
 
-    def _mark(self, mark: Mark, x: str, y: str, *, in_front: bool) -> None:
+    def _mark(self, mark: Mark, x: str, y: str) -> None:
         match mark:
             case Series():
                 self.data.append(self._series(mark) | _on(x, y))
             case Bars():
                 self.data.append(self._bars(mark) | _on(x, y))
             case Rule():
-                self.shapes.append(self._rule(mark, y) | {"layer": "above" if in_front else "below"})
+                self.shapes.append(self._rule(mark, y))
                 if mark.words:
                     self.notes.append(self._note(words_of(mark), x, y))
             case Ground():
@@ -254,7 +254,7 @@ class _Figure:
     def _rule(self, rule: Rule, y: str) -> Json:
         at = None if rule.y is None else (rule.y, rule.y)
         place = _across(at, (rule.x, rule.x), y, rule.upto)
-        return {"type": "line", "line": self._pen(rule.pen)} | place
+        return {"type": "line", "layer": "above" if rule.front else "between", "line": self._pen(rule.pen)} | place
 
     def _ground(self, ground: Ground) -> Json:
         return {"type": "rect", "layer": "below", "fillcolor": self.colour(ground.colour), "line": {"width": 0}}

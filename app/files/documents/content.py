@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from math import floor, isfinite
-from typing import Any, Literal
+from typing import Literal
 from zoneinfo import ZoneInfo
 
 from app.charts import Chart
@@ -188,7 +188,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A chart as its page draws it: a Plotly figure for a light ground, `width` × `height` pixels; `says` it in words.
+    """A chart as its page has it, drawn into `width` × `height` pixels; `says` it in words.
 
     data: makes the same in numbers; its first column lies across, every other one that holds numbers is a course of the
     chart. Only spreadsheets ask for them: they are tens of thousands of values.
@@ -197,7 +197,7 @@ class Picture:
     key: str
     title: str
     says: str
-    figure: Chart | dict[str, Any]
+    figure: Chart
     width: int
     height: int
     data: Callable[[], Table]

@@ -1,4 +1,4 @@
-"""Pictures of alignments: pure, values in, Plotly figures as dicts out. mm in.
+"""Pictures of alignments: pure, values in, charts out. mm in.
 
 The part is seen from above one of its corners, from where the touched faces are seen: grey as it should lie, in colour as it
 does, displacements enlarged so that they can be seen. Beside each touch stand its number and its deviation in µm.
@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from app.charts import Across, Axis, Chart, Dots, Labels, Mark, Note, Panel, Pen, Role, Room, Series
 from app.core.geometry.points import Floats
 from app.language.i18n import _
 from app.language.numbers import signed
-from app.web.theme import Palette, ThemeName, layout, legend, palette
 
 SEEN = 0.09  # of the part's size: so large the greatest displacement is drawn
 FACING = 0.7  # cosine: so far a face looks along an axis
@@ -31,9 +31,8 @@ class DrawnPoint(NamedTuple):
     misfit: bool = False
 
 
-def part_figure(motion: Floats, touches: Sequence[DrawnPoint], *, theme: ThemeName = "light") -> dict[str, Any]:
+def part_figure(motion: Floats, touches: Sequence[DrawnPoint]) -> Chart:
     """The part as it should lie and as it lies, with its touches."""
-    colours = palette(theme)
     places = np.array([touch.place for touch in touches], dtype=np.float64)
     normals = np.array([touch.normal for touch in touches], dtype=np.float64)
     view, depth = _view(normals, places)
@@ -42,23 +41,26 @@ def part_figure(motion: Floats, touches: Sequence[DrawnPoint], *, theme: ThemeNa
     moved = (np.column_stack([corners, np.ones(8)]) @ motion.T)[:, :3] - corners
     largest = max(float(np.linalg.norm(moved, axis=1).max()), *(abs(touch.off) for touch in touches), FAINTEST)
     times = enlargement(SEEN * size / largest)
-    data = _box(corners, view, depth, colours.faint, _("Nominal position"))
-    data += _box(
-        corners + times * moved, view, depth, colours.correction, _("Measured position, {times} ×").format(times=times)
+    return _framed(
+        [
+            *_box(corners, view, depth, "faint", _("Nominal position")),
+            *_box(
+                corners + times * moved,
+                view,
+                depth,
+                "correction",
+                _("Measured position, {times} ×").format(times=times),
+            ),
+            *_axes(corners, view, size),
+            *_touches(touches, places, normals, times, view),
+        ]
     )
-    data += _axes(corners, view, size, colours)
-    arrows, marks, words = _touches(touches, places, normals, times, view, colours)
-    return {"data": [*data, *arrows, *marks], "layout": _framed(theme, words)}
 
 
 def plane_figure(
-    motion: Floats,
-    nominal: Sequence[Sequence[float]],
-    measured_points: Sequence[Sequence[float]],
-    theme: ThemeName = "light",
-) -> dict[str, Any]:
+    motion: Floats, nominal: Sequence[Sequence[float]], measured_points: Sequence[Sequence[float]]
+) -> Chart:
     """Two points of a side, or two holes, from above; displacements enlarged."""
-    colours = palette(theme)
     places, measured = np.array(nominal, dtype=np.float64), np.array(measured_points, dtype=np.float64)
     size = max(float(np.linalg.norm(np.ptp(places, axis=0))), 1e-9)
     off = measured - places
@@ -66,34 +68,25 @@ def plane_figure(
     flat = np.column_stack([places, np.zeros(len(places)), np.ones(len(places))])
     fitted = places + times * ((flat @ motion.T)[:, :2] - places)
     enlarged = places + times * off
-    data = [
-        _line(
-            places,
-            colours.faint,
-            _("Nominal position"),
-            mode="lines+markers",
-            marker={"symbol": "circle-open", "size": 16},
-        ),
-        _line(fitted, colours.correction, _("Measured position, {times} ×").format(times=times)),
-        _line(
-            enlarged,
-            colours.attention,
-            _("Found"),
-            mode="markers",
-            marker={"symbol": "cross-thin-open", "size": 16, "line": {"width": 2.5}},
-        ),
-    ]
     words = [
-        _word(
-            enlarged[at],
+        Note(
             f"<b>{at + 1}</b> {signed(off[at][0] * 1000, 1)} {signed(off[at][1] * 1000, 1)} µm",
-            colours,
-            yshift=22,
-            bgcolor=None,
+            *_at(place),
+            shift=(0, 22),
+            size=14,
+            colour="ink",
         )
-        for at in range(len(places))
+        for at, place in enumerate(enlarged)
     ]
-    return {"data": data, "layout": _framed(theme, words)}
+    cross = Dots("cross-thin-open", 16, "attention", "attention", 2.5)
+    return _framed(
+        [
+            Series(*_xy(places), Pen("faint", 2), Dots("circle-open", 16, "faint"), name=_("Nominal position")),
+            Series(*_xy(fitted), Pen("correction", 2), name=_("Measured position, {times} ×").format(times=times)),
+            Series(*_xy(enlarged), dots=cross, name=_("Found")),
+            *words,
+        ]
+    )
 
 
 def enlargement(factor: float) -> int:
@@ -151,98 +144,68 @@ def _corners(places: Floats, normals: Floats) -> Floats:
     return np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
 
 
-def _box(corners: Floats, view: Floats, towards: Floats, colour: str, name: str) -> list[dict[str, Any]]:
+def _box(corners: Floats, view: Floats, towards: Floats, colour: Role, name: str) -> list[Series]:
     """The edges of a box: those behind it dotted."""
     flat = corners @ view.T
     hidden = int((corners @ towards).argmin())
     lines = []
-    for behind in (True, False):
+    for behind, pen in ((True, Pen(colour, 1.2, "dot")), (False, Pen(colour, 2.5))):
         x: list[float | None] = []
         y: list[float | None] = []
         for a, b in BOX:
             if (hidden in (a, b)) is behind:
                 x += [float(flat[a][0]), float(flat[b][0]), None]
                 y += [float(flat[a][1]), float(flat[b][1]), None]
-        style = {"color": colour, "width": 1.2 if behind else 2.5, "dash": "dot" if behind else "solid"}
-        lines.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "x": x,
-                "y": y,
-                "line": style,
-                "name": name,
-                "showlegend": not behind,
-                "hoverinfo": "skip",
-            }
-        )
+        lines.append(Series(x, y, pen, name="" if behind else name))
     return lines
 
 
-def _axes(corners: Floats, view: Floats, size: float, colours: Palette) -> list[dict[str, Any]]:
+def _axes(corners: Floats, view: Floats, size: float) -> list[Series]:
     """X, Y and Z from below the part, so that one knows from where it is seen."""
     flat = corners @ view.T
     start = np.array([flat[:, 0].min() - 0.12 * size, flat[:, 1].min() - 0.02 * size])
-    traces = []
-    for axis, name in enumerate("XYZ"):
-        end = start + 0.16 * size * view[:, axis]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines+text",
-                "x": [float(start[0]), float(end[0])],
-                "y": [float(start[1]), float(end[1])],
-                "text": ["", name],
-                "textposition": "top center" if axis == 2 else "middle right" if end[0] > start[0] else "middle left",
-                "textfont": {"size": 13, "color": colours.quiet},
-                "line": {"color": colours.quiet, "width": 1.5},
-                "showlegend": False,
-                "hoverinfo": "skip",
-                "cliponaxis": False,
-            }
-        )
-    return traces
+    ends = [start + 0.16 * size * view[:, axis] for axis in range(3)]
+    beside = [
+        "top center" if axis == 2 else "middle right" if end[0] > start[0] else "middle left"
+        for axis, end in enumerate(ends)
+    ]
+    return [
+        Series(*_xy(np.array([start, end])), Pen("quiet"), labels=Labels(["", "XYZ"[axis]], beside[axis], size=13))
+        for axis, end in enumerate(ends)
+    ]
 
 
 def _touches(
-    touches: Sequence[DrawnPoint], places: Floats, normals: Floats, times: int, view: Floats, colours: Palette
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]], list[dict[str, Any]]]:
+    touches: Sequence[DrawnPoint], places: Floats, normals: Floats, times: int, view: Floats
+) -> list[Series | Note]:
     """Arrows from where a touch should have been to where it was, their marks, and the words beside them."""
     ends = places + times * normals * np.array([[touch.off] for touch in touches])
     begin, end = places @ view.T, ends @ view.T
-    arrows = [
-        _line(np.array([begin[at], end[at]]), colours.stop if touch.misfit else colours.ink, None)
+    drawn: list[Series | Note] = [
+        Series(*_xy(np.array([begin[at], end[at]])), Pen("stop" if touch.misfit else "ink", 2))
         for at, touch in enumerate(touches)
     ]
-    marks, words = [], []
-    for misfits, name, symbol in ((False, _("Probed points"), "circle"), (True, _("Does not fit"), "x")):
+    for misfits, name, dots in (
+        (False, _("Probed points"), Dots("circle", 9, "ink")),
+        (True, _("Does not fit"), Dots("x", 12, "stop")),
+    ):
         chosen = [at for at, touch in enumerate(touches) if touch.misfit is misfits]
         if chosen:
-            colour = colours.stop if misfits else colours.ink
-            marks.append(
-                _line(
-                    end[chosen],
-                    colour,
-                    name,
-                    mode="markers",
-                    marker={"symbol": symbol, "size": 12 if misfits else 9, "color": colour},
-                    hoverinfo="text",
-                    hovertext=[
-                        _("point {n}: {off} µm along its face's normal").format(
-                            n=at + 1, off=signed(touches[at].off * 1000, 1)
-                        )
-                        for at in chosen
-                    ],
-                )
-            )
+            said = [
+                _("point {n}: {off} µm along its face's normal").format(n=at + 1, off=signed(touches[at].off * 1000, 1))
+                for at in chosen
+            ]
+            drawn.append(Series(*_xy(end[chosen]), dots=dots, name=name, hover=said))
     outward = _outward(places, normals) @ view.T
     for at, touch in enumerate(touches):
         way = outward[at] / max(float(np.linalg.norm(outward[at])), 1e-9)
-        beside = abs(way[0]) > 0.5
-        anchor = {"xanchor": "left" if way[0] > 0 else "right", "xshift": 9 if way[0] > 0 else -9} if beside else {}
-        rise = float(4 * way[1]) if beside else (18.0 if way[1] >= 0 else -18.0)
-        words.append(_word(end[at], f"<b>{at + 1}</b> {signed(touch.off * 1000, 1)}", colours, yshift=rise, **anchor))
-    return arrows, marks, words
+        across: Across = "center"
+        shift = (0.0, 18.0 if way[1] >= 0 else -18.0)
+        if abs(way[0]) > 0.5:
+            across, shift = ("left", (9.0, float(4 * way[1]))) if way[0] > 0 else ("right", (-9.0, float(4 * way[1])))
+        text = f"<b>{at + 1}</b> {signed(touch.off * 1000, 1)}"
+        drawn.append(Note(text, *_at(end[at]), across, shift=shift, size=14, colour="ink", ground=True))
+    return drawn
 
 
 def _outward(places: Floats, normals: Floats) -> Floats:
@@ -255,44 +218,17 @@ def _outward(places: Floats, normals: Floats) -> Floats:
     return ways
 
 
-def _line(points: Floats, colour: str, name: str | None, **more: Any) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": [float(value) for value in points[:, 0]],
-        "y": [float(value) for value in points[:, 1]],
-        "line": {"color": colour, "width": 2},
-        "name": name,
-        "showlegend": name is not None,
-        "hoverinfo": "skip",
-        "cliponaxis": False,
-    } | ({"marker": {"color": colour} | more.pop("marker", {})} | more)
+def _xy(points: Floats) -> tuple[list[float], list[float]]:
+    return [float(value) for value in points[:, 0]], [float(value) for value in points[:, 1]]
 
 
-def _word(place: Floats, text: str, colours: Palette, **more: Any) -> dict[str, Any]:
-    return {
-        "x": float(place[0]),
-        "y": float(place[1]),
-        "text": text,
-        "showarrow": False,
-        "font": {"size": 14, "color": colours.ink},
-        "bgcolor": colours.surface,
-        "borderpad": 1,
-    } | more
+def _at(place: Floats) -> tuple[float, float]:
+    return float(place[0]), float(place[1])
 
 
-def _framed(theme: ThemeName, words: list[dict[str, Any]]) -> dict[str, Any]:
-    hidden = {"visible": False, "fixedrange": True}
-    return layout(
-        theme,
-        margin={"l": 24, "r": 24, "t": 40, "b": 24},
-        showlegend=True,
-        legend=legend(theme),
-        xaxis=hidden,
-        yaxis=hidden | {"scaleanchor": "x", "scaleratio": 1},
-        annotations=words,
-        dragmode=False,
-    )
+def _framed(marks: Sequence[Mark]) -> Chart:
+    hidden = Axis(hidden=True, fixed=True)
+    return Chart([Panel(marks, hidden, equal=True)], hidden, Room(24, 24, 24, 40), drag="nothing")
 
 
 def touches_of(inputs: Mapping[str, Any], result: Mapping[str, Any]) -> list[DrawnPoint]:

@@ -1,6 +1,6 @@
 """JSON routes: pictures of alignments, and their text as a file."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from fastapi import Path, Query, Response
@@ -8,6 +8,7 @@ from fastapi.responses import PlainTextResponse
 from sqlalchemy.orm import Session
 
 from app.access.deps import AnyCaller
+from app.charts import Chart
 from app.errors import NotFound
 from app.geometry.alignment import figures, queries, trends
 from app.geometry.alignment.answers import TEXT, program_of, stop_of
@@ -15,11 +16,10 @@ from app.geometry.alignment.tables import Alignment
 from app.language.i18n import _
 from app.loop.machines.queries import machine_for, machine_of
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
-from app.web.api import FIGURE, MachineKey, Theme, api_router, plain, problems
+from app.web.api import FIGURE, MachineKey, Theme, api_router, chart_answer, plain, problems
 from app.web.deps import SessionDep
 from app.web.downloads import download
 from app.web.fields import Control
-from app.web.theme import ThemeName
 
 router = api_router("alignments")
 Number = Annotated[int, Path(description="Number of the alignment.", examples=[7])]
@@ -28,29 +28,29 @@ CUBE = [figures.DrawnPoint(at, at, 0.0) for at in ([50.0, 0.0, 0.0], [0.0, 50.0,
 
 
 @router.get("/alignments/{number}/figure", responses=problems(404) | FIGURE)
-def alignment_figure(session: SessionDep, caller: AnyCaller, number: Number, theme: Theme = "light") -> dict[str, Any]:
+def alignment_figure(session: SessionDep, caller: AnyCaller, number: Number, theme: Theme = "light") -> Response:
     """The part as it should lie and as it does as a Plotly figure, with its touches; displacements enlarged."""
-    return _drawn(session, queries.alignment(session, number, caller.only_machine), theme)
+    return chart_answer(_drawn(session, queries.alignment(session, number, caller.only_machine)), theme)
 
 
-def _drawn(session: Session, alignment: Alignment, theme: ThemeName) -> dict[str, Any]:
+def _drawn(session: Session, alignment: Alignment) -> Chart:
     inputs, motion = alignment.given, np.array(alignment.result["matrix"])
     if alignment.kind == "points":
-        return figures.part_figure(motion, figures.touches_of(inputs, alignment.result), theme=theme)
+        return figures.part_figure(motion, figures.touches_of(inputs, alignment.result))
     if alignment.kind == "two_points":
         nominal, measured = ([pair[name] for pair in inputs["side"]] for name in ("nominal", "measured"))
-        return figures.plane_figure(motion, nominal, measured, theme)
+        return figures.plane_figure(motion, nominal, measured)
     if alignment.kind == "two_holes":
         centres = [hole["centre"] for hole in alignment.result["holes"]]
-        return figures.plane_figure(motion, [hole["nominal"] for hole in inputs["holes"]], centres, theme)
+        return figures.plane_figure(motion, [hole["nominal"] for hole in inputs["holes"]], centres)
     on_it = None if alignment.part_id is None else queries.alignment(session, alignment.part_id)
     if on_it is None or on_it.kind != "points":
-        return figures.part_figure(motion, CUBE, theme=theme)
+        return figures.part_figure(motion, CUBE)
     touches = []
     for point in figures.touches_of(on_it.given, on_it.result):
         moved = (motion @ [*point.place, 1.0])[:3] - point.place
         touches.append(figures.DrawnPoint(point.place, point.normal, float(moved @ np.array(point.normal))))
-    return figures.part_figure(motion, touches, theme=theme)
+    return figures.part_figure(motion, touches)
 
 
 @router.get("/alignments/{number}/program", responses=problems(404) | plain(TEXT), response_class=PlainTextResponse)
@@ -91,7 +91,7 @@ def alignment_trend_figure(
         Query(description="The name that alignments were given.", min_length=1, max_length=200, examples=["pallet 4"]),
     ],
     theme: Theme = "light",
-) -> dict[str, Any]:
+) -> Response:
     """Shifts and turns of what was aligned under one name over time, as a Plotly figure."""
     machine_row = machine_for(session, caller, machine, "viewer")
     rows = queries.history(session, machine_row.id, name) if "\0" not in name else []
@@ -100,12 +100,8 @@ def alignment_trend_figure(
             _("There is no alignment with the name {name} on this machine.").format(name=repr(name[:60])),
             _("GET /api/v1/alignments lists what was aligned."),
         )
-    return trends.trend(
-        [
-            trends.Mark(
-                row.aligned_at, row.id, row.result["shift"], row.result["angles"], bool(row.result.get("misfits"))
-            )
-            for row in rows
-        ],
-        theme=theme,
-    )
+    marks = [
+        trends.Mark(row.aligned_at, row.id, row.result["shift"], row.result["angles"], bool(row.result.get("misfits")))
+        for row in rows
+    ]
+    return chart_answer(trends.trend(marks), theme)

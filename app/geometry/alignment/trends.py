@@ -1,13 +1,15 @@
 """Chart of one set-up's position over time. Pure; shifts in mm in, µm on the axis; turns in degrees."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from app.charts import Axis, Chart, Dots, Panel, Pen, Room, Series, time_axis
 from app.language.i18n import _
 from app.language.numbers import signed
-from app.language.times import on_axis
-from app.web.theme import ThemeName, date_axis, layout, legend, palette
+
+PENS = (Pen("ink"), Pen("correction", dash="dash"), Pen("wear", dash="dot"))
 
 
 class Mark(NamedTuple):
@@ -20,48 +22,35 @@ class Mark(NamedTuple):
     doubted: bool
 
 
-def trend(marks: Sequence[Mark], *, theme: ThemeName = "light") -> dict[str, Any]:
+def trend(marks: Sequence[Mark]) -> Chart:
     """Shifts above, turns below, one line for each axis, told apart by their marks as well."""
-    colours = palette(theme)
-    tones, dashes = (colours.ink, colours.correction, colours.wear), ("solid", "dash", "dot")
-    data = []
-    for axis, (name, symbol) in enumerate(zip("XYZ", ("circle", "square", "diamond"), strict=True)):
-        for below, scale, unit in ((False, 1000, "µm"), (True, 1, "°")):
-            values = [(mark.turns if below else mark.shift)[axis] * scale for mark in marks]
-            data.append(
-                {
-                    "type": "scatter",
-                    "mode": "lines+markers",
-                    "name": name,
-                    "legendgroup": name,
-                    "showlegend": not below,
-                    "x": [on_axis(mark.at) for mark in marks],
-                    "y": values,
-                    "yaxis": "y2" if below else "y",
-                    "line": {"color": tones[axis], "width": 1.5, "dash": dashes[axis]},
-                    "marker": {"symbol": symbol, "size": 8, "color": tones[axis]},
-                    "customdata": [f"/alignments/{mark.number}" for mark in marks],
-                    "text": [
-                        _("alignment {n}: {axis} {value} {unit}").format(
-                            n=mark.number, axis=name, value=signed(value, 4 if below else 1), unit=unit
-                        )
-                        for mark, value in zip(marks, values, strict=True)
-                    ],
-                    "hovertemplate": "%{text}<extra></extra>",
-                    "cliponaxis": False,
-                }
-            )
-
-    def titled(text: str) -> dict[str, Any]:
-        return {"title": {"text": text, "font": {"size": 13, "color": colours.quiet}, "standoff": 8}, "zeroline": True}
-
-    frame = layout(
-        theme,
-        margin={"l": 72, "r": 16, "t": 36, "b": 48},
-        showlegend=True,
-        legend=legend(theme),
-        xaxis=date_axis((mark.at for mark in marks), anchor="y2"),
-        yaxis=titled(_("Shift, µm")) | {"domain": [0.54, 1], "tickformat": "+.4~g", "zerolinecolor": colours.faint},
+    shifts = [_course(marks, axis, [mark.shift[axis] * 1000 for mark in marks], "µm", 1) for axis in range(3)]
+    turns = [_course(marks, axis, [mark.turns[axis] for mark in marks], "°", 4) for axis in range(3)]
+    return Chart(
+        [
+            Panel(shifts, Axis(_("Shift, µm"), format="+.4~g", zero="faint"), (0.54, 1)),
+            Panel(
+                [replace(turn, name="") for turn in turns], Axis(_("Turn, °"), format="+.4~g", zero="faint"), (0, 0.46)
+            ),
+        ],
+        time_axis([mark.at for mark in marks]),
+        Room(72, 16, 48, 36),
     )
-    frame["yaxis2"] = frame["yaxis"] | titled(_("Turn, °")) | {"domain": [0, 0.46]}
-    return {"data": data, "layout": frame}
+
+
+def _course(marks: Sequence[Mark], axis: int, values: list[float], unit: str, decimals: int) -> Series:
+    name, pen = "XYZ"[axis], PENS[axis]
+    return Series(
+        [mark.at for mark in marks],
+        values,
+        pen,
+        Dots(("circle", "square", "diamond")[axis], 8, pen.colour),
+        name=name,
+        hover=[
+            _("alignment {n}: {axis} {value} {unit}").format(
+                n=mark.number, axis=name, value=signed(value, decimals), unit=unit
+            )
+            for mark, value in zip(marks, values, strict=True)
+        ],
+        links=[f"/alignments/{mark.number}" for mark in marks],
+    )

@@ -1,6 +1,6 @@
 """JSON routes: form measurements, their pictures, their trend."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from fastapi import Path, Query, Request, Response
 
@@ -13,7 +13,18 @@ from app.geometry.geometric_form.queries import FormRow
 from app.geometry.geometric_form.schemas import FormIn
 from app.language.i18n import _
 from app.loop.machines.queries import machine_for, machine_keys_by_id, machine_named
-from app.web.api import FIGURE, After, Limit, MachineFilter, MachineKey, Theme, api_router, problems, sent_again
+from app.web.api import (
+    FIGURE,
+    After,
+    Limit,
+    MachineFilter,
+    MachineKey,
+    Theme,
+    api_router,
+    chart_answer,
+    problems,
+    sent_again,
+)
 from app.web.deps import SessionDep
 from app.web.fields import Page, ReasonIn, Slug, page_of
 
@@ -93,18 +104,14 @@ def form_figure(
     number: Number,
     section: Annotated[int, Query(ge=1, le=1000, description="Which section, for the picture of one.")] = 1,
     theme: Theme = "light",
-) -> dict[str, Any]:
+) -> Response:
     """The picture as a Plotly figure: section round, axis, map of a surface, or profile; deviations exaggerated."""
     row = _seen(session, caller, number)
     measurement, evaluation = row.measurement, row.evaluation
-    return figures.figure(
-        measurement.kind,
-        measurement.given,
-        evaluation.result,
-        measurement.tolerance,
-        section=section,
-        theme=theme,
+    chart = figures.figure(
+        measurement.kind, measurement.given, evaluation.result, measurement.tolerance, section=section
     )
+    return chart_answer(chart, theme)
 
 
 @router.get("/machines/{machine}/forms/{feature}/figure", responses=problems(404) | FIGURE)
@@ -115,7 +122,7 @@ def form_trend_figure(
     feature: Annotated[Slug, Path(description="The key of the feature.", examples=["bore-d50-axis"])],
     kind: Annotated[KindName | None, Query(description="Only of this kind.")] = None,
     theme: Theme = "light",
-) -> dict[str, Any]:
+) -> Response:
     """The deviations of a feature over time as a Plotly figure, with tolerance and uncertainty."""
     machine_row = machine_for(session, caller, machine, "viewer")
     rows = queries.trend(session, machine_row, feature, kind)
@@ -124,22 +131,20 @@ def form_trend_figure(
             _("There is no form measurement of the feature {feature} on this machine.").format(feature=repr(feature)),
             _("GET /api/v1/forms lists what was measured."),
         )
-    return figures.trend(
-        [
-            figures.Mark(
-                row.measurement.measured_at,
-                row.measurement.id,
-                row.evaluation.value,
-                row.evaluation.uncertainty,
-                row.measurement.tolerance,
-                row.evaluation.verdict,
-                wording.verdict_word(row.evaluation.verdict),
-                row.evaluation.suspects,
-            )
-            for row in rows
-        ],
-        theme=theme,
-    )
+    marks = [
+        figures.Mark(
+            row.measurement.measured_at,
+            row.measurement.id,
+            row.evaluation.value,
+            row.evaluation.uncertainty,
+            row.measurement.tolerance,
+            row.evaluation.verdict,
+            wording.verdict_word(row.evaluation.verdict),
+            row.evaluation.suspects,
+        )
+        for row in rows
+    ]
+    return chart_answer(figures.trend(marks), theme)
 
 
 def _seen(session: SessionDep, caller: Caller, number: int) -> FormRow:

@@ -1,6 +1,6 @@
 """JSON routes: runs of the preset compensation, what they ask to enter, the kinematics of machines and its back-ups."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from fastapi import Path, Query, Request, Response
 from pydantic import StringConstraints
@@ -23,7 +23,18 @@ from app.geometry.rotary_axes.schemas import EnterIn, KinematicsPlanIn, RestoreI
 from app.language.i18n import _
 from app.loop.machines.queries import machine_for, machine_named, only_machine
 from app.loop.readings import actions as readings
-from app.web.api import FIGURE, After, Limit, MachineKey, SerialAfter, Theme, api_router, problems, sent_again
+from app.web.api import (
+    FIGURE,
+    After,
+    Limit,
+    MachineKey,
+    SerialAfter,
+    Theme,
+    api_router,
+    chart_answer,
+    problems,
+    sent_again,
+)
 from app.web.deps import SessionDep
 from app.web.fields import Page, ReasonIn, Text200, page_of
 
@@ -146,12 +157,12 @@ def compare_kinematics_runs(session: SessionDep, caller: AnyCaller, run: RunNumb
 @router.get("/kinematics/runs/{run}/comparison-figure", responses=problems(404) | FIGURE)
 def kinematics_comparison_figure(
     session: SessionDep, caller: AnyCaller, run: RunNumber, other: Other, theme: Theme = "light"
-) -> dict[str, Any]:
+) -> Response:
     """The same as one picture: an arrow from then to now for every position error, and what to enter."""
     _run(session, caller, run)
     before, after = queries.two_runs(session, run, other)
     entered = run_history.to_enter(after)
-    return figures.comparison(run_history.changes(before, after), entered, theme=theme)
+    return chart_answer(figures.comparison(run_history.changes(before, after), entered), theme)
 
 
 @router.get("/kinematics/runs/{run}/figure", responses=problems(404) | FIGURE)
@@ -162,13 +173,13 @@ def kinematics_run_figure(
     axis: Annotated[Literal["A", "B", "C"], Query(description="The axis.", examples=["C"])],
     letter: Annotated[Literal["X", "Y", "Z"], Query(description="The direction of the deviation.", examples=["Y"])],
     theme: Theme = "light",
-) -> dict[str, Any]:
+) -> Response:
     """The deviation in one direction against the angle of the axis (EYC: Y against C), measured and optimised."""
     row = _run(session, caller, run)
     result = next((axis_result for axis_result in row.run.results["axes"] if axis_result["axis"] == axis), None)
     if result is None:
         raise Invalid.at("axis", _("run {run} did not measure axis {axis}").format(run=run, axis=axis))
-    return figures.diagram(result, letter, theme=theme, height=figures.greatest(result))
+    return chart_answer(figures.diagram(result, letter, height=figures.greatest(result)), theme)
 
 
 # --- machines
@@ -207,14 +218,14 @@ def kinematics_drift_figure(
     value: Annotated[str, Query(max_length=20, description="EX0C, Q146, backlash.C …", examples=["EX0C"])],
     head: Annotated[HeadName, Query(description="With this head.")] = "",
     theme: Theme = "light",
-) -> dict[str, Any]:
+) -> Response:
     """A value over the runs with its limit, what has been entered, and the trend."""
     machine_row = machine_for(session, caller, machine, "viewer")
     if value not in UNITS:
         raise Invalid.at("value", _("there is no such value; there are EX0C, EY0C, EA0C, Q141 to Q149, backlash.C …"))
     limits = queries.plan(session, machine_row.id).limits
     course = drift(value, run_history.measured(session, machine_row, head), limits.get(value))
-    return figures.course(course, theme=theme)
+    return chart_answer(figures.course(course), theme)
 
 
 @router.get("/machines/{machine}/kinematics/backups", responses=problems(404))

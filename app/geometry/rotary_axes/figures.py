@@ -10,31 +10,30 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
+from app.charts import Axis, Chart, Dots, Mark, Note, Panel, Pen, Role, Room, Series, Share, Spread, nothing, time_axis
 from app.geometry.rotary_axes.drift import Compared, Drift
 from app.geometry.rotary_axes.result_values import UNITS, as_reading
 from app.geometry.rotary_axes.wording import difference, name_words
 from app.geometry.rotary_axes.wording import entered as told
 from app.language.i18n import _
-from app.language.times import on_axis
-from app.web.theme import Palette, ThemeName, date_axis, layout, legend, nothing_drawn, palette
 
-GREEN: dict[ThemeName, str] = {"light": "#1a7a3c", "dark": "#62c985"}
 LETTERS = "XYZ"
+KINDS = ("measured", "optimised")
 ARROWS = {1: "\N{UPWARDS ARROW}", -1: "\N{DOWNWARDS ARROW}"}  # the axis came from smaller angles, or from larger ones
 SHAPES = {1: "triangle-up", -1: "triangle-down", 0: "circle"}
 ROOM = 1.25
 
 
-def diagram(axis: Mapping[str, Any], letter: str, *, theme: ThemeName = "light", height: float = 0.0) -> dict[str, Any]:
+def diagram(axis: Mapping[str, Any], letter: str, *, height: float = 0.0) -> Chart:
     """E{letter}{axis}: the deviation in one direction against the angle, for each approach, before and after.
 
     height: of the axis, mm at least, so that the diagrams of an axis can be read side by side.
     """
-    colours, at = palette(theme), LETTERS.index(letter)
-    traces: list[dict[str, Any]] = []
-    for kind, words, colour, dash in (
-        ("measured", _("measured"), colours.stop, "solid"),
-        ("optimised", _("optimised"), GREEN[theme], "dash"),
+    at = LETTERS.index(letter)
+    marks: list[Series] = []
+    for kind, words, pen in (
+        ("measured", _("measured"), Pen("stop", 2)),
+        ("optimised", _("optimised"), Pen("mended", 2, "dash")),
     ):
         for approach in sorted({position["approach"] for position in axis["positions"]}, reverse=True):
             chosen = sorted(
@@ -45,167 +44,96 @@ def diagram(axis: Mapping[str, Any], letter: str, *, theme: ThemeName = "light",
             if not chosen:
                 continue
             side = ARROWS.get(approach)
-            traces.append(
-                {
-                    "type": "scatter",
-                    "mode": "lines+markers",
-                    "name": f"{words} {side}" if side else words,
-                    "meta": kind,
-                    "x": [angle for angle, _value in chosen],
-                    "y": [value * 1000 for _angle, value in chosen],
-                    "line": {"color": colour, "width": 2, "dash": dash},
-                    "marker": {
-                        "symbol": ("square" if kind == "optimised" else "circle") if not approach else SHAPES[approach],
-                        "size": 9,
-                        "color": colour if kind == "measured" else colours.surface,
-                        "line": {"color": colour, "width": 2},
-                    },
-                    "hovertemplate": "%{x:+.3f}°: %{y:+.1f} µm<extra>" + words + "</extra>",
-                    "cliponaxis": False,
-                }
+            symbol = SHAPES[approach] if approach else "square" if kind == "optimised" else "circle"
+            marks.append(
+                Series(
+                    [angle for angle, _value in chosen],
+                    [value * 1000 for _angle, value in chosen],
+                    pen,
+                    Dots(symbol, 9, pen.colour if kind == "measured" else "surface", pen.colour, 2),
+                    meta=kind,
+                    name=f"{words} {side}" if side else words,
+                    hover=f"%{{x:+.3f}}°: %{{y:+.1f}} µm<br>{words}",
+                )
             )
-    if not traces:
-        return nothing_drawn(theme, _("This run holds no single positions"))
-    reach = max([abs(y) for trace in traces for y in trace["y"]] + [height * 1000, 1.0]) * ROOM
-    return {
-        "data": traces,
-        "layout": layout(
-            theme,
-            margin={"l": 64, "t": 34, "b": 46},
-            showlegend=True,
-            legend=legend(theme),
-            xaxis={
-                "title": {"text": _("{axis}, °").format(axis=axis["axis"]), "standoff": 6},
-                "tickvals": sorted(set(axis["angles"])) if len(axis["angles"]) <= 8 else None,
-                "showgrid": True,
-            },
-            yaxis={
-                "title": {"text": f"E{letter}{axis['axis']}, µm", "standoff": 6},
-                "range": [-reach, reach],
-                "zeroline": True,
-                "zerolinecolor": colours.faint,
-                "tickformat": "+.3~g",
-                "nticks": 6,
-            },
-        ),
-    }
+    if not marks:
+        return nothing(_("This run holds no single positions"))
+    values = [value for position in axis["positions"] for kind in KINDS if (value := position[kind][at]) is not None]
+    reach = max([abs(value) * 1000 for value in values] + [height * 1000, 1.0]) * ROOM
+    angles = sorted(set(axis["angles"]))
+    return Chart(
+        [
+            Panel(
+                marks,
+                Axis(f"E{letter}{axis['axis']}, µm", reach=(-reach, reach), format="+.3~g", ticks=6, zero="faint"),
+            )
+        ],
+        Axis(_("{axis}, °").format(axis=axis["axis"]), at=angles if len(angles) <= 8 else None),
+        Room(bottom=46),
+    )
 
 
 def greatest(axis: Mapping[str, Any]) -> float:
     """The largest deviation in any direction, mm: the height that all diagrams of an axis have."""
-    values = [
-        abs(v) for position in axis["positions"] for kind in ("measured", "optimised") for v in position[kind] if v
-    ]
+    values = [abs(v) for position in axis["positions"] for kind in KINDS for v in position[kind] if v]
     return max(values, default=0.0)
 
 
-def comparison(
-    changes: Sequence[Compared], entered: Mapping[str, float], *, theme: ThemeName = "light"
-) -> dict[str, Any]:
+def comparison(changes: Sequence[Compared], entered: Mapping[str, float]) -> Chart:
     """Picture of two runs: a row for each position error, an arrow from then to now, ±2 s about both."""
-    colours = palette(theme)
     rows = [change for change in changes if change.name.startswith("E")]
     if not rows:
-        return nothing_drawn(theme, _("The two runs have no position error in common"))
-    names = [f"<b>{change.name}</b>  {name_words(change.name)}" for change in rows]
+        return nothing(_("The two runs have no position error in common"))
     before = [_um(change.name, change.change.before) for change in rows]
     after = [_um(change.name, change.change.after) for change in rows]
-    tones = [_tone(change, colours) for change in rows]
+    tones: list[Role] = ["attention" if change.change.moved else "steady" for change in rows]
     spread = [
         2 * _um(change.name, change.change.deviation / 2**0.5) if change.change.deviation else 0.0 for change in rows
     ]
     largest = max([abs(v) + s for values in (before, after) for v, s in zip(values, spread, strict=True)] + [1.0])
-    span = 2.9 * largest  # room for the words at the right, on a narrow panel as well
-    shapes, notes = [], []
+    marks: list[Mark] = []
     for row, change in enumerate(rows):
-        shapes.append(
-            {
-                "type": "line",
-                "xref": "x",
-                "yref": "y",
-                "x0": before[row],
-                "x1": after[row],
-                "y0": row,
-                "y1": row,
-                "line": {"color": tones[row], "width": 5 if change.change.moved else 2},
-                "layer": "below",
-            }
-        )
+        pen = Pen(tones[row], 5 if change.change.moved else 2)
+        marks.append(Series([before[row], after[row]], [row, row], pen))
         words = [_moved(change)]
         if (enter := entered.get(change.name)) is not None:
             words.append(f"<b>{_('enter {value}').format(value=told(change.name, enter))}</b>")
-        notes.append(
-            {
-                "x": 1.0,
-                "xref": "paper",
-                "xanchor": "right",
-                "y": row,
-                "yref": "y",
-                "showarrow": False,
-                "text": " · ".join(words),
-                "font": {"size": 14, "color": colours.ink},
-                "align": "right",
-            }
+        marks.append(Note(" · ".join(words), Share(1), row, "right", size=14, colour="ink"))
+    for name, values, symbol in ((_("then"), before, "circle-open"), (_("now"), after, "diamond")):
+        # The points have the colour of what they mean, so the legend has a mark of its own.
+        marks.append(Series([None], [None], dots=Dots(symbol, 12, "ink", "ink", 2), name=name))
+        marks.append(
+            Series(
+                values,
+                list(range(len(rows))),
+                dots=Dots(symbol, 13, tones, tones, 2),
+                spread=Spread(spread, across=True),
+                meta=name,
+                hover=f"%{{x:+.1f}} µm<br>{name}",
+            )
         )
-    return {
-        "data": [
-            _key(_("then"), "circle-open", colours),
-            _key(_("now"), "diamond", colours),
-            _ends(_("then"), before, spread, tones, "circle-open", colours),
-            _ends(_("now"), after, spread, tones, "diamond", colours),
+    return Chart(
+        [
+            Panel(
+                marks,
+                Axis(
+                    at=list(range(len(rows))),
+                    words=[f"<b>{change.name}</b>  {name_words(change.name)}" for change in rows],
+                    reach=(len(rows) - 0.4, -0.6),
+                    colour="ink",
+                    letters=14,
+                ),
+            )
         ],
-        "layout": layout(
-            theme,
-            margin={"l": 196, "t": 34, "r": 12, "b": 46},
-            showlegend=True,
-            legend=legend(theme),
-            xaxis={
-                "title": {"text": _("µm; how an axis leans as µm over 1 m"), "standoff": 6},
-                "range": [-1.15 * largest, span],
-                "tickformat": "+.3~g",
-                "zeroline": True,
-                "zerolinecolor": colours.ink,
-                "tickvals": _ticks(largest),
-            },
-            yaxis={
-                "tickvals": list(range(len(rows))),
-                "ticktext": names,
-                "range": [len(rows) - 0.4, -0.6],
-                "color": colours.ink,
-                "tickfont": {"size": 14},
-            },
-            shapes=shapes,
-            annotations=notes,
+        Axis(
+            _("µm; how an axis leans as µm over 1 m"),
+            reach=(-1.15 * largest, 2.9 * largest),  # room for the words at the right, on a narrow panel as well
+            format="+.3~g",
+            zero="ink",
+            at=_ticks(largest),
         ),
-    }
-
-
-def _key(name: str, symbol: str, colours: Palette) -> dict[str, Any]:
-    """A line of the legend: the points themselves have the colour of what they mean."""
-    marker = {"symbol": symbol, "size": 12, "color": colours.ink, "line": {"width": 2, "color": colours.ink}}
-    return {"type": "scatter", "mode": "markers", "name": name, "x": [None], "y": [None], "marker": marker}
-
-
-def _ends(
-    name: str, values: list[float], spread: list[float], tones: list[str], symbol: str, colours: Palette
-) -> dict[str, Any]:
-    return {
-        "showlegend": False,
-        "type": "scatter",
-        "mode": "markers",
-        "name": name,
-        "meta": name,
-        "x": values,
-        "y": list(range(len(values))),
-        "error_x": {"type": "data", "array": spread, "color": colours.quiet, "thickness": 1.2, "width": 4},
-        "marker": {"symbol": symbol, "size": 13, "color": tones, "line": {"width": 2, "color": tones}},
-        "hovertemplate": "%{x:+.1f} µm<extra>" + name + "</extra>",
-        "cliponaxis": False,
-    }
-
-
-def _tone(change_row: Compared, colours: Palette) -> str:
-    return colours.attention if change_row.change.moved else colours.steady
+        Room(left=196, right=12, bottom=46),
+    )
 
 
 def _moved(change_row: Compared) -> str:
@@ -222,88 +150,53 @@ def _ticks(largest: float) -> list[float]:
     return [float(n * step) for n in range(-most, most + 1)]
 
 
-def course(drift: Drift, *, theme: ThemeName = "light") -> dict[str, Any]:
+def course(drift: Drift) -> Chart:
     """A value over the runs: its true course, what has been entered (steps), the limit about that, and the trend."""
-    colours = palette(theme)
     if not drift.points:
-        return nothing_drawn(theme, _("No run holds {name}").format(name=drift.name))
+        return nothing(_("No run holds {name}").format(name=drift.name))
     angle = UNITS[drift.name] == "°"
     factor, unit = (1.0, "°") if angle else (1000.0, "µm")
     if drift.name.startswith("radius"):
         factor, unit = 1.0, "mm"
-    at = [on_axis(point.at) for point in drift.points]
+    at = [point.at for point in drift.points]
     base = [(point.true - point.value) * factor for point in drift.points]
-    traces: list[dict[str, Any]] = []
+    marks: list[Series] = []
     if drift.limit is not None:
         for sign, words in ((1, _("upper limit")), (-1, _("lower limit"))):
             edge = [value + sign * drift.limit * factor for value in base]
-            traces.append(_steps(at, edge, words, {"color": colours.attention, "width": 1.5, "dash": "dash"}))
+            marks.append(Series(at, edge, Pen("attention", dash="dash", steps="hv"), meta=words))
     if any(base):
-        traces.append(_steps(at, base, _("entered"), {"color": colours.correction, "width": 2}))
+        marks.append(Series(at, base, Pen("correction", 2, steps="hv"), meta=_("entered")))
     if drift.trend is not None:
-        days = [point.at.timestamp() / 86_400 for point in drift.points]
+        days = [moment.timestamp() / 86_400 for moment in at]
         middle, mean = sum(days) / len(days), sum(point.true for point in drift.points) / len(days)
         ends = [(mean + drift.trend.slope * (day - middle)) * factor for day in (min(days), max(days))]
-        line = {"color": colours.quiet, "width": 1.5, "dash": "dot"}
-        first, last = min(drift.points, key=lambda p: p.at), max(drift.points, key=lambda p: p.at)
-        traces.append(_steps([on_axis(first.at), on_axis(last.at)], ends, _("trend"), line) | {"line": line})
+        marks.append(Series([min(at), max(at)], ends, Pen("quiet", dash="dot"), meta=_("trend")))
     beyond = [drift.limit is not None and abs(point.value) > drift.limit for point in drift.points]
     spread = [2 * (point.deviation or 0.0) * factor for point in drift.points]
-    traces.append(
-        {
-            "type": "scatter",
-            "mode": "lines+markers",
-            "name": drift.name,
-            "meta": drift.name,
-            "x": at,
-            "y": [point.true * factor for point in drift.points],
-            "line": {"color": colours.steady, "width": 1.5},
-            "marker": {
-                "size": 9,
-                "symbol": ["triangle-up" if out else "circle" for out in beyond],
-                "color": [colours.attention if out else colours.steady for out in beyond],
-            },
-            "error_y": {"type": "data", "array": spread, "color": colours.quiet, "thickness": 1.2, "width": 3}
-            if any(spread)
-            else {"visible": False},
-            "customdata": [f"/kinematics/runs/{point.number}" for point in drift.points],
-            "text": [_("run {n}").format(n=point.number) for point in drift.points],
-            "hovertemplate": "%{text}: %{y:+.4~g} " + unit + "<extra></extra>",
-            "cliponaxis": False,
-        }
+    marks.append(
+        Series(
+            at,
+            [point.true * factor for point in drift.points],
+            Pen("steady"),
+            Dots(
+                ["triangle-up" if out else "circle" for out in beyond],
+                9,
+                ["attention" if out else "steady" for out in beyond],
+            ),
+            spread=Spread(spread) if any(spread) else None,
+            meta=drift.name,
+            hover=[
+                f"{_('run {n}').format(n=point.number)}: {point.true * factor:+.4g} {unit}" for point in drift.points
+            ],
+            links=[f"/kinematics/runs/{point.number}" for point in drift.points],
+        )
     )
-    heights = [y for trace in traces for y in trace["y"] if isfinite(y)]
+    heights = [y for mark in marks for y in mark.y if isinstance(y, float) and isfinite(y)]
     low, high = min(heights), max(heights)
     room = max((high - low) * 0.15, 1e-6 if angle else 0.5)
-    return {
-        "data": traces,
-        "layout": layout(
-            theme,
-            margin={"l": 74, "t": 12},
-            xaxis=date_axis(point.at for point in drift.points),
-            yaxis={
-                "title": {"text": f"{drift.name}, {unit}", "standoff": 6},
-                "range": [low - room, high + room],
-                "tickformat": "+.4~g",
-                "nticks": 6,
-                "zeroline": True,
-                "zerolinecolor": colours.faint,
-            },
-        ),
-    }
-
-
-def _steps(at: list[str], values: list[float], name: str, line: dict[str, Any]) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": name,
-        "meta": name,
-        "x": at,
-        "y": values,
-        "line": line | {"shape": "hv"},
-        "hoverinfo": "skip",
-    }
+    height = Axis(f"{drift.name}, {unit}", reach=(low - room, high + room), format="+.4~g", ticks=6, zero="faint")
+    return Chart([Panel(marks, height)], time_axis(at), Room(left=74, top=12))
 
 
 def _um(name: str, value: float) -> float:

@@ -11,9 +11,9 @@ from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Engineer, Operator, Viewer, require
+from app.charts import svg, to_drawing
 from app.errors import Conflict, Invalid
 from app.files.documents.content import Picture
-from app.files.documents.drawing import drawing_of, svg
 from app.files.documents.files import MEDIA_TYPES
 from app.geometry.rotary_axes import actions, confirmation, form_reader, queries, run_history
 from app.geometry.rotary_axes.protocol import protocol_of
@@ -136,7 +136,7 @@ def protocol_page(request: Request, session: SessionDep, run: int) -> Response:
 
 def picture(chart: Picture) -> Markup:
     """A diagram of the protocol, drawn here: the page prints it as the PDF has it."""
-    return Markup(svg(drawing_of(chart.figure, chart.width, chart.height), chart.says, f"chart-{chart.key}"))  # noqa: S704 - svg() escapes
+    return Markup(svg(to_drawing(chart.figure, chart.width, chart.height), chart.says, f"chart-{chart.key}"))  # noqa: S704 - svg() escapes
 
 
 @router.post("/kinematics/runs/{run}/recompute")

@@ -1,6 +1,6 @@
 """JSON routes: work zeros and the fixtures they are found in."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import Path, Query, Request, Response
 from fastapi.responses import PlainTextResponse
@@ -22,7 +22,19 @@ from app.geometry.work_zero.schemas import FixtureIn, ZeroIn, ZeroRecomputeIn
 from app.loop.machines.queries import machine_for, machine_of, only_machine
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
 from app.loop.readings import actions as readings
-from app.web.api import FIGURE, After, Limit, MachineFilter, MachineKey, Theme, api_router, plain, problems, sent_again
+from app.web.api import (
+    FIGURE,
+    After,
+    Limit,
+    MachineFilter,
+    MachineKey,
+    Theme,
+    api_router,
+    chart_answer,
+    plain,
+    problems,
+    sent_again,
+)
 from app.web.deps import SessionDep
 from app.web.downloads import download
 from app.web.fields import Control, Page, Slug, page_of
@@ -98,7 +110,7 @@ def fixture_figure(
     fixture: FixtureKey,
     theme: Theme = "light",
     limit: Limit = 200,
-) -> dict[str, Any]:
+) -> Response:
     """The shift of a fixture over its last zeros as a Plotly figure."""
     machine_row = machine_for(session, caller, machine, "viewer")
     row = queries.fixture_of(session, machine, fixture)
@@ -112,7 +124,7 @@ def fixture_figure(
         )
         for comparison in queries.history(session, machine_row, row.key, limit=limit)
     ]
-    return figures.shift_figure(marks, row.settings.warning, row.settings.alarm, theme=theme)
+    return chart_answer(figures.shift_figure(marks, row.settings.warning, row.settings.alarm), theme)
 
 
 @router.get("/work-zeros/{number}", responses=problems(404))

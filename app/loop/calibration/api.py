@@ -1,6 +1,6 @@
 """JSON routes: calibrations, paired readings, suggestions, plans."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import Path, Query, Response
 
@@ -21,7 +21,18 @@ from app.loop.calibration.answers import (
 from app.loop.calibration.queries import Place
 from app.loop.calibration.schemas import CalibrationPlanIn, GaugeIn, PairIn, RingIn, SuggestionAcceptIn
 from app.loop.machines.queries import machine_for, machine_named
-from app.web.api import FIGURE, After, Limit, MachineKey, SerialAfter, Theme, api_router, problems, sent_again
+from app.web.api import (
+    FIGURE,
+    After,
+    Limit,
+    MachineKey,
+    SerialAfter,
+    Theme,
+    api_router,
+    chart_answer,
+    problems,
+    sent_again,
+)
 from app.web.deps import SessionDep
 from app.web.fields import Page, ReasonIn, page_of
 
@@ -215,19 +226,16 @@ def calibration_figure(
     location: R11,
     theme: Theme = "light",
     limit: Limit = 200,
-) -> dict[str, Any]:
+) -> Response:
     """The history of a location as a Plotly figure: differences, empirical value, limits R33 and R34."""
     machine_row = machine_for(session, caller, machine, "viewer")
     place = Place("average", location)
     value = queries.value_of(session, machine_row, place)
     rows = queries.calibrations(session, machine_row, place, newest_first=True, limit=limit)
     changes = queries.value_changes(session, machine_row, location, limit)
-    return figures.gauge_figure(
-        [mark_of(row) for row in reversed(rows)],
-        sorted((change.since, change.value) for change in changes),
-        value,
-        theme=theme,
-    )
+    marks = [mark_of(row) for row in reversed(rows)]
+    chart = figures.gauge_figure(marks, sorted((change.since, change.value) for change in changes), value)
+    return chart_answer(chart, theme)
 
 
 @router.get("/machines/{machine}/tools/{tool}/calibration-figure", responses=problems(404) | FIGURE)
@@ -238,10 +246,10 @@ def ring_figure(
     tool: R10,
     theme: Theme = "light",
     limit: Limit = 200,
-) -> dict[str, Any]:
+) -> Response:
     """The history of a probe in the ring as a Plotly figure: how far it stood beside the spindle, and the diameters."""
     machine_row = machine_for(session, caller, machine, "viewer")
     place = Place("tool", tool)
     queries.value_of(session, machine_row, place)
     rows = queries.calibrations(session, machine_row, place, newest_first=True, limit=limit)
-    return figures.ring_figure([mark_of(row) for row in reversed(rows)], theme=theme)
+    return chart_answer(figures.ring_figure([mark_of(row) for row in reversed(rows)]), theme)

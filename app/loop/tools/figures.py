@@ -116,7 +116,14 @@ def lives_figure(
                 (0.56, 1),
             ),
             Panel(
-                [total, *([] if planned is None else [Rule(Pen("ink", dash="dash"), planned, words=_("planned"))])],
+                [
+                    total,
+                    *(
+                        []
+                        if planned is None
+                        else [Rule(Pen("ink", dash="dash"), planned, front=True, words=_("planned"))]
+                    ),
+                ],
                 Axis(_("Sum, µm"), ticks=4, format="+.0f", zero="faint", fixed=True),
                 (0, 0.44),
             ),
@@ -132,9 +139,15 @@ def _parts_lines(usual: float | None, planned: int | None) -> list[Rule]:
     apart = (9 if (usual or 0) >= (planned or 0) else -9) if near else 0
     rules = []
     if usual is not None:
-        rules.append(Rule(Pen("faint", dash="dot"), usual, words=_("median {n}").format(n=f"{usual:g}"), raised=apart))
+        rules.append(
+            Rule(
+                Pen("faint", dash="dot"), usual, front=True, words=_("median {n}").format(n=f"{usual:g}"), raised=apart
+            )
+        )
     if planned is not None:
-        rules.append(Rule(Pen("ink", dash="dash"), planned, words=_("planned {n}").format(n=planned), raised=-apart))
+        rules.append(
+            Rule(Pen("ink", dash="dash"), planned, front=True, words=_("planned {n}").format(n=planned), raised=-apart)
+        )
     return rules
 
 

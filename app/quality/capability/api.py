@@ -2,7 +2,6 @@
 
 from typing import Annotated, Literal
 
-import msgspec
 from fastapi import Query, Response
 
 from app.access.deps import AnyCaller
@@ -12,7 +11,7 @@ from app.quality.capability.figures import CapabilityChart, histogram, probabili
 from app.quality.capability.queries import Study
 from app.quality.capability.request import StudyRequestDep, study_of
 from app.quality.capability.schemas import CapabilityOut, capability_out
-from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, problems
+from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
 from app.web.deps import SessionDep
 
 router = api_router("statistics")
@@ -61,5 +60,4 @@ def get_capability_figure(
     """The histogram with its fitted curve and the limits, or the normal probability plot."""
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     chart = drawn(study_of(session, current, choice))
-    figure = (histogram if picture == "histogram" else probability)(chart, theme=theme)
-    return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})
+    return chart_answer((histogram if picture == "histogram" else probability)(chart), theme)

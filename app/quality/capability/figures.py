@@ -1,19 +1,19 @@
 """Histogram with fitted curve and limits, and the normal probability plot. Pure; mm in, µm on the axes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, exp, pi, sqrt
 from typing import Any
 
 import numpy as np
 from scipy.special import ndtri
 
+from app.charts import Axis, Bars, Chart, Dots, Mark, Note, Panel, Pen, Room, Rule, Series, Share, nothing
 from app.core.spc.capability import Limits
 from app.core.spc.refusal import Floats
 from app.core.spc.spread import far_off
 from app.language.i18n import _, ngettext
 from app.language.numbers import signed
-from app.web.theme import Palette, ThemeName, layout, legend, nothing_drawn, palette
 
 MOST_BARS, FEWEST_BARS = 60, 8
 CURVE = 161  # points of a drawn curve
@@ -34,30 +34,26 @@ class CapabilityChart:
     normal: bool
 
 
-def histogram(drawn: CapabilityChart, *, theme: ThemeName = "light") -> dict[str, Any]:
+def histogram(drawn: CapabilityChart) -> Chart:
     """Bars of equal width, the fitted normal curve (overall; dashed: within) or the percentiles, and the limits."""
-    colours = palette(theme)
     if not len(drawn.values):
-        return nothing_drawn(theme, _("No readings here"))
+        return nothing(_("No readings here"))
     near = _near(drawn)
     edges = edges_of(near)
     counts, _edges = np.histogram(near, edges)
     width = float(edges[1] - edges[0])
     centres = (edges[:-1] + edges[1:]) / 2
     low, high = _range(drawn, edges)
-    beyond = [_outside(float(centre), drawn.limits) for centre in centres]
-    data: list[dict[str, Any]] = [
-        {
-            "type": "bar",
-            "name": _("Readings"),
-            "showlegend": False,
-            "meta": "histogram",
-            "x": (centres * 1000).tolist(),
-            "y": counts.tolist(),
-            "width": width * 1000 * 0.92,
-            "marker": {"color": [colours.attention if out else colours.steady for out in beyond], "opacity": 0.75},
-            "hovertemplate": _("%{x:+.2f} µm: %{y} readings") + "<extra></extra>",
-        }
+    marks: list[Mark] = [
+        Bars(
+            (centres * 1000).tolist(),
+            counts.tolist(),
+            ["attention" if _outside(float(centre), drawn.limits) else "steady" for centre in centres],
+            width * 1000 * 0.92,
+            opacity=0.75,
+            meta="histogram",
+            hover=_("%{x:+.2f} µm: %{y} readings"),
+        )
     ]
     if drawn.mean is not None and drawn.normal:
         at = np.linspace(low, high, CURVE)
@@ -70,26 +66,19 @@ def histogram(drawn: CapabilityChart, *, theme: ThemeName = "light") -> dict[str
                 height = [
                     scale * exp(-0.5 * ((x - drawn.mean) / sigma) ** 2) / (sigma * sqrt(2 * pi)) for x in at.tolist()
                 ]
-                data.append(_curve(name, at, height, colours, dash))
-    lines, names = _limit_lines(drawn, colours, (low, high))
-    return {
-        "data": data,
-        "layout": _layout(
-            theme,
-            bargap=0,
-            xaxis=_axis(_("Deviation, µm"), colours, (low, high)),
-            yaxis={"rangemode": "tozero", "nticks": 5, "title": _title(_("Readings"), colours)},
-            shapes=lines,
-            annotations=[*names, *_beyond(drawn, colours)],
-        ),
-    }
+                marks.append(Series((at * 1000).tolist(), height, Pen("correction", 2, dash), meta=dash, name=name))
+    return _chart(
+        [*marks, *_limit_lines(drawn, low, high), *_beyond(drawn)],
+        low,
+        high,
+        Axis(_("Readings"), from_zero=True, ticks=5),
+    )
 
 
-def probability(drawn: CapabilityChart, *, theme: ThemeName = "light") -> dict[str, Any]:
+def probability(drawn: CapabilityChart) -> Chart:
     """Ordered readings against normal quantiles: normal readings lie on the line. Of many, the ends and a thinned middle."""
-    colours = palette(theme)
     if len(drawn.values) < 2:
-        return nothing_drawn(theme, _("No readings here"))
+        return nothing(_("No readings here"))
     ordered = np.sort(drawn.values)
     n = len(ordered)
     at = np.arange(n) if n <= MOST_POINTS else _spread(n)
@@ -97,48 +86,26 @@ def probability(drawn: CapabilityChart, *, theme: ThemeName = "light") -> dict[s
     near = _near(drawn)
     low, high = _range(drawn, np.array([near.min(), near.max()]))
     reach = max(3.4, float(np.abs(z).max()) + 0.2)
-    data: list[dict[str, Any]] = [
-        {
-            "type": "scatter",
-            "mode": "markers",
-            "name": _("Readings"),
-            "meta": "readings",
-            "x": (ordered[at] * 1000).tolist(),
-            "y": z.tolist(),
-            "marker": {"size": 6, "color": colours.steady, "opacity": 0.8},
-            "hovertemplate": "%{x:+.2f} µm<extra></extra>",
-        }
+    marks: list[Mark] = [
+        Series(
+            (ordered[at] * 1000).tolist(),
+            z.tolist(),
+            dots=Dots(size=6, opacity=0.8),
+            meta="readings",
+            name=_("Readings"),
+            hover="%{x:+.2f} µm",
+        )
     ]
     if drawn.mean is not None and drawn.overall:
-        data.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "name": _("Normal distribution"),
-                "meta": "line",
-                "x": [(drawn.mean + side * reach * drawn.overall) * 1000 for side in (-1, 1)],
-                "y": [-reach, reach],
-                "line": {"width": 2, "color": colours.correction},
-                "hoverinfo": "skip",
-            }
-        )
-    lines, names = _limit_lines(drawn, colours, (low, high), percentiles=False)
-    return {
-        "data": data,
-        "layout": _layout(
-            theme,
-            xaxis=_axis(_("Deviation, µm"), colours, (low, high)),
-            yaxis={
-                "range": [-reach, reach],
-                "tickmode": "array",
-                "tickvals": [float(ndtri(share)) for share in SHARES],
-                "ticktext": [f"{share * 100:g} %" for share in SHARES],
-                "title": _title(_("Share of the readings below"), colours),
-            },
-            shapes=lines,
-            annotations=[*names, *_beyond(drawn, colours)],
-        ),
-    }
+        ends = [(drawn.mean + side * reach * drawn.overall) * 1000 for side in (-1, 1)]
+        marks.append(Series(ends, [-reach, reach], Pen("correction", 2), meta="line", name=_("Normal distribution")))
+    shares = Axis(
+        _("Share of the readings below"),
+        reach=(-reach, reach),
+        at=[float(ndtri(share)) for share in SHARES],
+        words=[f"{share * 100:g} %" for share in SHARES],
+    )
+    return _chart([*marks, *_limit_lines(drawn, low, high, percentiles=False), *_beyond(drawn)], low, high, shares)
 
 
 def _near(drawn: CapabilityChart) -> Floats:
@@ -146,7 +113,7 @@ def _near(drawn: CapabilityChart) -> Floats:
     return np.asarray(drawn.values[~far_off(drawn.values)])
 
 
-def _beyond(drawn: CapabilityChart, colours: Palette) -> list[dict[str, Any]]:
+def _beyond(drawn: CapabilityChart) -> list[Note]:
     """Note below the picture: the number of readings outside it."""
     far, middle = drawn.values[far_off(drawn.values)], float(np.median(drawn.values))
     words = []
@@ -158,10 +125,8 @@ def _beyond(drawn: CapabilityChart, colours: Palette) -> list[dict[str, Any]]:
             )
             text %= {"num": len(values), "at": signed(furthest, 1)}
             words.append(f"◂ {text}" if left else f"{text} ▸")
-    if not words:
-        return []
-    anchor = {"xref": "paper", "x": 1.0, "xanchor": "right", "yref": "paper", "y": -0.2, "yanchor": "top"}
-    return [anchor | {"text": "  ".join(words), "showarrow": False, "font": {"size": 13, "color": colours.attention}}]
+    where = Share(1), Share(-0.2)
+    return [Note("  ".join(words), *where, "right", "top", size=13, colour="attention")] if words else []
 
 
 def edges_of(values: Floats) -> Floats:
@@ -201,83 +166,26 @@ def _range(drawn: CapabilityChart, values: Floats) -> tuple[float, float]:
     return min(held) - room, max(held) + room
 
 
-def _curve(name: str, at: Floats, height: list[float], colours: Palette, dash: str) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": name,
-        "meta": dash,
-        "x": (at * 1000).tolist(),
-        "y": height,
-        "line": {"width": 2, "color": colours.correction, "dash": dash},
-        "hoverinfo": "skip",
-    }
-
-
-def _limit_lines(
-    drawn: CapabilityChart, colours: Palette, extent: tuple[float, float], *, percentiles: bool = True
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    marks: list[tuple[float, str, str, float, str]] = []
-    for limit, name in ((drawn.limits.lower, _("lower limit")), (drawn.limits.upper, _("upper limit"))):
-        if limit is not None:
-            marks.append((limit, name, colours.ink, 2, "solid"))
-    marks.append((0.0, _("target"), colours.quiet, 1, "4px,4px"))
-    if percentiles and not drawn.normal and drawn.percentiles is not None:
-        names = ("0.135 %", "50 %", "99.865 %")
-        marks += [
-            (value, name, colours.correction, 1.5, "6px,3px")
-            for value, name in zip(drawn.percentiles, names, strict=True)
-        ]
+def _limit_lines(drawn: CapabilityChart, low: float, high: float, *, percentiles: bool = True) -> list[Rule]:
     lines = [
-        {
-            "type": "line",
-            "yref": "paper",
-            "y0": 0,
-            "y1": 1,
-            "x0": at * 1000,
-            "x1": at * 1000,
-            "line": {"color": colour, "width": width, "dash": dash},
-        }
-        for at, _name, colour, width, dash in marks
-        if extent[0] <= at <= extent[1]
+        Rule(Pen("ink", 2), x=limit, words=name)
+        for limit, name in ((drawn.limits.lower, _("lower limit")), (drawn.limits.upper, _("upper limit")))
+        if limit is not None
     ]
-    labels = [
-        {
-            "x": at * 1000,
-            "yref": "paper",
-            "y": 1,
-            "yanchor": "bottom",
-            "xanchor": "center",
-            "yshift": 14 if colour == colours.correction else 0,
-            "text": name,
-            "showarrow": False,
-            "font": {"size": 12, "color": colour if colour != colours.ink else colours.quiet},
-        }
-        for at, name, colour, _width, _dash in marks
-        if extent[0] <= at <= extent[1]
+    lines.append(Rule(Pen("quiet", 1, "4px,4px"), x=0.0, words=_("target")))
+    if percentiles and not drawn.normal and drawn.percentiles is not None:
+        pen = Pen("correction", dash="6px,3px")
+        lines += [
+            Rule(pen, x=value, words=name, colour="correction", raised=14)
+            for value, name in zip(drawn.percentiles, ("0.135 %", "50 %", "99.865 %"), strict=True)
+        ]
+    return [
+        replace(line, x=line.x * 1000, front=True)
+        for line in lines
+        if isinstance(line.x, float) and low <= line.x <= high
     ]
-    return lines, labels
 
 
-def _title(text: str, colours: Palette) -> dict[str, Any]:
-    return {"text": text, "font": {"size": 13, "color": colours.quiet}, "standoff": 8}
-
-
-def _axis(title: str, colours: Palette, extent: tuple[float, float]) -> dict[str, Any]:
-    return {
-        "range": [extent[0] * 1000, extent[1] * 1000],
-        "tickformat": "+.4~g",
-        "nticks": 9,
-        "showline": True,
-        "title": _title(title, colours),
-    }
-
-
-def _layout(theme: ThemeName, **more: Any) -> dict[str, Any]:
-    return layout(
-        theme,
-        margin={"l": 76, "r": 28, "t": 44, "b": 96},
-        showlegend=True,
-        legend=legend(theme, y=-0.2, yanchor="top"),
-        **more,
-    )
+def _chart(marks: Sequence[Mark], low: float, high: float, height: Axis) -> Chart:
+    deviation = Axis(_("Deviation, µm"), reach=(low * 1000, high * 1000), format="+.4~g", ticks=9)
+    return Chart([Panel(marks, height)], deviation, Room(76, 28, 96, 44), legend="below")

@@ -1,8 +1,7 @@
 """JSON routes: baselines, control charts in numbers, and their figures."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
-import msgspec
 from fastapi import Path, Query, Response
 
 from app.access.deps import AnyCaller, Engineer, require
@@ -29,7 +28,7 @@ from app.quality.control_charts.schemas import (
 )
 from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import Marks
-from app.web.api import FIGURE, CharacteristicKey, Limit, Theme, api_router, problems, sent_again
+from app.web.api import FIGURE, CharacteristicKey, Limit, Theme, api_router, chart_answer, problems, sent_again
 from app.web.choice import Chosen
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Page, page_of
@@ -187,12 +186,11 @@ def get_control_chart(
     window = statistics.window_of(session, current.characteristic, **choice._asdict())
     baseline = _judge(session, current, version)
     if baseline is None:
-        return _answer(
-            control_figure(charts.unjudged(session, current, window), key=characteristic, theme=theme, width=width)
-        )
+        unjudged = charts.unjudged(session, current, window)
+        return chart_answer(control_figure(unjudged, key=characteristic, width=width), theme)
     view = charts.view(session, current, baseline, window, chart)
     marked = charts.marked_by(baseline) if signal is None else _run_of(session, current, signal)
-    return _answer(control_figure(view, key=characteristic, marked=marked, theme=theme, width=width))
+    return chart_answer(control_figure(view, key=characteristic, marked=marked, width=width), theme)
 
 
 def _run_of(session: SessionDep, current: CurrentCharacteristic, number: int) -> Marks:
@@ -229,8 +227,4 @@ def get_baseline_editor(
         quantity, chart, grouping, group_size, group_pause, settle, first_sequence, last_sequence, excluded
     )
     view, marked = picture_of(session, current, picked, window)
-    return _answer(control_figure(view, key=characteristic, marked=marked, theme=theme, width=width, picks=True))
-
-
-def _answer(figure: dict[str, Any]) -> Response:
-    return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})
+    return chart_answer(control_figure(view, key=characteristic, marked=marked, width=width, picks=True), theme)

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.charts import Dots, Labels, Series
 from app.core.spc.shewhart import Chart
 from app.language.i18n import _
 from app.language.numbers import signed
 from app.quality.control_charts.view import View
-from app.web.theme import Palette
 
 ROOM = 0.08
 TOO_FAR = 4.0  # times as far as limits and most points reach
@@ -51,44 +51,36 @@ def _open(low: float, high: float) -> tuple[float, float]:
     return low - room, high + room
 
 
-def beyond(
-    view: View, drawn: NDArray[np.int64], custom: list[Any], colours: Palette, low: float, high: float
-) -> list[dict[str, Any]]:
-    """The points that the axis does not reach, at its edge. custom: what each drawn point opens."""
+def beyond(view: View, drawn: NDArray[np.int64], links: list[object], low: float, high: float) -> list[Series]:
+    """The points that the axis does not reach, at its edge. links: what each drawn point opens."""
     values = view.points[drawn] * 1000
     far = (values > high) | (values < low)
     if not far.any():
         return []
     inset = (high - low) * 0.025
     above = values[far] > 0.5 * (low + high)
-    values_text = [
-        f"{value:.0f} µm" if view.kind in UNSIGNED else f"{signed(value, 0)} µm" for value in values[far].tolist()
-    ]
+    said = [f"{value:.0f} µm" if view.kind in UNSIGNED else f"{signed(value, 0)} µm" for value in values[far].tolist()]
     x = view.last[drawn[far]]
     wide = view.last[-1] - view.first[0]
     late = x > view.last[-1] - LATE * wide
-    labels = _spaced(values_text, np.abs(values[far]), x, above, late, CLOSE * wide)
+    texts = _spaced(said, np.abs(values[far]), x, above, late, CLOSE * wide)
+    beside = np.where(late, "middle left", "middle right").tolist()
     return [
-        {
-            "type": "scatter",
-            "mode": "markers+text" if sum(map(bool, labels)) <= WITH_VALUES else "markers",
-            "name": _("Beyond the axis"),
-            "meta": "beyond",
-            "x": x.tolist(),
-            "y": np.where(above, high - inset, low + inset).tolist(),
-            "text": labels,
-            "hovertext": values_text,
-            "textposition": np.where(late, "middle left", "middle right").tolist(),
-            "textfont": {"size": 12, "color": colours.ink},
-            "customdata": [custom[at] for at in np.flatnonzero(far).tolist()],
-            "marker": {
-                "size": 12,
-                "color": colours.attention,
-                "symbol": ["triangle-up-open" if up else "triangle-down-open" for up in above.tolist()],
-                "line": {"width": 2},
-            },
-            "hovertemplate": f"{_('Reading')} %{{x:d}}<br>%{{hovertext}}<extra></extra>",
-        }
+        Series(
+            x.tolist(),
+            np.where(above, high - inset, low + inset).tolist(),
+            dots=Dots(
+                ["triangle-up-open" if up else "triangle-down-open" for up in above.tolist()],
+                12,
+                "attention",
+                edge="attention",
+                edge_width=2,
+            ),
+            labels=Labels(texts, beside, "ink") if sum(map(bool, texts)) <= WITH_VALUES else None,
+            meta="beyond",
+            hover=[f"{_('Reading')} {number}<br>{value}" for number, value in zip(x.tolist(), said, strict=True)],
+            links=[links[at] for at in np.flatnonzero(far).tolist()],
+        )
     ]
 
 

@@ -1,86 +1,70 @@
-"""Control charts as Plotly takes them. Pure; lengths in mm in, µm on the axes.
+"""Control charts. Pure; lengths in mm in, µm on the axes.
 
 Points are steady grey; one that makes a signal is orange and a triangle that points the way it lies, or a diamond where a rule knows no
 side. Of more points than pixels each stretch shows its lowest and its highest, and those of its signals, so no extreme is
 thinned away.
 """
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.charts import Axis, Chart, Dots, Ground, Note, Panel, Pen, Room, Rule, Series, Share, nothing
 from app.core.spc.rules import Signals
-from app.core.spc.shewhart import Chart
+from app.core.spc.shewhart import Chart as Shewhart
 from app.language.i18n import _
 from app.language.numbers import signed
 from app.quality.control_charts.axis_range import UNSIGNED, beyond, reach
 from app.quality.control_charts.downsampling import thinned
 from app.quality.control_charts.view import Marks, View
-from app.quality.control_charts.wording import axis, chart_name
-from app.web.theme import Palette, ThemeName, layout, nothing_drawn, palette
+from app.quality.control_charts.wording import axis
 
 MOST_CHANGES = 40  # lines of tool changes; more are a fence
 WITH_MARKERS = 400
+CENTRE, LIMIT = Pen("quiet"), Pen("ink", dash="dash")
 TOGETHER = 0.1  # of the axis: limits that lie closer than this are named in one line
+Links = Callable[[Any], object]
 SYMBOLS = {1: "triangle-up", 0: "diamond", -1: "triangle-down"}
 
 
 def control_figure(
-    view: View,
-    *,
-    key: str,
-    marked: Marks | None = None,
-    theme: ThemeName = "light",
-    width: int = 1240,
-    picks: bool = False,
-) -> dict[str, Any]:
+    view: View, *, key: str, marked: Marks | None = None, width: int = 1240, picks: bool = False
+) -> Chart:
     """One control chart. picks: dragging chooses a period, and a click a point (see pick-period.js)."""
-    colours = palette(theme)
     if not len(view.points):
-        return nothing_drawn(theme, _("No points in this period."))
+        return nothing(_("No points in this period."))
     sides = _sides(view.signals, len(view))
-    indices = thinned(view.points if view.below is None else view.points - view.below, sides != NO_SIGNAL)
-    data = _limits(view, indices, colours)
-    data += _line(view, view.points, indices, colours, key, picks=picks)
-    if view.below is not None:
-        data += _line(view, view.below, indices, colours, key, picks=picks)
-        data += _signals(
-            view, np.where(sides == -1, view.below, view.points), indices, sides, colours, key, picks=picks
-        )
-    else:
-        data += _signals(view, view.points, indices, sides, colours, key, picks=picks)
+    drawn = thinned(view.points if view.below is None else view.points - view.below, sides != NO_SIGNAL)
+    links = _links(view, key, picks=picks)
     low, high = reach(view)
-    data += beyond(view, indices, _custom(view, indices, key, picks=picks), colours, low, high)
-    changes = _changes(view, colours)
-    period = _period(marked, view, colours) if marked is not None else ([], [])
     first, last = int(view.first[0]), int(view.last[-1])
     edge = max(1.0, (last - first) * 0.01)
-    return {
-        "data": data,
-        "layout": layout(
-            theme,
-            margin={"l": 76, "r": 20 if width < 600 or view.centre is None else 118, "t": 26, "b": 44},
-            xaxis={
-                "range": [first - edge, last + edge],
-                "showgrid": False,
-                "showline": True,
-                "tickformat": "d",
-                "nticks": 8 if width > 900 else 5,
-                "title": _title(_("Reading"), colours),
-            },
-            yaxis={
-                "range": [low, high],
-                "tickformat": _format(view.kind, high - low),
-                "nticks": 7,
-                "title": _title(_axis(view), colours),
-                "fixedrange": picks,
-            },
-            shapes=[*period[0], *changes],
-            annotations=[*period[1], *_names(view, colours, width, high - low)],
-            **({"dragmode": "select", "selectdirection": "h"} if picks else {}),
+    marks = [
+        *(_period(marked, view) if marked is not None else []),
+        *_changes(view),
+        *_limits(view, drawn),
+        _points(view, view.points, drawn, links, picks=picks),
+        *([] if view.below is None else [_points(view, view.below, drawn, links, picks=picks)]),
+        *_signals(view, drawn, sides, links),
+        *beyond(view, drawn, [links(at) for at in drawn], low, high),
+        *_names(view, width, high - low),
+    ]
+    height = Axis(_axis(view), reach=(low, high), format=_format(view.kind, high - low), ticks=7, fixed=picks)
+    return Chart(
+        [Panel(marks, height)],
+        Axis(
+            _("Reading"),
+            reach=(first - edge, last + edge),
+            format="d",
+            ticks=8 if width > 900 else 5,
+            grid=False,
         ),
-    }
+        Room(76, 20 if width < 600 or view.centre is None else 118, 44, 26),
+        drag="select" if picks else "zoom",
+    )
 
 
 NO_SIGNAL = 9
@@ -95,107 +79,73 @@ def _um(values: Any) -> Any:
     return np.round(np.asarray(values) * 1000, 4)
 
 
-def _line(
-    view: View, values: NDArray[np.float64], drawn: NDArray[np.int64], colours: Palette, key: str, *, picks: bool
-) -> list[dict[str, Any]]:
+def _points(view: View, values: NDArray[np.float64], drawn: NDArray[np.int64], links: Links, *, picks: bool) -> Series:
     """The points, joined within each tool: a gap at each change of it, unless a chart carries over."""
     few = len(drawn) <= WITH_MARKERS
     x: list[Any] = view.last[drawn].tolist()
     y: list[Any] = _um(values[drawn]).tolist()
-    data = _custom(view, drawn, key, picks=picks)
+    opened: list[Any] = [links(at) for at in drawn]
     edges = np.cumsum(view.begins)[drawn]
-    if view.kind in (Chart.INDIVIDUALS, Chart.MOVING_RANGE):
+    if view.kind in (Shewhart.INDIVIDUALS, Shewhart.MOVING_RANGE):
         for at in reversed((np.flatnonzero(np.diff(edges)) + 1).tolist()):
-            for column in (x, y, data):
+            for column in (x, y, opened):
                 column.insert(at, None)
-    return [
-        {
-            "type": "scatter",
-            "mode": "lines+markers" if few or picks else "lines",
-            "name": chart_name(view.kind),
-            "meta": "points",
-            "x": x,
-            "y": y,
-            "customdata": data,
-            "connectgaps": False,
-            "line": {"width": 1.2, "color": colours.faint if few else colours.steady},
-            "marker": {"size": 6 if few else 3, "color": colours.steady},
-            "hovertemplate": _hover(view),
-        }
-    ]
+    return Series(
+        x,
+        y,
+        Pen("faint" if few else "steady", 1.2),
+        Dots(size=6 if few else 3) if few or picks else None,
+        meta="points",
+        hover=_hover(view),
+        links=opened,
+    )
 
 
-def _signals(
-    view: View,
-    values: NDArray[np.float64],
-    drawn: NDArray[np.int64],
-    sides: NDArray[np.int8],
-    colours: Palette,
-    key: str,
-    *,
-    picks: bool,
-) -> list[dict[str, Any]]:
+def _signals(view: View, drawn: NDArray[np.int64], sides: NDArray[np.int8], links: Links) -> list[Series]:
     at = drawn[sides[drawn] != NO_SIGNAL]
     if not len(at):
         return []
+    values = view.points if view.below is None else np.where(sides == -1, view.below, view.points)
+    symbols = [SYMBOLS[int(side)] for side in sides[at]]
     return [
-        {
-            "type": "scatter",
-            "mode": "markers",
-            "name": _("Signal"),
-            "meta": "signals",
-            "x": view.last[at].tolist(),
-            "y": _um(values[at]).tolist(),
-            "customdata": _custom(view, at, key, picks=picks),
-            "marker": {
-                "size": 12 if len(at) <= 60 else 8,
-                "color": colours.attention,
-                "symbol": [SYMBOLS[int(side)] for side in sides[at]],
-                "line": {"width": 1, "color": colours.surface},
-            },
-            "hovertemplate": _hover(view),
-        }
+        Series(
+            view.last[at].tolist(),
+            _um(values[at]).tolist(),
+            dots=Dots(symbols, 12 if len(at) <= 60 else 8, "attention", "surface", 1),
+            meta="signals",
+            hover=_hover(view),
+            links=[links(one) for one in at],
+        )
     ]
 
 
-def _custom(view: View, at: NDArray[np.int64], key: str, *, picks: bool) -> list[Any]:
-    """Target of a click: the reading; where the chart picks readings, its number."""
-    last = view.last[at].tolist()
-    return last if picks else [f"/characteristics/{key}/readings/{number}" for number in last]
+def _links(view: View, key: str, *, picks: bool) -> Links:
+    """Target of a click on a point: the reading; where the chart picks readings, its number."""
+    if picks:
+        return lambda at: int(view.last[at])
+    return lambda at: f"/characteristics/{key}/readings/{view.last[at]}"
 
 
 def _hover(view: View) -> str:
     value = "%{y:.2f}" if view.kind in UNSIGNED else "%{y:+.2f}"
-    return f"{_('Reading')} %{{x:d}}<br>{value} µm<extra></extra>"
+    return f"{_('Reading')} %{{x:d}}<br>{value} µm"
 
 
-def _limits(view: View, drawn: NDArray[np.int64], colours: Palette) -> list[dict[str, Any]]:
-    lines = (
-        ("centre", view.centre, {"width": 1.5, "color": colours.quiet}),
-        ("lower", view.lower, {"width": 1.5, "color": colours.ink, "dash": "dash"}),
-        ("upper", view.upper, {"width": 1.5, "color": colours.ink, "dash": "dash"}),
-    )
-    traces = []
-    first, last = int(view.first[0]), int(view.last[-1])
-    for name, values, line in lines:
-        if values is None or _is_floor(view, values):
-            continue
-        single = np.ndim(values) == 0
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "meta": name,
-                "x": [first, last] if single else view.last[drawn].tolist(),
-                "y": [float(_um(values))] * 2 if single else _um(np.asarray(values)[drawn]).tolist(),
-                "line": line | ({} if single else {"shape": "hvh"}),
-                "hoverinfo": "skip",
-            }
+def _limits(view: View, drawn: NDArray[np.int64]) -> list[Series]:
+    lines = (("centre", view.centre, CENTRE), ("lower", view.lower, LIMIT), ("upper", view.upper, LIMIT))
+    ends = [int(view.first[0]), int(view.last[-1])]
+    return [
+        Series(ends, [float(_um(values))] * 2, pen, meta=name)
+        if np.ndim(values) == 0
+        else Series(
+            view.last[drawn].tolist(), _um(np.asarray(values)[drawn]).tolist(), replace(pen, steps="hvh"), meta=name
         )
-    return traces
+        for name, values, pen in lines
+        if values is not None and not _is_floor(view, values)
+    ]
 
 
-def _names(view: View, colours: Palette, width: int, span: float) -> list[dict[str, Any]]:
+def _names(view: View, width: int, span: float) -> list[Note]:
     """The limits by name, at the right of the newest point."""
     if width < 600 or view.centre is None:
         return []
@@ -211,20 +161,7 @@ def _names(view: View, colours: Palette, width: int, span: float) -> list[dict[s
         labels = [(_("{low} to {high}").format(low=low, high=high), float(np.mean(list(newest.values()))))]
     else:
         labels = [(f"{name} {_value(view, value, decimals)}", value) for name, value in newest.items()]
-    return [
-        {
-            "x": 1,
-            "xref": "paper",
-            "xanchor": "left",
-            "xshift": 6,
-            "y": value,
-            "yanchor": "middle",
-            "showarrow": False,
-            "text": text,
-            "font": {"size": 12, "color": colours.quiet},
-        }
-        for text, value in labels
-    ]
+    return [Note(text, Share(1), value, "left", shift=(6, 0)) for text, value in labels]
 
 
 def _value(view: View, value: float, decimals: int) -> str:
@@ -236,68 +173,42 @@ def _is_floor(view: View, values: Any) -> bool:
     return view.kind in UNSIGNED and not np.any(values)
 
 
-def _changes(view: View, colours: Palette) -> list[dict[str, Any]]:
+def _changes(view: View) -> list[Rule]:
     """Lines at tool changes, and at changes of the size that readings are measured by."""
     at = view.first[view.begins]
     at = at[at > view.first[0]]
-    if len(at) > MOST_CHANGES:
-        return []
-    return [
-        {
-            "type": "line",
-            "x0": number - 0.5,
-            "x1": number - 0.5,
-            "y0": 0,
-            "y1": 1,
-            "yref": "paper",
-            "line": {"width": 1, "color": colours.faint, "dash": "dot"},
-        }
-        for number in at.tolist()
-    ]
+    return [] if len(at) > MOST_CHANGES else [Rule(Pen("faint", 1, "dot"), x=number - 0.5) for number in at.tolist()]
 
 
-def _period(marked: Marks, view: View, colours: Palette) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+def _period(marked: Marks, view: View) -> list[Ground | Note]:
     first, last = max(marked.first, int(view.first[0])), min(marked.last, int(view.last[-1]))
     if first > last:
-        return [], []
-    box = {"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "layer": "below", "line": {"width": 0}}
-    shapes = [box | {"x0": first - 0.5, "x1": last + 0.5, "fillcolor": colours.bands[2]}]
-    shapes += [
-        box | {"x0": low - 0.5, "x1": high + 0.5, "fillcolor": colours.bands[4]}
-        for low, high in marked.excluded
-        if high >= first and low <= last
+        return []
+    return [
+        Ground("band-2", x=(first - 0.5, last + 0.5)),
+        *(
+            Ground("band-4", x=(low - 0.5, high + 0.5))
+            for low, high in marked.excluded
+            if high >= first and low <= last
+        ),
+        Note(marked.name, first, Share(1), "left", "bottom"),
     ]
-    name = {
-        "x": first,
-        "xanchor": "left",
-        "y": 1,
-        "yref": "paper",
-        "yanchor": "bottom",
-        "showarrow": False,
-        "text": marked.name,
-        "font": {"size": 12, "color": colours.quiet},
-    }
-    return shapes, [name]
 
 
 def _axis(view: View) -> str:
     match view.kind:
-        case Chart.MOVING_RANGE:
+        case Shewhart.MOVING_RANGE:
             return _("Moving range, µm")
-        case Chart.RANGES:
+        case Shewhart.RANGES:
             return _("Range, µm")
-        case Chart.DEVIATIONS:
+        case Shewhart.DEVIATIONS:
             return _("Standard deviation, µm")
-        case Chart.CUSUM:
+        case Shewhart.CUSUM:
             return _("Cumulative sum, µm")
         case _:
             return axis(view.quantity)
 
 
-def _format(kind: Chart, span: float) -> str:
+def _format(kind: Shewhart, span: float) -> str:
     sign = "" if kind in UNSIGNED else "+"
     return f"{sign}.0f" if span > 8 else f"{sign}.1f" if span > 0.8 else f"{sign}.2f"
-
-
-def _title(text: str, colours: Palette) -> dict[str, Any]:
-    return {"text": text, "font": {"size": 13, "color": colours.quiet}, "standoff": 8}

@@ -2,7 +2,6 @@
 
 from typing import Annotated, Literal
 
-import msgspec
 from fastapi import Path, Query, Response
 
 from app.access.deps import AnyCaller, Engineer
@@ -12,7 +11,7 @@ from app.quality.gauge_studies import actions, queries
 from app.quality.gauge_studies.answers import StudyOut, study_out
 from app.quality.gauge_studies.figures import figure_of
 from app.quality.gauge_studies.schemas import CorrectionIn, FromReadingsIn, StudyIn
-from app.web.api import FIGURE, Limit, Theme, api_router, problems, sent_again
+from app.web.api import FIGURE, Limit, Theme, api_router, chart_answer, problems, sent_again
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, Page, page_of
 
@@ -98,5 +97,5 @@ def get_gauge_figure(
     """Draw the results of the study as a chart."""
     row = queries.study(session, study, revision)
     caller.must_at(row.machine.id, "viewer")
-    figure = figure_of(picture, row.study.kind, row.settings, row.revision.rows, row.evaluation, theme=theme)
-    return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})
+    figure = figure_of(picture, row.study.kind, row.settings, row.revision.rows, row.evaluation)
+    return chart_answer(figure, theme)

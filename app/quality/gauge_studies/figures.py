@@ -1,21 +1,23 @@
 """Gauge studies drawn: values in order, linearity, components, by part and by operator. Pure; mm in, µm on the axes."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from app.charts import Axis, Bars, Chart, Dots, Faded, Mark, Panel, Pen, Role, Room, Rule, Series, band, nothing
 from app.core.spc.gauge.crossed import Study
 from app.core.spc.gauge.linearity import Linearity
 from app.core.spc.gauge.single import Bias
 from app.language.i18n import _
 from app.quality.gauge_studies.evaluation import Evaluation
 from app.quality.gauge_studies.labels import components
-from app.web.theme import Palette, ThemeName, layout, legend, palette
 
 SHARE = 0.1  # of the tolerance on either side of the reference: what the gauge may take (type 1)
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "star", "hexagon")
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot", "5px,2px", "2px,6px")
+TONES: tuple[Role, ...] = ("steady", "correction", "wear", "ink")
 MOST_TRACES = 12
 
 
@@ -25,236 +27,155 @@ def figure_of(
     settings: Mapping[str, Any],
     rows: Sequence[Mapping[str, Any]],
     found: Evaluation,
-    *,
-    theme: ThemeName = "light",
-) -> dict[str, Any]:
+) -> Chart:
     """The chart of a study; an empty one where the study has no such picture."""
     if kind == "linearity":
-        return _linearity(rows, found, theme)
+        return _linearity(rows, found)
     if kind != "grr":
-        return _repeats(settings, rows, found, theme)
+        return _repeats(settings, rows, found)
     if picture == "components":
-        return _components(settings, found, theme)
-    return _crossed(found, theme, by_operator=picture == "operators")
+        return _components(settings, found)
+    return _crossed(found, by_operator=picture == "operators")
 
 
-def _repeats(
-    settings: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], found: Evaluation, theme: ThemeName
-) -> dict[str, Any]:
+def _repeats(settings: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], found: Evaluation) -> Chart:
     """Values in order of time, less the reference, with their mean and what they may take of the tolerance."""
-    colours = palette(theme)
     off = (np.array(rows[0]["values"]) - settings["reference"]) * 1000
-    data = [_points(list(range(1, len(off) + 1)), off, _("Values"), colours.steady, lines=True)]
-    lines = [_level(0.0, colours.ink, _("reference"), 1.75)]
+    lines = [_level(0.0, "ink", _("reference"), 1.75)]
     if isinstance(found.bias, Bias):
         mean, s = found.bias.bias * 1000, found.bias.repeatability * 1000
-        lines.append(_level(mean, colours.correction, _("mean"), 2))
+        lines.append(_level(mean, "correction", _("mean"), 2))
         lines += [
-            _level(mean + side * 3 * s, colours.correction, f"{'+' if side > 0 else '−'}3 s", 1, "4px,4px")
+            _level(mean + side * 3 * s, "correction", f"{'+' if side > 0 else '−'}3 s", 1, "4px,4px")
             for side in (-1, 1)
         ]
-    tolerance = settings.get("tolerance")
-    if tolerance:
+    if tolerance := settings.get("tolerance"):
         lines += [
-            _level(side * SHARE * tolerance * 1000, colours.attention, _("10 % of the tolerance"), 1.5, "8px,4px")
+            _level(side * SHARE * tolerance * 1000, "attention", _("10 % of the tolerance"), 1.5, "8px,4px")
             for side in (-1, 1)
         ]
-    heights = [*off.tolist(), *(line["y0"] for line, _label in lines)]
-    return _drawn(data, lines, heights, theme, _("Value"), _("Value less reference, µm"), x_range=[0, len(off) + 1])
+    course = _points(range(1, len(off) + 1), off, "steady", lines=True)
+    x = Axis(_("Value"), reach=(0, len(off) + 1), format="d", ticks=10, grid=False)
+    heights = [*off.tolist(), *(line.y for line in lines)]
+    return _chart([*lines, course], x, _height(_("Value less reference, µm"), heights), right=140)
 
 
-def _linearity(rows: Sequence[Mapping[str, Any]], found: Evaluation, theme: ThemeName) -> dict[str, Any]:
+def _linearity(rows: Sequence[Mapping[str, Any]], found: Evaluation) -> Chart:
     """Biases over the reference, their means, the line and its band; where the band leaves 0 out, the gauge is biased."""
-    colours = palette(theme)
     x = [row["reference"] for row in rows for _value in row["values"]]
     y = [(value - row["reference"]) * 1000 for row in rows for value in row["values"]]
-    data = [_points(x, y, _("Values"), colours.steady)]
+    data = [_points(x, y, "steady", name=_("Values"))]
     heights = [0.0, *y]
     if isinstance(found.linearity, Linearity):
         line = found.linearity
         at = np.linspace(min(x), max(x), 41)
-        band = np.array([line.line_at(float(size)) for size in at]) * 1000
-        quiet = {"type": "scatter", "mode": "lines", "x": at.tolist(), "hoverinfo": "skip"}
+        course = np.array([line.line_at(float(size)) for size in at]) * 1000
+        middle, low, high = (course[:, column].tolist() for column in range(3))
+        name, over = _("95 % band of the line"), at.tolist()
+        means = [1000 * bias for bias in line.biases.values()]
         data = [
-            quiet | {"y": band[:, 1].tolist(), "line": {"width": 0}, "showlegend": False, "meta": "low"},
-            quiet
-            | {"y": band[:, 2].tolist(), "line": {"width": 0}, "fill": "tonexty", "fillcolor": _faded(colours.correction), "name": _("95 % band of the line"), "meta": "band"},
-            quiet | {"y": band[:, 0].tolist(), "line": {"width": 2, "color": colours.correction}, "name": _("Line"), "meta": "line"},
+            *band(over, low, high, Faded("correction", 0.18), metas=("low", "band"), name=name),
+            Series(over, middle, Pen("correction", 2), meta="line", name=_("Line")),
             *data,
-            _points(list(line.biases), [1000 * bias for bias in line.biases.values()], _("Mean bias"), colours.ink, size=11, symbol="diamond"),
-        ]  # fmt: skip
-        heights += band.reshape(-1).tolist()
-    lines = [_level(0.0, colours.ink, "", 1.75)]
+            _points(list(line.biases), means, "ink", name=_("Mean bias"), size=11, symbol="diamond"),
+        ]
+        heights += course.reshape(-1).tolist()
     room = 0.05 * (max(x) - min(x) or 1.0)
-    return _drawn(
-        data,
-        lines,
-        heights,
-        theme,
-        _("Reference, mm"),
-        _("Bias, µm"),
-        x_range=[min(x) - room, max(x) + room],
-        named=True,
-        tickformat="~g",
-    )
+    reach = (min(x) - room, max(x) + room)
+    across = Axis(_("Reference, mm"), reach=reach, format="~g", ticks=10, grid=False)
+    return _chart([_level(0.0, "ink", "", 1.75), *data], across, _height(_("Bias, µm"), heights))
 
 
-def _components(settings: Mapping[str, Any], found: Evaluation, theme: ThemeName) -> dict[str, Any]:
+def _components(settings: Mapping[str, Any], found: Evaluation) -> Chart:
     """Percent of the total variation and of the tolerance, side by side, with 10 and 30 %."""
-    colours = palette(theme)
     if not isinstance(found.anova, Study):
-        return {"data": [], "layout": layout(theme)}
+        return nothing("")
     study, tolerance = found.anova, settings.get("tolerance")
     rows = components(study)[:-1]
-    names = [name for name, _sigma in rows]
-    series = [(_("of the variation"), [study.percent(sigma) for _name, sigma in rows], colours.steady)]
+    series: list[tuple[str, list[float], Role]] = [
+        (_("of the variation"), [study.percent(sigma) for _name, sigma in rows], "steady")
+    ]
     if tolerance:
         shares = [study.percent_tolerance(sigma, tolerance) for _name, sigma in rows]
-        series.append((_("of the tolerance"), shares, colours.correction))
-    data: list[dict[str, Any]] = [
-        {
-            "type": "bar",
-            "name": name,
-            "meta": "components",
-            "x": names,
-            "y": values,
-            "marker": {"color": colour},
-            "text": [f"{value:.0f}" for value in values],
-            "textposition": "outside",
-            "cliponaxis": False,
-            "hovertemplate": "%{x}: %{y:.1f} %<extra></extra>",
-        }
+        series.append((_("of the tolerance"), shares, "correction"))
+    bars = [
+        Bars(
+            [name for name, _sigma in rows],
+            values,
+            colour,
+            texts=[f"{value:.0f}" for value in values],
+            meta="components",
+            name=name,
+            hover="%{x}: %{y:.1f} %",
+        )
         for name, values, colour in series
     ]
     top = max(value for _name, values, _colour in series for value in values)
-    lines = [
-        _level(10.0, colours.quiet, "10 %", 1.5, "4px,4px"),
-        _level(30.0, colours.attention, "30 %", 1.5, "8px,4px"),
-    ]
-    figure = _drawn(data, lines, [0.0, top], theme, None, _("Share, %"), x_range=None, named=True)
-    figure["layout"]["yaxis"] |= {"range": [0, max(top, 32) * 1.12], "tickformat": "~g"}
-    figure["layout"] |= {"bargap": 0.25, "bargroupgap": 0.08}
-    return figure
+    lines = [_level(10.0, "quiet", "10 %", 1.5, "4px,4px"), _level(30.0, "attention", "30 %", 1.5, "8px,4px")]
+    height = Axis(_("Share, %"), reach=(0, max(top, 32) * 1.12), format="~g", ticks=7)
+    return _chart([*bars, *lines], Axis(kind="names", grid=False), height)
 
 
-def _crossed(found: Evaluation, theme: ThemeName, *, by_operator: bool) -> dict[str, Any]:
+def _crossed(found: Evaluation, *, by_operator: bool) -> Chart:
     """Values by part, each operator with a shape and a line of means; or by operator, all parts about their own mean."""
-    colours = palette(theme)
     block = found.block
     assert block is not None
-    tones = (colours.steady, colours.correction, colours.wear, colours.ink)
-    data: list[dict[str, Any]] = []
+    zero = _level(0.0, "quiet", "", 1, "4px,4px")
     if by_operator:
         # What operators differ by shows when each part's own mean is taken off.
         off = (block - block.mean(axis=(1, 2), keepdims=True)) * 1000
-        for place, name in enumerate(found.operators):
-            values = off[:, place, :].reshape(-1)
-            data.append(_points([name] * len(values), values, name, colours.steady))
-        means = off.mean(axis=(0, 2))
-        data.append(
-            _points(list(found.operators), means, _("Mean"), colours.ink, size=12, symbol="diamond", lines=True)
-        )
-        return _drawn(data, [_level(0.0, colours.quiet, "", 1, "4px,4px")], off.reshape(-1).tolist(), theme, _("Operator"), _("Value less the part's mean, µm"), x_range=None)  # fmt: skip
+        data = [
+            _points([name] * off[:, place, :].size, off[:, place, :].reshape(-1), "steady")
+            for place, name in enumerate(found.operators)
+        ]
+        data.append(_points(found.operators, off.mean(axis=(0, 2)), "ink", size=12, symbol="diamond", lines=True))
+        x, title = Axis(_("Operator"), "names", grid=False), _("Value less the part's mean, µm")
+        return _chart([zero, *data], x, _height(title, off.reshape(-1).tolist()))
+    data = []
     off = (block - block.mean()) * 1000
     for place, name in enumerate(found.operators[:MOST_TRACES]):
-        tone, symbol = tones[place % len(tones)], SYMBOLS[place % len(SYMBOLS)]
-        trials = off.shape[2]
-        x = [part for part in found.parts for _trial in range(trials)]
-        data.append(_points(x, off[:, place, :].reshape(-1), name, tone, symbol=symbol) | {"showlegend": False})
-        mean = _points(list(found.parts), off[:, place, :].mean(axis=1), name, tone, symbol=symbol, size=9, lines=True)
-        mean["line"] |= {"dash": DASHES[place % len(DASHES)]}
-        data.append(mean)
-    return _drawn(data, [_level(0.0, colours.quiet, "", 1, "4px,4px")], off.reshape(-1).tolist(), theme, _("Part"), _("Value less the mean of all, µm"), x_range=None, named=len(found.operators) > 1)  # fmt: skip
+        tone, symbol = TONES[place % len(TONES)], SYMBOLS[place % len(SYMBOLS)]
+        x_of_all = [part for part in found.parts for _trial in range(off.shape[2])]
+        data.append(_points(x_of_all, off[:, place, :].reshape(-1), tone, symbol=symbol))
+        mean = _points(found.parts, off[:, place, :].mean(axis=1), tone, symbol=symbol, size=9, lines=True)
+        pen = Pen(tone, 1.25, DASHES[place % len(DASHES)])
+        data.append(replace(mean, pen=pen, name=name if len(found.operators) > 1 else ""))
+    x, title = Axis(_("Part"), "names", grid=False), _("Value less the mean of all, µm")
+    return _chart([zero, *data], x, _height(title, off.reshape(-1).tolist()))
 
 
 def _points(
-    x: Sequence[Any], y: Any, name: str, colour: str, *, size: int = 7, symbol: str = "circle", lines: bool = False
-) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines+markers" if lines else "markers",
-        "name": name,
-        "meta": "values",
-        "x": list(x),
-        "y": [float(value) for value in y],
-        "marker": {"symbol": symbol, "size": size, "color": colour, "opacity": 0.85},
-        "line": {"width": 1.25, "color": colour},
-        "hovertemplate": "%{x}: %{y:+.2f} µm<extra></extra>",
-        "cliponaxis": False,
-    }
-
-
-def _level(
-    y: float, colour: str, text: str, width: float, dash: str = "solid"
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    line = {
-        "type": "line",
-        "layer": "below",
-        "xref": "paper",
-        "x0": 0,
-        "x1": 1,
-        "y0": y,
-        "y1": y,
-        "line": {"color": colour, "width": width, "dash": dash},
-    }
-    label = {
-        "xref": "paper",
-        "x": 1,
-        "xanchor": "left",
-        "xshift": 6,
-        "y": y,
-        "yanchor": "middle",
-        "text": text,
-        "showarrow": False,
-        "font": {"size": 12, "color": colour},
-    }
-    return line, label
-
-
-def _drawn(
-    data: list[dict[str, Any]],
-    lines: list[tuple[dict[str, Any], dict[str, Any]]],
-    heights: Sequence[float],
-    theme: ThemeName,
-    x_title: str | None,
-    y_title: str,
+    x: Sequence[Any],
+    y: Any,
+    colour: Role,
     *,
-    x_range: list[float] | None,
-    named: bool = False,
-    tickformat: str = "d",
-) -> dict[str, Any]:
-    colours = palette(theme)
-    low, high = min(heights), max(heights)
+    name: str = "",
+    size: int = 7,
+    symbol: str = "circle",
+    lines: bool = False,
+) -> Series:
+    return Series(
+        list(x),
+        [float(value) for value in y],
+        Pen(colour, 1.25) if lines else None,
+        Dots(symbol, size, colour, opacity=0.85),
+        meta="values",
+        name=name,
+        hover="%{x}: %{y:+.2f} µm",
+    )
+
+
+def _level(y: float, colour: Role, words: str, width: float, dash: str = "solid") -> Rule:
+    return Rule(Pen(colour, width, dash), y, words=words, colour=colour)
+
+
+def _height(title: str, heights: Sequence[float | None]) -> Axis:
+    known = [height for height in heights if height is not None]
+    low, high = min(known), max(known)
     room = max(0.1 * (high - low), 0.01)
-    xaxis: dict[str, Any] = {"showgrid": False, "showline": True}
-    if x_title is not None:
-        xaxis["title"] = _title(x_title, colours)
-    xaxis |= {"type": "category"} if x_range is None else {"range": x_range, "tickformat": tickformat, "nticks": 10}
-    labelled = any(label["text"] for _line, label in lines)
-    return {
-        "data": data,
-        "layout": layout(
-            theme,
-            margin={"l": 76, "r": 140 if labelled and x_range is not None else 44, "t": 40 if named else 20, "b": 56},
-            showlegend=named,
-            legend=legend(theme),
-            xaxis=xaxis,
-            yaxis={
-                "range": [low - room, high + room],
-                "tickformat": "+.4~g",
-                "nticks": 7,
-                "title": _title(y_title, colours),
-            },
-            shapes=[line for line, _label in lines],
-            annotations=[label for _line, label in lines if label["text"]],
-        ),
-    }
+    return Axis(title, reach=(low - room, high + room), format="+.4~g", ticks=7)
 
 
-def _title(text: str, colours: Palette) -> dict[str, Any]:
-    return {"text": text, "font": {"size": 13, "color": colours.quiet}, "standoff": 8}
-
-
-def _faded(colour: str) -> str:
-    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
-    return f"rgba({red},{green},{blue},0.18)"
+def _chart(marks: Sequence[Mark], x: Axis, y: Axis, right: int = 44) -> Chart:
+    chart = Chart([Panel(marks, y)], x)
+    return replace(chart, room=Room(76, right, 56, 40 if chart.named else 20))

@@ -2,7 +2,6 @@
 
 from typing import Annotated
 
-import msgspec
 from fastapi import Query, Response
 
 from app.access.deps import AnyCaller
@@ -12,7 +11,7 @@ from app.quality.wear import queries
 from app.quality.wear.chart import chart_of
 from app.quality.wear.figures import wear_figure
 from app.quality.wear.schemas import WearOut
-from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, problems
+from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID
 
@@ -57,8 +56,4 @@ def get_wear_figure(
     """The wear curve with its line, what the corrections took out of it, and the forecast to the limits that are near."""
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     wear = queries.wear_of(session, current, queries.shown(session, current, last))
-    return Response(
-        msgspec.json.encode(wear_figure(chart_of(wear), theme=theme, width=width)),
-        media_type="application/json",
-        headers={"Cache-Control": "no-store"},
-    )
+    return chart_answer(wear_figure(chart_of(wear), width=width), theme)

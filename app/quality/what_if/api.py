@@ -2,7 +2,6 @@
 
 from typing import Annotated, Literal
 
-import msgspec
 from fastapi import Depends, Path, Query, Response
 
 from app.access.deps import AnyCaller, Engineer, Operator, require
@@ -21,7 +20,7 @@ from app.quality.what_if.schemas import (
     WhatIfIn,
     WhatIfOut,
 )
-from app.web.api import FIGURE, Before, CharacteristicKey, Limit, Theme, api_router, problems
+from app.web.api import FIGURE, Before, CharacteristicKey, Limit, Theme, api_router, chart_answer, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, Moment, Page, page_of
 
@@ -102,8 +101,8 @@ def get_what_if_figure(
 ) -> Response:
     """Deviations with today's and the other settings, and what each loop had taken out by its corrections."""
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    figure = course_figure(chart_of(simulation.replayed(session, current, asked)), theme=theme, width=width)
-    return Response(msgspec.json.encode(figure), media_type="application/json", headers={"Cache-Control": "no-store"})
+    chart = chart_of(simulation.replayed(session, current, asked))
+    return chart_answer(course_figure(chart, width=width), theme)
 
 
 @router.post("/characteristics/{characteristic}/proposals", status_code=201, responses=problems(404, 409, 429))

@@ -1,4 +1,4 @@
-"""JSON routes: the figures of a characteristic, as Plotly takes them."""
+"""JSON routes: the figures of a characteristic."""
 
 from typing import Annotated, Literal
 

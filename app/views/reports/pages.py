@@ -9,9 +9,9 @@ from fastapi import APIRouter, Query, Request, Response
 from markupsafe import Markup
 
 from app.access.deps import require
+from app.charts import svg, to_drawing
 from app.errors import InbandError, Invalid
 from app.files.documents.content import Format, Paper, Picture
-from app.files.documents.drawing import drawing_of, svg
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.quality.proof import queries as proof
@@ -73,7 +73,7 @@ def report_page(
 
 def picture(chart: Picture) -> Markup:
     """A chart of the report, drawn here: the page prints it as the PDF has it."""
-    return Markup(svg(drawing_of(chart.figure, chart.width, chart.height), chart.says, f"chart-{chart.key}"))  # noqa: S704 - svg() escapes
+    return Markup(svg(to_drawing(chart.figure, chart.width, chart.height), chart.says, f"chart-{chart.key}"))  # noqa: S704 - svg() escapes
 
 
 def _errors(problem: InbandError | None) -> Mapping[str, str]:

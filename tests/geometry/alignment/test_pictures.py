@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.charts import to_plotly
 from app.core.geometry.frames import frame, from_angles
-from app.geometry.alignment import wording
-from app.geometry.alignment.figures import MOST, DrawnPoint, enlargement, part_figure, plane_figure
+from app.geometry.alignment import figures, wording
+from app.geometry.alignment.figures import MOST, DrawnPoint, enlargement
 
 OUTWARD = [
     DrawnPoint([10.0, 10.0, 0.0], [0.0, 0.0, 1.0], 0.02),
@@ -26,6 +27,10 @@ def test_a_touch_more_is_advised_only_where_it_helps() -> None:
     near = {"place": [0.0, 0.0, 0.0], "normal": [0.0, -1.0, 0.0]}
     assert "2.1 times as certain" in wording.advice(near | {"gain": 2.1})
     assert "No single additional point" in wording.advice(near | {"gain": 1.01})
+
+
+def part_figure(motion: Any, touches: list[DrawnPoint], theme: Any = "light") -> dict[str, Any]:
+    return to_plotly(figures.part_figure(motion, touches), theme)
 
 
 def spans(figure: dict[str, Any], name: str) -> tuple[float, float, float, float]:
@@ -56,7 +61,7 @@ def test_the_part_holds_its_touches_whichever_way_normals_point(touches: list[Dr
 def test_what_does_not_fit_is_marked_by_shape_and_name() -> None:
     (trace,) = [each for each in part_figure(MOVED, OUTWARD)["data"] if each.get("name") == "Does not fit"]
     assert trace["marker"]["symbol"] == "x"
-    assert trace["hovertext"] == ["point 5: −200.0 µm along its face's normal"]
+    assert trace["text"] == ["point 5: −200.0 µm along its face's normal"]
 
 
 def test_displacements_are_enlarged_as_the_legend_says() -> None:
@@ -75,4 +80,5 @@ def test_displacements_are_enlarged_as_the_legend_says() -> None:
 )
 def test_odd_touches_are_drawn_in_plain_numbers(touches: list[DrawnPoint]) -> None:
     json.dumps(part_figure(np.eye(4), touches, theme="dark"), allow_nan=False)
-    json.dumps(plane_figure(np.eye(4), [[0.0, 0.0], [100.0, 0.0]], [[0.0, 0.0], [100.0, 0.0]]), allow_nan=False)
+    two = [[0.0, 0.0], [100.0, 0.0]]
+    json.dumps(to_plotly(figures.plane_figure(np.eye(4), two, two)), allow_nan=False)

@@ -10,14 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sqlalchemy.orm import Session
 
+from app.charts import to_plotly
 from app.core.spc.quantity import Quantity
 from app.core.spc.rules import RULES, RuleName, signals
 from app.core.spc.shewhart import Chart
 from app.loop.characteristics.queries import CurrentCharacteristic, characteristic_named
 from app.loop.summaries.queries import Window
-from app.quality.control_charts import charts
+from app.quality.control_charts import charts, figures
 from app.quality.control_charts.downsampling import MOST_POINTS, STRETCHES, thinned
-from app.quality.control_charts.figures import control_figure
 from app.quality.control_charts.queries import baseline_in_force, charted
 from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import View
@@ -141,6 +141,10 @@ def seen(values: list[float] | np.ndarray[Any, Any], *, upper: float = 3.0) -> V
     )
 
 
+def control_figure(view: View, **more: Any) -> dict[str, Any]:
+    return to_plotly(figures.control_figure(view, **more))
+
+
 def traces(figure: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {trace["meta"]: trace for trace in figure["data"]}
 
@@ -205,7 +209,7 @@ def test_a_broken_insert_does_not_press_the_limits_into_a_line() -> None:
     low, high = figure["layout"]["yaxis"]["range"]
     assert -8 < low < -3 < 3 < high < 8
     beyond = traces(figure)["beyond"]
-    assert (beyond["x"], beyond["hovertext"]) == ([41, 82], ["+400 µm", "−300 µm"])
+    assert (beyond["x"], beyond["hovertext"]) == ([41, 82], ["Reading 41<br>+400 µm", "Reading 82<br>−300 µm"])
     assert [label.strip() for label in beyond["text"]] == ["+400 µm", "−300 µm"]
     assert beyond["marker"]["symbol"] == ["triangle-up-open", "triangle-down-open"]
     assert all(low < y < high for y in beyond["y"])

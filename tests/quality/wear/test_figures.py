@@ -5,8 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.charts import to_plotly
 from app.core.wear import Fit, Towards, fit, forecast
-from app.quality.wear.figures import Life, WearChart, wear_figure
+from app.quality.wear.figures import Life, WearChart
+from app.quality.wear.figures import wear_figure as chart_of
 
 HALF = 0.008
 
@@ -35,6 +37,10 @@ def chart(**changes: Any) -> WearChart:
         "corrects": True,
     }
     return WearChart(**(given | changes))
+
+
+def wear_figure(given: WearChart, theme: Any = "light", width: int = 1240) -> dict[str, Any]:
+    return to_plotly(chart_of(given, width=width), theme)
 
 
 def traces(figure: dict[str, Any], meta: str) -> list[dict[str, Any]]:

@@ -6,7 +6,7 @@ from reportlab.lib.colors import Color
 from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import Flowable
 
-from app.files.documents.drawing import Area, Dot, Drawing, Line, Mark, Words
+from app.charts.marks import Area, Dot, Drawing, Line, Mark, Words
 from app.files.documents.files.fonts import BOLD, CHINESE, REGULAR, runs, width_of
 
 

@@ -25,8 +25,8 @@ from reportlab.platypus import (
 )
 from reportlab.platypus import Table as Grid
 
+from app.charts import to_drawing
 from app.files.documents.content import Fact, Paper, Picture, Report, Section, Table
-from app.files.documents.drawing import drawing_of
 from app.files.documents.files.canvas import Chart, colour
 from app.files.documents.files.fonts import BOLD, REGULAR, fonts, markup, runs, width_of
 from app.language.i18n import _
@@ -181,7 +181,7 @@ def _least(section: Section, width: float) -> float:
 
 
 def _chart(picture: Picture, width: float) -> Flowable:
-    return Chart(drawing_of(picture.figure, picture.width, picture.height), width)
+    return Chart(to_drawing(picture.figure, picture.width, picture.height), width)
 
 
 _BESIDE = TableStyle([

@@ -1,13 +1,13 @@
-"""Pictures of form: pure, values in, Plotly figures as dicts out. mm in, µm on the axes."""
+"""Pictures of form: pure, values in, charts out. mm in, µm on the axes."""
 
 from collections.abc import Mapping
 from typing import Any
 
+from app.charts import Chart
 from app.geometry.geometric_form.figures.axes import axis_figure, position_figure
 from app.geometry.geometric_form.figures.rounds import round_figure
 from app.geometry.geometric_form.figures.surfaces import profile_figure, surface_figure
 from app.geometry.geometric_form.figures.trends import Mark, trend
-from app.web.theme import ThemeName
 
 __all__ = ["Mark", "figure", "trend"]
 
@@ -19,17 +19,16 @@ def figure(
     tolerance: float | None,
     *,
     section: int = 1,
-    theme: ThemeName = "light",
-) -> dict[str, Any]:
+) -> Chart:
     """The picture of a measurement. section: which one is drawn, of roundness."""
     suspects = [suspect for suspect in result["suspects"] if suspect["of"] == "feature"]
     details = result["details"]
     if kind == "roundness":
-        return round_figure(inputs["sections"], details["sections"], suspects, section, theme)
+        return round_figure(inputs["sections"], details["sections"], suspects, section)
     if kind == "straightness":
-        return profile_figure(details, suspects, theme)
+        return profile_figure(details, suspects)
     if "residuals" in details:
-        return surface_figure(inputs["points"], details, suspects, theme)
+        return surface_figure(inputs["points"], details, suspects)
     if kind == "position":
-        return position_figure(details, suspects, tolerance, theme)
-    return axis_figure(kind, details, suspects, tolerance, theme)
+        return position_figure(details, suspects, tolerance)
+    return axis_figure(kind, details, suspects, tolerance)

@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from app.geometry.geometric_form.figures.parts import framed, line, note, titled
+from app.charts import Axis, Chart, Dots, Panel, Pen, Role, Series, Spread, nothing, time_axis
+from app.geometry.geometric_form.figures.parts import ROOM
 from app.language.i18n import _
-from app.language.times import on_axis
-from app.web.theme import ThemeName, date_axis, palette
 
 SYMBOLS = {
     None: "circle-open",
@@ -31,68 +30,47 @@ class Mark(NamedTuple):
     suspects: int
 
 
-def trend(marks: Sequence[Mark], *, theme: ThemeName = "light") -> dict[str, Any]:
+def trend(marks: Sequence[Mark]) -> Chart:
     """One mark per measurement, its shape by the verdict; the tolerance as steps."""
-    colours = palette(theme)
     if not marks:
-        words = note(_("Not measured yet"), colours, x=0.5, y=0.5, xref="paper", yref="paper")
-        hidden = {"visible": False}
-        return {"data": [], "layout": framed(theme, xaxis=hidden, yaxis=hidden, annotations=[words])}
-    data: list[dict[str, Any]] = []
+        return nothing(_("Not measured yet"))
+    drawn: list[Series] = []
     limited = [mark for mark in marks if mark.tolerance is not None]
     if limited:
-        data.append(
-            line(
-                [on_axis(mark.at) for mark in limited],
+        drawn.append(
+            Series(
+                [mark.at for mark in limited],
                 [(mark.tolerance or 0.0) * 1000 for mark in limited],
-                colours.quiet,
-                _("Tolerance"),
-                line={"dash": "dash", "shape": "hv"},
-                mode="lines+markers" if len(limited) == 1 else "lines",
-                marker={"symbol": "line-ew-open", "size": 24},
+                Pen("quiet", dash="dash", steps="hv"),
+                Dots("line-ew-open", 24, "quiet") if len(limited) == 1 else None,
+                name=_("Tolerance"),
             )
         )
     for verdict, symbol in SYMBOLS.items():
         chosen = [mark for mark in marks if mark.verdict == verdict]
         if not chosen:
             continue
-        tone = colours.attention if verdict in {"bad", "bad_unsure"} else colours.steady
-        data.append(
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "name": chosen[0].word,
-                "meta": verdict,
-                "x": [on_axis(mark.at) for mark in chosen],
-                "y": [mark.value * 1000 for mark in chosen],
-                "error_y": {
-                    "type": "data",
-                    "array": [(mark.uncertainty or 0.0) * 1000 for mark in chosen],
-                    "color": colours.faint,
-                    "thickness": 1.5,
-                    "width": 4,
-                },
-                "marker": {"symbol": symbol, "size": 11, "color": tone, "line": {"width": 1.5, "color": tone}},
-                "customdata": [f"/forms/{mark.number}" for mark in chosen],
-                "text": [
+        tone: Role = "attention" if verdict in {"bad", "bad_unsure"} else "steady"
+        drawn.append(
+            Series(
+                [mark.at for mark in chosen],
+                [mark.value * 1000 for mark in chosen],
+                dots=Dots(symbol, 11, tone, tone),
+                spread=Spread([(mark.uncertainty or 0.0) * 1000 for mark in chosen], colour="faint"),
+                meta=verdict or "",
+                name=chosen[0].word,
+                hover=[
                     _("measurement {n}: {value:.1f} µm, {word}").format(
                         n=mark.number, value=mark.value * 1000, word=mark.word
                     )
                     + (_(", suspect points") if mark.suspects else "")
                     for mark in chosen
                 ],
-                "hovertemplate": "%{text}<extra></extra>",
-                "cliponaxis": False,
-            }
+                links=[f"/forms/{mark.number}" for mark in chosen],
+            )
         )
     highest = max(
         [mark.value + (mark.uncertainty or 0.0) for mark in marks] + [mark.tolerance or 0.0 for mark in marks]
     )
-    return {
-        "data": data,
-        "layout": framed(
-            theme,
-            xaxis=date_axis(mark.at for mark in marks),
-            yaxis=titled(_("Deviation, µm"), colours, range=[0, max(highest, 1e-6) * 1120], nticks=6),
-        ),
-    }
+    height = Axis(_("Deviation, µm"), reach=(0, max(highest, 1e-6) * 1120), ticks=6)
+    return Chart([Panel(drawn, height)], time_axis([mark.at for mark in marks]), ROOM)

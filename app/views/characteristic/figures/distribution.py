@@ -97,7 +97,7 @@ def histogram_figure(counts: Sequence[int], limits: HasLimits) -> Chart:
         ],
     )
     lines = [
-        Rule(pen, sign * limit)
+        Rule(pen, sign * limit, front=True)
         for limit, pen in (
             (half, TOLERANCE),
             (limits.averaging_limit * 1000, LIMIT),

@@ -51,7 +51,7 @@ def result_figure(name: str, title: str, points: Sequence[ResultPoint], ranges: 
                 ),
             )
         ],
-        Axis(_("Reading number"), format="d", ticks=9, grid=False, line=True),
+        Axis(_("Reading number"), format="d", ticks=9, grid=False),
         Room(left=78, right=20, top=12, bottom=48),
     )
 

@@ -108,11 +108,12 @@ def zone_chart(
         ticks=3,
         format="+.1f",
         zero="faint",
+        line=False,
         fixed=True,
         letters=11,
         title_letters=12,
     )
-    hidden = Axis(reach=(-1, 1), grid=False, labelled=False, fixed=True)
+    hidden = Axis(reach=(-1, 1), grid=False, line=False, labelled=False, fixed=True)
     return Chart(
         [
             Panel(readings, _size_axis(limits, ruler, sizes, letters, brief=brief), READINGS),
@@ -126,7 +127,6 @@ def zone_chart(
             ticks=9,
             every=1 if last - first <= 12 else None,
             grid=False,
-            line=True,
         ),
         Room(left, right, 48),
     )
