@@ -1,5 +1,6 @@
 """Settings of an installation. Every field is also an environment variable: ``port`` is ``INBAND_PORT``."""
 
+import re
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -81,6 +82,16 @@ def _timezone(name: str) -> str:
     return name
 
 
+def _shifts(text: str) -> str:
+    """Clock times at which shifts begin, `06:00,14:00,22:00`, in their order."""
+    begins = [each.strip() for each in text.split(",")]
+    if not all(re.fullmatch(r"([01]\d|2[0-3]):[0-5]\d", each) for each in begins) or begins != sorted(set(begins)):
+        raise ValueError(
+            f"{text!r} is no list of times; name when the shifts begin, in order, such as 06:00,14:00,22:00"
+        )
+    return ",".join(begins)
+
+
 def is_loopback(host: str) -> bool:
     """Tell if only programs on this computer reach ``host``."""
     try:
@@ -127,6 +138,10 @@ class Settings(BaseSettings):
     timezone: Annotated[str, AfterValidator(_timezone)] = Field(
         default_factory=computer_timezone,
         description="Time zone of the plant, such as Europe/Belgrade: pages, charts, reports and files have its times.",
+    )
+    shifts: Annotated[str, AfterValidator(_shifts)] = Field(
+        default="06:00,14:00,22:00",
+        description="When the shifts of the plant begin, by its clock: for the period *this shift*.",
     )
     database_patience: float = Field(
         default=5.0,

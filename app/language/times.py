@@ -1,6 +1,6 @@
 """Moments as people read them: in the time zone of the plant, and no other.
 
-The setting `timezone` names the zone (INBAND_TIMEZONE; without it that of the computer). Pages, charts, reports, files and
+The setting `shifts` says when the shifts begin. The setting `timezone` names the zone (INBAND_TIMEZONE; without it that of the computer). Pages, charts, reports, files and
 sentences take it from here, so that all times on a screen are of one zone. A wall-clock time that is there twice, because the
 clocks went back, is written with its offset. JSON keeps RFC 3339 with an offset.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from datetime import datetime
+from datetime import datetime, time, timedelta
 from functools import cache
 from typing import TYPE_CHECKING
 from zoneinfo import ZoneInfo
@@ -21,11 +21,13 @@ if TYPE_CHECKING:  # a fifth of a second to read, which most commands need not s
 SECONDS, MINUTES = "%Y-%m-%d %H:%M:%S", "%Y-%m-%d %H:%M"
 _chosen: ContextVar[ZoneInfo | None] = ContextVar("zone", default=None)
 _of_process: list[ZoneInfo] = []
+_shifts: list[time] = [time(6), time(14), time(22)]
 
 
 def use_zone(settings: Settings) -> None:
-    """Take the plant's time zone of these settings for the whole process."""
+    """Take the plant's time zone and the beginnings of its shifts of these settings for the whole process."""
     _of_process[:] = [ZoneInfo(settings.timezone)]
+    _shifts[:] = [time.fromisoformat(begin) for begin in settings.shifts.split(",")]
 
 
 @cache
@@ -53,6 +55,19 @@ def in_zone(zone: ZoneInfo) -> Iterator[None]:
 def local(at: datetime) -> datetime:
     """The moment in the zone of the plant."""
     return at.astimezone(plant_zone())
+
+
+def begin_of_day(at: datetime, days: int = 0) -> datetime:
+    """Midnight at the plant, so many days after that of the moment."""
+    return datetime.combine(local(at).date() + timedelta(days), time(), plant_zone())
+
+
+def begin_of_shift(at: datetime) -> datetime:
+    """The beginning of the shift in which the moment lies."""
+    there = local(at)
+    days = (there.date(), there.date() - timedelta(1))
+    begins = (datetime.combine(day, begin, plant_zone()) for day in days for begin in reversed(_shifts))
+    return next(begin for begin in begins if begin <= there)
 
 
 def is_twice(at: datetime) -> bool:

@@ -1,12 +1,14 @@
 """Choice of readings: by number, by time, or the last ones; the same fields in every API and page."""
 
 from datetime import datetime
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from fastapi import Depends, Query
 
 from app.errors import FieldError, Invalid
+from app.files.formats import cell_values
 from app.language.i18n import _
+from app.language.times import plant_zone
 from app.web.fields import LARGEST_ID, Moment
 
 
@@ -20,16 +22,9 @@ class Choice(NamedTuple):
     end: datetime | None
 
 
-def chosen(
-    last: Annotated[
-        str | None, Query(pattern=r"^([1-9][0-9]{0,17}|all)$", description="The last so many readings, or `all`.")
-    ] = None,
-    first: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="From this reading on.")] = None,
-    through: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="To this reading, itself included.")] = None,
-    start: Annotated[Moment | None, Query(alias="from", description="Measured at this moment or later.")] = None,
-    end: Annotated[Moment | None, Query(alias="to", description="Measured at this moment or earlier.")] = None,
+def _in_order(
+    last: str | None, first: int | None, through: int | None, start: datetime | None, end: datetime | None
 ) -> Choice:
-    """The readings by number, by time, or the last ones; the last 200 if nothing is said."""
     for name, low, high in (("first", first, through), ("from", start, end)):
         if low is not None and high is not None and low > high:  # type: ignore[operator]
             message = _("is beyond the end of the range; exchange the two")
@@ -43,4 +38,41 @@ def chosen(
     return Choice(None if last in (None, "all") else int(last), first, through, start, end)
 
 
+Last = Annotated[
+    str | None, Query(pattern=r"^([1-9][0-9]{0,17}|all)$", description="The last so many readings, or `all`.")
+]
+First = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="From this reading on.")]
+Through = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="To this reading, itself included.")]
+
+
+def chosen(
+    last: Last = None,
+    first: First = None,
+    through: Through = None,
+    start: Annotated[Moment | None, Query(alias="from", description="Measured at this moment or later.")] = None,
+    end: Annotated[Moment | None, Query(alias="to", description="Measured at this moment or earlier.")] = None,
+) -> Choice:
+    """The readings by number, by time, or the last ones; the last 200 if nothing is said."""
+    return _in_order(last, first, through, start, end)
+
+
+def chosen_on_page(
+    last: Last = None,
+    first: First = None,
+    through: Through = None,
+    start: Annotated[str, Query(alias="from", max_length=64)] = "",
+    end: Annotated[str, Query(alias="to", max_length=64)] = "",
+) -> Choice:
+    """The same in the address of a page: a moment without an offset is one of the plant's clock."""
+    return _in_order(last, first, through, _moment("from", start, 0), _moment("to", end, 1))
+
+
+def _moment(name: str, typed: str, fold: Literal[0, 1]) -> datetime | None:
+    try:
+        return cell_values.moment(typed, plant_zone(), fold=fold) if typed.strip() else None
+    except cell_values.Unreadable as error:
+        raise Invalid.at(name, str(error), do=_("Correct the named fields and send it again.")) from None
+
+
 Chosen = Annotated[Choice, Depends(chosen)]
+ChosenOnPage = Annotated[Choice, Depends(chosen_on_page)]

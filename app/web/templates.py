@@ -19,7 +19,7 @@ from starlette.responses import HTMLResponse
 from app import __version__
 from app.errors import InbandError
 from app.language import i18n, numbers, times
-from app.web import states, theme
+from app.web import period, states, theme
 from app.web.assets import Assets
 from app.web.paging import address
 from app.web.request_log import note_reason
@@ -56,6 +56,7 @@ def environment() -> Environment:
         fixed=numbers.fixed,
         short=numbers.short,
         when=numbers.when,
+        as_field=period.field,
         written=lambda at: times.written(at, times.MINUTES),
         ago=numbers.ago,
     )
@@ -67,6 +68,7 @@ def environment() -> Environment:
         states=states,
         inband_version=__version__,
         plant_zone=times.plant_zone,
+        usual_periods=period.usual_periods,
     )
     return env
 

@@ -5,16 +5,18 @@ import io
 import os
 import re
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from typing import Any
 from zoneinfo import ZoneInfo
 
 import openpyxl
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from app.language.times import in_zone
 from app.loop.readings import exporting
 from app.loop.readings import queries as readings
+from app.web.period import field, usual_periods
 from tests.conftest import RunServer, Server
 from tests.shop import Person, Shop
 
@@ -114,10 +116,54 @@ def test_periods_are_typed_in_plant_time(shop: Shop, server: Server, begin: str,
     )
 
 
+def test_the_pages_of_charts_take_a_period_of_the_plants_clock(shop: Shop, server: Server) -> None:
+    viewer = Person(server, "viewer")
+    about = f"/characteristics/{shop.characteristic}"
+    query = "?from=2026-10-25T03:00&to=2026-10-25T04:00"
+    assert "from=2026-10-25T03%3A00%3A00%2B01%3A00" in viewer.open(about + query)
+    assert "from=2026-10-25T03%3A00%3A00%2B01%3A00" in viewer.open(f"{about}/control{query}")
+
+
+def test_usual_periods_begin_by_the_plants_clock() -> None:
+    with in_zone(ZoneInfo("Europe/Berlin")):
+        at = datetime(2026, 10, 26, 4, 30, tzinfo=UTC)  # Monday, 05:30; the clocks went back on Sunday
+        periods = {period.name: (field(period.start), field(period.end)) for period in usual_periods(at, at)}
+    assert periods == {
+        "This shift": ("2026-10-25T22:00", ""),
+        "Today": ("2026-10-26T00:00", ""),
+        "Yesterday": ("2026-10-25T00:00", "2026-10-26T00:00"),
+        "This tool": ("2026-10-26T05:30", ""),
+        "This week": ("2026-10-26T00:00", ""),
+        "Last week": ("2026-10-19T00:00", "2026-10-26T00:00"),
+    }
+    assert field("25.10.2026 06:00:01.0004", end=True) == "2026-10-25T06:00:01.001"
+    assert field("soon") == ""
+
+
+def test_a_period_is_picked_with_one_press(shop: Shop, server: Server, page: Page) -> None:
+    about = f"/characteristics/{shop.characteristic}"
+    Person(server, "viewer").sign_in(page)
+    page.goto(f"{about}?scale=true")
+    picker = page.locator(".period-picker")
+    picker.locator("summary").click()
+    picker.get_by_role("link", name="Yesterday").click()
+    page.wait_for_url("**scale=true&from=*")
+    picker.locator("summary").click()
+    picker.get_by_label("From").fill("2026-10-25T03:00")
+    picker.get_by_label("To").fill("2026-10-25T04:00")
+    picker.get_by_role("button", name="Show").click()
+    expect(picker.locator("summary")).to_have_text("25 Oct 2026 03:00 – 25 Oct 2026 04:00")
+    assert "scale=true" in page.url
+    page.goto(f"{about}/report?last=200")
+    page.get_by_role("button", name="Last week").click()
+    expect(page.locator("input[name=to]")).to_have_value(re.compile(r"T00:00$"))
+    expect(page.get_by_label("Number of last readings")).to_have_value("")
+
+
 @pytest.mark.parametrize("where", ["report", "capability", "what-if"])
 def test_an_hour_that_is_missing_is_refused(shop: Shop, server: Server, where: str) -> None:
     page = Person(server, "engineer").open(f"/characteristics/{shop.characteristic}/{where}?from=2026-03-29+02:30", 422)
-    assert 'value="2026-03-29 02:30"' in page
+    assert 'value="2026-03-29T02:30"' in page
 
 
 def test_who_was_first_is_told_in_plant_time(shop: Shop) -> None:

@@ -1,6 +1,7 @@
 """Pages: the control charts of a characteristic with its baselines, and the editor that freezes one."""
 
 from collections.abc import Mapping
+from datetime import datetime
 from functools import cached_property
 from typing import Annotated, Any, Literal
 from urllib.parse import urlencode
@@ -41,7 +42,7 @@ from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import View
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
-from app.web.choice import Choice, Chosen
+from app.web.choice import Choice, ChosenOnPage
 from app.web.deps import FormDep, SessionDep, texts
 from app.web.fields import LARGEST_SERIAL, Reason
 from app.web.forms import parsed
@@ -130,7 +131,11 @@ class ControlPage:
 
 def _as_query(choice: Choice) -> dict[str, Any]:
     names = {"start": "from", "end": "to"}
-    chosen = {names.get(name, name): value for name, value in choice._asdict().items() if value is not None}
+    chosen = {
+        names.get(name, name): value.isoformat() if isinstance(value, datetime) else value
+        for name, value in choice._asdict().items()
+        if value is not None
+    }
     return chosen or {"last": "all"}
 
 
@@ -140,7 +145,7 @@ def control_page(
     session: SessionDep,
     caller: Viewer,
     characteristic: str,
-    choice: Chosen,
+    choice: ChosenOnPage,
     chart: Annotated[Remembering | None, Query()] = None,
     baseline: Annotated[int | None, Query(ge=1, le=LARGEST_SERIAL)] = None,
     x_live_part: Annotated[str | None, Header()] = None,
@@ -169,11 +174,11 @@ def _control(
         else queries.baseline_of(session, current.characteristic, version)
     )
     kind = Chart(chart) if chart and judge is not None and Chart(chart) in charts.kinds(judge) else None
-    chosen = _as_query(choice)
+    chosen, kept = _as_query(choice), {"chart": kind and kind.value, "baseline": version}
 
     def link(**changes: Any) -> str:
         """This page with something else chosen."""
-        parameters = (chosen if not changes.keys() & {"last", "first"} else {}) | {"chart": kind, "baseline": version}
+        parameters = (chosen if not changes.keys() & {"last", "first", "from"} else {}) | kept
         values = {name: value for name, value in {**parameters, **changes}.items() if value is not None}
         return f"/characteristics/{key}/control?{urlencode(values)}"
 
@@ -192,6 +197,8 @@ def _control(
         parameters=current.parameters,
         suits=suited(session, current) if part is None else None,
         choice=choice,
+        kept=kept,
+        tool_since=statistics.tool_since(session, current.characteristic) if part is None else None,
         chart=kind,
         version=version,
         remembering=[kind for kind in charts.REMEMBERING if judge is not None and kind in charts.kinds(judge)],
@@ -214,7 +221,7 @@ def _control(
 
 @router.get("/characteristics/{characteristic}/control/freeze")
 def freeze_page(
-    request: Request, session: SessionDep, caller: Engineer, characteristic: str, choice: Chosen
+    request: Request, session: SessionDep, caller: Engineer, characteristic: str, choice: ChosenOnPage
 ) -> Response:
     """Choose a period, see what its baseline would be, and freeze it. What is chosen is in the address."""
     del caller
@@ -289,7 +296,7 @@ def _pictured(typed: Mapping[str, str], choice: Choice) -> dict[str, Any]:
 
 @router.post("/characteristics/{characteristic}/control/freeze")
 def freeze(
-    request: Request, session: SessionDep, caller: Engineer, characteristic: str, choice: Chosen, form: FormDep
+    request: Request, session: SessionDep, caller: Engineer, characteristic: str, choice: ChosenOnPage, form: FormDep
 ) -> Response:
     """Freeze what was previewed, with a reason."""
     current = characteristics.characteristic_named(session, characteristic)

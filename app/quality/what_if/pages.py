@@ -16,6 +16,7 @@ from app.language.i18n import _
 from app.language.numbers import short
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
+from app.loop.summaries import queries as summaries
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.quality.what_if import actions, form_reader, map_axes, proposals, simulation, wording
@@ -78,6 +79,7 @@ def _what_if(
         version=current.version.version,
         today=current.parameters,
         typed=typed,
+        tool_since=summaries.tool_since(session, current.characteristic),
         periods=form_reader.periods(typed["last"]),
         placeholders=form_reader.placeholders(current.parameters, answer.past.delay if answer else None),
         errors=errors,

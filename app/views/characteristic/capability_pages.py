@@ -13,6 +13,7 @@ from app.files.formats import cell_values
 from app.language.i18n import _
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
+from app.loop.summaries import queries as summaries
 from app.loop.summaries import wording as statistics
 from app.quality.capability import wording
 from app.quality.capability.pictures import interval
@@ -78,9 +79,10 @@ def capability_page(
     study = study_of(session, current, choice)
     path = f"/characteristics/{current.characteristic.key}/capability"
     now = _query(choice)
+    kept = {name: value for name, value in now.items() if name in {"side", "confidence"}}
 
     def link(**changes: Any) -> str:
-        unchanged = now if not changes.keys() & {"last"} else {"side": choice.side}
+        unchanged = now if not changes.keys() & {"last", "from"} else kept
         return f"{path}?{urlencode({name: value for name, value in (unchanged | changes).items() if value})}"
 
     def figure(picture: str) -> str:
@@ -101,6 +103,9 @@ def capability_page(
         machine=current.machine,
         parameters=current.parameters,
         choice=choice,
+        kept=kept,
+        link=link,
+        tool_since=summaries.tool_since(session, current.characteristic),
         runs=[
             (_("All") if run == "all" else run, link(last=run), not timed and run == (choice.last or str(USUAL)))
             for run in RUNS

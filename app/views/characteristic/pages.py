@@ -43,7 +43,7 @@ from app.views.characteristic.figures import angle_of, residuals_of, touches_pic
 from app.views.characteristic.figures_api import ResultName
 from app.views.characteristic.glance import band_picture
 from app.views.characteristic.wording import state_word
-from app.web.choice import Choice, Chosen
+from app.web.choice import Choice, ChosenOnPage
 from app.web.deps import Before, FormDep, SessionDep
 from app.web.fields import LARGEST_ID, Reason
 from app.web.forms import by_field
@@ -128,7 +128,7 @@ def characteristic_page(
     session: SessionDep,
     caller: Viewer,
     characteristic: str,
-    choice: Chosen,
+    choice: ChosenOnPage,
     scale: Annotated[Literal["zones", "true", "time"], Query()] = "zones",
     before: Before = None,
     edge: Annotated[Literal["tool", "1000", "all"], Query()] = "tool",
@@ -142,7 +142,7 @@ def characteristic_page(
 
     def link(**changes: Any) -> str:
         """This page with something else chosen."""
-        unchanged = (chosen if not changes.keys() & {"last", "first"} else {}) | {
+        unchanged = (chosen if not changes.keys() & {"last", "first", "from"} else {}) | {
             "scale": scale,
             "edge": edge,
             "result": result,
@@ -172,7 +172,9 @@ def characteristic_page(
         in_force=current.version,
         table=parameter_table(current.version.parameters),
         choice=choice,
+        tool_since=statistics.tool_since(session, current.characteristic) if x_live_part is None else None,
         scale=scale,
+        result=result,
         before=before,
         decisions_of=lambda rows: part_of(
             rows, DECISIONS_ON_PAGE, before, lambda row: row.sequence, lambda **at: f"{link(**at)}#decisions"

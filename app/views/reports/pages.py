@@ -14,6 +14,7 @@ from app.errors import InbandError, Invalid
 from app.files.documents.content import Format, Paper, Picture
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
+from app.loop.summaries import queries as summaries
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.views.reports import queries
@@ -52,6 +53,7 @@ def report_page(
         report=report,
         report_request=report_request,
         given=typed_fields,
+        tool_since=summaries.tool_since(session, current.characteristic),
         errors=_errors(problem),
         sections=[(name.value, queries.title_of(name), name in report_request.sections) for name in SectionName],
         papers=[(Paper.A4.value, "A4"), (Paper.LETTER.value, "Letter")],

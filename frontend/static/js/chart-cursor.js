@@ -8,12 +8,9 @@
 //   redraw()                        the chart has new content     place()   … or another part of it is shown
 
 import { ChartPanel } from "./chart-panel.js";
-
-const NEAR = { mouse: 24, pen: 24, touch: 44 }; // px
-const MOVED = 8; // px; a press that moved further was a drag
+import { nearest, pixels, pointsOf, pressed } from "./chart-points.js";
 
 const element = (name, className, more = {}) => Object.assign(document.createElement(name), { className }, more);
-const linkOf = (custom) => [[custom].flat()[0]].find((link) => typeof link === "string" && link.startsWith("/"));
 
 export class ChartCursor {
   points = [];
@@ -25,7 +22,10 @@ export class ChartCursor {
     this.line = element("span", "chart-line", { hidden: true });
     chart.append(this.line, this.ring);
     this.panel = new ChartPanel(chart, words, this);
-    chart.plot.addEventListener("pointerdown", (event) => this.press(event), { capture: true });
+    pressed(chart.plot, (event) => {
+      const point = nearest(chart, this.points.filter(({ x }) => this.seen(x)), event);
+      if (point) this.select(point);
+    });
     chart.addEventListener("keydown", (event) => this.key(event));
     this.onShared = ({ detail }) => detail.from !== this && detail.axis === this.axisName && this.mark(detail.x);
   }
@@ -43,14 +43,7 @@ export class ChartCursor {
   }
 
   redraw() {
-    this.points = this.chart.plot.data.flatMap((trace, curve) => {
-      const axis = this.chart.axes[`yaxis${(trace.yaxis ?? "y").slice(1)}`];
-      return (trace.customdata ?? []).flatMap((custom, number) => {
-        const link = linkOf(custom);
-        if (!link || !axis || trace.x?.[number] == null || trace.y?.[number] == null) return [];
-        return [{ link, curve, number, kind: trace.meta ?? curve, x: this.chart.axis.r2l(trace.x[number]), y: axis.r2l(trace.y[number]), axis }];
-      });
-    }).sort((one, other) => one.x - other.x);
+    this.points = pointsOf(this.chart);
     if (this.at) {
       const { link, kind } = this.at;
       const again = this.points.find((point) => point.link === link && point.kind === kind);
@@ -58,11 +51,6 @@ export class ChartCursor {
       this.panel.refresh();
     }
     this.place();
-  }
-
-  pixels(point) {
-    const { axis } = this.chart;
-    return [axis._offset + axis.l2p(point.x), point.axis._offset + point.axis.l2p(point.y)];
   }
 
   seen(x) {
@@ -74,7 +62,7 @@ export class ChartCursor {
     const shown = this.at !== null && this.points.includes(this.at) && this.seen(this.at.x);
     this.ring.hidden = !shown;
     if (shown) {
-      const [left, top] = this.pixels(this.at);
+      const [left, top] = pixels(this.chart, this.at);
       Object.assign(this.ring.style, { left: `${left}px`, top: `${top}px` });
     }
     this.mark(this.marked);
@@ -94,34 +82,6 @@ export class ChartCursor {
   tell(x) {
     this.mark(x);
     document.dispatchEvent(new CustomEvent("chartcursor", { detail: { x, axis: this.axisName, from: this } }));
-  }
-
-  press(down) {
-    if (!this.chart.axis || down.button !== 0) return;
-    let several = false;
-    const more = (event) => { several ||= event.pointerId !== down.pointerId; };
-    const up = (event) => {
-      if (event.pointerId !== down.pointerId) return;
-      for (const kind of ["pointerup", "pointercancel"]) window.removeEventListener(kind, up, true);
-      window.removeEventListener("pointerdown", more, true);
-      const moved = Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY);
-      if (event.type === "pointerup" && moved < MOVED && !several) this.pick(event);
-    };
-    for (const kind of ["pointerup", "pointercancel"]) window.addEventListener(kind, up, true);
-    window.addEventListener("pointerdown", more, true);
-  }
-
-  pick(event) {
-    const box = this.chart.plot.getBoundingClientRect();
-    let nearest = null;
-    let distance = NEAR[event.pointerType] ?? NEAR.mouse;
-    for (const point of this.points) {
-      if (!this.seen(point.x)) continue;
-      const [x, y] = this.pixels(point);
-      const away = Math.hypot(event.clientX - box.left - x, event.clientY - box.top - y);
-      if (away <= distance) [nearest, distance] = [point, away];
-    }
-    if (nearest) this.select(nearest);
   }
 
   key(event) {

@@ -4,9 +4,10 @@
 //   touch     two fingers: what lies under them stays under them; one finger scrolls the page, a tap selects
 //   keyboard  + − zoom, Shift+← → pan, Home End, 0 the whole chart; ← → and Escape are the cursor's (chart-cursor.js)
 //
-// chart has: plot (Plotly's element), axis (its x axis once drawn), view (chart-view.js), cursor, movable, hint().
+// chart has: plot (Plotly's element), axis (its x axis once drawn), view (chart-view.js), cursor, movable, words.
 
 const STEP = 0.7; // of the span, by a key or a button
+const HINTED = "inband-chart-hint";
 const NARROW = 48; // px between two fingers: above one another they only pan
 
 // About the point that is selected, if it is in sight.
@@ -25,12 +26,20 @@ function share(chart, clientX) {
   return (clientX - chart.plot.getBoundingClientRect().left - _offset) / _length;
 }
 
+// Once in a browser: a wheel that scrolls the page over a chart could zoom it.
+function hint(chart) {
+  if (localStorage.getItem(HINTED)) return;
+  localStorage.setItem(HINTED, "yes");
+  const words = chart.appendChild(Object.assign(document.createElement("div"), { className: "chart-hint", textContent: chart.words.hint }));
+  setTimeout(() => words.remove(), 4_000);
+}
+
 function wheel(chart, event) {
   if (!chart.movable) return;
   const zooms = event.ctrlKey || event.metaKey;
   const sideways = event.shiftKey ? event.deltaY || event.deltaX : Math.abs(event.deltaX) > Math.abs(event.deltaY) && event.deltaX;
   if (!zooms && !(sideways && chart.view.shown)) {
-    if (!sideways) chart.hint();
+    if (!sideways) hint(chart);
     return;
   }
   event.preventDefault();

@@ -3,7 +3,7 @@
 //
 //   new ChartStrip(chart, words)   chart has: view (chart-view.js), cursor; words: of the buttons
 //   draw(values)                   [[x, low, high], …] of everything, ascending
-//   update()                       the view has changed
+//   show(is)                       it is there or not, and shows the view as it is now
 
 import { zoomIn, zoomOut } from "./chart-gestures.js";
 
@@ -15,6 +15,7 @@ const element = (name, className, more = {}) => Object.assign(document.createEle
 
 export class ChartStrip {
   constructor(chart, words) {
+    this.chart = chart;
     this.view = chart.view;
     this.root = element("div", "chart-strip");
     this.bar = element("div", "range-bar");
@@ -38,7 +39,10 @@ export class ChartStrip {
       button("−", words.out, () => zoomOut(chart)), button("+", words.in, () => zoomIn(chart)), this.bar, this.follow, this.reset,
     );
     this.bar.addEventListener("pointerdown", (event) => this.grab(event));
-    chart.append(this.root);
+  }
+
+  get isShown() {
+    return this.root.isConnected;
   }
 
   grab(event) {
@@ -84,14 +88,18 @@ export class ChartStrip {
     this.picture.replaceChildren(path);
   }
 
-  update() {
-    const { view } = this;
+  show(is) {
+    const { view, chart } = this;
+    chart.classList.toggle("with-strip", is);
+    if (!is) return this.root.remove();
+    if (!this.isShown) chart.append(this.root);
     const [first, last] = view.whole;
     const [low, high] = view.range;
     const percent = (value) => `${((value - first) / (last - first)) * 100}%`;
     Object.assign(this.window.style, { left: percent(low), right: `calc(100% - ${percent(high)})` });
     this.reset.disabled = !view.shown;
-    this.follow.hidden = !view.shown || !this.live;
+    if (view.shown && this.live) this.bar.after(this.follow);
+    else this.follow.remove();
     this.follow.setAttribute("aria-pressed", view.follows);
   }
 }

@@ -1,7 +1,9 @@
-// What a figure (Plotly's JSON, as the server makes it) says of its x axis.
+// Figures (Plotly's JSON, as the server makes it): how they are fetched, and what they say of their x axis.
+
+import { theme } from "./theme-switch.js";
 
 // Plotly shows times as they are written. They come in the time zone of the plant: without the offset they are its wall clock.
-export function wallClock(figure) {
+function wallClock(figure) {
   if (figure.layout.xaxis?.type !== "date") return figure;
   const local = (moment) => moment.replace(/(Z|[+-]\d\d:\d\d(:\d\d)?)$/, "");
   for (const trace of figure.data) trace.x = trace.x?.map(local);
@@ -58,4 +60,26 @@ export function courseOf({ data }) {
   const most = Math.max(...traces.map((trace) => trace.x.length));
   return traces.filter((trace) => trace.x.length > most / 4).flatMap((trace) =>
     trace.x.flatMap((x, n) => (x == null || typeof trace.y[n] !== "number" ? [] : [[valueOf(x), trace.y[n], trace.y[n]]])));
+}
+
+// The figure at an address; of a part [low, high] of its readings, with half as many on either side.
+export async function fetchFigure(src, width, part = null) {
+  const url = new URL(src, location.href);
+  url.searchParams.set("theme", theme());
+  url.searchParams.set("width", Math.max(200, Math.round(width)));
+  if (part) {
+    for (const name of ["last", "from", "to"]) url.searchParams.delete(name);
+    const [low, high] = part;
+    url.searchParams.set("first", Math.max(1, Math.floor(low - (high - low) / 2)));
+    url.searchParams.set("through", Math.max(1, Math.ceil(high + (high - low) / 2)));
+  }
+  const answer = await fetch(url, { headers: { Accept: "application/json" }, signal: AbortSignal.timeout(60_000) });
+  if (!answer.ok) throw new Error(`${answer.status}`);
+  return wallClock(await answer.json());
+}
+
+// The layout with these ends of the x axis, which nothing but the view changes: no box across, nothing that Plotly keeps.
+export function withRange(layout, range) {
+  const axes = Object.entries(layout).filter(([name]) => name.startsWith("yaxis")).map(([name, axis]) => [name, { ...axis, fixedrange: true }]);
+  return { ...layout, ...Object.fromEntries(axes), uirevision: false, xaxis: { ...layout.xaxis, autorange: false, range } };
 }

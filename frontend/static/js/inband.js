@@ -12,6 +12,7 @@ import "./live-part.js";
 import "./alarm-signal.js";
 import "./theme-switch.js";
 import "./times.js";
+import "./period-presets.js";
 import "./plotly-chart.js";
 
 document.addEventListener("click", (event) => {

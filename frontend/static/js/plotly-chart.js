@@ -16,18 +16,16 @@
 import { ChartCursor } from "./chart-cursor.js";
 import { gestures } from "./chart-gestures.js";
 import { ChartStrip } from "./chart-strip.js";
+import { ChartTrouble } from "./chart-trouble.js";
 import { ChartView } from "./chart-view.js";
 import { coalesced } from "./coalesce.js";
-import { courseOf, extentOf, isMovable, isThinned, wallClock } from "./figure.js";
+import { courseOf, extentOf, fetchFigure, isMovable, isThinned, withRange } from "./figure.js";
 import { subscribe } from "./live.js";
 import { loadPlotly } from "./plotly-library.js";
-import { theme } from "./theme-switch.js";
-import { age } from "./times.js";
 
 const CONFIG = { displayModeBar: false, displaylogo: false, responsive: true, scrollZoom: false };
 const LONG = 50; // points; below fewer there is no strip until a part of them is shown
 const SETTLED = 250; // ms after the last change of the view finer data is fetched
-const HINTED = "inband-chart-hint";
 
 class PlotlyChart extends HTMLElement {
   static observedAttributes = ["src"];
@@ -51,7 +49,7 @@ class PlotlyChart extends HTMLElement {
     this.view.disconnect();
     this.cursor.disconnect();
     document.removeEventListener("themechange", this.onTheme);
-    clearInterval(this.clock);
+    this.trouble.end();
     if (this.drawn) window.Plotly.purge(this.plot);
     this.drawn = false;
   }
@@ -61,74 +59,50 @@ class PlotlyChart extends HTMLElement {
   }
 
   build() {
-    const label = this.getAttribute("label") ?? "";
     this.words = document.querySelector('meta[name="plotly"]').dataset;
     this.plot = this.appendChild(Object.assign(document.createElement("div"), { className: "plot" }));
     this.plot.setAttribute("role", "img");
-    this.plot.setAttribute("aria-label", label);
+    this.plot.setAttribute("aria-label", this.getAttribute("label") ?? "");
     this.setAttribute("role", "group");
     this.setAttribute("aria-label", this.words.keys);
     this.view = new ChartView(this.getAttribute("name") ?? "zoom", () => this.moved());
     this.strip = new ChartStrip(this, this.words);
     this.cursor = new ChartCursor(this, this.words);
+    this.trouble = new ChartTrouble(this, this.words);
     gestures(this);
   }
 
-  get axes() {
-    return this.plot._fullLayout;
-  }
-
   get axis() {
-    return this.drawn ? this.axes.xaxis : null;
+    return this.drawn ? this.plot._fullLayout.xaxis : null;
   }
 
   async load() {
     try {
       const width = this.clientWidth; // 0 before the page is laid out
-      const [Plotly, whole] = await Promise.all([loadPlotly(), this.ask(width)]);
+      const src = this.getAttribute("src");
+      const [Plotly, whole] = await Promise.all([loadPlotly(), fetchFigure(src, width)]);
       const extent = isMovable(whole) ? extentOf(whole) : null;
       this.movable = extent !== null;
       if (this.movable) this.view.grow(extent.whole, extent);
-      const finer = this.movable && this.view.shown && this.hasAttribute("finer") && isThinned(whole);
-      const figure = finer ? await this.ask(width, this.view.shown) : whole;
+      this.finer = this.movable && this.hasAttribute("finer") && isThinned(whole);
+      const figure = this.finer && this.view.shown ? await fetchFigure(src, width, this.view.shown) : whole;
       await document.fonts.ready; // letters are measured when drawn
+      while (this.plot._dragging) await new Promise((resolve) => setTimeout(resolve, 100)); // a box that is being drawn
       if (!this.isConnected) return;
-      await Plotly.react(this.plot, figure.data, this.layoutOf(figure), { ...CONFIG, doubleClick: !this.movable && "reset" });
+      const layout = this.movable ? withRange(figure.layout, this.ends()) : figure.layout;
+      const touch = matchMedia("(pointer: coarse)").matches && { dragmode: false };
+      await Plotly.react(this.plot, figure.data, { ...layout, ...touch }, { ...CONFIG, doubleClick: !this.movable && "reset" });
       if (!this.drawn) this.listen();
       this.drawn = true;
-      this.finer = this.hasAttribute("finer") && isThinned(whole);
       this.width = width;
-      this.fetched = Date.now();
       this.offer(whole);
-      this.settle();
+      this.trouble.over();
+      this.dispatchEvent(new CustomEvent("drawn", { bubbles: true }));
       if (Math.abs(this.clientWidth - width) > 40) this.refresh(); // laid out while it was on its way
     } catch (error) {
-      this.complain(error);
+      this.trouble.say(error);
       setTimeout(() => this.isConnected && this.refresh(), 5_000);
     }
-  }
-
-  // The figure; of a part of it, with half as much on either side.
-  async ask(width, part = null) {
-    const url = new URL(this.getAttribute("src"), location.href);
-    url.searchParams.set("theme", theme());
-    url.searchParams.set("width", Math.max(200, Math.round(width)));
-    if (part) {
-      for (const name of ["last", "from", "to"]) url.searchParams.delete(name);
-      const [low, high] = part;
-      url.searchParams.set("first", Math.max(1, Math.floor(low - (high - low) / 2)));
-      url.searchParams.set("through", Math.max(1, Math.ceil(high + (high - low) / 2)));
-    }
-    const answer = await fetch(url, { headers: { Accept: "application/json" }, signal: AbortSignal.timeout(60_000) });
-    if (!answer.ok) throw new Error(`${answer.status}`);
-    return wallClock(await answer.json());
-  }
-
-  layoutOf({ layout }) {
-    const made = { ...layout, ...(matchMedia("(pointer: coarse)").matches && { dragmode: false }) };
-    if (!this.movable) return made;
-    for (const name of Object.keys(made).filter((each) => each.startsWith("yaxis"))) made[name] = { ...made[name], fixedrange: true };
-    return { ...made, uirevision: false, xaxis: { ...layout.xaxis, autorange: false, range: this.ends() } };
   }
 
   // What is shown, as Plotly writes it (and writes into it).
@@ -150,9 +124,7 @@ class PlotlyChart extends HTMLElement {
   // Another part is to be shown.
   moved() {
     if (!this.drawn || !this.movable) return;
-    this.strip.update();
-    this.strip.root.hidden &&= !this.view.shown;
-    this.classList.toggle("with-strip", !this.strip.root.hidden);
+    this.strip.show(this.strip.isShown || this.view.shown !== null);
     this.frame ??= requestAnimationFrame(() => {
       this.frame = null;
       if (this.drawn) window.Plotly.relayout(this.plot, { "xaxis.range": this.ends() });
@@ -164,42 +136,10 @@ class PlotlyChart extends HTMLElement {
   // What can be done with it.
   offer(whole) {
     const course = this.movable ? courseOf(whole) : [];
-    this.strip.root.hidden = !this.movable || (course.length < LONG && !this.view.shown);
-    this.classList.toggle("with-strip", !this.strip.root.hidden);
-    if (this.movable) {
-      this.strip.draw(course);
-      this.strip.update();
-    }
+    if (this.movable) this.strip.draw(course);
+    this.strip.show(this.movable && (course.length >= LONG || this.view.shown !== null));
     this.cursor.redraw();
     if (this.movable || this.cursor.points.length) this.tabIndex = 0;
-  }
-
-  // Once in a browser: a wheel that scrolls the page over a chart could zoom it.
-  hint() {
-    if (this.hinted || localStorage.getItem(HINTED)) return;
-    this.hinted = true;
-    localStorage.setItem(HINTED, "yes");
-    const hint = this.appendChild(Object.assign(document.createElement("div"), { className: "chart-hint", textContent: this.words.hint }));
-    setTimeout(() => hint.remove(), 4_000);
-  }
-
-  settle() {
-    clearInterval(this.clock);
-    this.trouble?.remove();
-    this.trouble = null;
-    this.dispatchEvent(new CustomEvent("drawn", { bubbles: true }));
-  }
-
-  complain(error) {
-    this.trouble ??= this.appendChild(Object.assign(document.createElement("div"), { className: "trouble" }));
-    this.trouble.setAttribute("role", "status");
-    const say = () => {
-      const old = this.fetched ? this.words.old.replace("{age}", age((Date.now() - this.fetched) / 1000)) : "";
-      this.trouble.textContent = `▲ ${this.words.trouble} (${error.message}) ${old}`;
-    };
-    clearInterval(this.clock);
-    this.clock = setInterval(say, 1_000);
-    say();
   }
 }
 

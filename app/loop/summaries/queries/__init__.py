@@ -14,6 +14,7 @@ from app.loop.summaries.queries.results import (
     rejects_of,
     results_of,
     since_tool_change,
+    tool_since,
 )
 from app.loop.summaries.queries.window import Window, window_of
 
@@ -36,5 +37,6 @@ __all__ = [
     "results_of",
     "since_tool_change",
     "single_readings",
+    "tool_since",
     "window_of",
 ]

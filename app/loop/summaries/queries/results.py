@@ -1,12 +1,13 @@
 """Results of the measuring variants over the readings, and the number of rejected parts."""
 
 from collections.abc import Sequence
+from datetime import datetime
 from typing import NamedTuple
 
 from sqlalchemy import ColumnElement, Float, Integer, func, select, text
 from sqlalchemy.orm import Session
 
-from app.loop.summaries.queries.chart_data import MOST_BLOCKS, MOST_READINGS, excluded_of
+from app.loop.summaries.queries.chart_data import MOST_BLOCKS, MOST_READINGS, excluded_of, single_readings
 from app.loop.summaries.queries.window import Window
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.readings import Reading, ReadingResults, Stream
@@ -122,6 +123,12 @@ def since_tool_change(session: Session, characteristic: Characteristic) -> Windo
         )
     ).one()
     return Window(at[0] + 1, at[1], at[1])
+
+
+def tool_since(session: Session, characteristic: Characteristic) -> datetime | None:
+    """The moment of the first reading of a part that the tool of now has cut; None before there is one."""
+    first = since_tool_change(session, characteristic).first
+    return next((reading.measured_at for reading in single_readings(session, characteristic, [first])), None)
 
 
 _SINCE_CHANGE = """

@@ -1,0 +1,66 @@
+"""Periods that people often look at, and moments as a field of a form holds them; by the clock of the plant."""
+
+from datetime import UTC, datetime, timedelta
+from typing import NamedTuple
+
+from app.files.formats import cell_values
+from app.language.i18n import _
+from app.language.times import begin_of_day, begin_of_shift, local, plant_zone
+
+
+class Period(NamedTuple):
+    """One to choose: without an end it goes on."""
+
+    name: str
+    start: datetime
+    end: datetime | None = None
+
+    @property
+    def query(self) -> dict[str, str | None]:
+        """The period as an address says it."""
+        return {"from": self.start.isoformat(), "to": self.end.isoformat() if self.end else None}
+
+    def is_chosen(self, start: datetime | None, end: datetime | None) -> bool:
+        return (self.start, self.end) == (start, end)
+
+
+def usual_periods(tool_since: datetime | None = None, now: datetime | None = None) -> list[Period]:
+    """The periods that every page offers. tool_since: the first reading of the tool in the machine."""
+    now = now or datetime.now(UTC)
+    today, monday = begin_of_day(now), begin_of_day(now, -local(now).weekday())
+    tool = [] if tool_since is None else [Period(_("This tool"), local(tool_since))]
+    return [
+        Period(_("This shift"), begin_of_shift(now)),
+        Period(_("Today"), today),
+        Period(_("Yesterday"), begin_of_day(now, -1), today),
+        *tool,
+        Period(_("This week"), monday),
+        Period(_("Last week"), begin_of_day(monday, -7), monday),
+    ]
+
+
+def field(moment: datetime | str | None, *, end: bool = False) -> str:
+    """A moment, or what was typed as one, as `<input type="datetime-local">` has it; nothing where it is none.
+
+    The field knows milliseconds: a beginning is rounded down to them, an `end` up.
+    """
+    if isinstance(moment, str):
+        try:
+            at = local(cell_values.moment(moment, plant_zone(), fold=1 if end else 0)).replace(tzinfo=None)
+        except cell_values.Unreadable:
+            return _as_typed(moment)
+    elif moment is None:
+        return ""
+    else:
+        at = local(moment).replace(tzinfo=None)
+    finer = timedelta(microseconds=at.microsecond % 1000)
+    at += timedelta(milliseconds=1) - finer if end and finer else -finer
+    return at.isoformat(timespec="milliseconds" if at.microsecond else "seconds" if at.second else "minutes")
+
+
+def _as_typed(text: str) -> str:
+    """A time that the plant's clock never showed, as it was typed; nothing of what is no time."""
+    try:
+        return datetime.fromisoformat(text.strip()).replace(tzinfo=None).isoformat(timespec="minutes")
+    except ValueError:
+        return ""
