@@ -39,7 +39,7 @@ class Format(StrEnum):
     NDJSON = "ndjson"
 
 
-File = Annotated[Path, typer.Argument(help="CSV, NDJSON or JSON.", exists=True, dir_okay=False, readable=True)]
+File = Annotated[Path, typer.Argument(help="CSV, NDJSON, JSON or XLSX.", exists=True, dir_okay=False, readable=True)]
 Mapping = Annotated[
     str,
     typer.Option(
@@ -68,13 +68,26 @@ TimeFormat = Annotated[
 Encoding = Annotated[
     str | None, typer.Option(envvar="INBAND_ENCODING", help="utf-8, utf-16, cp1250, cp1251 …", show_default="automatic")
 ]
+Sheet = Annotated[
+    str | None, typer.Option(envvar="INBAND_SHEET", help="Sheet of a workbook.", show_default="the first with cells")
+]
 Characteristic = Annotated[str, typer.Option(envvar="INBAND_CHARACTERISTIC", help="The key of the characteristic.")]
 
 
 @cli.command("import")
 def import_file(
     file: File,
-    characteristic: Characteristic,
+    characteristic: Annotated[
+        str, typer.Option(envvar="INBAND_CHARACTERISTIC", help="The key of the characteristic.")
+    ] = "",
+    columns: Annotated[
+        str,
+        typer.Option(
+            envvar="INBAND_COLUMNS",
+            help="In place of --characteristic, for a wide sheet: D35=shaft-d35,D40=shaft-d40, a column for each.",
+        ),
+    ] = "",
+    sheet: Sheet = None,
     mapping: Mapping = "",
     delimiter: Delimiter = None,
     decimal: Decimal = None,
@@ -95,27 +108,59 @@ def import_file(
     from app.loop.readings.importing.actions import import_readings
     from app.loop.readings.importing.history import Flawed
     from app.loop.readings.importing.layout import look
+    from app.loop.readings.importing.wide import Column, ColumnResult, columns_said, import_wide
 
+    if bool(characteristic) == bool(columns):
+        raise typer.BadParameter(
+            _("Name one characteristic, or the columns of several."), param_hint="--characteristic"
+        )
+    if columns and live:
+        raise typer.BadParameter(_("A wide sheet is imported as history only."), param_hint="--live")
     wishes = wishes_of(mapping, delimiter, decimal, unit, timezone, time_format, encoding)
-    layout = look(file, wishes)
-    _tell(layout)
-    with existing(settings_from(data_dir=data_dir, database_url=database_url)) as database, _bar(file) as bar:
+    actor = f"command line ({getpass.getuser()})"
+    with (
+        readable(file, sheet) as path,
+        existing(settings_from(data_dir=data_dir, database_url=database_url)) as database,
+        _bar(file) as bar,
+    ):
+        layout = look(path, wishes, file.name, complete=not columns)
+        _tell(layout, wide=bool(columns))
+        how: dict[str, Any] = {"actor": actor, "source": file.name, "dry_run": dry_run, "progress": bar}
         try:
-            summary = import_readings(
-                database,
-                characteristic,
-                file,
-                layout,
-                actor=f"command line ({getpass.getuser()})",
-                live=live,
-                dry_run=dry_run,
-                progress=bar,
-            )
+            if columns:
+                results = import_wide(database, columns_said(columns, layout), path, layout, unit=wishes.unit, **how)
+            else:
+                summary = import_readings(database, characteristic, path, layout, live=live, **how)
+                results = [ColumnResult(Column(0, characteristic), summary)]
         except Flawed as refusal:
             report(refusal)
             raise typer.Exit(1) from None
     with in_zone(_zone(timezone)):
-        _sum_up(summary, characteristic, live=live, dry_run=dry_run)
+        for column, result, trouble in results:
+            if result is not None:
+                _sum_up(result, column.characteristic, live=live, dry_run=dry_run)
+            elif isinstance(trouble, Flawed):
+                report(trouble)
+            elif trouble is not None:
+                say(f"{column.characteristic}: {trouble.detail} {trouble.what_to_do or ''}", style="bold red")
+    if any(trouble is not None for _column, _result, trouble in results):
+        raise typer.Exit(1)
+
+
+@contextmanager
+def readable(file: Path, sheet: str | None = None) -> "Iterator[Path]":
+    """The file as text: itself, or a sheet of the workbook that it is."""
+    from app.files.formats import spreadsheet
+    from app.files.formats.delimited import Unusable
+
+    if file.suffix.lower() not in spreadsheet.ENDINGS:
+        yield file
+        return
+    try:
+        with spreadsheet.text_of(file, sheet) as path:
+            yield path
+    except Unusable as error:
+        raise typer.BadParameter(str(error), param_hint="FILE") from None
 
 
 @cli.command("export")
@@ -186,11 +231,11 @@ def wishes_of(
     )
 
 
-def _tell(layout: "Layout") -> None:
+def _tell(layout: "Layout", *, wide: bool = False) -> None:
     """Print how the file is understood, so that a wrong guess is seen."""
     known = ", ".join(f"{name} ← {layout.named(name)}" for name in layout.columns)
     say(_("Columns: {known} (in {unit})").format(known=known, unit=layout.unit))
-    if layout.ignored:
+    if layout.ignored and not wide:
         say(_("Not used: {names}").format(names=", ".join(layout.ignored)))
     if "measured_at" not in layout.columns:
         say(_("There is no column of times: every reading gets the time of this import."), style="yellow")

@@ -9,7 +9,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.cli.base import cli, say
-from app.cli.data import Decimal, Delimiter, Encoding, File, Mapping, TimeFormat, UnitOption, Zone, report, wishes_of
+from app.cli.data import (
+    Decimal,
+    Delimiter,
+    Encoding,
+    File,
+    Mapping,
+    TimeFormat,
+    UnitOption,
+    Zone,
+    readable,
+    report,
+    wishes_of,
+)
 from app.core.parameters import ParameterError, Parameters, read
 from app.errors import Invalid
 from app.language.i18n import _
@@ -61,15 +73,16 @@ def replay_file(
     from app.loop.readings.replaying import replay
 
     rules = _parameters(parameters, factor)
-    layout = look(file, wishes_of(mapping, delimiter, decimal, unit, timezone, time_format, encoding))
-    decisions = replay(rules, lines(file, layout, "replay"), "replay")
     flaws: list[Flaw] = []
-    good = _aside(decisions, flaws)
-    if as_json or not sys.stdout.isatty():
-        for decision in good:
-            sys.stdout.write(msgspec.json.encode(decision).decode() + "\n")
-    else:
-        Console().print(_table(good))
+    with readable(file) as path:
+        wishes = wishes_of(mapping, delimiter, decimal, unit, timezone, time_format, encoding)
+        layout = look(path, wishes, file.name)
+        good = _aside(replay(rules, lines(path, layout, "replay"), "replay"), flaws)
+        if as_json or not sys.stdout.isatty():
+            for decision in good:
+                sys.stdout.write(msgspec.json.encode(decision).decode() + "\n")
+        else:
+            Console().print(_table(good))
     if flaws:
         report(Flawed(flaws[:200], len(flaws)), stored=False)
         raise typer.Exit(1)

@@ -12,6 +12,17 @@ from app.language.i18n import _
 DELIMITERS = (";", "\t", ",", "|")
 ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "cp1250", "cp1251", "cp1252", "iso-8859-2", "iso-8859-5")
 SAMPLE = 64 * 1024
+LOOKED_AT = 1_000_000  # bytes from which an encoding is guessed
+_SIGNS_OF_ALL = "°±µ²³×·–—„“”‚‘’…€§«»\N{NO-BREAK SPACE}"
+_LATIN = "äöüÄÖÜß" + _SIGNS_OF_ALL
+# The common letters of German, of Serbian and Slovene, and of Cyrillic; rare ones would only confuse.
+LETTERS = {
+    "cp1252": _LATIN + "Øø",
+    "cp1250": _LATIN + "čćšžđČĆŠŽĐ",
+    "iso-8859-2": _LATIN + "čćšžđČĆŠŽĐ",
+    "cp1251": "аеионрстлвкмдпузбјљњжчцшћђАВДИКМНОПРСТ" + _SIGNS_OF_ALL,
+    "iso-8859-5": "аеионрстлвкмдпузбјљњжчцшћђАВДИКМНОПРСТ",
+}
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 # Full-width signs too, which some spreadsheets take for the plain ones. A sign behind another delimiter begins a cell where
 # the spreadsheet of another country parts the line there; a plain number does no harm there.
@@ -36,10 +47,32 @@ class Row(NamedTuple):
 
 
 def encoding_of(path: Path) -> str:
-    """Encoding by the byte order mark, else UTF-8."""
+    """Encoding by the byte order mark; else UTF-8 if the beginning is, else the one whose letters fit best."""
     with path.open("rb") as file:
-        start = file.read(4)
-    return next((name for mark, name in _MARKS if start.startswith(mark)), "utf-8")
+        start = file.read(LOOKED_AT)
+    for mark, name in _MARKS:
+        if start.startswith(mark):
+            return name
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(start)
+    except UnicodeDecodeError:
+        return max(LETTERS, key=lambda name: _fit(start, name))
+    return "utf-8"
+
+
+def _fit(content: bytes, encoding: str) -> int:
+    """Letters that the languages of the encoding have, less those that they do not have."""
+    characters = [character for character in content.decode(encoding, "replace") if character > "\x7f"]
+    return sum(1 if character in LETTERS[encoding] else -1 for character in characters)
+
+
+def samples(path: Path) -> list[tuple[str, list[str]]]:
+    """The first lines with letters beyond ASCII in each encoding, for a person to see which one is right."""
+    with path.open("rb") as file:
+        start = file.read(LOOKED_AT)
+    beginning = [line for line in start.splitlines() if line.strip()][:200]
+    telling = ([line for line in beginning if any(byte > 0x7F for byte in line)] or beginning)[:3]
+    return [(name, [line.decode(name, "replace")[:120] for line in telling]) for name in ("utf-8", *LETTERS)]
 
 
 def open_text(path: Path, encoding: str) -> TextIO:

@@ -202,6 +202,7 @@ def store_history(
         _refuse_change(current, now)
         _refuse_new_empirical_value(judge.empirical_value, _empirical_value(session, now))
         _move_over(cursor, entry, current.version.version, judge.now, summary)
+        cursor.execute("DROP TABLE staged")  # a wide sheet stages one characteristic after the other
     if summary.stored:
         counted = {"file": source, "readings": summary.stored, "first": summary.first_sequence}
         audit.record(session, actor, "readings imported", f"characteristic/{entry.characteristic}", None, counted)

@@ -2,13 +2,13 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from zoneinfo import ZoneInfo
 
 from app.errors import FieldError, Invalid
-from app.files.formats import cell_values, delimited
+from app.files.formats import cell_values, delimited, spreadsheet
 from app.files.formats.delimited import Unusable
 from app.language.i18n import _
 
@@ -62,7 +62,7 @@ class Wishes:
 class Layout:
     """The layout by which a file is read."""
 
-    kind: str  # csv, lines (one JSON object per line) or list (one JSON list)
+    kind: str  # csv, sheet (of a workbook, as text), lines (one JSON object per line) or list (one JSON list)
     header: tuple[str, ...]
     columns: Mapping[str, tuple[int, ...]]  # field -> places in the header; a date and a time may be two
     encoding: str = "utf-8"
@@ -71,6 +71,12 @@ class Layout:
     unit: str = "mm"
     zone: ZoneInfo | None = None
     time_format: str | None = None
+    skips_blank: bool = False  # a row without the measured value says nothing: another column of a wide sheet has one
+
+    @property
+    def is_table(self) -> bool:
+        """Tell if its lines are rows of cells."""
+        return self.kind in {"csv", "sheet"}
 
     @property
     def complete(self) -> bool:
@@ -115,6 +121,8 @@ def look(path: Path, wishes: Wishes, name: str | None = None, *, complete: bool 
     try:
         if ending in {".ndjson", ".jsonl", ".json"}:
             layout = _json_layout(path, wishes, zone, is_list=ending == ".json")
+        elif ending in spreadsheet.ENDINGS:  # written as text before (app/files/formats/spreadsheet.py)
+            layout = _csv_layout(path, replace(wishes, encoding="utf-8", delimiter="\t", decimal="."), zone, "sheet")
         else:
             layout = _csv_layout(path, wishes, zone)
     except Unusable as error:
@@ -146,7 +154,7 @@ def _refuse_wide(columns: int) -> None:
         )
 
 
-def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None) -> Layout:
+def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "csv") -> Layout:
     encoding = wishes.encoding or delimited.encoding_of(path)
     delimiter = wishes.delimiter or delimited.delimiter_of(path, encoding)
     rows = delimited.rows(path, encoding, delimiter)
@@ -157,9 +165,11 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None) -> Layout:
     header = tuple(cell.strip().removeprefix("\ufeff") for cell in first.cells)
     columns = _columns(header, wishes.mapping)
     place = columns.get("measured", (0,))[0]
-    sample = [row.cells[place] for row, _count in zip(rows, range(200), strict=False) if len(row.cells) > place]
+    # Where no column is the measured one, it may be any of them, or several.
+    only = slice(place, place + 1) if "measured" in columns else slice(None)
+    sample = [cell for row, _count in zip(rows, range(200), strict=False) for cell in row.cells[only]]
     return Layout(
-        kind="csv",
+        kind=kind,
         header=header,
         columns=columns,
         encoding=encoding,

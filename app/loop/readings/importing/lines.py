@@ -50,7 +50,7 @@ def lines(path: Path, layout: Layout, characteristic: str, *, now: datetime | No
     """
     now = now or datetime.now(UTC)
     mark = fingerprint(path)
-    source = _csv(path, layout) if layout.kind == "csv" else _json(path, layout)
+    source = _csv(path, layout) if layout.is_table else _json(path, layout)
     for number, item in source:
         if isinstance(item, Flaw):
             yield item
@@ -85,6 +85,8 @@ def _csv(path: Path, layout: Layout) -> Found:
         for row in rows:
             if len(row.cells) < width or any(cell.strip() for cell in row.cells[width:]):
                 yield row.line, Flaw(row.line, "", "", _width(len(row.cells), width, layout.delimiter))
+                continue
+            if layout.skips_blank and not any(row.cells[place].strip() for place in layout.columns["measured"]):
                 continue
             values: dict[str, Any] = {}
             flaws: list[Flaw] = []

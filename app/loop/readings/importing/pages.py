@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from typing import Annotated, Any
-from urllib.parse import urlencode
 
 from fastapi import APIRouter, Path, Request, Response
 from starlette.concurrency import run_in_threadpool
@@ -11,22 +10,26 @@ from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Engineer, require
 from app.db.engine import Database
-from app.errors import InbandError
+from app.errors import InbandError, Invalid
+from app.files.formats import delimited
 from app.files.formats.delimited import ENCODINGS
 from app.language.i18n import _
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
-from app.loop.readings.importing import uploads
+from app.loop.readings.importing import uploads, wide
 from app.loop.readings.importing.actions import import_readings
 from app.loop.readings.importing.history import Flawed
 from app.loop.readings.importing.layout import NAMES, Layout, Wishes, look
-from app.loop.readings.importing.preview import Preview, preview
+from app.loop.readings.importing.preview import TRIED_WHOLE, Preview, PreviewLine, first_lines, preview
+from app.loop.readings.importing.uploads import Upload
+from app.loop.readings.importing.wide import ColumnResult
 from app.web.deps import FormDep, Number, SessionDep, SettingsDep
+from app.web.paging import address
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 Token = Annotated[str, Path(max_length=64)]
-HOW = ("timezone", "unit", "decimal", "delimiter", "encoding", "time_format")
+HOW = ("timezone", "unit", "decimal", "delimiter", "encoding", "time_format", "sheet")
 SIGNS = {"tab": "\t", "comma": ",", "semicolon": ";", "bar": "|"}
 
 
@@ -48,6 +51,8 @@ def _done(
 ) -> dict[str, Any] | None:
     if stored is None:
         return None
+    if not characteristic:
+        return {"to": None, "stored": stored, "repeated": repeated or 0, "first": None, "last": None}
     current = characteristics.characteristic_named(session, characteristic)
     last = first + stored - 1 if first and stored else None
     return {"to": current.characteristic, "stored": stored, "repeated": repeated or 0, "first": first, "last": last}
@@ -67,8 +72,11 @@ def _start(
         "imports/start.html",
         status=status,
         choices=[
-            (current.characteristic.key, f"{current.characteristic.name} · {current.machine.name}")
-            for current in characteristics.characteristics(session, limit=100_000)
+            ("", _("Several: a column for each")),
+            *(
+                (current.characteristic.key, f"{current.characteristic.name} · {current.machine.name}")
+                for current in characteristics.characteristics(session, limit=100_000)
+            ),
         ],
         chosen=characteristic,
         error=error,
@@ -85,9 +93,13 @@ async def send(request: Request, session: SessionDep, caller: Engineer, settings
         return await run_in_threadpool(
             _start, request, session, characteristic, error=_("Choose the file to import."), status=422
         )
-    await run_in_threadpool(characteristics.characteristic_named, session, characteristic)
-    kept = await run_in_threadpool(uploads.keep, settings, caller.name, file.filename, file.file)
-    return RedirectResponse(f"/import/{kept.token}?{urlencode({'characteristic': characteristic})}", 303)
+    if characteristic:
+        await run_in_threadpool(characteristics.characteristic_named, session, characteristic)
+    try:
+        kept = await run_in_threadpool(uploads.keep, settings, caller.name, file.filename, file.file)
+    except Invalid as error:
+        return await run_in_threadpool(_start, request, session, characteristic, error=error.detail, status=422)
+    return RedirectResponse(address(f"/import/{kept.token}", characteristic=characteristic or None), 303)
 
 
 @router.get("/import/{token}")
@@ -100,12 +112,12 @@ def look_at_it(
     characteristic: str = "",
 ) -> Response:
     """Show how the file is understood, what it would come to, what is wrong with it."""
-    return _preview(request, session, caller, settings, token, characteristic, request.query_params)
+    session.commit()  # nothing is kept open while the file is read
+    return _preview(request, caller, settings, token, characteristic, request.query_params)
 
 
 def _preview(
     request: Request,
-    session: Any,
     caller: Caller,
     settings: Any,
     token: str,
@@ -114,9 +126,11 @@ def _preview(
     *,
     status: int = 200,
 ) -> Response:
-    upload = uploads.find(settings, caller.name, token)
-    current = characteristics.characteristic_named(session, characteristic)
-    session.commit()  # nothing is kept open while the file is read
+    upload = uploads.find(settings, caller.name, token, said.get("sheet", ""))
+    if not characteristic:
+        return _wide_preview(request, upload, said, status=status)
+    with _database(request).sessions() as session:
+        current = characteristics.characteristic_named(session, characteristic)
     layout: Layout | None = None
     preview_result: Preview | None = None
     trouble: InbandError | None = None
@@ -133,21 +147,69 @@ def _preview(
         and not preview_result.flaw_count
         and trouble is None
     )
+    return _page(request, upload, said, layout, trouble, status=status, to=current, found=preview_result, ready=ready)
+
+
+def _wide_preview(request: Request, upload: Upload, said: Mapping[str, str], *, status: int) -> Response:
+    """The preview of a wide sheet: a characteristic for each column, guessed by its name until somebody has chosen."""
+    with _database(request).sessions() as session:
+        known = characteristics.characteristics(session, limit=100_000)
+    layout: Layout | None = None
+    trouble: InbandError | None = None
+    shown: list[PreviewLine] = []
+    chosen: dict[int, str] = {}
+    results: list[ColumnResult] = []
+    try:
+        layout = look(upload.path, _wishes(said), upload.name, complete=False)
+        if any(name.startswith("to_") for name in said):
+            chosen = {column.place: column.characteristic for column in wide.columns_of(said, layout)}
+        else:
+            chosen = wide.columns_by_name(layout, known)
+        shown = first_lines(upload.path, layout)
+        if chosen and upload.path.stat().st_size <= TRIED_WHOLE:
+            results = wide.preview(_database(request), chosen, upload.path, layout, unit=_wishes(said).unit)
+    except InbandError as error:
+        trouble = error
+    ready = bool(chosen) and trouble is None and all(result.trouble is None for result in results)
+    return _page(
+        request,
+        upload,
+        said,
+        layout,
+        trouble,
+        status=status,
+        to=None,
+        shown=shown,
+        chosen=chosen,
+        results=results,
+        known=known,
+        ready=ready,
+    )
+
+
+def _page(
+    request: Request,
+    upload: Upload,
+    said: Mapping[str, str],
+    layout: Layout | None,
+    trouble: InbandError | None,
+    **more: Any,
+) -> Response:
+    to: characteristics.CurrentCharacteristic | None = more["to"]
     return page(
         request,
-        "imports/preview.html",
-        status=status,
+        "imports/preview.html" if to else "imports/wide.html",
         upload=upload,
         size=upload.path.stat().st_size,
-        to=current,
         layout=layout,
-        found=preview_result,
         trouble=trouble,
-        ready=ready,
         said={name: said.get(name, "") for name in HOW},
-        fields=_fields(layout) if layout else [],
+        fields=_fields(layout, wide=to is None) if layout else [],
+        sheets=[(name, name) for name in upload.sheets],
         encodings=[("", _("automatic")), *((name, name) for name in ENCODINGS)],
-        back=f"/import?{urlencode({'characteristic': characteristic})}",
+        samples=delimited.samples(upload.path) if layout is None else [],
+        back=address("/import", characteristic=to.characteristic.key if to else None),
+        **more,
     )
 
 
@@ -163,7 +225,7 @@ def _wishes(said: Mapping[str, str]) -> Wishes:
     )
 
 
-def _fields(layout: Layout) -> list[dict[str, Any]]:
+def _fields(layout: Layout, *, wide: bool = False) -> list[dict[str, Any]]:
     """Each field that a column can be, with the columns to choose from and the one that it is."""
     labels = {
         "measured": _("Measured value"),
@@ -175,6 +237,8 @@ def _fields(layout: Layout) -> list[dict[str, Any]]:
     columns = [(str(at), name or _("Column {n}").format(n=at)) for at, name in enumerate(layout.header, start=1)]
     fields: list[dict[str, Any]] = []
     for name, label in labels.items():
+        if wide and name in {"measured", "key"}:
+            continue
         places = layout.columns.get(name, ())
         value = "+".join(str(place + 1) for place in places)
         pair = [(value, layout.named(name))] if len(places) > 1 else []
@@ -195,17 +259,39 @@ def import_it(
 ) -> Response:
     """All of it or nothing; what is wrong is shown where it was to be seen before."""
     characteristic = form.get("characteristic", "")
-    upload = uploads.find(settings, caller.name, token)
+    upload = uploads.find(settings, caller.name, token, form.get("sheet", ""))
     session.commit()  # the import has a transaction of its own, and takes a while
     try:
-        layout = look(upload.path, _wishes(form), upload.name)
+        layout = look(upload.path, _wishes(form), upload.name, complete=bool(characteristic))
+        if not characteristic:
+            return _import_wide(request, caller, upload, layout, form)
         summary = import_readings(
             _database(request), characteristic, upload.path, layout, actor=caller.name, source=upload.name
         )
-    except Flawed:
-        return _preview(request, session, caller, settings, token, characteristic, form, status=422)
+    except InbandError as error:
+        if characteristic and not isinstance(error, Flawed):
+            raise
+        return _preview(request, caller, settings, token, characteristic, form, status=error.status)
     uploads.forget(upload)
     outcome = {"characteristic": characteristic, "stored": summary.stored, "repeated": summary.repeated}
     if summary.first_sequence is not None:
         outcome["first"] = summary.first_sequence
-    return RedirectResponse(f"/import?{urlencode(outcome)}", 303)
+    return RedirectResponse(address("/import", **outcome), 303)
+
+
+def _import_wide(
+    request: Request, caller: Caller, upload: Upload, layout: Layout, form: Mapping[str, str]
+) -> RedirectResponse:
+    results = wide.import_wide(
+        _database(request),
+        wide.columns_of(form, layout),
+        upload.path,
+        layout,
+        unit=_wishes(form).unit,
+        actor=caller.name,
+        source=upload.name,
+    )
+    uploads.forget(upload)
+    summaries = [result.summary for result in results if result.summary is not None]
+    stored, repeated = sum(each.stored for each in summaries), sum(each.repeated for each in summaries)
+    return RedirectResponse(address("/import", stored=stored, repeated=repeated, columns=len(results)), 303)

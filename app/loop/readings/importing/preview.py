@@ -58,6 +58,11 @@ def preview(database: Database, characteristic: str, path: Path, layout: Layout)
     return Preview(shown, summary, [], 0, None, None)
 
 
+def first_lines(path: Path, layout: Layout) -> list[PreviewLine]:
+    """The first lines as they stand in the file."""
+    return [PreviewLine(number, cells, None, []) for number, cells in islice(_cells(path, layout), SHOWN_LINES)]
+
+
 def _shown(path: Path, layout: Layout, characteristic: str) -> Iterator[PreviewLine]:
     raw = dict(islice(_cells(path, layout), SHOWN_LINES))
     read: dict[int, Line] = {}
@@ -78,7 +83,7 @@ def _shown(path: Path, layout: Layout, characteristic: str) -> Iterator[PreviewL
 
 def _cells(path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:
     try:
-        if layout.kind == "csv":
+        if layout.is_table:
             for row in islice(delimited.rows(path, layout.encoding, layout.delimiter), 1, None):
                 yield row.line, [_short(cell) for cell in row.cells]
         else:

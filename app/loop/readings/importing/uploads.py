@@ -9,7 +9,8 @@ import time
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from app.errors import NotFound
+from app.errors import Invalid, NotFound
+from app.files.formats import delimited, spreadsheet
 from app.language.i18n import _
 from app.settings import Settings
 
@@ -18,15 +19,20 @@ _TOKEN = re.compile(r"[A-Za-z0-9_-]{22}")
 
 
 class Upload(NamedTuple):
-    """A file that waits to be imported; `name` is what its owner calls it."""
+    """A file that waits to be imported; `name` is what its owner calls it.
+
+    path: its text. sheets: the sheets of a workbook, of which `sheet` is the one at `path`.
+    """
 
     token: str
     name: str
     path: Path
+    sheets: tuple[str, ...] = ()
+    sheet: str = ""
 
 
 def keep(settings: Settings, owner: str, name: str, content: BinaryIO) -> Upload:
-    """Keep what was sent; files of yesterday go."""
+    """Keep what was sent, the sheets of a workbook as text; files of yesterday go. Raises `Invalid` for no workbook."""
     folder = _folder(settings)
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     for old in folder.iterdir():
@@ -37,23 +43,33 @@ def keep(settings: Settings, owner: str, name: str, content: BinaryIO) -> Upload
     with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
         shutil.copyfileobj(content, file)
     name = "".join(character for character in Path(name).name if character.isprintable())[:100] or "file.csv"
-    about = json.dumps({"name": name, "owner": owner})
+    sheets = {}
+    if Path(name).suffix.lower() in spreadsheet.ENDINGS:
+        try:
+            sheets = {sheet: text.name for sheet, text in spreadsheet.texts(path, folder, token).items()}
+        except delimited.Unusable as error:
+            raise Invalid.at("file", str(error)) from None
+        finally:
+            path.unlink()
+    about = json.dumps({"name": name, "owner": owner, "sheets": sheets})
     with os.fdopen(os.open(folder / f"{token}.about", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
         file.write(about)
     return Upload(token, name, path)
 
 
-def find(settings: Settings, owner: str, token: str) -> Upload:
-    """The file that this person has sent. Raises `NotFound`."""
+def find(settings: Settings, owner: str, token: str, sheet: str = "") -> Upload:
+    """The file that this person has sent; of a workbook the named sheet, else the first. Raises `NotFound`."""
     folder = _folder(settings)
     if _TOKEN.fullmatch(token):
         try:
             about = json.loads((folder / f"{token}.about").read_text())
         except FileNotFoundError:
             about = {}
-        path = folder / f"{token}.data"
+        sheets: dict[str, str] = about.get("sheets", {})
+        sheet = sheet if sheet in sheets else next(iter(sheets), "")
+        path = folder / sheets.get(sheet, f"{token}.data")
         if about.get("owner") == owner and path.exists():
-            return Upload(token, about["name"], path)
+            return Upload(token, about["name"], path, tuple(sheets), sheet)
     raise NotFound(
         _("This file is not here any more: it was imported, or you sent it more than a day ago."),
         _("Send it again under Set-up, Import."),
@@ -62,8 +78,8 @@ def find(settings: Settings, owner: str, token: str) -> Upload:
 
 def forget(upload: Upload) -> None:
     """It was imported, or is not wanted."""
-    upload.path.unlink(missing_ok=True)
-    upload.path.with_suffix(".about").unlink(missing_ok=True)
+    for path in upload.path.parent.glob(f"{upload.token}.*"):
+        path.unlink(missing_ok=True)
 
 
 def _folder(settings: Settings) -> Path:

@@ -1,0 +1,154 @@
+"""Wide sheets: one column a characteristic, one row a part. All columns are imported or none."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from sqlalchemy.orm import Session
+
+from app.db.engine import Database
+from app.errors import InbandError, Invalid
+from app.files.formats import cell_values
+from app.language.i18n import _
+from app.loop.characteristics import queries as characteristics
+from app.loop.characteristics.queries import CurrentCharacteristic
+from app.loop.readings import queries
+from app.loop.readings.importing.history import MOST_FLAWS, Flawed, Progress, Summary, store_history
+from app.loop.readings.importing.layout import Layout
+from app.loop.readings.importing.lines import Flaw, lines
+from app.loop.readings.records import Entry
+
+
+class Column(NamedTuple):
+    """A column of measured values (its place in the header) and the characteristic that it belongs to."""
+
+    place: int
+    characteristic: str
+
+
+class ColumnResult(NamedTuple):
+    """The result of one column: what was stored, or would be, or why it cannot be."""
+
+    column: Column
+    summary: Summary | None
+    trouble: InbandError | None = None
+
+
+def columns_by_name(layout: Layout, known: Sequence[CurrentCharacteristic]) -> dict[int, str]:
+    """The columns whose name is the key or the name of a characteristic: its key by place in the header."""
+    names: dict[str, list[str]] = {}
+    for current in known:
+        for name in {current.characteristic.key, current.characteristic.name}:
+            names.setdefault(cell_values.folded(name), []).append(current.characteristic.key)
+    found: dict[int, str] = {}
+    taken = {place for field, places in layout.columns.items() if field != "measured" for place in places}
+    for place, name in enumerate(layout.header):
+        keys = names.get(cell_values.folded(name), [])
+        if place not in taken and len(keys) == 1 and keys[0] not in found.values():
+            found[place] = keys[0]
+    return found
+
+
+def layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
+    """The layout by which one column is read; without a unit that somebody said, that of its header counts, else mm."""
+    fields = {name: places for name, places in layout.columns.items() if name not in {"measured", "touches", "key"}}
+    own_unit = unit or cell_values.unit_in(layout.header[column.place]) or "mm"
+    return replace(layout, columns=fields | {"measured": (column.place,)}, unit=own_unit, skips_blank=True)
+
+
+def import_wide(
+    database: Database,
+    columns: Sequence[Column],
+    path: Path,
+    layout: Layout,
+    *,
+    unit: str | None,
+    actor: str,
+    source: str,
+    dry_run: bool = False,
+    progress: Progress = lambda: None,
+) -> list[ColumnResult]:
+    """Import every column as history of its characteristic, in one transaction.
+
+    dry_run: say for each column what would happen, also what stands against it. Raises `NotFound`, `Flawed` and `Invalid`
+    otherwise; then nothing is stored.
+    """
+    _refuse_twice(columns)
+    with database.sessions() as session:
+        entries = [(column, _entry(session, column)) for column in columns]
+        results = []
+        # In the order of the machines, as everybody takes their locks.
+        for column, entry in sorted(entries, key=lambda pair: pair[1].machine_id):
+            with session.begin_nested() as part:
+                try:
+                    found = lines(path, layout_of(layout, column, unit), entry.characteristic)
+                    summary = store_history(session, entry, found, actor=actor, source=source, progress=progress)
+                    results.append(ColumnResult(column, summary))
+                except InbandError as trouble:
+                    part.rollback()
+                    results.append(ColumnResult(column, None, trouble))
+        if dry_run:
+            session.rollback()
+        else:
+            _refuse_flawed(results)
+            session.commit()
+    return sorted(results, key=lambda result: result.column.place)
+
+
+def preview(
+    database: Database, chosen: Mapping[int, str], path: Path, layout: Layout, *, unit: str | None
+) -> list[ColumnResult]:
+    """The result that each column would have. Stores nothing."""
+    columns = [Column(place, key) for place, key in chosen.items()]
+    return import_wide(database, columns, path, layout, unit=unit, actor="", source="", dry_run=True)
+
+
+def _refuse_twice(columns: Sequence[Column]) -> None:
+    keys = [column.characteristic for column in columns]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise Invalid.at("columns", _("{key} is named for two columns; name it for one").format(key=key))
+    if not columns:
+        raise Invalid.at("columns", _("No column is said to be a characteristic; say which is which"))
+
+
+def _entry(session: Session, column: Column) -> Entry:
+    entry = queries.entry_of(
+        session, characteristics.characteristic_named(session, column.characteristic).characteristic.key
+    )
+    assert entry is not None
+    return entry
+
+
+def _refuse_flawed(results: Sequence[ColumnResult]) -> None:
+    """Raise what stands against any column, the errors of all of them together."""
+    troubles = [result.trouble for result in results if result.trouble is not None]
+    flawed = [trouble for trouble in troubles if isinstance(trouble, Flawed)]
+    others = [trouble for trouble in troubles if not isinstance(trouble, Flawed)]
+    if others:
+        raise others[0]
+    if flawed:
+        flaws: list[Flaw] = sorted(flaw for trouble in flawed for flaw in trouble.flaws)
+        raise Flawed(flaws[:MOST_FLAWS], sum(trouble.count for trouble in flawed))
+
+
+def columns_said(text: str, layout: Layout) -> list[Column]:
+    """Columns from `D35=shaft-d35,3=shaft-d40`: a column by name or number, and the key of its characteristic."""
+    found = []
+    for pair in filter(None, (part.strip() for part in text.split(","))):
+        name, _sign, key = (part.strip() for part in pair.rpartition("="))
+        place = layout.header.index(name) if name in layout.header else int(name) - 1 if name.isdecimal() else -1
+        if not key or not 0 <= place < len(layout.header):
+            there = ", ".join(layout.header)
+            raise Invalid.at(
+                "columns", _("{pair} names no column; the file has: {header}").format(pair=repr(pair), header=there)
+            )
+        found.append(Column(place, key))
+    return found
+
+
+def columns_of(form: Mapping[str, str], layout: Layout) -> list[Column]:
+    """Columns as chosen in a form: `to_3` is the key of the characteristic of the third column."""
+    chosen = ((place, form.get(f"to_{place + 1}", "").strip()) for place in range(len(layout.header)))
+    return [Column(place, key) for place, key in chosen if key]
