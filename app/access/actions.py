@@ -25,6 +25,7 @@ __all__ = [
     "add_role_key",
     "change_password",
     "change_role",
+    "check_password",
     "create_invitation",
     "disable_person",
     "enable_person",
@@ -115,22 +116,31 @@ def change_password(session: Session, caller: Caller, old: str, new: str, keep_t
     Raises `Invalid` when the old password is wrong or the new one cannot be used. Who was wrong `GUESSES` times has lost
     the session: `SessionEnded`, which must not take the transaction back.
     """
-    person = _person(session, caller.person_id)
-    own = _own_session(session, person, keep_token) if keep_token else None
-    if not matches(old, person.password_hash):
-        if own is not None:
-            _count_guess(session, own, person)
-        wrong = _("is not your present password")
-        raise Invalid(f"old: {wrong}", _("Type your present password again."), errors=[FieldError("old", wrong)])
+    person = check_password(session, caller, old, keep_token, "old")
     acceptable(new, person.name, "new")
     person.password_hash = hashed(new)
-    if own is not None:
-        own.wrong_passwords = 0
     own_token = digest(keep_token) if keep_token else b""
     session.execute(
         delete(BrowserSession).where(BrowserSession.person_id == person.id, BrowserSession.token_hash != own_token)
     )
     record(session, caller.name, "password changed", f"person/{person.name}")
+
+
+def check_password(session: Session, caller: Caller, password: str, token: str | None, field: str) -> Person:
+    """Somebody says their present password once more, before something that their session alone must not do.
+
+    Raises `Invalid` when it is wrong; `SessionEnded` when it was wrong `GUESSES` times.
+    """
+    person = _person(session, caller.person_id)
+    own = _own_session(session, person, token) if token else None
+    if not matches(password, person.password_hash):
+        if own is not None:
+            _count_guess(session, own, person)
+        wrong = _("is not your present password")
+        raise Invalid(f"{field}: {wrong}", _("Type your present password again."), errors=[FieldError(field, wrong)])
+    if own is not None:
+        own.wrong_passwords = 0
+    return person
 
 
 def _own_session(session: Session, person: Person, token: str) -> BrowserSession:

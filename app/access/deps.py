@@ -10,7 +10,7 @@ import secrets
 from base64 import urlsafe_b64decode, urlsafe_b64encode
 from contextlib import suppress
 from operator import xor
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from fastapi import Depends, Request
 from sqlalchemy.exc import SQLAlchemyError
@@ -18,14 +18,26 @@ from starlette.concurrency import run_in_threadpool
 
 from app.access.audit.actions import acts
 from app.access.callers import Caller, Role
+from app.access.devices import Device, device_of
 from app.access.keys import KeyRing
 from app.access.queries import SignedIn, signed_in
 from app.db.engine import Database
 from app.errors import NotAllowed, NotSignedIn
 from app.language.i18n import _
-from app.web.deps import SAFE_METHODS, SESSION_COOKIE, SessionDep
+from app.web.deps import SAFE_METHODS, SESSION_COOKIE, STATION_COOKIE, SessionDep
 
-__all__ = ["Admin", "AnyCaller", "Caller", "Engineer", "Operator", "Viewer", "recognise", "require"]
+__all__ = [
+    "Admin",
+    "AnyCaller",
+    "AtStation",
+    "Caller",
+    "Engineer",
+    "Operator",
+    "Station",
+    "Viewer",
+    "recognise",
+    "require",
+]
 
 
 def bearer(request: Request) -> str | None:
@@ -152,6 +164,45 @@ def require(role: Role) -> Any:
     return Depends(caller_with_role)
 
 
+class AtStation(NamedTuple):
+    """A viewer of the station of a machine: a person who is signed in, or the device that is bound to it."""
+
+    caller: Caller | None
+    device: Device | None
+
+    def must_act(self) -> None:
+        """Raises `NotAllowed` for a person without the role operator. On a device it is asked who acts."""
+        if self.caller is not None:
+            self.caller.must("operator")
+
+    @property
+    def may_act(self) -> bool:
+        return self.caller is None or self.caller.may("operator")
+
+
+async def get_at_station(request: Request, session: SessionDep, machine: str) -> AtStation:
+    """Return the device of this machine, or whoever is signed in. A device is nobody: no other route knows its cookie.
+
+    Raises what `get_caller` raises, and `NotAllowed` for the device of another machine.
+    """
+    token = request.cookies.get(STATION_COOKIE)
+    device = await run_in_threadpool(device_of, session, token) if token else None
+    if device is not None and device.machine == machine:
+        request.state.csrf = masked(device.csrf)
+        if request.method not in SAFE_METHODS:
+            await _check_token(request, device.csrf)
+        return AtStation(None, device)
+    if device is not None and SESSION_COOKIE not in request.cookies:
+        raise NotAllowed(
+            _("This device is bound to machine {machine}.").format(machine=device.machine),
+            _("Open /station/{machine}, or have it bound again: Set-up, Stations.").format(machine=device.machine),
+        )
+    caller = await get_caller(request, session)
+    caller.must("viewer")
+    return AtStation(caller, None)
+
+
+Station = Annotated[AtStation, Depends(get_at_station)]
 Viewer = Annotated[Caller, require("viewer")]
 Operator = Annotated[Caller, require("operator")]
 Engineer = Annotated[Caller, require("engineer")]

@@ -39,15 +39,21 @@ async def events(
     """
     if caller.only_machine is None:
         caller.must("viewer")
+    token = request.cookies.get(SESSION_COOKIE, "")
+    access = Access(digest(token) if caller.kind == "person" else None, caller.key_id, caller.role)
+    return stream(request, access, caller.machine, last_event_id, after)
+
+
+def stream(
+    request: Request, access: Access, machine: str | None, last_event_id: str | None, after: int | None = None
+) -> StreamingResponse:
+    """The events of one machine, or of all, as an answer; they end with the access."""
     live: Live = request.app.state.live
     if last_event_id is not None and last_event_id.isascii() and last_event_id.isdigit() and len(last_event_id) < 19:
         after = int(last_event_id)
 
-    token = request.cookies.get(SESSION_COOKIE, "")
-    access = Access(digest(token) if caller.kind == "person" else None, caller.key_id, caller.role)
-
     async def frames() -> AsyncIterator[bytes]:
-        async for frame in live.stream(access, after, caller.machine):
+        async for frame in live.stream(access, after, machine):
             yield frame
 
     return StreamingResponse(

@@ -7,11 +7,12 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.responses import RedirectResponse
 
 from app.access import actions, queries
-from app.access.deps import AnyCaller
+from app.access.deps import AnyCaller, Caller
+from app.access.identification import LONGEST_PIN, SHORTEST_PIN, set_pin
 from app.access.passwords import SHORTEST
 from app.access.sign_in import SignedIn, begin_session, sign_in, sign_out
 from app.db.engine import Database
-from app.errors import InbandError
+from app.errors import InbandError, Invalid
 from app.language.i18n import _
 from app.web.deps import SESSION_COOKIE, FormDep, SessionDep, SettingsDep, from_this_site
 from app.web.forms import by_field
@@ -145,7 +146,7 @@ def send_invitation(
 
 @router.get("/account")
 def account_page(request: Request, caller: AnyCaller, done: str = "") -> Response:
-    return page(request, "access/account.html", me=caller, errors={}, done=done, shortest=SHORTEST)
+    return _account(request, caller, {}, done=done)
 
 
 @router.post("/account/password")
@@ -167,4 +168,40 @@ def send_password(request: Request, session: SessionDep, caller: AnyCaller, form
             errors = by_field(error)
         else:
             return RedirectResponse("/account?done=password", 303)
-    return page(request, "access/account.html", status=422, me=caller, errors=errors, done="", shortest=SHORTEST)
+    return _account(request, caller, errors, status=422)
+
+
+@router.post("/account/pin")
+def send_pin(request: Request, session: SessionDep, caller: AnyCaller, form: FormDep) -> Response:
+    """Set one's own PIN, or remove it."""
+    pin = "" if form.get("remove") else form.get("pin", "")
+    errors: dict[str, str] = {}
+    if not pin and not form.get("remove"):
+        errors = {"pin": _("Is missing")}
+    else:
+        try:
+            set_pin(session, caller, form.get("password", ""), pin, request.cookies.get(SESSION_COOKIE))
+        except actions.SessionEnded:  # answered here, so that what was counted stays
+            answer = RedirectResponse("/sign-in?ended=password", 303)
+            answer.delete_cookie(SESSION_COOKIE, httponly=True, samesite="lax")
+            return answer
+        except Invalid as error:
+            errors = by_field(error)
+        else:
+            return RedirectResponse(f"/account?done={'pin' if pin else 'no-pin'}", 303)
+    return _account(request, caller, errors, status=422)
+
+
+def _account(
+    request: Request, caller: Caller, errors: dict[str, str], *, done: str = "", status: int = 200
+) -> Response:
+    return page(
+        request,
+        "access/account.html",
+        status=status,
+        me=caller,
+        errors=errors,
+        done=done,
+        shortest=SHORTEST,
+        pin_lengths=(SHORTEST_PIN, LONGEST_PIN),
+    )

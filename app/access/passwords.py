@@ -1,5 +1,6 @@
 """Passwords: argon2id by pwdlib, a few at a time, and the same work for a name that nobody has."""
 
+import hashlib
 import re
 import secrets
 import threading
@@ -60,6 +61,14 @@ def matches(password: str, password_hash: str | None) -> bool:
     with _at_once:
         right = _hashing.verify(password, password_hash or _nobodys())
     return right and password_hash is not None
+
+
+def looked_up(code: str) -> bytes:
+    """Stored form of a code by which its owner is found: the same for the same code, and slow to compute for all that are tried."""
+    with _at_once:
+        return hashlib.scrypt(
+            code.encode("utf-8", "surrogatepass"), salt=b"inband badge", n=2**15, r=8, p=1, maxmem=2**26, dklen=32
+        )
 
 
 @cache

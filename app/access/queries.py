@@ -55,6 +55,8 @@ SELECT s.token_hash, NULL::int, p.role FROM browser_session s JOIN person p ON p
 WHERE s.token_hash = ANY(%s) AND s.expires_at > now() AND p.disabled_at IS NULL
 UNION ALL
 SELECT NULL, k.id, k.role FROM api_key k WHERE k.id = ANY(%s) AND k.revoked_at IS NULL
+UNION ALL
+SELECT d.token_hash, NULL, NULL FROM station_device d WHERE d.token_hash = ANY(%s) AND d.revoked_at IS NULL
 """
 
 
@@ -62,7 +64,7 @@ async def still_granted(conn: AsyncConnection[Any], accesses: Collection[Access]
     """Return those of the accesses that are granted still, with the role that they had."""
     sessions = [access.session for access in accesses if access.session is not None]
     keys = [access.key for access in accesses if access.key is not None]
-    cursor = await conn.execute(_GRANTED, (sessions, keys))
+    cursor = await conn.execute(_GRANTED, (sessions, keys, sessions))
     return {Access(*row) for row in await cursor.fetchall()}
 
 

@@ -1,18 +1,14 @@
 """Signing in and out of a browser, and slowing down who guesses.
 
-Failures are counted in the database, so that all server processes count together. An attempt is noted before the password
-is looked at and struck out when it was right: a hundred attempts at once are a hundred failures, not one.
-
 Strangers who guess keep nobody out: from a place where somebody has signed in before (a browser by its cookie, an address)
 only the failures with that name from that place count. All other places share what is left to guessing.
 """
 
 import secrets
-import zlib
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from ipaddress import IPv6Address, ip_address
-from math import ceil
 from typing import NamedTuple
 
 from sqlalchemy import delete, func, select
@@ -20,10 +16,11 @@ from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.orm import Session
 
 from app.access import names, queries
+from app.access.attempts import Wait, note_attempt, strike_out
 from app.access.audit.actions import Acting, record
 from app.access.new_keys import digest
 from app.access.passwords import LONGEST, matches
-from app.access.tables import BrowserSession, KnownPlace, LoginFailure, Person
+from app.access.tables import BrowserSession, KnownPlace, Person
 from app.db.engine import Database
 from app.errors import InbandError, TooManyRequests
 from app.language.i18n import _
@@ -34,8 +31,7 @@ FREE = {"pair": 5, "address": 20, "name": 50, "name anywhere": 500}
 """Failures before one must wait: of a name from one place, from one address; of a name from anywhere, for an address with
 `OWN_FAILURES`, and for every place from which nobody of that name has signed in before."""
 OWN_FAILURES = 3
-FIRST_WAIT, LONGEST_WAIT = 5.0, 300.0
-"""Seconds; the wait doubles with each further failure."""
+WAIT = Wait(first=5.0, longest=300.0)
 PLACES = 50
 """Places kept of a person, the latest."""
 
@@ -70,7 +66,7 @@ def sign_in(database: Database, name: str, password: str, address: str, hours: i
         known_here = person is not None and device != "" and queries.known_place(session, person.id, here)
         counted_at = here if known_here else place
         known = known_here or (person is not None and queries.known_place(session, person.id, place))
-        noted = _note_attempt(session, counted_as, counted_at, known=known)
+        note_attempt(session, counted_as, counted_at, COUNTED, partial(_refuse, known=known))
     usable = person is not None and person.disabled_at is None
     right = matches(password[: LONGEST + 1], person.password_hash if person is not None and usable else None)
     if not right or person is None:
@@ -82,8 +78,7 @@ def sign_in(database: Database, name: str, password: str, address: str, hours: i
             _("Type both again. If you have forgotten the password, ask an administrator for a new one."),
         )
     with database.begin() as session:
-        own = (LoginFailure.name == counted_as) & (LoginFailure.address == counted_at)
-        session.execute(delete(LoginFailure).where((LoginFailure.id == noted) | own))
+        strike_out(session, counted_as, counted_at)
         new_device = "" if counted_at == here else secrets.token_urlsafe(32)
         _remember(session, person, [place, f"device {digest(new_device).hex()}" if new_device else here])
         by = Acting(person_id=person.id)
@@ -133,35 +128,16 @@ def sign_out(session: Session, token: str, name: str) -> None:
     session.execute(delete(BrowserSession).where(BrowserSession.token_hash == digest(token)))
 
 
-def _note_attempt(session: Session, name: str, address: str, *, known: bool) -> int:
-    for lock in sorted({_lock_number(name), _lock_number(address)}):
-        session.execute(select(func.pg_advisory_xact_lock(7292, lock)))  # a class of their own: 7291 is the house's
-    session.execute(delete(LoginFailure).where(LoginFailure.at < func.now() - timedelta(days=1)))
-    failures = queries.failures(session, name, address, COUNTED)
+def _refuse(failures: queries.Failures, *, known: bool) -> None:
+    """Raises `TooManyRequests` where one must wait."""
     waits = [(failures.pair, FREE["pair"])]
     if not known:
         of_name = FREE["name"] if failures.address.number >= OWN_FAILURES else FREE["name anywhere"]
         waits += [(failures.address, FREE["address"]), (failures.name, of_name)]
-    left = max(_left(failed, free, failures.now) for failed, free in waits)
+    left = max(WAIT.left(failed, free, failures.now) for failed, free in waits)
     if left > 0:
         raise TooManyRequests(
             _("Too many sign-ins have failed."),
             _("Wait {n} seconds, then try again.").format(n=left),
             retry_after=left,
         )
-    attempt = LoginFailure(name=name, address=address)
-    session.add(attempt)
-    session.flush()
-    return attempt.id
-
-
-def _lock_number(text: str) -> int:
-    return zlib.crc32(text.encode()) % 2_000_000_000
-
-
-def _left(failed: queries.Failed, free: int, now: datetime) -> int:
-    """Seconds still to wait, counted from the last of these failures."""
-    if failed.number < free or failed.last is None:
-        return 0
-    wait: float = min(LONGEST_WAIT, FIRST_WAIT * 2 ** min(failed.number - free, 10))
-    return ceil(wait - (now - failed.last).total_seconds())

@@ -1,4 +1,4 @@
-"""People, their browser sessions, one-time invitations, failed sign-ins, known places, and API keys."""
+"""People, their browser sessions, invitations, failed sign-ins, known places and badges; API keys; devices bound to machines."""
 
 from datetime import datetime
 
@@ -27,6 +27,7 @@ class Person(Base):
     password_hash: Mapped[str]
     created_at: Mapped[datetime] = mapped_column(server_default=func.now())
     disabled_at: Mapped[datetime | None]
+    pin_hash: Mapped[str | None]  # what they identify themselves with at a station
 
 
 class BrowserSession(Base):
@@ -96,3 +97,34 @@ class ApiKey(Base):
     machine_id: Mapped[int | None] = mapped_column(ForeignKey("machine.id"), index=True)
     created_at: Mapped[datetime] = mapped_column(server_default=func.now())
     revoked_at: Mapped[datetime | None]
+
+
+class StationDevice(Base):
+    """A tablet bound to one machine: it shows the machine's station and does nothing by itself.
+
+    Bound by a one-time code; from then on its cookie holds the token. The table has only the SHA-256 of either.
+    """
+
+    __tablename__ = "station_device"
+    __table_args__ = (CheckConstraint("(code_hash IS NULL) <> (token_hash IS NULL)", name="code_or_token"),)
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True)
+    machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), index=True)
+    name: Mapped[str]
+    code_hash: Mapped[bytes | None] = mapped_column(LargeBinary, unique=True)
+    token_hash: Mapped[bytes | None] = mapped_column(LargeBinary, unique=True)
+    csrf: Mapped[str]
+    created_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    bound_at: Mapped[datetime | None]
+    last_used_at: Mapped[datetime | None]
+    revoked_at: Mapped[datetime | None]
+
+
+class Badge(Base):
+    """A badge that is scanned at a station. Its code is looked up by a hash that is slow to compute."""
+
+    __tablename__ = "badge"
+
+    code_hash: Mapped[bytes] = mapped_column(LargeBinary, primary_key=True)
+    person_id: Mapped[int] = mapped_column(ForeignKey("person.id"), index=True)
+    created_at: Mapped[datetime] = mapped_column(server_default=func.now())

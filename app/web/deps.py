@@ -20,6 +20,8 @@ Before = Annotated[int | None, Query(ge=1, le=LARGEST_ID)]
 """Number of the last item of the part before."""
 Word = Annotated[str | None, Query(max_length=64)]
 SESSION_COOKIE = "inband_session"
+STATION_COOKIE = "inband_station"
+"""Of a device that is bound to a machine; sent to the pages below /station only."""
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 
 

@@ -164,7 +164,9 @@ PAGES = {
         "/setup/parameters?parameter=zero_range&value=0.002&on={characteristic}",
     ],
     "/setup/people": ["/setup/people"],
+    "/setup/stations": ["/setup/stations"],
     "/setup/audit": ["/setup/audit"],
+    "/station": ["/station"],
     "/account": ["/account"],
     "/import": ["/import"],
     "/api/docs": ["/api/docs"],
@@ -172,7 +174,13 @@ PAGES = {
 }
 SIGNED_OUT = {"/sign-in", "/invitation/{token}"}
 OPENED_ELSEWHERE = {"/import/{token}"}  # needs a file that was sent; tests/loop/importing
-PARTS = {"/plant-summary", "/alarms/count", "/corrections/count", "/setup/fit"}  # only ever fetched into a page
+PARTS = {
+    "/plant-summary",
+    "/alarms/count",
+    "/corrections/count",
+    "/setup/fit",
+    "/station/{machine}/events",
+}  # only ever fetched into a page
 
 
 def routes_of(router: Any) -> Iterator[APIRoute]:

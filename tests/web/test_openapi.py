@@ -292,6 +292,7 @@ OF_MANY_READINGS = ("/baselines", "/baselines/preview", "/gauge-studies/from-rea
 # What a page's form does, by the operations of the API that do the same; None: there is none, or it is for everybody.
 FORMS: dict[str, tuple[str, ...] | None] = {
     "/account/password": None,
+    "/account/pin": None,
     "/alarms/{number}/acknowledge": ("acknowledge_alarm",),
     "/alignments/new": ("align",),
     "/alignments/pallets/new": ("compose_pallet",),
@@ -347,7 +348,14 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/setup/people/{person}/password": ("change_person",),
     "/setup/people/{person}/{what}": ("change_person",),
     "/setup/programs": ("read_program",),
+    "/setup/stations": None,
+    "/setup/stations/badges": None,
+    "/setup/stations/badges/{person}/remove": None,
+    "/setup/stations/{device}/revoke": None,
     "/sign-in": None,
+    "/station": None,
+    "/station/{machine}/alarms/{number}": None,  # on a device it is asked who acts: tests/views/station
+    "/station/{machine}/tools/{number}/change": None,
     "/sign-out": None,
     "/signals/{number}": ("comment_signal",),
     "/work-zeros/fixtures/{machine}/{fixture}": ("watch_fixture",),

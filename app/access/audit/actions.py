@@ -10,9 +10,9 @@ from app.db.engine import driver_connection
 __all__ = ["NOBODY", "Acting", "acts", "record"]
 
 
-def acts(person_id: int | None, key_id: int | None) -> None:
-    """Say who acts from now on in this request."""
-    acting.set(Acting(person_id, key_id))
+def acts(person_id: int | None, key_id: int | None, device_id: int | None = None) -> None:
+    """Say who acts from now on in this request, and at which station device."""
+    acting.set(Acting(person_id, key_id, device_id))
 
 
 def record(

@@ -30,6 +30,9 @@ class AuditEntryOut(BaseModel):
     before: dict[str, Any] | None
     after: dict[str, Any] | None
     why: str | None
+    device_id: int | None = Field(
+        description="The station device where the person identified themselves; null for what was done elsewhere."
+    )
 
 
 @router.get("/audit", dependencies=[require("engineer")])

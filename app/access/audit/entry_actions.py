@@ -7,15 +7,17 @@ from psycopg import Connection
 from psycopg.types.json import Jsonb
 
 _INSERT = """
-INSERT INTO audit_entry (actor, person_id, key_id, action, subject, before, after, why) VALUES (%s, %s, %s, %s, %s, %s, %s, %s)
+INSERT INTO audit_entry (actor, person_id, key_id, action, subject, before, after, why, device_id)
+VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s)
 """
 
 
 class Acting(NamedTuple):
-    """The numbers of who acts: of a person or of a key."""
+    """The numbers of who acts: of a person or of a key; and of the station device where a person has identified themselves."""
 
     person_id: int | None = None
     key_id: int | None = None
+    device_id: int | None = None
 
 
 NOBODY = Acting()
@@ -38,4 +40,4 @@ def write(
     """Note that somebody changed something; see `app.access.audit.actions.record`, which takes a session."""
     by = by or acting.get()
     values = [None if side is None else Jsonb(side) for side in (before, after)]
-    connection.execute(_INSERT, [actor, by.person_id, by.key_id, action, subject, *values, why or None])
+    connection.execute(_INSERT, [actor, by.person_id, by.key_id, action, subject, *values, why or None, by.device_id])

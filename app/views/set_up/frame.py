@@ -20,6 +20,7 @@ def setup_page(
     ]
     if caller.may("admin"):
         tabs.append(("people", _("People"), "/setup/people"))
+        tabs.append(("stations", _("Stations"), "/setup/stations"))
     if caller.may("engineer"):
         tabs.append(("audit", _("Record of changes"), "/setup/audit"))
         tabs.append(("jobs", _("Background jobs"), "/setup/jobs"))
@@ -45,5 +46,8 @@ def done(code: str) -> str | None:
         "role": _("The role is changed."),
         "disabled": _("The person can no longer sign in, and has been signed out everywhere."),
         "enabled": _("The person can sign in again."),
+        "unbound": _("The device is revoked. It shows nothing any more."),
+        "badge": _("The badge is bound."),
+        "no-badges": _("The badges are removed."),
         "withdrawn": _("The invitation is withdrawn."),
     }.get(code)

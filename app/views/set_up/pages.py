@@ -12,6 +12,7 @@ from app.views.set_up import (
     many_pages,
     people_pages,
     program_pages,
+    station_pages,
 )
 
 router = APIRouter(include_in_schema=False)
@@ -22,5 +23,14 @@ def setup() -> Response:
     return RedirectResponse("/setup/characteristics", 303)
 
 
-for part in (machine_pages, characteristic_pages, many_pages, program_pages, people_pages, audit_pages, job_pages):
+for part in (
+    machine_pages,
+    characteristic_pages,
+    many_pages,
+    program_pages,
+    people_pages,
+    station_pages,
+    audit_pages,
+    job_pages,
+):
     router.include_router(part.router)

@@ -3,14 +3,21 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Annotated
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
-from app.access.deps import Operator, Viewer, require
-from app.errors import Conflict, Invalid, NotFound
+from app.access import devices
+from app.access import queries as access
+from app.access.audit.actions import acts
+from app.access.deps import AtStation, Caller, Station
+from app.access.events_api import stream
+from app.access.identification import LONGEST_PIN, NotIdentified, Shown, identify
+from app.access.new_keys import digest
+from app.access.sign_in import sign_out
+from app.errors import Conflict, InbandError, Invalid, NotAllowed, NotFound, TooManyRequests
 from app.language.i18n import _
 from app.loop.alarm_response import queries as alarms
 from app.loop.alarm_response import wording as alarm_wording
@@ -24,24 +31,71 @@ from app.loop.tools import confirmation
 from app.loop.tools import queries as tool_queries
 from app.loop.tools.schemas import ToolChange
 from app.quality.wear.queries import next_event
+from app.settings import Settings
 from app.views.characteristic.glance import band_picture
 from app.views.characteristic.wording import state_word
 from app.views.station import queries
 from app.views.station.wording import next_action
-from app.web.deps import FormDep, Number, SessionDep
+from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, from_this_site
 from app.web.forms import by_field, length, parsed, words
+from app.web.live import Access
 from app.web.paging import address
 from app.web.templates import page
 
 router = APIRouter(prefix="/station", include_in_schema=False)
 NO_FORM: Mapping[str, str] = {}
+REFUSED = (Invalid, NotIdentified, NotAllowed, TooManyRequests)
+"""After these the same is asked again, with what was typed."""
+
+
+@router.get("")
+def bind_page(request: Request, session: SessionDep, code: Annotated[str, Query(max_length=40)] = "") -> Response:
+    """The form in which a device is bound; one that is bound already is led to its machine."""
+    token = request.cookies.get(STATION_COOKIE)
+    device = devices.device_of(session, token) if token and not code else None
+    if device is not None:
+        return RedirectResponse(f"/station/{device.machine}", 303)
+    return page(request, "station/bind.html", code=code, errors={})
+
+
+@router.post("", dependencies=[Depends(from_this_site)])
+def bind(request: Request, session: SessionDep, settings: SettingsDep, form: FormDep) -> Response:
+    """Bind this browser to the machine of the code. Whoever is signed in on it is signed out: it is everybody's from now on."""
+    try:
+        device, token = devices.bind(session, form.get("code", ""))
+    except Invalid as error:
+        return page(
+            request, "station/bind.html", status=error.status, code=form.get("code", ""), errors=by_field(error)
+        )
+    answer = RedirectResponse(f"/station/{device.machine}", 303)
+    _keep(answer, token, settings)
+    signed_in = request.cookies.get(SESSION_COOKIE)
+    person = access.signed_in(session, signed_in, {}) if signed_in else None
+    if signed_in and person:
+        sign_out(session, signed_in, person.caller.name)
+    answer.delete_cookie(SESSION_COOKIE, httponly=True, samesite="lax")
+    return answer
+
+
+def _keep(answer: Response, token: str, settings: Settings) -> None:
+    """Keep the device bound for another while."""
+    answer.set_cookie(
+        STATION_COOKIE,
+        token,
+        max_age=round(devices.UNUSED.total_seconds()),
+        path="/station",
+        httponly=True,
+        samesite="lax",
+        secure=settings.secure_cookies,
+    )
 
 
 @router.get("/{machine}")
 def station_page(
     request: Request,
     session: SessionDep,
-    caller: Viewer,
+    at: Station,
+    settings: SettingsDep,
     machine: str,
     done: Number = None,
     late: Number = None,
@@ -49,13 +103,13 @@ def station_page(
 ) -> Response:
     """The machine as it stands. done, late: the alarm of the last action; tool: the tool that was changed."""
     station = queries.station(session, machine)
-    return page(
+    answer = page(
         request,
         "station/station.html",
         station=station,
         machine=station.machine,
         next_action=next_action(station),
-        may_act=caller.may("operator"),
+        may_act=at.may_act,
         done=_of_machine(session, station.machine, done) if done else None,
         late=_of_machine(session, station.machine, late) if late else None,
         tool=confirmation.done("change", tool) if tool else None,
@@ -67,31 +121,38 @@ def station_page(
         outcomes=outcomes,
         address=address,
     )
+    if at.device is not None:
+        _keep(answer, request.cookies[STATION_COOKIE], settings)
+    return answer
 
 
-@router.get("/{machine}/alarms/{number}", dependencies=[require("operator")])
+@router.get("/{machine}/alarms/{number}")
 def ask_alarm(
     request: Request,
     session: SessionDep,
+    at: Station,
     machine: str,
     number: int,
     action: Annotated[str, Query(max_length=40)] = "",
 ) -> Response:
     """The second touch at an alarm. One that is acknowledged meanwhile leads back."""
+    at.must_act()
     machine_row = machine_named(session, machine)
     row = _of_machine(session, machine_row, number)
     if row.alarm.acknowledged_at is not None:
         return RedirectResponse(address(f"/station/{machine}", late=number), 303)
-    return _ask_alarm(request, machine_row, row, action)
+    return _ask_alarm(request, session, at, machine_row, row, action)
 
 
 def _ask_alarm(
     request: Request,
+    session: Session,
+    at: AtStation,
     machine: Machine,
     row: AlarmRow,
     action: str,
     form: Mapping[str, str] = NO_FORM,
-    error: Invalid | None = None,
+    error: InbandError | None = None,
 ) -> Response:
     if action not in alarm_wording.offered(row):
         raise NotFound(_("There is nothing at this address."), _("Go back to the station of the machine."))
@@ -102,8 +163,7 @@ def _ask_alarm(
         machine=machine,
         row=row,
         action=action,
-        form=form,
-        errors=by_field(error) if error else {},
+        **_asked(session, at, form, error),
         wording=alarm_wording,
         address=address,
     )
@@ -111,36 +171,39 @@ def _ask_alarm(
 
 @router.post("/{machine}/alarms/{number}")
 def acknowledge(
-    request: Request, session: SessionDep, caller: Operator, machine: str, number: int, form: FormDep
+    request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep
 ) -> Response:
     """Acknowledge the alarm. Sent twice, or after somebody else, it changes nothing and says so."""
     machine_row = machine_named(session, machine)
     row = _of_machine(session, machine_row, number)
     outcome = "done"
     try:
+        caller = _who(request, at, form)
         acknowledge_as_typed(session, number, form, caller)
     except Conflict:
         alarm = alarms.alarm(session, number).alarm
         again = alarm.acknowledged_by == caller.name and alarm.action == form.get("action")
         outcome = "done" if again else "late"
-    except Invalid as error:
-        return _ask_alarm(request, machine_row, row, form.get("action", ""), form, error)
+    except REFUSED as error:
+        return _ask_alarm(request, session, at, machine_row, row, form.get("action", ""), form, error)
     return RedirectResponse(address(f"/station/{machine}", **{outcome: number}), 303)
 
 
-@router.get("/{machine}/tools/{number}/change", dependencies=[require("operator")])
-def ask_tool(request: Request, session: SessionDep, machine: str, number: int) -> Response:
+@router.get("/{machine}/tools/{number}/change")
+def ask_tool(request: Request, session: SessionDep, at: Station, machine: str, number: int) -> Response:
     """The second touch of a tool change."""
-    return _ask_tool(request, session, machine_named(session, machine), number)
+    at.must_act()
+    return _ask_tool(request, session, at, machine_named(session, machine), number)
 
 
 def _ask_tool(
     request: Request,
     session: Session,
+    at: AtStation,
     machine: Machine,
     number: int,
     form: Mapping[str, str] = NO_FORM,
-    error: Invalid | None = None,
+    error: InbandError | None = None,
 ) -> Response:
     tool_queries.tool(session, machine, number)
     (row,) = tool_queries.tools(session, machine, only=number)
@@ -151,23 +214,69 @@ def _ask_tool(
         status=error.status if error else 200,
         machine=machine,
         question=replace(question, send_to=f"/station/{machine.key}/tools/{number}/change"),
-        form=form,
-        errors=by_field(error) if error else {},
+        **_asked(session, at, form, error),
     )
 
 
 @router.post("/{machine}/tools/{number}/change")
 def change_tool(
-    request: Request, session: SessionDep, caller: Operator, machine: str, number: int, form: FormDep
+    request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep
 ) -> Response:
     """Say that the tool was changed."""
     machine_row = machine_named(session, machine)
     try:
+        caller = _who(request, at, form)
         change = parsed(ToolChange, {"offset": length(form.get("offset")), "reason": words(form, "reason")})
         tools.change_tool(session, machine_row, number, change.offset, change.reason, caller)
-    except Invalid as error:
-        return _ask_tool(request, session, machine_row, number, form, error)
+    except REFUSED as error:
+        return _ask_tool(request, session, at, machine_row, number, form, error)
     return RedirectResponse(address(f"/station/{machine}", tool=number), 303)
+
+
+def _who(request: Request, at: AtStation, form: Mapping[str, str]) -> Caller:
+    """The person who acts: signed in, or identified on the device for this one action.
+
+    Raises `NotIdentified`, `TooManyRequests`, and `NotAllowed` for a person without the role operator.
+    """
+    if at.device is None:
+        assert at.caller is not None
+        at.caller.must("operator")
+        return at.caller
+    name = form.get("other_name", "").strip() or form.get("who", "")
+    shown = Shown(name, form.get("pin", ""), form.get("badge", "").strip())
+    caller = identify(request.app.state.database, at.device, shown)
+    caller.must("operator")
+    acts(caller.person_id, None, at.device.id)
+    return caller
+
+
+def _asked(session: Session, at: AtStation, form: Mapping[str, str], error: InbandError | None) -> dict[str, Any]:
+    """Content of every second touch: what was typed, what was wrong, and on a device the question who acts."""
+    errors: dict[str, str] = {}
+    if error is not None:
+        errors = by_field(error) or {"who": f"{error.detail} {error.what_to_do or ''}".strip()}
+    return {
+        "form": form,
+        "errors": errors,
+        "asks_who": at.device is not None,
+        "people": devices.people_at(session, at.device.id) if at.device else [],
+        "longest": LONGEST_PIN,
+    }
+
+
+@router.get("/{machine}/events")
+def events(
+    request: Request,
+    session: SessionDep,
+    at: Station,
+    machine: str,
+    last_event_id: Annotated[str | None, Header()] = None,
+) -> Response:
+    """The live events of this machine, for its station."""
+    cookie = STATION_COOKIE if at.device else SESSION_COOKIE
+    token, role = request.cookies.get(cookie), at.caller.role if at.caller else None
+    granted = Access(digest(token) if token else None, at.caller.key_id if at.caller else None, role)
+    return stream(request, granted, machine_named(session, machine).key, last_event_id)
 
 
 def _of_machine(session: Session, machine: Machine, number: int) -> AlarmRow:
