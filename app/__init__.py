@@ -12,6 +12,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         reports          a characteristic and a period as page, PDF, spreadsheet; many at once in the background
         search           readings and parts across characteristics, one field for everything
         overview         every characteristic ranked by what needs attention, with the reasons
+        to_do            everything that waits for a person, with one count
         approvals        corrections that wait for a person
         station          one machine on the tablet beside it, readable from two metres
         plant            the first page: every machine and characteristic at a glance

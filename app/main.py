@@ -36,7 +36,6 @@ from app.jobs.runner import JobRunner
 from app.language.times import use_zone
 from app.loop.alarm_response import api as alarms
 from app.loop.alarm_response import pages as alarm_pages
-from app.loop.alarm_response.queries import ACTIVE_COUNT
 from app.loop.calibration import api as calibration
 from app.loop.calibration import jobs
 from app.loop.calibration import pages as calibration_pages
@@ -75,11 +74,11 @@ from app.quality.what_if import api as what_if
 from app.quality.what_if import pages as what_if_pages
 from app.settings import Settings
 from app.views.approvals import pages as queue_pages
-from app.views.approvals.queries import WAITING_COUNT
 from app.views.characteristic import capability_pages, figures_api
 from app.views.characteristic import pages as characteristic_pages
 from app.views.overview import api as overview
 from app.views.overview import pages as overview_pages
+from app.views.plant import machine_pages
 from app.views.plant import pages as plant_pages
 from app.views.reports import actions as report_actions
 from app.views.reports import api as reports
@@ -88,9 +87,13 @@ from app.views.reports import jobs_pages as report_job_pages
 from app.views.reports import pages as report_pages
 from app.views.reports import points_api as report_points
 from app.views.reports.worker import ReportWorker
+from app.views.search import api as search
+from app.views.search import pages as search_pages
 from app.views.search import readings_api as reading_list
 from app.views.set_up import pages as setup_pages
 from app.views.station import pages as station_pages
+from app.views.to_do import pages as to_do_pages
+from app.views.to_do.queries import COUNT as TO_DO_COUNT
 from app.web import api_docs, health
 from app.web.limits import BodyLimit
 from app.web.live import Live
@@ -109,6 +112,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     statistics.router,
     capability.router,
     overview.router,
+    search.router,
     proof.router,
     wear.router,
     zeros.router,
@@ -143,8 +147,11 @@ ROUTERS: tuple[APIRouter, ...] = (
     audit.router,
     health.router,
     api_docs.router,
+    machine_pages.router,
     plant_pages.router,
     station_pages.router,
+    search_pages.router,
+    to_do_pages.router,
     overview_pages.router,
     characteristic_pages.router,
     control_pages.router,
@@ -265,8 +272,7 @@ def create_app(settings: Settings | None = None, ending: Callable[[], None] = la
     app.state.report_worker = report_worker
     app.state.metrics = health.registry(database, settings.data_dir)
     app.state.waiting = {
-        "active_alarms": ACTIVE_COUNT.scalar_subquery(),
-        "waiting_corrections": WAITING_COUNT.scalar_subquery(),
+        "to_do": TO_DO_COUNT.scalar_subquery(),
     }
     add_problem_handlers(app, recognise)
     app.add_middleware(BodyLimit)

@@ -2,7 +2,7 @@
 
 A page is answered with `page(request, "plant.html", machines=…)`. The templates find in every context what the layers
 around the route have put into `request.state`: `person` (name, role; None if nobody is signed in), `csrf` (the token
-for forms), `active_alarms` and `waiting_corrections` (numbers, or None if not known).
+for forms), `to_do` (how many things wait for a person, or None if not known).
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from app.errors import InbandError
 from app.language import i18n, numbers, times
 from app.web import period, states, theme
 from app.web.assets import Assets
+from app.web.doors import door_of, search_words
 from app.web.paging import address
 from app.web.request_log import note_reason
 
@@ -62,6 +63,8 @@ def environment() -> Environment:
     )
     env.globals.update(
         address=address,
+        door_of=door_of,
+        search_words=search_words,
         asset=assets().url,
         assets=assets(),
         theme=theme,
@@ -95,8 +98,7 @@ def render(request: Request, template: str | Template, **context: Any) -> str:
                     "chosen_theme": chosen_theme(request),
                     "person": getattr(state, "person", None),
                     "csrf": getattr(state, "csrf", ""),
-                    "active_alarms": None,
-                    "waiting_corrections": None,
+                    "to_do": None,
                 }
                 | getattr(state, "waiting", {})
                 | context

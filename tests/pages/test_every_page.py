@@ -85,6 +85,13 @@ PAGES = {
     "/alarms/{number}": ["/alarms/{alarm}", "/alarms/{alarm}?action=keep_cutting"],
     "/corrections": ["/corrections", "/corrections?machine={machine}"],
     "/corrections/{machine}/tools/{tool}": ["/corrections/{machine}/tools/5"],
+    "/todo": ["/todo", "/todo?machine={machine}&mine=true"],
+    "/search": ["/search", "/search?q=shaft"],
+    "/parts": ["/parts", "/parts?part=SN-1"],
+    "/parts/{part:path}": ["/parts/SN%201/2"],
+    "/machines": ["/machines"],
+    "/machines/{machine}": ["/machines/{machine}"],
+    "/machines/{machine}/geometry": ["/machines/{machine}/geometry"],
     "/tools": ["/tools"],
     "/machines/{machine}/tools/{number}": ["/machines/{machine}/tools/3", "/machines/{machine}/tools/32"],
     "/machines/{machine}/tools": ["/machines/{machine}/tools?tool=3"],
@@ -174,13 +181,13 @@ PAGES = {
 }
 SIGNED_OUT = {"/sign-in", "/invitation/{token}"}
 OPENED_ELSEWHERE = {"/import/{token}"}  # needs a file that was sent; tests/loop/importing
-PARTS = {
+PARTS = {  # only ever fetched into a page
     "/plant-summary",
-    "/alarms/count",
-    "/corrections/count",
+    "/todo/count",
     "/setup/fit",
     "/station/{machine}/events",
-}  # only ever fetched into a page
+    "/characteristics/{characteristic}/readings/{sequence}/panel",
+}
 
 
 def routes_of(router: Any) -> Iterator[APIRoute]:

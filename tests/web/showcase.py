@@ -115,7 +115,7 @@ def showcase(stage: Stage | None = None) -> Starlette:
     person = SimpleNamespace(name="Ana Petrović", role="operator")
 
     def home(request: Request) -> Response:
-        request.state.person, request.state.csrf, request.state.active_alarms = person, "token", 2
+        request.state.person, request.state.csrf, request.state.waiting = person, "token", {"to_do": 2}
         points, _steps, _marks = story()
         template = environment().from_string(text)
         parts: dict[str, Any] = {
@@ -197,10 +197,7 @@ def showcase(stage: Stage | None = None) -> Starlette:
         )
 
     def count(request: Request) -> Response:
-        return page(request, "alarm_count.html", active_alarms=stage.alarms)
-
-    def waiting(request: Request) -> Response:
-        return page(request, "waiting_count.html", waiting_corrections=0)
+        return page(request, "to_do_count.html", to_do=stage.alarms)
 
     def problem(request: Request) -> Response:
         request.state.person = person
@@ -221,8 +218,7 @@ def showcase(stage: Stage | None = None) -> Starlette:
             Route("/chart", home),
             Route("/figures/{name}", figure),
             Route("/part", part),
-            Route("/alarms/count", count),
-            Route("/corrections/count", waiting),
+            Route("/todo/count", count),
             Route("/problem", problem),
             Route("/api/v1/events", events),
             Mount("/static", assets()),

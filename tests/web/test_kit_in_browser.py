@@ -118,7 +118,7 @@ def test_the_number_of_alarms_is_live(open_page: OpenPage, show: Show) -> None:
     with open_page("/chart") as page:
         expect(page.locator("live-status")).to_have_attribute("state", "live")
         send(show, "alarm", machine="lathe-1")
-        expect(page.locator(".nav .count")).to_contain_text("3 active alarms")
+        expect(page.locator(".nav .count")).to_contain_text("3 wait for a person")
 
 
 def test_without_connection_the_page_says_how_old_it_is(open_page: OpenPage, show: Show) -> None:

@@ -55,10 +55,17 @@ SHOWN_AT = {"sections": "touches", "points": "touches", "nominal": "nominal_x"}
 
 
 @router.get("/forms", dependencies=[require("viewer")])
-def overview(request: Request, session: SessionDep) -> Response:
+def overview(request: Request, session: SessionDep, machine: Word = None) -> Response:
     """Every feature with its newest result."""
+    chosen = machine_named(session, machine) if machine else None
     return page(
-        request, "geometric_form/overview.html", features=queries.features(session), wording=wording, trend=trend_url
+        request,
+        "geometric_form/overview.html",
+        features=queries.features(session, chosen.id if chosen else None),
+        machine=chosen,
+        machines=machines(session),
+        wording=wording,
+        trend=trend_url,
     )
 
 

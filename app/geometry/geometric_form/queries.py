@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from sqlalchemy import Select, and_, func, select
+from sqlalchemy import Select, and_, func, select, true
 from sqlalchemy.orm import Session
 
 from app.errors import NotFound
@@ -107,10 +107,11 @@ def trend(session: Session, machine: Machine, feature: str, kind: str | None = N
     return sorted(rows, key=lambda row: (row.measurement.measured_at, row.measurement.id))
 
 
-def features(session: Session, limit: int = 200) -> list[Feature]:
-    """Every feature and kind with its newest measurement, the one measured last first."""
+def features(session: Session, only: int | None = None, limit: int = 200) -> list[Feature]:
+    """Every feature and kind, of one machine or of all, with its newest measurement, the one measured last first."""
     latest = (
         select(func.max(FormMeasurement.id).label("id"), func.count().label("count"))
+        .where(true() if only is None else FormMeasurement.machine_id == only)
         .group_by(FormMeasurement.machine_id, FormMeasurement.feature, FormMeasurement.kind)
         .order_by(func.max(FormMeasurement.id).desc())
         .limit(limit)

@@ -43,7 +43,8 @@ def board(
         rows=rows,
         active=queries.active_count(session, machine_id),
         last=queries.acknowledged_last(session, machine_id=machine_id),
-        machines=[(row.key, row.name, by_machine.get(row.key, 0)) for row in machines.machines(session)],
+        machines=machines.machines(session),
+        by_machine=by_machine,
         machine=machine_row,
         done=queries.alarm(session, done) if done else None,
         late=queries.alarm(session, late) if late else None,
@@ -51,12 +52,6 @@ def board(
         outcomes=outcomes,
         address=address,
     )
-
-
-@router.get("/alarms/count", dependencies=[require("viewer")])
-def count(request: Request, session: SessionDep) -> Response:
-    """The number beside *Alarms* in the navigation."""
-    return page(request, "alarm_count.html", active_alarms=queries.active_count(session))
 
 
 @router.get("/alarms/history", dependencies=[require("viewer")])
@@ -71,7 +66,7 @@ def history(request: Request, session: SessionDep, machine: Word = None, before:
         request,
         "alarms/history.html",
         part=part_of(rows, ON_HISTORY_PAGE, before, lambda row: row.alarm.id, link),
-        machines=[(row.key, row.name) for row in machines.machines(session)],
+        machines=machines.machines(session),
         machine=machine_row,
         wording=wording,
         outcomes=outcomes,

@@ -36,16 +36,6 @@ def memory_address(machine: str, **query: Any) -> str:
     return address(f"/machines/{machine}/tools", **query)
 
 
-@router.get("/tools", dependencies=[require("viewer")])
-def choose_machine(request: Request, session: SessionDep) -> Response:
-    """The list of machines, to choose a tool memory from. With one machine, go straight there."""
-    all_machines = machines.machines(session)
-    if len(all_machines) == 1:
-        return RedirectResponse(memory_address(all_machines[0].key), 303)
-    waiting = queries.open_counts(session)
-    return page(request, "tools/machines.html", machines=[(row, waiting.get(row.id, {})) for row in all_machines])
-
-
 @router.get("/machines/{machine}/tools", dependencies=[require("viewer")])
 def memories(
     request: Request,
@@ -263,6 +253,10 @@ def _ask(
         question=question,
         form=form or {},
         errors=by_field(error) if error else {},
-        trail=[(_("Tool memory"), "/tools"), (machine_row.name, memory_address(machine))],
+        trail=[
+            (_("Machines"), "/machines"),
+            (machine_row.name, f"/machines/{machine}"),
+            (_("Tool memory"), memory_address(machine)),
+        ],
         back=memory_address(machine),
     )

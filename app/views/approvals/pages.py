@@ -42,13 +42,14 @@ def queue_page(
 ) -> Response:
     """Corrections that wait, by machine and tool; ``at``: the tool where something was done (``done``) or not (``late``)."""
     chosen = machine_named(session, machine) if machine else None
-    by_machine = queue.count_by_machine(session)
+    by_machine, every = queue.count_by_machine(session), machines.machines(session)
     return page(
         request,
         "tools/queue.html",
         groups=queue.groups(session, chosen),
         machine=chosen,
-        machines=[(one, by_machine.get(one.id, 0)) for one in machines.machines(session)],
+        machines=[(one, by_machine.get(one.id, 0)) for one in every],
+        by_machine={one.key: by_machine[one.id] for one in every if one.id in by_machine},
         done=confirmation.done(done, n) if done and n else None,
         late=_too_late(session, at, late, n) if at and late and n else None,
         wording=wording,
@@ -61,12 +62,6 @@ def queue_page(
 
 def _too_late(session: Session, machine: str, verb: str, number: int) -> list[str]:
     return list(wording.refused(queries.correction(session, machine_named(session, machine), number), machine, verb))
-
-
-@router.get("/corrections/count", dependencies=[require("viewer")])
-def count(request: Request, session: SessionDep) -> Response:
-    """The number beside *Approvals* in the navigation."""
-    return page(request, "waiting_count.html", waiting_corrections=queue.count(session))
 
 
 @router.get("/corrections/{machine}/tools/{tool}", dependencies=[require("operator")])

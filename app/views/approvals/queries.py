@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from sqlalchemy import func, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.core.decision.step import rounded
@@ -44,14 +44,6 @@ class Group(NamedTuple):
     approvable: list[int]
     total: float
     after: float
-
-
-WAITING_COUNT = select(func.count()).select_from(Correction).where(Correction.status.in_(DECIDED_BY_PEOPLE))
-
-
-def count(session: Session) -> int:
-    """Return the number of corrections that wait for a person."""
-    return session.scalar(WAITING_COUNT) or 0
 
 
 def count_by_machine(session: Session) -> dict[int, int]:

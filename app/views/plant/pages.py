@@ -8,12 +8,14 @@ from sqlalchemy.orm import Session
 
 from app.access.deps import require
 from app.core.state import CharacteristicState
+from app.loop.machines import queries as machines
 from app.quality.wear.queries import next_event
 from app.quality.wear.wording import hunting_word
 from app.views.characteristic import state_queries as queries
 from app.views.characteristic.glance import band_picture, sparkline
 from app.views.characteristic.state_queries import CharacteristicRow, Group
 from app.views.characteristic.wording import state_word
+from app.views.plant.connections import connections_of
 from app.web.deps import SessionDep
 from app.web.templates import page
 
@@ -38,9 +40,15 @@ def plant_page(request: Request, session: SessionDep, show: Show = "all") -> Res
     return _page(request, session, show, None)
 
 
+@router.get("/machines/{machine}")
+def machine_home(request: Request, session: SessionDep, machine: str, show: Show = "all") -> Response:
+    """The home of one machine: its state now, and the way to everything that belongs to it."""
+    return _page(request, session, show, machine)
+
+
 @router.get("/plant/{machine}")
 def machine_page(request: Request, session: SessionDep, machine: str, show: Show = "all") -> Response:
-    """One machine; also the part of the plant's page that is fetched again when something happens to it (`short` if folded)."""
+    """The same; also the part of the plant's page that is fetched again when something happens to it (`short` if folded)."""
     return _page(request, session, show, machine)
 
 
@@ -60,6 +68,8 @@ def _page(request: Request, session: Session, show: str, machine: str | None) ->
         "plant/plant.html",
         groups=[_view(group, show, MOST_OF_A_MACHINE if machine else MOST // max(1, len(groups))) for group in groups],
         machine=groups[0].machine if machine else None,
+        connections=connections_of(session, groups[0].machine) if machine else [],
+        machines=machines.machines(session) if machine else [],
         show=show,
         state_word=state_word,
         band=lambda row: band_picture(row.stream.last_deviation, row.parameters, None, row.average),

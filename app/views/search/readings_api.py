@@ -18,7 +18,7 @@ from app.web.deps import SessionDep
 from app.web.fields import Moment, Page
 
 router = api_router("readings")
-_CURSOR = r"^[0-9]{1,19}(-[0-9]{1,19}){0,3}$"
+CURSOR = r"^[0-9]{1,19}(-[0-9]{1,19}){0,3}$"
 
 
 @router.get("/readings", responses=problems(404))
@@ -40,7 +40,7 @@ def list_readings(
     after: Annotated[
         str | None,
         Query(
-            pattern=_CURSOR,
+            pattern=CURSOR,
             description="Cursor: the `next` of the page before. Of one characteristic it is the number of a reading.",
         ),
     ] = None,

@@ -212,6 +212,7 @@ def _machine(
         "machines",
         status=status,
         machine=machine,
+        machines=queries.machines(session),
         typed=typed or {name: _shown(getattr(machine, name)) for name in SHOWN},
         errors=errors or {},
         controls=controls(),

@@ -1,7 +1,7 @@
-// What tells a person who looks elsewhere that an alarm has come: the number of active alarms in the title of the tab, and
-// a tone, where it was switched on.
+// What tells a person who looks elsewhere that an alarm has come: the number of things that wait for a person in the title of
+// the tab (at a station, of active alarms), and a tone, where it was switched on.
 //
-//   [data-alarms]   an element of the page that says how many alarms are active; a live part keeps it true
+//   [data-to-do], [data-alarms]   an element of the page that says how many there are; a live part keeps it true
 //   <alarm-sound [machine] data-label data-on data-off data-touch>   the switch of the tone; remembered on this device
 //
 // A browser plays nothing before it was touched once. Until then the switch says so.
@@ -19,9 +19,9 @@ let title = null;
 const heard = new Set();
 
 function showCount() {
-  const counted = document.querySelector("[data-alarms]");
+  const counted = document.querySelector("[data-to-do], [data-alarms]");
   title ??= document.title;
-  const number = Number(counted?.dataset.alarms ?? 0);
+  const number = Number(counted?.dataset.toDo ?? counted?.dataset.alarms ?? 0);
   document.title = number ? `(${number}) ${title}` : title;
 }
 
@@ -88,7 +88,7 @@ function hear(event) {
 showCount();
 document.addEventListener("livepart", showCount);
 
-if (document.querySelector("[data-alarms], alarm-sound")) {
+if (document.querySelector("[data-to-do], [data-alarms], alarm-sound")) {
   const machine = document.querySelector("alarm-sound")?.getAttribute("machine");
   subscribe(machine ? `alarm:${machine}` : "alarm", hear);
 }

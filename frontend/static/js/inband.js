@@ -10,6 +10,7 @@
 import "./live-status.js";
 import "./live-part.js";
 import "./alarm-signal.js";
+import "./search-box.js";
 import "./theme-switch.js";
 import "./times.js";
 import "./period-presets.js";

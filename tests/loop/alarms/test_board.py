@@ -102,9 +102,9 @@ class TestWithoutScripts:
         assert len(re.findall(r'class="cell-link"', rest)) == 2
 
     def test_the_number_in_the_navigation(self, shop: Shop, operator: Person) -> None:
-        before = int(re.search(r'data-count="(\d+)"', operator.open("/alarms/count"))[1])  # type: ignore[index]
+        before = int(re.search(r'data-count="(\d+)"', operator.open("/todo/count"))[1])  # type: ignore[index]
         shop.read(20.0)
-        assert f'data-count="{before + 1}"' in operator.open("/alarms/count")
+        assert f'data-count="{before + 1}"' in operator.open("/todo/count")
 
     @pytest.mark.parametrize("path", ["/alarms/999999", "/alarms?machine=nowhere", "/alarms/0?action=noted"])
     def test_what_is_not_there_is_a_page_in_words(self, operator: Person, path: str) -> None:

@@ -124,7 +124,7 @@ class TestWithoutScripts:
 
     def test_the_choice_of_machine(self, shop: Shop, operator: Person, server: Any) -> None:
         other = Shop(server)
-        text = operator.open("/tools")
+        text = operator.open(page_of(shop))
         assert f"/machines/{shop.machine}/tools" in text
         assert f"/machines/{other.machine}/tools" in text
         operator.open("/machines/nowhere/tools", 404)

@@ -91,11 +91,11 @@ class TestQueue:
         assert shop.correction(first)["status"] == "awaiting_approval"
 
     def test_the_number_in_the_navigation(self, shop: Shop, operator: Person) -> None:
-        before = operator.open("/corrections/count")
+        before = operator.open("/todo/count")
         awaiting(shop, 20.0)
-        after = operator.open("/corrections/count")
+        after = operator.open("/todo/count")
         assert before != after
-        assert 'id="waiting-count"' in operator.open("/")
+        assert 'id="to-do-count"' in operator.open("/")
 
 
 class TestTool:

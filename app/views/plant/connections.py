@@ -1,0 +1,42 @@
+"""Last exchanges between a machine and the server, as far as they are recorded. Never writes."""
+
+from datetime import datetime
+from typing import NamedTuple
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.language.i18n import _
+from app.loop.machines import keys
+from app.loop.tables.machines import Machine
+from app.loop.tables.readings import Stream
+from app.loop.tables.tools import Correction
+
+
+class Connection(NamedTuple):
+    """One way of the machine to the server: what it is, since when nothing came, more in words."""
+
+    what: str
+    at: datetime | None
+    more: str
+
+
+def connections_of(session: Session, machine: Machine) -> list[Connection]:
+    """Return the last reading, the last correction that was confirmed, the last one fetched as text, and the newest key."""
+    received = session.scalar(select(func.max(Stream.last_received_at)).where(Stream.machine_id == machine.id))
+    applied, fetched = session.execute(
+        select(func.max(Correction.applied_at), func.max(Correction.fetched_at)).where(
+            Correction.machine_id == machine.id
+        )
+    ).one()
+    in_use = [key for key in keys.machine_keys(session, machine.id) if key.revoked_at is None]
+    return [
+        Connection(_("Last reading received"), received, ""),
+        Connection(_("Last correction confirmed"), applied, ""),
+        Connection(_("Last corrections fetched as program text"), fetched, ""),
+        Connection(
+            _("Newest key in use"),
+            max((key.created_at for key in in_use), default=None),
+            ", ".join(key.name for key in in_use[:5]) or _("Without a key the machine cannot push readings."),
+        ),
+    ]

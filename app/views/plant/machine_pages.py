@@ -1,0 +1,89 @@
+"""Pages: all machines, and the geometry of one of them."""
+
+from typing import Annotated, NamedTuple
+
+from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.access.deps import require
+from app.geometry.alignment.tables import Alignment
+from app.geometry.geometric_form.tables import FormMeasurement
+from app.geometry.rotary_axes.tables import KinematicsRun
+from app.geometry.work_zero.tables import WorkZero
+from app.language.i18n import _
+from app.loop.machines import queries as machines
+from app.loop.tables.machines import Machine
+from app.views.characteristic import state_queries
+from app.web.deps import SessionDep
+from app.web.paging import address, slice_of
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False, dependencies=[require("viewer")])
+ON_PAGE = 200
+
+
+class Geometry(NamedTuple):
+    """One kind of geometric results of a machine: how many there are, where they are shown and where one is made."""
+
+    title: str
+    explained: str
+    results: int
+    path: str
+    new_path: str
+
+
+@router.get("/machines")
+def machines_page(
+    request: Request, session: SessionDep, after: Annotated[int, Query(ge=0, le=1_000_000)] = 0
+) -> Response:
+    """Every machine with how it stands."""
+    groups = state_queries.plant(session, trends=False)
+    part = slice_of(groups, ON_PAGE, after, lambda **query: address("/machines", **query))
+    return page(request, "machines/list.html", part=part, last=_last)
+
+
+def _last(group: state_queries.Group) -> object:
+    """Time of the last reading that was received from the machine."""
+    received = [row.stream.last_received_at for row in group.rows if row.stream.last_received_at is not None]
+    return max(received, default=None)
+
+
+@router.get("/tools")
+def tool_memories() -> Response:
+    """The former list of tool memories: machines have a page of their own."""
+    return RedirectResponse("/machines", 308)
+
+
+@router.get("/machines/{machine}/geometry")
+def geometry_page(request: Request, session: SessionDep, machine: str) -> Response:
+    """Work zeros, alignments, form and rotary axes of one machine, as far as it has any."""
+    chosen = machines.machine_named(session, machine)
+    return page(
+        request,
+        "machines/geometry.html",
+        machine=chosen,
+        machines=machines.machines(session),
+        kinds=_geometry(session, chosen),
+    )
+
+
+def _geometry(session: Session, machine: Machine) -> list[Geometry]:
+    key = machine.key
+    counts = [
+        session.scalar(select(func.count()).select_from(table).where(table.machine_id == machine.id)) or 0
+        for table in (WorkZero, Alignment, FormMeasurement, KinematicsRun)
+    ]
+    kinds = [
+        (_("Work zero"), _("Origin and size from probed points; shift of each fixture."), "work-zeros?machine={}"),
+        (_("Alignment"), _("Position and rotation of a part, pallet or fixture."), "alignments?machine={}"),
+        (_("Form"), _("Roundness, straightness, flatness and position of features."), "forms?machine={}"),
+        (_("Rotary axes"), _("Position of the axes, drift, back-ups, limits."), "kinematics/machines/{}"),
+    ]
+    return [
+        Geometry(
+            title, explained, count, f"/{path.format(key)}", f"/{path.split('?')[0].split('/')[0]}/new?machine={key}"
+        )
+        for (title, explained, path), count in zip(kinds, counts, strict=True)
+    ]

@@ -1,0 +1,48 @@
+"""JSON route: one search for all that has a name."""
+
+from typing import Annotated
+
+from fastapi import Query
+from pydantic import BaseModel, Field
+
+from app.access.deps import Viewer
+from app.views.search import queries
+from app.views.search.parts import Part
+from app.web.api import api_router, problems
+from app.web.deps import SessionDep
+
+router = api_router("search")
+
+
+class SearchHit(BaseModel):
+    """Something that bears the name that was searched."""
+
+    kind: queries.Kind
+    key: Annotated[str, Field(description="What programs call it; of a part its name, of a page its path.")]
+    title: str
+    path: Annotated[str, Field(description="Its page.")]
+
+
+class SearchOut(BaseModel):
+    """Results of a search: of each kind the best few, machines first, pages last."""
+
+    items: list[SearchHit]
+
+
+@router.get("/search", responses=problems())
+def search(
+    session: SessionDep,
+    caller: Viewer,
+    q: Annotated[
+        Part,
+        Query(
+            description="Part of a name, a number of a tool or an alarm, or how a part's name begins.",
+            examples=["shaft"],
+        ),
+    ],
+) -> SearchOut:
+    """Machines, characteristics, tools, alarms, parts and pages by their names.
+
+    Parts are found by the beginning of their name; *report* before a name finds the report of a characteristic.
+    """
+    return SearchOut.model_validate({"items": [hit._asdict() for hit in queries.hits(session, q, caller)]})

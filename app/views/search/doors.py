@@ -1,0 +1,52 @@
+"""Pages that search finds by their name or by a word of the glossary, with the role that each needs."""
+
+from typing import NamedTuple
+
+from app.access.callers import Role
+from app.language.i18n import _
+
+
+class Door(NamedTuple):
+    """A page: its title, its path, and words that lead to it as well."""
+
+    title: str
+    path: str
+    words: str
+    role: Role = "viewer"
+
+
+def doors() -> list[Door]:
+    """All pages that stand by themselves, in the reader's language."""
+    return [
+        Door(_("Plant"), "/", _("all machines, state now")),
+        Door(_("To do"), "/todo", _("what waits for a person, open tasks")),
+        Door(_("Alarms"), "/alarms", _("acknowledge, tool worn, probe fault")),
+        Door(_("History of alarms"), "/alarms/history", _("acknowledged alarms")),
+        Door(_("Approvals"), "/corrections", _("corrections that wait, approve, held")),
+        Door(_("Proposals"), "/proposals", _("proposed parameters, what-if")),
+        Door(
+            _("Quality"),
+            "/overview",
+            _("ranking, statistics, Cp, Cpk, Pp, Ppk, capability, control charts, run rules, what-if"),
+        ),
+        Door(_("Gauge studies"), "/gauges", _("Cg, Cgk, %GRR, ndc, R&R, bias, linearity, measuring system, MSA")),
+        Door(_("Reports"), "/reports", _("PDF, spreadsheet, XLSX, CSV, hand over")),
+        Door(_("Find a part"), "/parts", _("serial number, part")),
+        Door(_("Machines"), "/machines", _("tool memory, R10, average memory, R11, connections")),
+        Door(
+            _("Calibration"), "/calibration", _("probe calibration, ring, empirical value, gauge, measuring error, due")
+        ),
+        Door(_("Work zero"), "/work-zeros", _("edge finder, fixture, vice, G54, origin")),
+        Door(_("Alignment"), "/alignments", _("frame, rotation, set-up error, pallet, residual")),
+        Door(_("Form and position"), "/forms", _("roundness, flatness, straightness, cylindricity")),
+        Door(_("Rotary axes"), "/kinematics", _("kinematics, preset compensation, cycle 452, calibration sphere")),
+        Door(_("Characteristics, set-up"), "/setup/characteristics", _("R parameters, nominal, limits, tolerance")),
+        Door(_("Machines, set-up"), "/setup/machines", _("keys, control")),
+        Door(_("Program text"), "/setup/programs", _("read a program, Sinumerik, Fanuc, Heidenhain")),
+        Door(_("People"), "/setup/people", _("invite, role, user, password"), "admin"),
+        Door(_("Record of changes"), "/setup/audit", _("audit trail, who changed what"), "engineer"),
+        Door(_("Background jobs"), "/setup/jobs", _("periodic jobs, failing"), "engineer"),
+        Door(_("Proof"), "/proof", _("published examples, validation")),
+        Door(_("Account"), "/account", _("password, sign out")),
+        Door(_("API"), "/api/docs", _("REST, OpenAPI, program")),
+    ]

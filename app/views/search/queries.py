@@ -1,0 +1,147 @@
+"""One search for all that has a name: machines, characteristics, tools, alarms, parts, pages. Never writes."""
+
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
+
+from sqlalchemy import ColumnElement, Select, case, func, or_, select, text
+from sqlalchemy.orm import Session
+
+from app.access.callers import Caller
+from app.language.i18n import _
+from app.loop.tables.alarms import Alarm
+from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.machines import Machine
+from app.loop.tables.readings import Stream
+from app.loop.tables.tools import Tool
+from app.views.search.doors import doors
+from app.views.search.parts import part_path
+from app.web.fields import LARGEST_ID, LARGEST_SERIAL
+from app.web.states import word_of
+
+Kind = Literal["machine", "characteristic", "tool", "alarm", "report", "part", "page"]
+MOST_OF_A_KIND = 6
+ACTIVE_ALARMS = 500  # that are looked through by their kind
+_AFTER_THE_LAST = chr(0x10FFFF)
+
+# The names of parts in the order of their bytes, one step of the index each, however many readings a part has.
+_PARTS = text("""
+WITH RECURSIVE named AS (
+    (SELECT part FROM reading WHERE part ~>=~ :low AND part ~<~ :high ORDER BY part USING ~<~ LIMIT 1)
+    UNION ALL
+    SELECT (SELECT part FROM reading WHERE part ~>~ named.part AND part ~<~ :high ORDER BY part USING ~<~ LIMIT 1)
+    FROM named WHERE named.part IS NOT NULL
+)
+SELECT part FROM named WHERE part IS NOT NULL LIMIT :most
+""")
+
+
+class Hit(NamedTuple):
+    """Something that bears the name. key: what programs call it; path: its page."""
+
+    kind: Kind
+    key: str
+    title: str
+    path: str
+
+
+def hits(session: Session, term: str, caller: Caller) -> list[Hit]:
+    """Everything whose name holds the term, of each kind the best few; none of an empty term."""
+    term = term.strip()
+    if not term:
+        return []
+    searched = (_machines, _characteristics, _tools, _alarms, _parts)
+    return [hit for search in searched for hit in search(session, term)] + list(_pages(term, caller))
+
+
+def _best(term: str, *names: ColumnElement[str]) -> tuple[ColumnElement[bool], ColumnElement[int]]:
+    """The condition that one of the names holds the term, and the rank: exact, at the beginning, anywhere."""
+    lower = [func.lower(name) for name in names]
+    rank = case(
+        (or_(*(name == term.lower() for name in lower)), 0),
+        (or_(*(name.startswith(term.lower(), autoescape=True) for name in lower)), 1),
+        else_=2,
+    )
+    return or_(*(name.icontains(term, autoescape=True) for name in names)), rank
+
+
+def _machines(session: Session, term: str) -> Iterator[Hit]:
+    named, rank = _best(term, Machine.key, Machine.name)  # type: ignore[arg-type]
+    query = select(Machine.key, Machine.name).where(named).order_by(rank, Machine.key).limit(MOST_OF_A_KIND)
+    for key, name in session.execute(query):
+        yield Hit("machine", key, name, f"/machines/{key}")
+
+
+def _characteristics(session: Session, term: str) -> Iterator[Hit]:
+    names = (Characteristic.key, Characteristic.name, func.coalesce(Characteristic.part, ""))
+    named, rank = _best(term, *names)  # type: ignore[arg-type]
+    report = _("Report").lower()
+    wanted = term.lower().removeprefix(report).strip() if term.lower().startswith(report) else None
+    if wanted:
+        named, rank = _best(wanted, *names)  # type: ignore[arg-type]
+    query = (
+        select(Characteristic.key, Characteristic.name, Machine.name)
+        .join(Machine, Machine.id == Characteristic.machine_id)
+        .where(named)
+        .order_by(rank, Characteristic.key)
+        .limit(MOST_OF_A_KIND)
+    )
+    for key, name, machine in session.execute(query):
+        if wanted:
+            yield Hit("report", key, _("Report: {name}").format(name=name), f"/characteristics/{key}/report")
+        else:
+            yield Hit("characteristic", key, f"{name} ({key}), {machine}", f"/characteristics/{key}")
+
+
+def _tools(session: Session, term: str) -> Iterator[Hit]:
+    """Tools by number (*T3*, *tool 3*), as far as a characteristic corrects them, and by name."""
+    number = _number(term, "t", _("tool"), most=LARGEST_SERIAL)
+    query: Select[str, str, int, str | None] = (
+        select(Machine.key, Machine.name, Tool.number, Tool.name)
+        .join(Machine, Machine.id == Tool.machine_id)
+        .order_by(Machine.key, Tool.number)
+        .limit(MOST_OF_A_KIND)
+    )
+    used = select(Stream.tool_memory).where(Stream.machine_id == Tool.machine_id, Stream.tool_memory == Tool.number)
+    named = Tool.name.icontains(term, autoescape=True)
+    condition = named if number is None else or_(named, (Tool.number == number) & used.exists())
+    for key, machine, tool, name in session.execute(query.where(condition)):
+        title = _("Tool {number}").format(number=tool) + (f" {name}" if name else "") + f", {machine}"
+        yield Hit("tool", f"{key}/{tool}", title, f"/machines/{key}/tools?tool={tool}#tool")
+
+
+def _alarms(session: Session, term: str) -> Iterator[Hit]:
+    """Any alarm by its number; the active ones by their kind."""
+    query = select(Alarm.id, Alarm.kind, Machine.name).join(Machine, Machine.id == Alarm.machine_id)
+    number = _number(term, "#", _("alarm"), most=LARGEST_ID)
+    if number is not None:
+        found = session.execute(query.where(Alarm.id == number)).all()
+    else:
+        active = query.where(Alarm.acknowledged_at.is_(None)).order_by(Alarm.id.desc()).limit(ACTIVE_ALARMS)
+        found = [row for row in session.execute(active) if term.lower() in word_of(row.kind).lower()]
+    for alarm, kind, machine in found[:MOST_OF_A_KIND]:
+        yield Hit("alarm", str(alarm), f"{alarm} {word_of(kind)}, {machine}", f"/alarms/{alarm}")
+
+
+def _number(term: str, *signs: str, most: int) -> int | None:
+    """The number in *3*, *T3*, *tool 3*."""
+    rest = term.lower()
+    for sign in sorted(signs, key=len, reverse=True):
+        rest = rest.removeprefix(sign.lower()).strip()
+    return int(rest) if rest.isascii() and rest.isdecimal() and len(rest) < 20 and int(rest) <= most else None
+
+
+def _parts(session: Session, term: str) -> Iterator[Hit]:
+    """Parts whose name begins so, in the letters as typed, in capitals or in small letters."""
+    names: list[str] = []
+    for beginning in dict.fromkeys((term, term.upper(), term.lower())):
+        span = {"low": beginning, "high": beginning + _AFTER_THE_LAST, "most": MOST_OF_A_KIND}
+        names += session.scalars(_PARTS, span)
+    for part in list(dict.fromkeys(names))[:MOST_OF_A_KIND]:
+        yield Hit("part", part, part, part_path(part))
+
+
+def _pages(term: str, caller: Caller) -> Iterator[Hit]:
+    lower = term.lower()
+    found = [door for door in doors() if caller.may(door.role) and lower in f"{door.title}, {door.words}".lower()]
+    for door in sorted(found, key=lambda door: lower not in door.title.lower())[:MOST_OF_A_KIND]:
+        yield Hit("page", door.path, door.title, door.path)

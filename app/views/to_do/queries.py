@@ -1,0 +1,173 @@
+"""Everything that waits for a person: active alarms, corrections to decide about, open proposals, background jobs that fail. Never writes.
+
+A held correction is part of the alarm that holds it and counts only where none does. A calibration that is overdue and a
+fixture that has shifted are alarms. The count is the same for everybody, whatever their role.
+"""
+
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Literal, NamedTuple
+
+from sqlalchemy import ColumnElement, Select, any_, func, select
+from sqlalchemy.orm import Session
+
+from app.access.callers import Caller, Role
+from app.jobs.tables import JobFailure
+from app.jobs.wording import job_word
+from app.language.i18n import _
+from app.language.numbers import um
+from app.loop.alarm_response import queries as alarms
+from app.loop.alarm_response import wording
+from app.loop.alarms.reading_kinds import HOLDING
+from app.loop.tables.alarms import Alarm
+from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.machines import Machine
+from app.loop.tables.readings import Reading
+from app.loop.tables.tools import Correction
+from app.quality.what_if.proposals import proposals
+from app.quality.what_if.tables import ParameterProposal
+from app.web.states import word_of
+
+Kind = Literal["alarm", "correction", "proposal", "job"]
+MOST = 200  # of each kind, on one page
+
+
+class Task(NamedTuple):
+    """One thing that waits. state: for its badge; about: what it is about; role: whoever has it, or a higher one, may do it."""
+
+    kind: Kind
+    state: str
+    word: str
+    machine: Machine | None
+    about: str
+    sentence: str
+    since: datetime
+    action: str
+    path: str
+    role: Role
+
+
+def _held_alone() -> ColumnElement[bool]:
+    """A held correction that no active alarm holds."""
+    holding = (
+        select(Alarm.id)
+        .join(Reading, (Reading.machine_id == Alarm.machine_id) & (Alarm.id == any_(Reading.alarms)))
+        .where(
+            Alarm.machine_id == Correction.machine_id,
+            Alarm.kind.in_(HOLDING),
+            Alarm.acknowledged_at.is_(None),
+            Reading.characteristic_id == Correction.characteristic_id,
+            Reading.sequence == Correction.sequence,
+        )
+    )
+    return (Correction.status == "held") & ~holding.exists()
+
+
+_TO_DECIDE = (Correction.status == "awaiting_approval") | _held_alone()
+COUNT: Select[int] = select(
+    alarms.ACTIVE_COUNT.scalar_subquery()
+    + select(func.count()).select_from(Correction).where(_TO_DECIDE).scalar_subquery()
+    + select(func.count()).where(ParameterProposal.status == "open").scalar_subquery()
+    + select(func.count()).select_from(JobFailure).scalar_subquery()
+)
+
+
+def count(session: Session) -> int:
+    """Number of things that wait for a person, in the whole plant."""
+    return session.scalar(COUNT) or 0
+
+
+def tasks(session: Session, machine: Machine | None = None, caller: Caller | None = None) -> list[Task]:
+    """All that waits, alarms first, each kind with the oldest first: at one machine, or what one person's role may do."""
+    found = [*_alarms(session, machine), *_corrections(session, machine), *_proposals(session, machine)]
+    if machine is None:
+        found += _jobs(session)
+    return [task for task in found if caller is None or caller.may(task.role)]
+
+
+def _alarms(session: Session, machine: Machine | None) -> Iterator[Task]:
+    rows = alarms.alarms(session, state="active", machine_id=machine.id if machine else None, limit=MOST)
+    for row in rows:
+        alarm = row.alarm
+        about = row.characteristic.name if row.characteristic else ""
+        if not about and alarm.tool_memory:
+            about = _("Tool {number}").format(number=alarm.tool_memory)
+        yield Task(
+            "alarm",
+            alarm.kind,
+            wording.kind_word(alarm.kind),
+            row.machine,
+            about,
+            wording.sentence(alarm),
+            alarm.raised_at,
+            _("Acknowledge"),
+            f"/alarms/{alarm.id}",
+            "operator",
+        )
+
+
+def _corrections(session: Session, machine: Machine | None) -> Iterator[Task]:
+    query = (
+        select(Correction, Machine, Characteristic.name)
+        .join(Machine, Machine.id == Correction.machine_id)
+        .join(
+            Characteristic,
+            (Characteristic.machine_id == Correction.machine_id) & (Characteristic.id == Correction.characteristic_id),
+        )
+        .where(_TO_DECIDE)
+        .order_by(Correction.created_at)
+        .limit(MOST)
+    )
+    if machine is not None:
+        query = query.where(Correction.machine_id == machine.id)
+    for correction, at, name in session.execute(query):
+        yield Task(
+            "correction",
+            correction.status,
+            word_of(correction.status),
+            at,
+            name,
+            _("Tool {number}: correction of {amount}").format(
+                number=correction.tool_memory, amount=um(correction.amount)
+            ),
+            correction.created_at,
+            _("Decide"),
+            f"/corrections?machine={at.key}",
+            "operator",
+        )
+
+
+def _proposals(session: Session, machine: Machine | None) -> Iterator[Task]:
+    for status in ("open", "outdated"):  # an outdated one is open still: somebody rejects it
+        rows = proposals(session, machine_id=machine.id if machine else None, status=status, limit=MOST)
+        for row in reversed(rows):
+            yield Task(
+                "proposal",
+                "awaiting_approval",
+                _("Proposal") if status == "open" else _("Outdated proposal"),
+                row.machine,
+                row.characteristic.name,
+                _("{who} proposes other parameters: {why}").format(
+                    who=row.proposal.proposed_by, why=row.proposal.reason
+                ),
+                row.proposal.proposed_at,
+                _("Decide"),
+                f"/proposals/{row.proposal.id}",
+                "engineer",
+            )
+
+
+def _jobs(session: Session) -> Iterator[Task]:
+    for failure in session.scalars(select(JobFailure).order_by(JobFailure.first_at).limit(MOST)):
+        yield Task(
+            "job",
+            "probe_fault",
+            _("Background job fails"),
+            None,
+            job_word(failure.job),
+            f"{failure.subject}: {failure.error}" if failure.subject else failure.error,
+            failure.first_at,
+            _("Look"),
+            "/setup/jobs",
+            "engineer",
+        )

@@ -1,0 +1,111 @@
+"""One search for all that has a name, over REST, as a page, and with suggestions in the browser."""
+
+import re
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.conftest import Server
+from tests.shop import Person, Shop
+
+ODD = "../7 ?&#%<b> ö"
+
+
+@pytest.fixture(scope="module")
+def shop(server: Server) -> Shop:
+    shop = Shop(server)
+    shop.add(f"{shop.characteristic}-b", tool_memory=0, average_memory=0)
+    for part in ("Serial-0001", "Serial-0002", ODD):
+        shop.read(6.0, part=part)
+        shop.read(0.0, f"{shop.characteristic}-b", part=part)
+    shop.read(350.0)
+    return shop
+
+
+def found(shop: Shop, q: str, client: Any = None) -> list[tuple[str, str]]:
+    answer = (client or shop.admin).get("/api/v1/search", params={"q": q})
+    assert answer.status_code == 200, answer.text
+    return [(item["kind"], item["key"]) for item in answer.json()["items"]]
+
+
+def test_by_name_key_number_and_beginning(shop: Shop) -> None:
+    alarm = str(shop.alarms()[0]["id"])
+    assert found(shop, shop.machine.upper())[0] == ("machine", shop.machine)
+    assert found(shop, shop.characteristic)[:2] == [
+        ("characteristic", shop.characteristic),
+        ("characteristic", f"{shop.characteristic}-b"),
+    ]
+    assert ("report", shop.characteristic) in found(shop, f"report {shop.characteristic}")
+    assert ("tool", f"{shop.machine}/3") in found(shop, "T3")
+    assert ("tool", f"{shop.machine}/3") in found(shop, "tool 3")
+    assert ("alarm", alarm) in found(shop, alarm)
+    assert ("alarm", alarm) in found(shop, "worn")
+    assert ("part", "Serial-0001") not in found(shop, "erial"), "parts are found by the beginning of their name"
+    assert found(shop, "Serial-0") == [("part", "Serial-0001"), ("part", "Serial-0002")]
+    assert found(shop, ODD) == [("part", ODD)]
+    assert found(shop, "cpk") == [("page", "/overview")]
+    assert found(shop, "probe calibration") == [("page", "/calibration")]
+    assert found(shop, "%") == [("page", "/gauges")], "%GRR, and no wildcard"
+    for nothing in ("_", "zzzz", "9" * 60):
+        assert found(shop, nothing) == []
+
+
+def test_rights(shop: Shop, server: Server) -> None:
+    assert ("page", "/setup/people") in found(shop, "people")
+    assert found(shop, "people", server.client(server.key("viewer"))) == []
+    assert shop.machine_client.get("/api/v1/search?q=a").status_code == 403
+    assert shop.admin.get("/api/v1/search").status_code == 422
+    assert shop.admin.get("/api/v1/search?q=a%00").status_code == 422
+
+
+def test_the_page_of_a_part(shop: Shop, viewer: Person) -> None:
+    (item,) = shop.call("GET", "/search?q=Serial-0001")["items"]
+    text = viewer.open(item["path"])
+    readings = re.findall(r'class="row-name" href="(/characteristics/[^"]+/readings/\d+)"', text)
+    assert readings == [f"/characteristics/{shop.characteristic}{b}/readings/1" for b in ("-b", "")]
+    assert "Pending" in text or "Superseded" in text, "the page says what became of the correction"
+    for path in readings:
+        viewer.open(path)
+    answer = shop.admin.get("/api/v1/search", params={"q": ODD})
+    assert "Nothing was measured" not in viewer.open(answer.json()["items"][0]["path"])
+    assert viewer.open("/parts/Serial-0001") == text or "Serial-0001" in viewer.open("/parts/Serial-0001")
+    assert "Nothing was measured" in viewer.open("/parts?part=serial-0001")
+    viewer.open("/parts?part=" + "x" * 129, 422)
+
+
+def test_the_page_of_results_works_without_script(shop: Shop, viewer: Person) -> None:
+    text = viewer.open(f"/search?q={shop.machine}")
+    assert f'href="/machines/{shop.machine}"' in text
+    assert 'action="/search"' in text
+    assert "Nothing is called that" in viewer.open("/search?q=zzzz")
+
+
+@pytest.mark.browser
+def test_by_keyboard(shop: Shop, viewer: Person, page: Page) -> None:
+    viewer.sign_in(page)
+    page.goto("/overview")
+    field = page.get_by_role("combobox", name="Search")
+    page.keyboard.press("/")
+    expect(field).to_be_focused()
+    page.keyboard.type("Serial-0")
+    options = page.get_by_role("option")
+    expect(options).to_have_count(2)
+    page.keyboard.press("Escape")
+    expect(options).to_have_count(0)
+    expect(field).to_be_focused()
+    page.keyboard.press("Escape")
+    expect(field).not_to_be_focused()
+    page.keyboard.press("/")
+    expect(options).to_have_count(2)
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    expect(options.nth(1)).to_have_attribute("aria-selected", "true")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("heading", name="Part Serial-0002")).to_be_visible()
+    page.keyboard.press("/")
+    page.keyboard.type(shop.machine)
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/search?q=*")
+    page.get_by_role("link", name=re.compile("^Lathe")).first.click()
+    page.wait_for_url(f"**/machines/{shop.machine}")
