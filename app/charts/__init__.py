@@ -27,6 +27,7 @@ from app.charts.description import (
     band,
     empty,
     nothing,
+    reading_axis,
     time_axis,
 )
 from app.charts.palette import BANDS, PALETTES, Colour, Faded, Role, ThemeName
@@ -61,6 +62,7 @@ __all__ = [
     "band",
     "empty",
     "nothing",
+    "reading_axis",
     "svg",
     "time_axis",
     "to_drawing",

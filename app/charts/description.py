@@ -12,6 +12,7 @@ from datetime import datetime, timedelta
 from typing import Literal
 
 from app.charts.palette import Colour
+from app.language.i18n import _
 from app.language.times import plant_zone
 
 Value = float | str | datetime | None  # None leaves a gap
@@ -248,6 +249,11 @@ def time_axis(moments: Sequence[datetime] = (), *, hidden: bool = False) -> Axis
     reach = (known[0] - half, known[-1] + half) if close else None
     zone = plant_zone().key
     return Axis(zone, "time", reach, grid=False, hidden=hidden, title_letters=12)
+
+
+def reading_axis(reach: tuple[float, float], width: int) -> Axis:
+    """An axis of the numbers of readings, in a chart so many pixels wide."""
+    return Axis(_("Reading"), reach=reach, format="d", ticks=8 if width > 900 else 5, grid=False)
 
 
 def band(

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.charts import Axis, Chart, Dots, Ground, Note, Panel, Pen, Room, Rule, Series, Share, nothing
+from app.charts import Axis, Chart, Dots, Ground, Note, Panel, Pen, Room, Rule, Series, Share, nothing, reading_axis
 from app.core.spc.rules import Signals
 from app.core.spc.shewhart import Chart as Shewhart
 from app.language.i18n import _
@@ -55,13 +55,7 @@ def control_figure(
     height = Axis(_axis(view), reach=(low, high), format=_format(view.kind, high - low), ticks=7, fixed=picks)
     return Chart(
         [Panel(marks, height)],
-        Axis(
-            _("Reading"),
-            reach=(first - edge, last + edge),
-            format="d",
-            ticks=8 if width > 900 else 5,
-            grid=False,
-        ),
+        reading_axis((first - edge, last + edge), width),
         Room(76, 20 if width < 600 or view.centre is None else 118, 44, 26),
         drag="select" if picks else "zoom",
     )

@@ -10,7 +10,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.charts import Axis, Chart, Dots, Faded, Mark, Note, Panel, Pen, Role, Room, Rule, Series, Share, band, nothing
+from app.charts import (
+    Axis,
+    Chart,
+    Dots,
+    Faded,
+    Mark,
+    Note,
+    Panel,
+    Pen,
+    Role,
+    Room,
+    Rule,
+    Series,
+    Share,
+    band,
+    nothing,
+    reading_axis,
+)
 from app.core import wear
 from app.core.wear import Fit, Forecast, Towards
 from app.language.i18n import _
@@ -103,7 +120,7 @@ def wear_figure(chart: WearChart, *, width: int = 1240) -> Chart:
     shape = "+.0f" if high - low > 8 else "+.1f"
     return Chart(
         [Panel(marks, Axis(_("Wear, µm"), reach=(low - room, high + room), format=shape, ticks=7, zero="faint"))],
-        Axis(_("Reading"), reach=shown, format="d", ticks=8 if width > 900 else 5, grid=False),
+        reading_axis(shown, width),
         Room(LEFT, right, 48, 44),
     )
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from app.charts import Axis, Chart, Dots, Panel, Pen, Room, Rule, Series
+from app.charts import Axis, Chart, Dots, Panel, Pen, Room, Rule, Series, reading_axis
 from app.language.i18n import _
 
 FAR = 3.0  # times the tolerance: what deviates further is drawn at the edge
@@ -67,18 +67,11 @@ def course_figure(chart: CourseChart, *, width: int = 1240) -> Chart:
     limits = [Rule(Pen("ink", 1.25, "dash"), sign * chart.half * 1000) for sign in (-1, 1)]
     shape = "+.0f" if high > 8 else "+.1f"
     deviations = Axis(_("Deviation, µm"), reach=(-high, high), format=shape, ticks=7, zero="faint")
-    readings = Axis(
-        _("Reading"),
-        reach=(chart.today.sequence[0] - 1, chart.today.sequence[-1] + 1),
-        format="d",
-        ticks=8 if width > 900 else 5,
-        grid=False,
-    )
     return Chart(
         [
             Panel([*limits, *above], deviations, (SPLIT + 0.06, 1)),
             Panel(below, Axis(_("Taken out, µm"), format="+.0f", ticks=4), (0, SPLIT)),
         ],
-        readings,
+        reading_axis((chart.today.sequence[0] - 1, chart.today.sequence[-1] + 1), width),
         Room(left=76, bottom=48, top=40),
     )

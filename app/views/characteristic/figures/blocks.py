@@ -44,15 +44,7 @@ def envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits) -> list[Serie
     x = [block.middle for block in blocks]
     links = [block.link for block in blocks]
     said = [
-        "<br>".join(
-            (
-                f"<b>{_('Readings {first} to {last}').format(first=block.first, last=block.last)}</b>",
-                _("largest {value}").format(value=um(block.maximum)),
-                *_mean(block),
-                _("smallest {value}").format(value=um(block.minimum)),
-            )
-        )
-        for block in blocks
+        block_words(block.first, block.last, um(block.maximum), um(block.minimum), *_mean(block)) for block in blocks
     ]
     means = [None if block.mean is None else ruler.position(block.mean) for block in blocks]
     extremes = [
@@ -88,6 +80,13 @@ def envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits) -> list[Serie
         Series(x, means, Pen("average"), meta="mean", name=_("Mean"), hover=said, links=links),
         *([marks] if extremes else []),
     ]
+
+
+def block_words(first: int, last: int, largest: str, smallest: str, *middle: str) -> str:
+    """Words of a block when it is pointed at, from the largest value downward."""
+    head = f"<b>{_('Readings {first} to {last}').format(first=first, last=last)}</b>"
+    ends = _("largest {value}").format(value=largest), _("smallest {value}").format(value=smallest)
+    return "<br>".join((head, ends[0], *middle, ends[1]))
 
 
 def _mean(block: Block) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from app.charts import Axis, Chart, Dots, Mark, Panel, Pen, Room, Series, band, empty
 from app.language.i18n import _
 from app.language.numbers import NO_BREAK_SPACE, signed
-from app.views.characteristic.figures.blocks import BETWEEN, EDGE
+from app.views.characteristic.figures.blocks import BETWEEN, EDGE, block_words
 
 SIGNED = frozenset({"taper"})  # the others are sizes without a sign
 
@@ -88,13 +88,12 @@ def _envelope(name: str, ranges: Sequence[ResultRange]) -> list[Series]:
     x = [(block.first + block.last) / 2 for block in ranges]
     links = [block.link for block in ranges]
     said = [
-        "<br>".join(
-            (
-                f"<b>{_('Readings {first} to {last}').format(first=block.first, last=block.last)}</b>",
-                _("largest {value}").format(value=worded(name, block.maximum)),
-                _("mean {value}").format(value=worded(name, block.mean)),
-                _("smallest {value}").format(value=worded(name, block.minimum)),
-            )
+        block_words(
+            block.first,
+            block.last,
+            worded(name, block.maximum),
+            worded(name, block.minimum),
+            _("mean {value}").format(value=worded(name, block.mean)),
         )
         for block in ranges
     ]
