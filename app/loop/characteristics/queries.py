@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from sqlalchemy import func, select
+from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
 
 from app.access.callers import Caller, Role
@@ -68,10 +68,13 @@ def key_is_taken(session: Session, key: str) -> bool:
 
 
 def characteristics(
-    session: Session, *, machine_id: int | None = None, after: str = "", limit: int = 1000
+    session: Session, *, machine_id: int | None = None, named: str = "", after: str = "", limit: int = 1000
 ) -> list[CurrentCharacteristic]:
-    """Characteristics by key, of one machine or of all."""
+    """Characteristics by key, of one machine or of all; `named`: those whose name, key or part holds this."""
     query = _CURRENT.where(Characteristic.key > after).order_by(Characteristic.key).limit(limit)
+    if named:
+        names = (Characteristic.name, Characteristic.key, Characteristic.part)
+        query = query.where(or_(*(name.icontains(named, autoescape=True) for name in names)))
     if machine_id is not None:
         query = query.where(Characteristic.machine_id == machine_id)
     return [CurrentCharacteristic(*row) for row in session.execute(query)]

@@ -35,11 +35,17 @@ LOOKED_BACK = 100  # readings from which a plausible jump is suggested
 
 @router.get("/setup/characteristics")
 def characteristics_page(
-    request: Request, session: SessionDep, caller: Viewer, machine: str = "", after: str = ""
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    machine: str = "",
+    after: str = "",
+    q: Annotated[str, Query(max_length=128)] = "",
 ) -> Response:
-    chosen = machines.find_machine(session, machine)
-    rows = queries.characteristics(session, machine_id=chosen.id if chosen else None, after=after, limit=ON_PAGE + 1)
-    link = partial(address, "/setup/characteristics", machine=chosen.key if chosen else None)
+    chosen, named = machines.find_machine(session, machine), q.replace("\0", "").strip()
+    only = chosen.id if chosen else None
+    rows = queries.characteristics(session, machine_id=only, named=named, after=after, limit=ON_PAGE + 1)
+    link = partial(address, "/setup/characteristics", machine=chosen.key if chosen else None, q=named or None)
     return setup_page(
         request,
         "characteristics.html",
@@ -48,6 +54,7 @@ def characteristics_page(
         part=part_of(rows, ON_PAGE, after, lambda current: current.characteristic.key, link, "after"),
         machines=machines.machines(session, limit=100_000),
         machine=chosen,
+        q=named,
         mode_words=lambda mode: parameter_form.choice("mode", mode.value),
     )
 

@@ -11,6 +11,7 @@ import "./live-status.js";
 import "./live-part.js";
 import "./alarm-signal.js";
 import "./search-box.js";
+import "./table-tools.js";
 import "./theme-switch.js";
 import "./times.js";
 import "./period-presets.js";
