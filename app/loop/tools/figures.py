@@ -67,6 +67,9 @@ def offset_figure(changes: Sequence[OffsetChange]) -> Chart:
     return Chart([Panel(marks, Axis(_("Offset, mm"), format="+.4f", ticks=6))], time_axis(), Room(left=84))
 
 
+MOST_NAMES = 4  # below the bars of lives, side by side on a phone
+
+
 @dataclass(frozen=True)
 class LifeBar:
     """One edge in the chart of lives. total: sum of its corrections, mm; ended_at is None for the present one."""
@@ -104,7 +107,7 @@ def lives_figure(
         meta="total",
         hover=[_life_text(life, um(life.total), _("corrected in all")) for life in lives],
     )
-    names = [_("now") if life.ended_at is None else local(life.ended_at).strftime("%d.%m.") for life in lives]
+    named = _named(lives)
     reach = (-0.6, max(len(lives) - 0.4, 3.4))
     sign = -1 if sum(life.total or 0.0 for life in lives) < 0 else 1
     planned = None if planned_total is None else sign * planned_total * 1000
@@ -128,9 +131,20 @@ def lives_figure(
                 (0, 0.44),
             ),
         ],
-        Axis(at=at, words=names, reach=reach, grid=False, fixed=True),
+        Axis(at=[at for at, _name in named], words=[name for _at, name in named], reach=reach, grid=False, fixed=True),
         Room(left=70, top=14, right=92, bottom=34),
     )
+
+
+def _named(lives: Sequence[LifeBar]) -> list[tuple[int, str]]:
+    """The bars that have room for their day below them: from the present one back, one of each day."""
+    apart = max(1.0, len(lives) / MOST_NAMES)
+    named: list[tuple[int, str]] = []
+    for at, life in reversed(list(enumerate(lives))):
+        name = _("now") if life.ended_at is None else local(life.ended_at).strftime("%d.%m.")
+        if not named or (named[-1][0] - at >= apart and named[-1][1] != name):
+            named.append((at, name))
+    return named[::-1]
 
 
 def _parts_lines(usual: float | None, planned: int | None) -> list[Rule]:

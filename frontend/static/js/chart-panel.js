@@ -23,6 +23,7 @@ export class ChartPanel {
 
   show(link, point) {
     this.link = link;
+    if (this.root.hidden) this.fill([this.opening(link)], null); // until more is known
     this.root.hidden = false;
     this.chart.classList.add("with-panel");
     if (READING.test(link)) this.load(link);
