@@ -12,6 +12,7 @@ import "./live-part.js";
 import "./alarm-signal.js";
 import "./search-box.js";
 import "./table-tools.js";
+import "./scroll-box.js";
 import "./theme-switch.js";
 import "./times.js";
 import "./period-presets.js";

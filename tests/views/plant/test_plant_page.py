@@ -186,3 +186,19 @@ def test_every_state_has_words() -> None:
     from app.views.characteristic.wording import state_word
 
     assert all(state_word(state) for state in CharacteristicState)
+
+
+class TestRows:
+    def test_a_row_opens_wherever_it_is_touched(self, page: Page, shop: Shop, viewer: Person) -> None:
+        shop.read(12.0)
+        viewer.sign_in(page)
+        for size in ((1280, 800), (390, 844)):
+            page.set_viewport_size({"width": size[0], "height": size[1]})
+            page.goto(f"/plant/{shop.machine}")
+            box = line(page, shop).locator(".deviation").bounding_box()
+            assert box is not None
+            page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+            page.wait_for_url(f"**/characteristics/{shop.characteristic}")
+            page.goto(f"/plant/{shop.machine}")
+            line(page, shop).locator(".alarm-link").click()
+            page.wait_for_url(f"**/alarms?machine={shop.machine}")
