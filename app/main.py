@@ -76,6 +76,8 @@ from app.settings import Settings
 from app.views.approvals import pages as queue_pages
 from app.views.characteristic import capability_pages, figures_api
 from app.views.characteristic import pages as characteristic_pages
+from app.views.compare import api as compare
+from app.views.compare import pages as compare_pages
 from app.views.overview import api as overview
 from app.views.overview import pages as overview_pages
 from app.views.plant import machine_pages
@@ -111,6 +113,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     figures_api.router,
     statistics.router,
     capability.router,
+    compare.router,
     overview.router,
     search.router,
     proof.router,
@@ -152,6 +155,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     station_pages.router,
     search_pages.router,
     to_do_pages.router,
+    compare_pages.router,
     overview_pages.router,
     characteristic_pages.router,
     control_pages.router,

@@ -11,7 +11,7 @@ Door = Literal["plant", "todo", "quality", "machines", "setup"]
 _BEHIND: dict[Door, re.Pattern[str]] = {
     "plant": re.compile(r"/|/characteristics/[^/]+(/readings/.*)?"),
     "todo": re.compile(r"/(todo|alarms|corrections|proposals)(/.*)?"),
-    "quality": re.compile(r"/(overview|characteristics|signals|gauges|reports|parts)(/.*)?"),
+    "quality": re.compile(r"/(overview|compare|characteristics|signals|gauges|reports|parts)(/.*)?"),
     "machines": re.compile(
         r"/(machines|plant|tools|calibration|work-zeros|alignments|forms|kinematics)(/.*)?|/setup/machines/(?!new$)[^/]+(/.*)?"
     ),

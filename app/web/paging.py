@@ -9,13 +9,13 @@ Row = TypeVar("Row")
 
 
 def address(path: str, **query: Any) -> str:
-    """A path with those of the query that are given.
+    """A path with those of the query that are given; a list is said again and again.
 
-    >>> address("/alarms", machine="lathe-1", before=None)
-    '/alarms?machine=lathe-1'
+    >>> address("/alarms", machine="lathe-1", before=None), address("/compare", of=["d35", "d40"])
+    ('/alarms?machine=lathe-1', '/compare?of=d35&of=d40')
     """
     given = {name: value for name, value in query.items() if value is not None}
-    return f"{path}?{urlencode(given)}" if given else path
+    return f"{path}?{urlencode(given, doseq=True)}" if given else path
 
 
 @dataclass(frozen=True)

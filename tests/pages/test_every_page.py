@@ -177,6 +177,7 @@ PAGES = {
     "/account": ["/account"],
     "/import": ["/import"],
     "/api/docs": ["/api/docs"],
+    "/compare": ["/compare", "/compare?of={characteristic}&by=version"],
     "/proof": ["/proof"],
 }
 SIGNED_OUT = {"/sign-in", "/invitation/{token}"}

@@ -1,0 +1,86 @@
+"""Page: compared characteristics, versions, tools and periods."""
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from app.access.deps import require
+from app.errors import InbandError
+from app.language.i18n import _
+from app.loop.characteristics import queries as characteristics
+from app.quality.capability import wording as capability
+from app.views.compare.chart import row_of
+from app.views.compare.series import MOST, By, compared
+from app.web.choice import ChosenOnPage
+from app.web.deps import SessionDep
+from app.web.paging import address
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False, dependencies=[require("viewer")])
+
+
+@router.get("/compare")
+def compare_page(
+    request: Request,
+    session: SessionDep,
+    choice: ChosenOnPage,
+    of: Annotated[list[str] | None, Query(max_length=12)] = None,
+    by: By = By.CHARACTERISTIC,
+    overlaid: bool = False,
+    of_tolerance: bool = False,
+    own_scale: bool = False,
+) -> Response:
+    """Choose what to compare, see it on one scale, with the statistics of each."""
+    keys = list(dict.fromkeys(of or []))
+    problem: InbandError | None = None
+    rows = []
+    try:
+        rows = [row_of(session, each) for each in compared(session, keys, by, choice)]
+    except InbandError as error:
+        problem = error
+    how = {"by": by.value, "overlaid": overlaid, "of_tolerance": of_tolerance, "own_scale": own_scale}
+    said = {name: "true" if value is True else value for name, value in how.items() if value}
+    spans = {
+        "last": None if choice.last is None else str(choice.last),
+        "first": choice.first,
+        "through": choice.through,
+        "from": choice.start.isoformat() if choice.start else None,
+        "to": choice.end.isoformat() if choice.end else None,
+    }
+    period = {name: value for name, value in spans.items() if value is not None} or {"last": "all"}
+
+    def link(**changes: object) -> str:
+        """This page with something else chosen; None takes a choice away."""
+        moved = {"last", "from", "to", "first", "through"} & set(changes)
+        kept = {} if moved else period
+        return _address("/compare", keys, {**said, **kept, **changes})
+
+    return page(
+        request,
+        "compare/compare.html",
+        status=problem.status if problem else 200,
+        problem=problem,
+        rows=rows,
+        keys=keys,
+        by=by.value,
+        bys=[
+            (By.CHARACTERISTIC.value, _("Characteristics")),
+            (By.VERSION.value, _("Versions of the parameters")),
+            (By.TOOL.value, _("Tools")),
+            (By.PERIOD.value, _("This period and the one before")),
+        ],
+        how=how,
+        kept={**said, "of": keys},
+        choice=choice,
+        chart_url=_address("/api/v1/compare/figure", keys, {**said, **period}),
+        link=link,
+        known=characteristics.characteristics(session, limit=100_000),
+        most=MOST,
+        capability=capability,
+    )
+
+
+def _address(path: str, keys: list[str], query: Mapping[str, object]) -> str:
+    """A path with the keys, each as `of`, and what else is said."""
+    return address(path, of=keys, **query)

@@ -1,0 +1,54 @@
+"""Compared series: over the API and on the page."""
+
+from html import unescape
+from typing import Any
+
+import pytest
+
+from tests.shop import Shop
+from tests.views.set_up.test_setup_pages import PASSWORD, Browser
+
+
+@pytest.fixture(scope="module")
+def shop(server: Any) -> Shop:
+    """Two characteristics; of the first three readings by version 1, a tool change, and two by version 2."""
+    shop = Shop(server)
+    shop.add(f"{shop.characteristic}-b", target=20.0, tolerance_width=0.032)
+    for deviation in (1.0, 2.0, 3.0):
+        shop.read(deviation)
+    shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0, reason="new insert")
+    shop.call("PATCH", f"/characteristics/{shop.characteristic}", parameters={"R33": 0.002}, reason="quieter probe")
+    for deviation in (-1.0, -2.0):
+        shop.read(deviation)
+    shop.call("POST", "/readings", 201, characteristic=f"{shop.characteristic}-b", measured=20.008)
+    server.person("Vera", "viewer", PASSWORD)
+    return shop
+
+
+def series(shop: Shop, query: str) -> list[list[float]]:
+    figure = shop.call("GET", f"/compare/figure?{query}")
+    return [[round(y, 3) for y in trace["y"]] for trace in figure["data"] if trace.get("meta") == "readings"]
+
+
+def test_characteristics_versions_tools_and_periods(shop: Shop) -> None:
+    one, two = shop.characteristic, f"{shop.characteristic}-b"
+    assert series(shop, f"of={one}&of={two}") == [[1, 2, 3, -1, -2], [8]]
+    assert series(shop, f"of={one}&of={two}&of_tolerance=true")[1] == [50], "of half the tolerance, 16 µm"
+    assert series(shop, f"of={one}&by=version") == [[1, 2, 3], [-1, -2]]
+    assert series(shop, f"of={one}&by=tool") == [[1, 2, 3], [-1, -2]]
+    assert series(shop, f"of={one}&by=period&last=2") == [[2, 3], [-1, -2]]
+    figure = shop.call("GET", f"/compare/figure?of={one}&of={two}")["layout"]
+    assert figure["yaxis"]["range"] == figure["yaxis2"]["range"], "one scale"
+    shop.call("GET", "/compare/figure?of=nobody", 404)
+    shop.call("GET", f"/compare/figure?of={one}&by=size", 422)
+
+
+def test_the_statistics_of_each_stand_below(server: Any, shop: Shop) -> None:
+    viewer = Browser(server, "Vera")
+    text = unescape(viewer.get(f"/compare?of={shop.characteristic}&by=version"))
+    assert f"Seat {shop.characteristic}, version 1" in text
+    assert f"characteristics/{shop.characteristic}?first=4&through=5" in text
+    assert "+2.00" in text  # the mean of version 1, µm
+    assert "−1.50" in text  # of version 2
+    assert "nobody" in viewer.get("/compare?of=nobody", 404)
+    assert "Nothing to compare yet" in viewer.get("/compare")
