@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import httpx
@@ -394,7 +395,13 @@ def complaints() -> list[str]:
 
 
 @pytest.fixture
-def page(browser: Browser, server: Server, complaints: list[str]) -> Iterator[Page]:
+def screen() -> dict[str, Any]:
+    """What a page is seen on, as the browser's context names it; a class of tests may have another one."""
+    return {"viewport": {"width": 1280, "height": 800}}
+
+
+@pytest.fixture
+def page(browser: Browser, server: Server, complaints: list[str], screen: dict[str, Any]) -> Iterator[Page]:
     """A page of the server; console errors and requests to any other host fail the test."""
     host = urlsplit(server.url).netloc
 
@@ -403,7 +410,7 @@ def page(browser: Browser, server: Server, complaints: list[str]) -> Iterator[Pa
         if parts.scheme not in {"data", "blob", "about"} and parts.netloc != host:
             complaints.append(f"request to a foreign host: {request.url}")
 
-    context = browser.new_context(base_url=server.url, viewport={"width": 1280, "height": 800}, locale="en-GB")
+    context = browser.new_context(base_url=server.url, locale="en-GB", **screen)
     context.on("request", look)
     opened = context.new_page()
     opened.set_default_timeout(15_000)

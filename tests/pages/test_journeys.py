@@ -1,0 +1,207 @@
+"""What people come for most often, done as they do it, and the number of touches, clicks and keys that it takes.
+
+Everybody begins at the plant page, signed in. Who stands at a machine has fingers, who sits at a desk a mouse and keys.
+"""
+
+from datetime import UTC, datetime, timedelta
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from tests.conftest import Server
+from tests.shop import Person, Shop
+
+PART = "SN-2041"  # the part of the last reading
+PLACE_OF_LAST = """(chart) => {
+  const plot = chart.querySelector(".plot"), box = plot.getBoundingClientRect(), { xaxis, yaxis } = plot._fullLayout;
+  const { x, y } = plot.data.find((trace) => trace.meta === "readings");
+  return [box.x + xaxis._offset + xaxis.d2p(x.at(-1)), box.y + yaxis._offset + yaxis.d2p(y.at(-1))];
+}"""  # in pixels of the screen
+
+
+class Hands:
+    """The hands of somebody at a page. Each touch, each click, each key and each text typed into a field counts one."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.count = 0
+
+    def tap(self, what: Locator) -> None:
+        self.count += 1
+        what.tap()
+
+    def tap_at(self, x: float, y: float) -> None:
+        self.count += 1
+        self.page.touchscreen.tap(x, y)
+
+    def click(self, what: Locator) -> None:
+        self.count += 1
+        what.click()
+
+    def press(self, key: str) -> None:
+        self.count += 1
+        self.page.keyboard.press(key)
+
+    def type(self, text: str, field: Locator | None = None) -> None:
+        """Into a field in place of what it holds; without one, where the cursor is."""
+        self.count += 1
+        if field is not None:
+            field.fill(text)
+        else:
+            self.page.keyboard.type(text)
+
+
+@pytest.fixture(scope="module")
+def shop(server: Server) -> Shop:
+    """A characteristic with readings of last week, of yesterday and of now, the last one corrected; one correction that
+    waits for approval, and one alarm, each on a tool of its own."""
+    made = Shop(server)
+    noon = datetime.now(UTC).replace(hour=12)
+    readings = [
+        {
+            "characteristic": made.characteristic,
+            "measured": 40 + (n % 5 - 2) / 5000,
+            "measured_at": (noon - timedelta(days=before) + timedelta(seconds=n)).isoformat(),
+        }
+        for before in (8, 7, 1)
+        for n in range(40)
+    ]
+    assert made.admin.post("/api/v1/readings/batch", json=readings).status_code == 201
+    made.read(6.1, part=PART)
+    made.add(f"{made.characteristic}-approval", tool_memory=4, average_memory=6, mode="approval")
+    made.read(6.0, f"{made.characteristic}-approval")
+    made.add(f"{made.characteristic}-oversize", tool_memory=7, average_memory=8)
+    made.read(12.5, f"{made.characteristic}-oversize")
+    return made
+
+
+def at_the_plant(page: Page, person: Person) -> Hands:
+    person.sign_in(page)
+    page.goto("/")
+    expect(page.locator("live-status")).to_have_attribute("state", "live")
+    return Hands(page)
+
+
+def line(page: Page, shop: Shop, more: str = "") -> Locator:
+    """The line of a characteristic on the plant page."""
+    return page.locator(f"[id='c-{shop.characteristic}{more}']")
+
+
+def name(page: Page, shop: Shop) -> Locator:
+    return line(page, shop).get_by_role("link", name=f"Seat {shop.characteristic}", exact=True)
+
+
+class TestByTouch:
+    """An operator with a tablet of ten inches, held upright."""
+
+    @pytest.fixture
+    def screen(self) -> dict[str, Any]:
+        return {"viewport": {"width": 800, "height": 1280}, "has_touch": True}
+
+    def test_acknowledge_an_alarm(self, page: Page, shop: Shop, operator: Person) -> None:
+        hands = at_the_plant(page, operator)
+        hands.tap(line(page, shop, "-oversize").get_by_role("link", name="1 alarm"))
+        hands.tap(page.get_by_role("link", name="Noted"))
+        hands.tap(page.get_by_role("dialog").get_by_role("button", name="Noted"))
+        expect(page.get_by_role("status").filter(has_text="Oversize")).to_contain_text("Noted")
+        assert shop.alarms() == []
+        assert hands.count == 3
+
+    def test_approve_a_correction(self, page: Page, shop: Shop, operator: Person) -> None:
+        hands = at_the_plant(page, operator)
+        hands.tap(line(page, shop, "-approval").get_by_role("link", name="−6.0 µm awaiting approval"))
+        hands.tap(page.get_by_role("link", name="Approve"))
+        dialog = page.get_by_role("dialog")
+        hands.tap(dialog.get_by_role("radio", name="As expected"))
+        hands.tap(dialog.get_by_role("button", name="Approve"))
+        expect(page.get_by_role("status").filter(has_text="approved")).to_be_visible()
+        assert hands.count == 4
+
+    def test_report_a_tool_change(self, page: Page, shop: Shop, operator: Person) -> None:
+        hands = at_the_plant(page, operator)
+        hands.tap(line(page, shop).get_by_role("link", name="T3"))
+        hands.tap(page.get_by_role("link", name="Tool changed"))
+        dialog = page.get_by_role("dialog")
+        hands.tap(dialog.locator(".chip").first)
+        hands.tap(dialog.get_by_role("button", name="Tool changed"))
+        expect(page.locator("main")).to_contain_text("starts a new life")
+        assert hands.count == 4
+
+    def test_why_was_it_corrected_last(self, page: Page, shop: Shop, operator: Person) -> None:
+        hands = at_the_plant(page, operator)
+        hands.tap(name(page, shop))
+        chart = page.locator("plotly-chart.zones")
+        expect(chart).to_have_attribute("tabindex", "0")
+        chart.scroll_into_view_if_needed()
+        hands.tap_at(*chart.evaluate(PLACE_OF_LAST))
+        expect(chart.locator(".chart-panel")).to_contain_text("beyond the averaging limit 5.0 µm: corrected in full.")
+        assert hands.count == 2
+
+
+class TestAtTheDesk:
+    """An engineer with a mouse and a keyboard."""
+
+    def test_find_a_part(self, page: Page, shop: Shop, engineer: Person) -> None:
+        hands = at_the_plant(page, engineer)
+        hands.press("/")
+        hands.type(PART)
+        expect(page.get_by_role("option").filter(has_text=PART)).to_be_visible()
+        hands.press("ArrowDown")
+        hands.press("Enter")
+        expect(page.get_by_role("heading", level=1)).to_have_text(f"Part {PART}")
+        expect(page.locator("#of-part")).to_contain_text("corrected in full")
+        assert hands.count == 4
+
+    def test_look_at_yesterday(self, page: Page, shop: Shop, engineer: Person) -> None:
+        hands = at_the_plant(page, engineer)
+        hands.click(name(page, shop))
+        hands.click(page.locator(".period-picker summary").first)
+        hands.click(page.get_by_role("link", name="Yesterday"))
+        page.wait_for_url(lambda url: "from=" in url)
+        counted = f"/characteristics/{shop.characteristic}/statistics?{urlsplit(page.url).query}"
+        expect(page.locator("#numbers dd").first).to_have_text(str(shop.call("GET", counted)["count"]))
+        assert hands.count == 3
+
+    def test_see_the_capability(self, page: Page, shop: Shop, engineer: Person) -> None:
+        hands = at_the_plant(page, engineer)
+        hands.click(name(page, shop))
+        hands.click(page.get_by_role("link", name="Capability", exact=True))
+        expect(page.locator("#indices")).to_contain_text("Ppk")
+        assert hands.count == 2
+
+    def test_change_r33_with_a_reason(self, page: Page, shop: Shop, engineer: Person) -> None:
+        hands = at_the_plant(page, engineer)
+        hands.click(name(page, shop))
+        hands.click(page.get_by_role("link", name="Parameters in Set-up"))
+        hands.type("0.0015", page.locator("#f-zero_range"))
+        hands.type("Half as many corrections", page.get_by_label("Reason for the change"))
+        hands.click(page.get_by_role("button", name="Save"))
+        expect(page.locator("#versions")).to_contain_text("Half as many corrections")
+        assert shop.call("GET", f"/characteristics/{shop.characteristic}")["parameters"]["zero_range"] == 0.0015
+        assert hands.count == 5
+
+    def test_report_last_week_on_paper(self, page: Page, shop: Shop, engineer: Person) -> None:
+        hands = at_the_plant(page, engineer)
+        hands.click(name(page, shop))
+        hands.click(page.get_by_role("link", name="Report", exact=True))
+        hands.click(page.get_by_role("button", name="Last week"))
+        hands.click(page.get_by_role("button", name="Show"))
+        with page.expect_download() as got:
+            hands.click(page.get_by_role("link", name="PDF"))
+        assert got.value.path().read_bytes().startswith(b"%PDF-")
+        assert hands.count == 5
+
+    def test_add_a_characteristic_like_another(self, page: Page, shop: Shop, engineer: Person) -> None:
+        hands = at_the_plant(page, engineer)
+        hands.click(name(page, shop))
+        hands.click(page.get_by_role("link", name="Parameters in Set-up"))
+        hands.click(page.get_by_role("link", name="Add one like it"))
+        hands.type("Seat of the other end", page.get_by_label("Name"))
+        hands.type("other-end", page.get_by_label("Key"))
+        hands.click(page.get_by_role("button", name="Add characteristic"))
+        expect(page.get_by_role("heading", level=1)).to_have_text("Seat of the other end")
+        made = shop.call("GET", "/characteristics/other-end")
+        assert made["parameters"]["averaging_limit"] == 0.005
+        assert hands.count == 6
