@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from math import floor, isfinite
-from typing import Literal
+from typing import Any, Literal
 from zoneinfo import ZoneInfo
 
-from app.charts import Chart
 from app.language.i18n import _
 from app.language.numbers import MINUS, NO_BREAK_SPACE, NOTHING, signed
 from app.language.times import written
@@ -191,13 +190,14 @@ class Picture:
     """A chart as its page has it, drawn into `width` × `height` pixels; `says` it in words.
 
     data: makes the same in numbers; its first column lies across, every other one that holds numbers is a course of the
-    chart. Only spreadsheets ask for them: they are tens of thousands of values.
+    chart. Only spreadsheets ask for them: they are tens of thousands of values. figure: a `Chart`, untyped because msgspec
+    reads stored reports, which have no pictures, and takes no union of dataclasses as a type.
     """
 
     key: str
     title: str
     says: str
-    figure: Chart
+    figure: Any
     width: int
     height: int
     data: Callable[[], Table]
