@@ -31,8 +31,8 @@ lint: $(VENV)/installed-dev
 	@$(BIN)/djlint --lint --quiet frontend/templates > $(VENV)/djlint.txt || { cat $(VENV)/djlint.txt; exit 1; }
 	@$(BIN)/lint-imports > $(VENV)/lint-imports.txt || { cat $(VENV)/lint-imports.txt; exit 1; }
 
-bench: $(VENV)/installed-dev
-	@for each in cli single batch chart memory spc history replay; do $(BIN)/python -m bench.$$each; done
+bench: $(VENV)/installed-dev $(VENV)/browser
+	@for each in cli single batch chart memory spc history replay pages; do $(BIN)/python -m bench.$$each; done
 
 messages: $(VENV)/installed
 	@$(BIN)/pybabel -q extract -F pyproject.toml --project Inband -o frontend/locale/inband.pot .

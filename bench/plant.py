@@ -66,7 +66,7 @@ def plant(characteristics: int = 0, machine: str = "bench") -> Iterator[Plant]:
         )
         try:
             url = f"http://127.0.0.1:{port}"
-            _wait_until_ready(url, process)
+            wait_until_ready(url, process)
             database = Database(dsn, pool_size=1)
             with database.begin() as session:
                 key = actions.add_key(session, role="admin", machine=None, name="bench", actor="bench").secret
@@ -81,7 +81,8 @@ def plant(characteristics: int = 0, machine: str = "bench") -> Iterator[Plant]:
             server.stop()
 
 
-def _wait_until_ready(url: str, process: subprocess.Popen[bytes]) -> None:
+def wait_until_ready(url: str, process: subprocess.Popen[bytes]) -> None:
+    """Until it answers, at most half a minute."""
     for _attempt in range(300):
         if process.poll() is not None:
             raise SystemExit("the server ended before it was ready")
