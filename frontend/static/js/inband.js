@@ -11,12 +11,17 @@ import "./live-status.js";
 import "./live-part.js";
 import "./alarm-signal.js";
 import "./search-box.js";
-import "./table-tools.js";
 import "./scroll-box.js";
 import "./theme-switch.js";
 import "./times.js";
-import "./period-presets.js";
-import "./plotly-chart.js";
+
+// What only some pages have is loaded where it stands: with the page, or with a live part that brings it.
+const SOMETIMES = [["plotly-chart", "./plotly-chart.js"], ["period-presets", "./period-presets.js"], ["table[data-sortable]", "./table-tools.js"]];
+function load() {
+  for (const [selector, module] of SOMETIMES) if (document.querySelector(selector)) import(module);
+}
+load();
+document.addEventListener("livepart", load);
 
 document.addEventListener("click", (event) => {
   const opener = event.target.closest("[data-opens]");
