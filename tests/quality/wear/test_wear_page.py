@@ -64,7 +64,7 @@ def test_in_the_browser_the_curve_is_drawn_and_goes_on(server: Server, shop: Sho
     curve.scroll_into_view_if_needed()
     expect(curve.locator(".main-svg").first).to_be_visible(timeout=30_000)
     expect(curve).to_contain_text("per part")
-    page.get_by_role("navigation", name="How many readings").last.get_by_role("link", name="All").click()
+    page.get_by_role("navigation", name="Readings of the wear curve").get_by_role("link", name="All").click()
     page.wait_for_url("**edge=all**")
     expect(page.locator("#wear")).to_contain_text("over the last 40 readings")
     shop.read(1.0)
