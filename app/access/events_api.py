@@ -1,6 +1,5 @@
 """`GET /api/v1/events`: what changes, as it changes."""
 
-from collections.abc import AsyncIterator
 from typing import Annotated
 
 from fastapi import Header, Query, Request
@@ -11,7 +10,7 @@ from app.access.new_keys import digest
 from app.web.api import api_router
 from app.web.deps import SESSION_COOKIE
 from app.web.fields import LARGEST_ID
-from app.web.live import Access, Live
+from app.web.live import Access, stream
 
 router = api_router("events")
 
@@ -42,20 +41,3 @@ async def events(
     token = request.cookies.get(SESSION_COOKIE, "")
     access = Access(digest(token) if caller.kind == "person" else None, caller.key_id, caller.role)
     return stream(request, access, caller.machine, last_event_id, after)
-
-
-def stream(
-    request: Request, access: Access, machine: str | None, last_event_id: str | None, after: int | None = None
-) -> StreamingResponse:
-    """The events of one machine, or of all, as an answer; they end with the access."""
-    live: Live = request.app.state.live
-    if last_event_id is not None and last_event_id.isascii() and last_event_id.isdigit() and len(last_event_id) < 19:
-        after = int(last_event_id)
-
-    async def frames() -> AsyncIterator[bytes]:
-        async for frame in live.stream(access, after, machine):
-            yield frame
-
-    return StreamingResponse(
-        frames(), media_type="text/event-stream", headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
-    )

@@ -76,3 +76,14 @@ def _moment(name: str, typed: str, fold: Literal[0, 1]) -> datetime | None:
 
 Chosen = Annotated[Choice, Depends(chosen)]
 ChosenOnPage = Annotated[Choice, Depends(chosen_on_page)]
+
+
+def check_order(start: datetime | None, end: datetime | None) -> None:
+    """Raises `Invalid` when from … to runs backwards."""
+    if start is not None and end is not None and start > end:
+        message = _("{start} is later than `to` {end}").format(start=start.isoformat(), end=end.isoformat())
+        raise Invalid(
+            _("`from` {message}.").format(message=message),
+            _("Exchange the two moments."),
+            errors=[FieldError("from", message)],
+        )

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import msgspec
 import psycopg
 from psycopg import AsyncConnection
+from starlette.requests import Request
+from starlette.responses import StreamingResponse
 
 from app.db.connections import Connections
 from app.db.events import CHANNEL
@@ -254,3 +256,20 @@ def _resync(number: int) -> Message:
 def _frame(kind: str, change: dict[str, Any], number: int | None) -> bytes:
     head = "" if number is None else f"id: {number}\n"
     return f"{head}event: {kind}\ndata: {msgspec.json.encode(change).decode()}\n\n".encode()
+
+
+def stream(
+    request: Request, access: Access, machine: str | None, last_event_id: str | None, after: int | None = None
+) -> StreamingResponse:
+    """The events of one machine, or of all, as an answer; they end with the access."""
+    live: Live = request.app.state.live
+    if last_event_id is not None and last_event_id.isascii() and last_event_id.isdigit() and len(last_event_id) < 19:
+        after = int(last_event_id)
+
+    async def frames() -> AsyncIterator[bytes]:
+        async for frame in live.stream(access, after, machine):
+            yield frame
+
+    return StreamingResponse(
+        frames(), media_type="text/event-stream", headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
+    )

@@ -193,24 +193,12 @@ def _with_decisions(outcomes: list[Outcome], database: Database) -> bytes:
     return msgspec.json.encode(_counts(outcomes) | {"items": items})
 
 
-def entry_for(session: SessionDep, caller: AnyCaller, characteristic: str) -> Entry:
-    """The place of a characteristic, for somebody who may look at it. Raises `NotFound`, `NotAllowed`."""
-    entry = queries.entry_of(session, characteristic)
-    if entry is None:
-        raise NotFound(
-            _("There is no characteristic %(key)s.") % {"key": characteristic},
-            _("Check the key; GET /api/v1/characteristics lists them all."),
-        )
-    caller.must_at(entry.machine_id, "viewer")
-    return entry
-
-
 @router.get("/readings/{characteristic}/{sequence}", responses=problems(404))
 def get_reading(
     session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, sequence: Sequence
 ) -> ReadingDetail:
     """One reading with its touches and the full reason."""
-    entry = entry_for(session, caller, characteristic)
+    entry = queries.entry_for(session, caller, characteristic)
     return ReadingDetail.model_validate(queries.detail(session, entry, sequence))
 
 
@@ -219,6 +207,6 @@ def exclude_reading(
     session: SessionDep, caller: Operator, characteristic: CharacteristicKey, sequence: Sequence, exclusion: ExcludeIn
 ) -> ReadingDetail:
     """Take a reading out of the statistics, never out of the record."""
-    entry = entry_for(session, caller, characteristic)
+    entry = queries.entry_for(session, caller, characteristic)
     actions.exclude(session, entry, sequence, caller.name, exclusion.reason)
     return ReadingDetail.model_validate(queries.detail(session, entry, sequence))

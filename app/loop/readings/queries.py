@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import ColumnElement, func, select, tuple_
 from sqlalchemy.orm import Session
 
+from app.access.callers import Caller
 from app.core.decision.limits import Zone
 from app.core.decision.step import Code
 from app.core.plausibility import uncorrected
@@ -309,3 +310,15 @@ def reasons(
         parameters = characteristics.parameters_of(session, machine_id, at[0], record.parameters_version)
         reasons_by_key[at] = reason(record, parameters, amounts[at])
     return reasons_by_key
+
+
+def entry_for(session: Session, caller: Caller, characteristic: str) -> Entry:
+    """The place of a characteristic, for somebody who may look at it. Raises `NotFound`, `NotAllowed`."""
+    entry = entry_of(session, characteristic)
+    if entry is None:
+        raise NotFound(
+            _("There is no characteristic %(key)s.") % {"key": characteristic},
+            _("Check the key; GET /api/v1/characteristics lists them all."),
+        )
+    caller.must_at(entry.machine_id, "viewer")
+    return entry

@@ -1,18 +1,16 @@
 """JSON route: the numbers of a run of readings."""
 
 from dataclasses import replace
-from datetime import datetime
 from typing import Annotated
 
 from fastapi import Query
 from pydantic import BaseModel, Field
 
 from app.access.deps import AnyCaller
-from app.errors import FieldError, Invalid
-from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import queries
 from app.web.api import CharacteristicKey, api_router, problems
+from app.web.choice import check_order
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, Moment, answer_from
 
@@ -85,14 +83,3 @@ def get_statistics(
         rejected_since_tool_change=of_tool.parts if of_tool else None,
         sections_outside_since_tool_change=of_tool.sections if of_tool else None,
     )
-
-
-def check_order(start: datetime | None, end: datetime | None) -> None:
-    """Raises `Invalid` when from … to runs backwards."""
-    if start is not None and end is not None and start > end:
-        message = _("{start} is later than `to` {end}").format(start=start.isoformat(), end=end.isoformat())
-        raise Invalid(
-            _("`from` {message}.").format(message=message),
-            _("Exchange the two moments."),
-            errors=[FieldError("from", message)],
-        )

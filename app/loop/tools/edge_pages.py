@@ -15,7 +15,7 @@ from app.loop.machines.queries import machine_named
 from app.loop.tools import confirmation, queries, wording
 from app.loop.tools.edge_schemas import ToolSettings
 from app.loop.tools.edges import describe_tool
-from app.loop.tools.lives import lives
+from app.loop.tools.lives_queries import lives
 from app.web.deps import FormDep, SessionDep
 from app.web.forms import by_field, length, parsed
 from app.web.templates import page

@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field
 
 from app.core.parameters import LARGEST_LENGTH, MOST_LOCATIONS
-from app.loop.tools.lives import Life, Lives
+from app.loop.tools.lives_queries import Life, Lives
 from app.web.fields import Body, Reason, Text200, answer_from
 
 

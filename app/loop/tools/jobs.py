@@ -18,7 +18,7 @@ from app.loop.tables.tools import OUTSTANDING, Correction, Tool
 from app.loop.tools import wording
 from app.loop.tools.alarm_kinds import TOOL_LIFE
 from app.loop.tools.events import alarm_raised, correction_changed
-from app.loop.tools.lives import plan_of
+from app.loop.tools.lives_queries import plan_of
 
 ACTOR = "inband"
 

@@ -6,7 +6,7 @@ from app.language.i18n import _, ngettext
 from app.language.numbers import NOTHING, age, mm, um
 from app.language.times import in_sentence
 from app.loop.tables.tools import Correction
-from app.loop.tools.lives import Life
+from app.loop.tools.lives_queries import Life
 from app.loop.tools.queries import OffsetChange
 
 # Why the system itself dropped a correction, as it is stored: the word, and what goes with it.

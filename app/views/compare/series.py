@@ -16,7 +16,7 @@ from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.loop.tables.characteristics import ParametersVersion
 from app.loop.tables.readings import Reading
-from app.loop.tools.lives import Life, lives
+from app.loop.tools.lives_queries import Life, lives
 from app.web.choice import Choice
 
 MOST = 12  # series on a page

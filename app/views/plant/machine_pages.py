@@ -3,19 +3,13 @@
 from typing import Annotated, NamedTuple
 
 from fastapi import APIRouter, Query, Request, Response
-from sqlalchemy import func, select
-from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access.deps import require
-from app.geometry.alignment.tables import Alignment
-from app.geometry.geometric_form.tables import FormMeasurement
-from app.geometry.rotary_axes.tables import KinematicsRun
-from app.geometry.work_zero.tables import WorkZero
 from app.language.i18n import _
 from app.loop.machines import queries as machines
-from app.loop.tables.machines import Machine
 from app.views.characteristic import state_queries
+from app.views.plant import geometry_queries
 from app.web.deps import SessionDep
 from app.web.paging import address, slice_of
 from app.web.templates import page
@@ -65,16 +59,11 @@ def geometry_page(request: Request, session: SessionDep, machine: str) -> Respon
         "machines/geometry.html",
         machine=chosen,
         machines=machines.machines(session),
-        kinds=_geometry(session, chosen),
+        kinds=_geometry(chosen.key, geometry_queries.results_of(session, chosen.id)),
     )
 
 
-def _geometry(session: Session, machine: Machine) -> list[Geometry]:
-    key = machine.key
-    counts = [
-        session.scalar(select(func.count()).select_from(table).where(table.machine_id == machine.id)) or 0
-        for table in (WorkZero, Alignment, FormMeasurement, KinematicsRun)
-    ]
+def _geometry(key: str, counts: list[int]) -> list[Geometry]:
     kinds = [
         (_("Work zero"), _("Origin and size from probed points; shift of each fixture."), "work-zeros?machine={}"),
         (_("Alignment"), _("Position and rotation of a part, pallet or fixture."), "alignments?machine={}"),

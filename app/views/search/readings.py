@@ -18,7 +18,7 @@ from app.language.i18n import _
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.readings import queries as readings
 from app.loop.readings.records import Entry, Record
-from app.loop.summaries.queries.window import window_of
+from app.loop.summaries.queries import window_of
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Reading
 from app.web.fields import AHEAD, LARGEST_ID, LARGEST_SERIAL

@@ -9,11 +9,11 @@ from app.core.decision.limits import Zone
 from app.core.decision.step import Action
 from app.loop.machines.queries import only_machine
 from app.loop.readings.answers import ReadingRow
-from app.loop.readings.api import entry_for
-from app.loop.summaries.api import check_order
+from app.loop.readings.queries import entry_for
 from app.views.search import readings
 from app.views.search.parts import Part
 from app.web.api import Limit, MachineFilter, api_router, problems
+from app.web.choice import check_order
 from app.web.deps import SessionDep
 from app.web.fields import Moment, Page
 

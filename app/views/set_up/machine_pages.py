@@ -13,11 +13,10 @@ from app.access.keys import add_key
 from app.core.parameters import AVERAGE_LOCATIONS, MOST_LOCATIONS, TOOL_LOCATIONS
 from app.errors import InbandError
 from app.language.i18n import _
-from app.loop.characteristics import many
+from app.loop.characteristics import many_actions
 from app.loop.characteristics import queries as characteristics
 from app.loop.machines import actions, keys, queries
 from app.loop.machines.actions import MAY_BE_NOTHING, MachineChange, MachineIn
-from app.loop.tables.machines import Machine
 from app.views.set_up.frame import setup_page
 from app.web.deps import AddressDep, FormDep, SessionDep
 from app.web.forms import by_field, length, parsed, whole
@@ -81,7 +80,7 @@ def machines_page(request: Request, session: SessionDep, caller: Viewer) -> Resp
 @router.get("/setup/machines/new")
 def new_machine_page(request: Request, session: SessionDep, caller: Engineer, like: str = "") -> Response:
     if like:
-        return _new(request, caller, _typed_like(session, queries.machine_named(session, like)), {})
+        return _new(request, caller, _typed_like(session, like), {})
     return _new(request, caller, {"control": "sinumerik", "type": "lathe"} | _usual_counts(), {})
 
 
@@ -91,8 +90,10 @@ def send_new_machine(request: Request, session: SessionDep, caller: Engineer, fo
         typed = {name: text for name, text in form.items() if name not in {"like", "characteristics"}}
         given = parsed(MachineIn, {**typed, **_counts(form)})
         if like := form.get("like"):
-            keys = many.copied_keys(form.get("characteristics", ""))
-            new_machine = many.copy_machine(session, queries.machine_named(session, like), given, keys, caller.name)
+            keys = many_actions.copied_keys(form.get("characteristics", ""))
+            new_machine = many_actions.copy_machine(
+                session, queries.machine_named(session, like), given, keys, caller.name
+            )
         else:
             new_machine = actions.add_machine(session, given, caller.name)
     except InbandError as error:
@@ -119,11 +120,14 @@ def _new(
     )
 
 
-def _typed_like(session: Session, source: Machine) -> dict[str, str]:
+def _typed_like(session: Session, like: str) -> dict[str, str]:
     """The form of a copy: the next number in its keys, which stay for good."""
-    number, key = many.next_number(source.key, [machine.key for machine in queries.machines(session, limit=100_000)])
+    source = queries.machine_named(session, like)
+    number, key = many_actions.next_number(
+        source.key, [machine.key for machine in queries.machines(session, limit=100_000)]
+    )
     there = [current.characteristic.key for current in characteristics.characteristics(session, machine_id=source.id)]
-    lines = [f"{each} = {many.key_like(each, source.key, key, number)}" for each in there]
+    lines = [f"{each} = {many_actions.key_like(each, source.key, key, number)}" for each in there]
     settings = {name: _shown(getattr(source, name)) for name in ("control", "type", *COUNTS)}
     return settings | {"key": key, "like": source.key, "characteristics": "\n".join(lines)}
 

@@ -10,8 +10,8 @@ from app.access.deps import Caller, Engineer
 from app.core.parameters import BY_NAME, FieldKind
 from app.errors import InbandError, Invalid
 from app.language.i18n import _
-from app.loop.characteristics import many, queries
-from app.loop.characteristics.many import NewValue
+from app.loop.characteristics import many_actions, queries
+from app.loop.characteristics.many_actions import NewValue
 from app.loop.characteristics.wording import explanation, label
 from app.loop.machines import queries as machines
 from app.views.set_up import parameter_form
@@ -44,7 +44,7 @@ def change(request: Request, session: SessionDep, caller: Engineer, form: FormDe
     """Make the changes that the preview showed, all of them or none."""
     try:
         versions = _versions(form.get("versions", ""))
-        number = many.change_many(session, versions, _new(form), form.get("reason", "").strip(), caller.name)
+        number = many_actions.change_many(session, versions, _new(form), form.get("reason", "").strip(), caller.name)
     except InbandError as error:
         session.expire_all()
         chosen = {key for key, _colon, _version in (pair.partition(":") for pair in form.get("versions", "").split())}
@@ -64,14 +64,16 @@ def _versions(text: str) -> dict[str, int]:
 def _new(said: Any) -> NewValue:
     """The new value as typed. Raises `Invalid` for a parameter that cannot be changed here."""
     field = BY_NAME.get(said.get("parameter", ""))
-    if field is None or field.name in many.OF_ONE:
+    if field is None or field.name in many_actions.OF_ONE:
         raise Invalid.at("parameter", _("Choose a parameter that several characteristics can have in common."))
     text = said.get("value", "").strip()
     if field.kind is FieldKind.YES_NO:
         return NewValue(field.name, text == "true")
     if field.kind is FieldKind.CHOICE:
         return NewValue(field.name, text or None)
-    return NewValue(field.name, parameter_form.number(text), said.get("unit") == "share" and field.name in many.LIMITS)
+    return NewValue(
+        field.name, parameter_form.number(text), said.get("unit") == "share" and field.name in many_actions.LIMITS
+    )
 
 
 def _page(
@@ -86,29 +88,32 @@ def _page(
 ) -> Response:
     machine = machines.find_machine(session, said.get("machine", ""))
     field = BY_NAME.get(said.get("parameter", ""))
-    if field is None or field.name in many.OF_ONE:
+    if field is None or field.name in many_actions.OF_ONE:
         field = BY_NAME["zero_range"]
     said = {"machine": "", "value": "", "unit": ""} | dict(said) | {"parameter": field.name}
     rows = queries.characteristics(session, machine_id=machine.id if machine else None, limit=MOST)
     new = _new(said)
-    plan = many.planned([row for row in rows if row.characteristic.key in chosen], new) if asked and chosen else []
+    plan = (
+        many_actions.planned([row for row in rows if row.characteristic.key in chosen], new) if asked and chosen else []
+    )
     return setup_page(
         request,
-        "many.html",
+        "many_actions.html",
         caller,
         "characteristics",
         status=problem.status if problem else 200,
         machines=[("", _("All machines")), *((each.key, each.name) for each in machines.machines(session, limit=MOST))],
         fields=[
-            (each.name, f"{each.r} {label(each.name)}" if each.r else label(each.name)) for each in many.changeable()
+            (each.name, f"{each.r} {label(each.name)}" if each.r else label(each.name))
+            for each in many_actions.changeable()
         ],
         field=field,
         help=explanation(field.name),
         input=parameter_form.inputs()[field.name],
         is_yes_no=field.kind is FieldKind.YES_NO,
-        is_limit=field.name in many.LIMITS,
+        is_limit=field.name in many_actions.LIMITS,
         said=said,
-        before=[(row, many.worded_now(row, field.name)) for row in rows],
+        before=[(row, many_actions.worded_now(row, field.name)) for row in rows],
         chosen=chosen,
         asked=asked,
         plan=plan,

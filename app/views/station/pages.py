@@ -13,7 +13,6 @@ from app.access import devices
 from app.access import queries as access
 from app.access.audit.actions import acts
 from app.access.deps import AtStation, Caller, Station
-from app.access.events_api import stream
 from app.access.identification import LONGEST_PIN, NotIdentified, Shown, identify
 from app.access.new_keys import digest
 from app.access.sign_in import sign_out
@@ -25,7 +24,6 @@ from app.loop.alarm_response.form_reader import acknowledge_as_typed
 from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.machines.queries import machine_named
-from app.loop.tables.machines import Machine
 from app.loop.tools import actions as tools
 from app.loop.tools import confirmation
 from app.loop.tools import queries as tool_queries
@@ -38,7 +36,7 @@ from app.views.station import queries
 from app.views.station.wording import next_action
 from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, from_this_site
 from app.web.forms import by_field, length, parsed, words
-from app.web.live import Access
+from app.web.live import Access, stream
 from app.web.paging import address
 from app.web.templates import page
 
@@ -110,8 +108,8 @@ def station_page(
         machine=station.machine,
         next_action=next_action(station),
         may_act=at.may_act,
-        done=_of_machine(session, station.machine, done) if done else None,
-        late=_of_machine(session, station.machine, late) if late else None,
+        done=_of_machine(session, station.machine.key, done) if done else None,
+        late=_of_machine(session, station.machine.key, late) if late else None,
         tool=confirmation.done("change", tool) if tool else None,
         now=datetime.now(UTC),
         state_word=state_word,
@@ -137,18 +135,16 @@ def ask_alarm(
 ) -> Response:
     """The second touch at an alarm. One that is acknowledged meanwhile leads back."""
     at.must_act()
-    machine_row = machine_named(session, machine)
-    row = _of_machine(session, machine_row, number)
+    row = _of_machine(session, machine, number)
     if row.alarm.acknowledged_at is not None:
         return RedirectResponse(address(f"/station/{machine}", late=number), 303)
-    return _ask_alarm(request, session, at, machine_row, row, action)
+    return _ask_alarm(request, session, at, row, action)
 
 
 def _ask_alarm(
     request: Request,
     session: Session,
     at: AtStation,
-    machine: Machine,
     row: AlarmRow,
     action: str,
     form: Mapping[str, str] = NO_FORM,
@@ -160,7 +156,7 @@ def _ask_alarm(
         request,
         "station/ask_alarm.html",
         status=error.status if error else 200,
-        machine=machine,
+        machine=row.machine,
         row=row,
         action=action,
         **_asked(session, at, form, error),
@@ -174,8 +170,7 @@ def acknowledge(
     request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep
 ) -> Response:
     """Acknowledge the alarm. Sent twice, or after somebody else, it changes nothing and says so."""
-    machine_row = machine_named(session, machine)
-    row = _of_machine(session, machine_row, number)
+    row = _of_machine(session, machine, number)
     outcome = "done"
     try:
         caller = _who(request, at, form)
@@ -185,7 +180,7 @@ def acknowledge(
         again = alarm.acknowledged_by == caller.name and alarm.action == form.get("action")
         outcome = "done" if again else "late"
     except REFUSED as error:
-        return _ask_alarm(request, session, at, machine_row, row, form.get("action", ""), form, error)
+        return _ask_alarm(request, session, at, row, form.get("action", ""), form, error)
     return RedirectResponse(address(f"/station/{machine}", **{outcome: number}), 303)
 
 
@@ -193,18 +188,19 @@ def acknowledge(
 def ask_tool(request: Request, session: SessionDep, at: Station, machine: str, number: int) -> Response:
     """The second touch of a tool change."""
     at.must_act()
-    return _ask_tool(request, session, at, machine_named(session, machine), number)
+    return _ask_tool(request, session, at, machine, number)
 
 
 def _ask_tool(
     request: Request,
     session: Session,
     at: AtStation,
-    machine: Machine,
+    key: str,
     number: int,
     form: Mapping[str, str] = NO_FORM,
     error: InbandError | None = None,
 ) -> Response:
+    machine = machine_named(session, key)
     tool_queries.tool(session, machine, number)
     (row,) = tool_queries.tools(session, machine, only=number)
     question = confirmation.about_tool(row, machine.key, "change")
@@ -229,7 +225,7 @@ def change_tool(
         change = parsed(ToolChange, {"offset": length(form.get("offset")), "reason": words(form, "reason")})
         tools.change_tool(session, machine_row, number, change.offset, change.reason, caller)
     except REFUSED as error:
-        return _ask_tool(request, session, at, machine_row, number, form, error)
+        return _ask_tool(request, session, at, machine, number, form, error)
     return RedirectResponse(address(f"/station/{machine}", tool=number), 303)
 
 
@@ -279,12 +275,12 @@ def events(
     return stream(request, granted, machine_named(session, machine).key, last_event_id)
 
 
-def _of_machine(session: Session, machine: Machine, number: int) -> AlarmRow:
+def _of_machine(session: Session, machine: str, number: int) -> AlarmRow:
     """An alarm of this machine. Raises `NotFound`."""
     row = alarms.alarm(session, number)
-    if row.machine.id != machine.id:
+    if row.machine.key != machine:
         raise NotFound(
-            _("Alarm {number} is not of machine {machine}.").format(number=number, machine=machine.key),
+            _("Alarm {number} is not of machine {machine}.").format(number=number, machine=machine),
             _("Go back to the station of the machine."),
         )
     return row

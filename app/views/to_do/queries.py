@@ -24,7 +24,7 @@ from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Reading
 from app.loop.tables.tools import Correction
-from app.quality.what_if.proposals import proposals
+from app.quality.what_if import queries as what_if
 from app.quality.what_if.tables import ParameterProposal
 from app.web.states import word_of
 
@@ -139,7 +139,7 @@ def _corrections(session: Session, machine: Machine | None) -> Iterator[Task]:
 
 def _proposals(session: Session, machine: Machine | None) -> Iterator[Task]:
     for status in ("open", "outdated"):  # an outdated one is open still: somebody rejects it
-        rows = proposals(session, machine_id=machine.id if machine else None, status=status, limit=MOST)
+        rows = what_if.proposals(session, machine_id=machine.id if machine else None, status=status, limit=MOST)
         for row in reversed(rows):
             yield Task(
                 "proposal",

@@ -14,7 +14,7 @@ from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.schemas import CharacteristicChange, CharacteristicIn
 from app.loop.machines import actions as machine_actions
 from app.loop.machines import queries as machines
-from app.loop.machines.schemas import MachineIn
+from app.loop.machines.actions import MachineIn
 from app.loop.tables.machines import Machine
 from app.web.forms import parsed
 
