@@ -73,19 +73,20 @@ class _Figure:
                 axes[f"xaxis{x[1:]}"] = self._axis(panel.x) | {"domain": list(panel.across), "anchor": y}
             for mark in panel.marks:
                 self._mark(mark, x, y)
-        if not self.data and not chart.x.hidden:  # without a point plotly would draw no axes
-            start = chart.x.reach[0] if chart.x.reach else 1
-            self.data.append(
-                {
-                    "type": "scatter",
-                    "x": [_value(start)],
-                    "y": [0],
-                    "opacity": 0,
-                    "showlegend": False,
-                    "hoverinfo": "skip",
-                }
-            )
+        if not chart.x.hidden:
+            self.data += [self._unseen(at) for at in range(len(chart.panels)) if not self._has_points(at)]
         return {"data": self.data, "layout": self._layout() | axes}
+
+    def _has_points(self, at: int) -> bool:
+        return any((trace.get("yaxis") or "y") == _name("y", at) for trace in self.data)
+
+    def _unseen(self, at: int) -> Json:
+        """A point that is not seen: in a panel without points plotly would not know where its axes are."""
+        panel = self.chart.panels[at]
+        reach = (panel.x or self.chart.x).reach
+        point: Json = {"type": "scatter", "x": [_value(reach[0]) if reach else 1], "y": [0], "opacity": 0}
+        named = {"xaxis": _name("x", at)} if panel.x else {}
+        return point | named | ({"yaxis": _name("y", at)} if at else {}) | {"showlegend": False, "hoverinfo": "skip"}
 
     def _layout(self) -> Json:
         chart, ink, surface = self.chart, self.colour("ink"), self.colour("surface")

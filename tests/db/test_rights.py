@@ -25,6 +25,7 @@ GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO {ROLE};
 """
 # Rows that move on or go away by themselves: notes made anew, plans, sessions, reports of a week, the journal of events.
 PASSING = {
+    "badge",
     "browser_session",
     "calibration_plan",
     "capability_verdict",
@@ -40,6 +41,7 @@ PASSING = {
     "report_file",
     "report_job",
     "report_part",
+    "station_device",
     "watching",
 }
 MOVING = {"average_memory", "machine_state", "stream", "tool"}  # any of their columns but the key may move

@@ -341,6 +341,7 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/setup/machines/{machine}": ("change_machine",),
     "/setup/machines/{machine}/keys": ("make_machine_key",),
     "/setup/machines/{machine}/keys/{key}/revoke": ("revoke_machine_key",),
+    "/setup/parameters": ("change_characteristic",),
     "/setup/people/invitations": ("invite_person",),
     "/setup/people/invitations/{token_hash}/withdraw": ("invite_person",),
     "/setup/people/keys": ("make_key",),
