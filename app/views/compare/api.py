@@ -7,14 +7,14 @@ from fastapi import Query, Response
 from app.access.deps import require
 from app.views.compare.chart import course_of
 from app.views.compare.figures import compare_figure
-from app.views.compare.series import By, compared
+from app.views.compare.series import SeriesBy, compared
 from app.web.api import FIGURE, Theme, api_router, chart_answer, problems
 from app.web.choice import Chosen
 from app.web.deps import SessionDep
 
 router = api_router("statistics")
 Of = Annotated[list[str], Query(max_length=12, description="Characteristics.", examples=["shaft-d40"])]
-ByQuery = Annotated[By, Query(description="What differs: characteristics, or versions, tools, periods of each.")]
+ByQuery = Annotated[SeriesBy, Query(description="What differs: characteristics, or versions, tools, periods of each.")]
 
 
 @router.get("/compare/figure", responses=problems(404) | FIGURE, response_model=None, dependencies=[require("viewer")])
@@ -22,7 +22,7 @@ def get_comparison(
     session: SessionDep,
     of: Of,
     choice: Chosen,
-    by: ByQuery = By.CHARACTERISTIC,
+    by: ByQuery = SeriesBy.CHARACTERISTIC,
     overlaid: Annotated[bool, Query(description="All in one panel, in place of one above the other.")] = False,
     of_tolerance: Annotated[bool, Query(description="As a share of half the tolerance, in place of µm.")] = False,
     own_scale: Annotated[bool, Query(description="Each panel reaches as far as its own readings.")] = False,
@@ -30,7 +30,7 @@ def get_comparison(
     width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels.")] = 1240,  # noqa: ARG001 - every chart is asked with its width
 ) -> Response:
     """Readings of several characteristics, or of several versions, tools or periods, on one scale."""
-    in_time = by is By.CHARACTERISTIC
+    in_time = by is SeriesBy.CHARACTERISTIC
     courses = [course_of(session, each, in_time=in_time) for each in compared(session, of, by, choice)]
     figure = compare_figure(courses, overlaid=overlaid, of_tolerance=of_tolerance, own_scale=own_scale)
     return chart_answer(figure, theme)

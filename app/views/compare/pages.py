@@ -11,7 +11,7 @@ from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.quality.capability import wording as capability
 from app.views.compare.chart import row_of
-from app.views.compare.series import MOST, By, compared
+from app.views.compare.series import MOST, SeriesBy, compared
 from app.web.choice import ChosenOnPage
 from app.web.deps import SessionDep
 from app.web.paging import address
@@ -26,7 +26,7 @@ def compare_page(
     session: SessionDep,
     choice: ChosenOnPage,
     of: Annotated[list[str] | None, Query(max_length=12)] = None,
-    by: By = By.CHARACTERISTIC,
+    by: SeriesBy = SeriesBy.CHARACTERISTIC,
     overlaid: bool = False,
     of_tolerance: bool = False,
     own_scale: bool = False,
@@ -65,10 +65,10 @@ def compare_page(
         keys=keys,
         by=by.value,
         bys=[
-            (By.CHARACTERISTIC.value, _("Characteristics")),
-            (By.VERSION.value, _("Versions of the parameters")),
-            (By.TOOL.value, _("Tools")),
-            (By.PERIOD.value, _("This period and the one before")),
+            (SeriesBy.CHARACTERISTIC.value, _("Characteristics")),
+            (SeriesBy.VERSION.value, _("Versions of the parameters")),
+            (SeriesBy.TOOL.value, _("Tools")),
+            (SeriesBy.PERIOD.value, _("This period and the one before")),
         ],
         how=how,
         kept={**said, "of": keys},

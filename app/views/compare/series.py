@@ -23,7 +23,7 @@ MOST = 12  # series on a page
 MOST_EACH = 4  # versions or tools of one characteristic
 
 
-class By(StrEnum):
+class SeriesBy(StrEnum):
     """Difference between the series of one characteristic."""
 
     CHARACTERISTIC = "characteristic"  # nothing: one series each
@@ -40,16 +40,16 @@ class Compared(NamedTuple):
     window: Window
 
 
-def compared(session: Session, keys: list[str], by: By, choice: Choice) -> list[Compared]:
+def compared(session: Session, keys: list[str], by: SeriesBy, choice: Choice) -> list[Compared]:
     """The series, the older ones of a characteristic first. Raises `NotFound`, and `Invalid` for more than fit on a page."""
     found: list[Compared] = []
     for key in dict.fromkeys(keys):
         current = characteristics.characteristic_named(session, key)
         found += {
-            By.CHARACTERISTIC: _alone,
-            By.VERSION: _by_version,
-            By.TOOL: _by_tool,
-            By.PERIOD: _by_period,
+            SeriesBy.CHARACTERISTIC: _alone,
+            SeriesBy.VERSION: _by_version,
+            SeriesBy.TOOL: _by_tool,
+            SeriesBy.PERIOD: _by_period,
         }[by](session, current, choice)
     if len(found) > MOST:
         raise Invalid.at("of", _("{n} series are too many; compare {most} at most").format(n=len(found), most=MOST))
