@@ -1,8 +1,8 @@
 """Readings by part and by time of arrival.
 
 Two indexes of `reading`: whoever names a part finds all that was measured on it, and a list across characteristics comes
-newest first. Measured on the rows of a batch they cost about a quarter of what storing a row costs; single readings, whose
-time is that of the commit, are not slower. They are built while nobody writes: about ten seconds for ten million readings.
+newest first. They cost a batch about a quarter of its speed; a single reading waits for its commit first of all. They are
+built while nobody writes.
 
 Revision ID: 0102
 Revises: 0101
