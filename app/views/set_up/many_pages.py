@@ -98,7 +98,7 @@ def _page(
     )
     return setup_page(
         request,
-        "many_actions.html",
+        "many.html",
         caller,
         "characteristics",
         status=problem.status if problem else 200,
