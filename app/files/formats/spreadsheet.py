@@ -15,7 +15,7 @@ from app.files.formats.delimited import Unusable
 from app.language.i18n import _
 
 ENDINGS = {".xlsx", ".xlsm"}
-MOST_BYTES = 2_000_000_000  # of the parts of the file when unpacked
+MOST_BYTES = 500_000_000  # of the parts of the file when unpacked: about ten million cells, a minute's work
 MOST_COLUMNS = 2_000
 _PLAIN = str.maketrans({"\t": " ", "\r": " ", "\n": " "})
 
@@ -72,14 +72,18 @@ def _refuse_large(path: Path) -> None:
 
 
 def _write(sheet: Any, target: Path) -> Path | None:
-    """The rows of a sheet, the number of a line being that of its row; None where no cell is filled."""
-    filled = False
+    """The rows of a sheet, the number of a line being that of its row; None where no cell is filled.
+
+    Every row is as wide as the first that is filled: what the file says of its width is often that of a formatted column.
+    """
+    sheet.reset_dimensions()
+    width = 0
     with target.open("w", encoding="utf-8", newline="") as file:
         for row in sheet.iter_rows(values_only=True):
-            cells = [_text(value) for value in row[:MOST_COLUMNS]]
-            filled = filled or any(cells)
-            file.write("\t".join(cells) + "\n")
-    if not filled:
+            cells = "\t".join(map(_text, row[:MOST_COLUMNS])).rstrip("\t")
+            width = width or (cells.count("\t") + 1 if cells else 0)
+            file.write(cells + "\t" * (width - 1 - cells.count("\t")) + "\n")
+    if not width:
         target.unlink()
         return None
     return target

@@ -121,4 +121,5 @@ def _page(
         may_change=bool(plan) and not any(each.errors for each in plan) and not all(each.is_same for each in plan),
         problem=problem,
         changed=request.query_params.get("changed"),
+        most=MOST if len(rows) == MOST else None,
     )

@@ -35,6 +35,7 @@ def workbook(path: Path, header: list[str], rows: list[list[Any]]) -> Path:
     sheet = book.create_sheet("Measurements")
     for row in [header, *rows]:
         sheet.append(row)
+    sheet["XFD1"].number_format = "0.000"  # a format, no value: the file says that it is 16,384 columns wide
     book.save(path)
     return path
 
