@@ -38,6 +38,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         alarm_response   the list of alarms, acknowledgement and what follows from it
         tools            tool memory (R10), average memory (R11), corrections and their life
         programs         program text of the controls: read, written
+        timeline         events along time or readings on every chart: alarms, tool changes, calibrations, versions
         alarms           kinds of alarms, raised once
         readings         the door: probe readings come in, are decided, stored and answered together
         characteristics  nominal, limits, and the versions of the R parameters

@@ -18,6 +18,7 @@ from starlette.routing import Mount, Route
 
 from app.charts import to_plotly
 from app.core.decision.limits import Limits, classify
+from app.loop.timeline.figures import Event
 from app.loop.tools.figures import OffsetChange, offset_figure
 from app.views.characteristic import figures as charts
 from app.views.characteristic import glance
@@ -65,9 +66,9 @@ def story(count: int = 200, seed: int = 1) -> tuple[list[charts.Point], list[cha
         kinds = {"oversize": "Oversize", "undersize": "Undersize", "wear": "Tool worn", "probe_fault": "Probe fault"}
         if zone in kinds:
             kind = "tool_worn" if zone == "wear" else str(zone)
-            marks.append(charts.Mark(n, kind, kinds[zone], f"/alarms/{n}", active=zone == "probe_fault"))
+            marks.append(Event(n, kind, kinds[zone], f"/alarms/{n}", active=zone == "probe_fault"))
         if n == count * 3 // 4:
-            marks.append(charts.Mark(n, "tool_change", "Tool T3 changed"))
+            marks.append(Event(n, "tool_change", "Tool T3 changed"))
             drift, average = 0.0, 0.0
         points.append(
             charts.Point(
@@ -149,7 +150,7 @@ def showcase(stage: Stage | None = None) -> Starlette:
             "width": int(query.get("width", 1240)),
         }
         if request.path_params["name"] == "zones":
-            made = charts.zone_chart(shown, steps=steps, marks=marks, **common)
+            made = charts.zone_chart(shown, steps=steps, events=marks, **common)
         elif request.path_params["name"] == "empty":
             made = charts.zone_chart([], **common)
         elif request.path_params["name"] == "thinned":

@@ -16,6 +16,7 @@ from app.geometry.alignment.tables import Alignment
 from app.language.i18n import _
 from app.loop.machines.queries import machine_for, machine_of
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
+from app.loop.timeline.queries import with_events_of_machine
 from app.web.api import FIGURE, MachineKey, Theme, api_router, chart_answer, plain, problems
 from app.web.deps import SessionDep
 from app.web.downloads import download
@@ -104,4 +105,4 @@ def alignment_trend_figure(
         trends.Mark(row.aligned_at, row.id, row.result["shift"], row.result["angles"], bool(row.result.get("misfits")))
         for row in rows
     ]
-    return chart_answer(trends.trend(marks), theme)
+    return chart_answer(with_events_of_machine(session, machine_row, trends.trend(marks)), theme)

@@ -13,6 +13,7 @@ from app.geometry.geometric_form.queries import FormRow
 from app.geometry.geometric_form.schemas import FormIn
 from app.language.i18n import _
 from app.loop.machines.queries import machine_for, machine_keys_by_id, machine_named
+from app.loop.timeline.queries import with_events_of_machine
 from app.web.api import (
     FIGURE,
     After,
@@ -144,7 +145,7 @@ def form_trend_figure(
         )
         for row in rows
     ]
-    return chart_answer(figures.trend(marks), theme)
+    return chart_answer(with_events_of_machine(session, machine_row, figures.trend(marks)), theme)
 
 
 def _seen(session: SessionDep, caller: Caller, number: int) -> FormRow:

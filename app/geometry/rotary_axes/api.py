@@ -23,6 +23,7 @@ from app.geometry.rotary_axes.schemas import EnterIn, KinematicsPlanIn, RestoreI
 from app.language.i18n import _
 from app.loop.machines.queries import machine_for, machine_named, only_machine
 from app.loop.readings import actions as readings
+from app.loop.timeline.queries import with_events_of_machine
 from app.web.api import (
     FIGURE,
     After,
@@ -225,7 +226,7 @@ def kinematics_drift_figure(
         raise Invalid.at("value", _("there is no such value; there are EX0C, EY0C, EA0C, Q141 to Q149, backlash.C …"))
     limits = queries.plan(session, machine_row.id).limits
     course = drift(value, run_history.measured(session, machine_row, head), limits.get(value))
-    return chart_answer(figures.course(course), theme)
+    return chart_answer(with_events_of_machine(session, machine_row, figures.course(course)), theme)
 
 
 @router.get("/machines/{machine}/kinematics/backups", responses=problems(404))

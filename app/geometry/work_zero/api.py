@@ -22,6 +22,7 @@ from app.geometry.work_zero.schemas import FixtureIn, ZeroIn, ZeroRecomputeIn
 from app.loop.machines.queries import machine_for, machine_of, only_machine
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
 from app.loop.readings import actions as readings
+from app.loop.timeline.queries import with_events_of_machine
 from app.web.api import (
     FIGURE,
     After,
@@ -124,7 +125,8 @@ def fixture_figure(
         )
         for comparison in queries.history(session, machine_row, row.key, limit=limit)
     ]
-    return chart_answer(figures.shift_figure(marks, row.settings.warning, row.settings.alarm), theme)
+    figure = figures.shift_figure(marks, row.settings.warning, row.settings.alarm)
+    return chart_answer(with_events_of_machine(session, machine_row, figure), theme)
 
 
 @router.get("/work-zeros/{number}", responses=problems(404))

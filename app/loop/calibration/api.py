@@ -21,6 +21,8 @@ from app.loop.calibration.answers import (
 from app.loop.calibration.queries import Place
 from app.loop.calibration.schemas import CalibrationPlanIn, GaugeIn, PairIn, RingIn, SuggestionAcceptIn
 from app.loop.machines.queries import machine_for, machine_named
+from app.loop.timeline.figures import CALIBRATION
+from app.loop.timeline.queries import with_events_of_machine
 from app.web.api import (
     FIGURE,
     After,
@@ -235,7 +237,7 @@ def calibration_figure(
     changes = queries.value_changes(session, machine_row, location, limit)
     marks = [mark_of(row) for row in reversed(rows)]
     chart = figures.gauge_figure(marks, sorted((change.since, change.value) for change in changes), value)
-    return chart_answer(chart, theme)
+    return chart_answer(with_events_of_machine(session, machine_row, chart, without=(CALIBRATION,)), theme)
 
 
 @router.get("/machines/{machine}/tools/{tool}/calibration-figure", responses=problems(404) | FIGURE)
@@ -252,4 +254,5 @@ def ring_figure(
     place = Place("tool", tool)
     queries.value_of(session, machine_row, place)
     rows = queries.calibrations(session, machine_row, place, newest_first=True, limit=limit)
-    return chart_answer(figures.ring_figure([mark_of(row) for row in reversed(rows)]), theme)
+    chart = figures.ring_figure([mark_of(row) for row in reversed(rows)])
+    return chart_answer(with_events_of_machine(session, machine_row, chart, without=(CALIBRATION,)), theme)

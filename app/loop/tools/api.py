@@ -8,6 +8,8 @@ from app.access.deps import AnyCaller, Operator
 from app.core.parameters import MOST_LOCATIONS
 from app.core.plausibility import empirical_value_warnings, offset_warnings
 from app.loop.machines.queries import machine_for, machine_named
+from app.loop.timeline.figures import MANUAL_EDIT, TOOL_CHANGE
+from app.loop.timeline.queries import with_events_of_machine
 from app.loop.tools import actions, applying, queries, wording
 from app.loop.tools.figures import OffsetChange, offset_figure
 from app.loop.tools.schemas import (
@@ -35,6 +37,7 @@ from app.web.deps import SessionDep
 from app.web.fields import Page, page_of
 
 router = api_router("offsets")
+DRAWN = (TOOL_CHANGE, MANUAL_EDIT)  # events of the offset's own chart
 R10 = Annotated[int, Path(description="Tool memory location R10, 1 to what the machine has.", examples=[3])]
 R11 = Annotated[int, Path(description="Average memory location R11, 1 to what the machine has.", examples=[5])]
 Number = Annotated[int, Path(description="Number of the correction; counts per machine.", examples=[18])]
@@ -105,7 +108,8 @@ def tool_figure(
     queries.tool(session, machine_row, tool)
     steps = reversed(queries.offset_history(session, machine_row, tool, limit=limit))
     changes = [OffsetChange(step.event.at, step.event.offset_after, step.kind, wording.step(step)) for step in steps]
-    return chart_answer(offset_figure(changes), theme)
+    chart = offset_figure(changes)
+    return chart_answer(with_events_of_machine(session, machine_row, chart, tool=tool, without=DRAWN), theme)
 
 
 # --- average memory

@@ -5,12 +5,15 @@ from typing import Annotated
 from fastapi import Path, Query, Response
 
 from app.access.deps import AnyCaller, Engineer, require
+from app.charts import Chart as Figure
+from app.charts import ThemeName
 from app.core.spc.quantity import Quantity
 from app.core.spc.shewhart import Chart
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
+from app.loop.timeline import queries as timeline
 from app.quality.control_charts import actions, charts, queries, signals_queries
 from app.quality.control_charts.answers import baseline_out, control_out, draft_out
 from app.quality.control_charts.drafts import draft_of
@@ -187,10 +190,18 @@ def get_control_chart(
     baseline = _judge(session, current, version)
     if baseline is None:
         unjudged = charts.unjudged(session, current, window)
-        return chart_answer(control_figure(unjudged, key=characteristic, width=width), theme)
+        return _with_events(session, current, control_figure(unjudged, key=characteristic, width=width), width, theme)
     view = charts.view(session, current, baseline, window, chart)
     marked = charts.marked_by(baseline) if signal is None else _run_of(session, current, signal)
-    return chart_answer(control_figure(view, key=characteristic, marked=marked, width=width), theme)
+    figure = control_figure(view, key=characteristic, marked=marked, width=width)
+    return _with_events(session, current, figure, width, theme)
+
+
+def _with_events(
+    session: SessionDep, current: CurrentCharacteristic, figure: Figure, width: int, theme: ThemeName
+) -> Response:
+    """The figure with the events of the characteristic, whose tool changes it marks itself."""
+    return chart_answer(timeline.with_events(session, current, figure, width, lines=False), theme)
 
 
 def _run_of(session: SessionDep, current: CurrentCharacteristic, number: int) -> Marks:

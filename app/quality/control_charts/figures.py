@@ -185,7 +185,7 @@ def _period(marked: Marks, view: View) -> list[Ground | Note]:
             for low, high in marked.excluded
             if high >= first and low <= last
         ),
-        Note(marked.name, first, Share(1), "left", "bottom"),
+        Note(marked.name, first, Share(1, inside=True), "left", "top"),
     ]
 
 

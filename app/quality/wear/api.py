@@ -7,6 +7,7 @@ from fastapi import Query, Response
 from app.access.deps import AnyCaller
 from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import queries as statistics
+from app.loop.timeline import queries as timeline
 from app.quality.wear import queries
 from app.quality.wear.chart import chart_of
 from app.quality.wear.figures import wear_figure
@@ -56,4 +57,5 @@ def get_wear_figure(
     """The wear curve with its line, what the corrections took out of it, and the forecast to the limits that are near."""
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     wear = queries.wear_of(session, current, queries.shown(session, current, last))
-    return chart_answer(wear_figure(chart_of(wear), width=width), theme)
+    figure = wear_figure(chart_of(wear), width=width)
+    return chart_answer(timeline.with_events(session, current, figure, width, lines=False), theme)

@@ -7,6 +7,7 @@ from fastapi import Depends, Path, Query, Response
 from app.access.deps import AnyCaller, Engineer, Operator, require
 from app.core.replay import LONGEST_DELAY
 from app.loop.characteristics import queries as characteristics
+from app.loop.timeline import queries as timeline
 from app.quality.what_if import actions, proposals, simulation
 from app.quality.what_if.chart import chart_of
 from app.quality.what_if.figures import course_figure
@@ -102,7 +103,7 @@ def get_what_if_figure(
     """Deviations with today's and the other settings, and what each loop had taken out by its corrections."""
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     chart = chart_of(simulation.replayed(session, current, asked))
-    return chart_answer(course_figure(chart, width=width), theme)
+    return chart_answer(timeline.with_events(session, current, course_figure(chart, width=width), width), theme)
 
 
 @router.post("/characteristics/{characteristic}/proposals", status_code=201, responses=problems(404, 409, 429))

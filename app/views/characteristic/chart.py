@@ -1,7 +1,7 @@
 """Everything that is read for the charts of one characteristic. Never writes.
 
-Beside the readings there are corrections, alarms and tool changes. Of each no more are read than can be told apart on a
-chart, by an index, however many there are.
+Beside the readings there are corrections and events. Of each no more are read than can be told apart on a chart, by an
+index, however many there are.
 """
 
 from bisect import bisect_right
@@ -13,18 +13,16 @@ from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.core.decision.limits import classify
-from app.language.i18n import _
-from app.loop.alarm_response.wording import kind_word
 from app.loop.characteristics.queries import CurrentCharacteristic, parameters_of
 from app.loop.readings import queries as readings
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import ChartData, ChartReading, Window
-from app.loop.tables.alarms import Alarm
 from app.loop.tables.tools import OPEN, AverageMemory, Correction, ToolEvent
+from app.loop.timeline import queries as timeline
+from app.loop.timeline.figures import Event
 from app.views.characteristic.figures import (
     Block,
     HandPoint,
-    Mark,
     Point,
     ResultPoint,
     ResultRange,
@@ -32,13 +30,11 @@ from app.views.characteristic.figures import (
     SizeAxis,
     Step,
 )
-from app.views.characteristic.figures.lanes import COUNTED, MANUAL_EDIT, TOOL_CHANGE
+from app.views.characteristic.figures.lanes import COUNTED
 
 MOST_STEPS = 500
 MOST_SAMPLED = 200  # of more corrections than that, so many are shown, evenly spread
 MOST_BEFORE = 5_000  # corrections of a tool's life that are added up to where the chart begins
-MOST_ALARMS = 200
-MOST_MARKS = 24  # side by side, without covering each other
 MOST_CHANGES = 100
 MOST_MOMENTS = 200
 MOST_RUN = 2_000
@@ -52,7 +48,7 @@ class Chart:
     blocks: list[Block]
     points: list[Point]
     steps: list[Step]
-    marks: list[Mark]
+    events: list[Event]
     hands: list[HandPoint]
     total_before: float
     sizes: SizeAxis
@@ -82,12 +78,7 @@ def chart_of(session: Session, current: CurrentCharacteristic, window: Window) -
     has_memory = parameters.average_memory > 0
     targets = _targets(session, current, course.readings)
     changes = _changes(session, current, course, window)
-    marks = [*_alarms(session, current, window), *_change_marks(current, window, changes)]
-    drawn_marks = _thinned(marks, window)
-    steps = _steps(session, current, window, changes)
     before = _total_before(session, current, window, changes) if window.count else 0.0
-    if len(drawn_marks) < len(marks):
-        steps = _added_up(steps, changes, before)
     return Chart(
         blocks=[
             Block(
@@ -116,8 +107,8 @@ def chart_of(session: Session, current: CurrentCharacteristic, window: Window) -
             )
             for reading in course.readings
         ],
-        steps=steps,
-        marks=drawn_marks,
+        steps=_steps(session, current, window, changes),
+        events=timeline.events_by_reading(session, current, window.first, window.last) if window.count else [],
         hands=_hands(session, current, window),
         total_before=before,
         sizes=_size_axis(session, current, course),
@@ -197,70 +188,6 @@ def empirical_value_of(session: Session, current: CurrentCharacteristic) -> floa
     location = current.parameters.average_memory
     memory = session.get(AverageMemory, (current.machine.id, location)) if location else None
     return memory.empirical_value if memory else 0.0
-
-
-def _change_marks(current: CurrentCharacteristic, window: Window, changes: Sequence[_Change]) -> list[Mark]:
-    number = current.parameters.tool_memory
-    words = {"change": _("T{number} changed"), "edit": _("T{number} offset edited")}
-    return [
-        Mark(
-            change.sequence,
-            TOOL_CHANGE if change.kind == "change" else MANUAL_EDIT,
-            words[change.kind].format(number=number),
-            f"/machines/{current.machine.key}/tools?tool={number}#tool",
-        )
-        for change in changes
-        if window.first <= change.sequence
-    ]
-
-
-def _thinned(marks: Sequence[Mark], window: Window) -> list[Mark]:
-    """Replace marks of one kind that would cover each other by the newest with their number; keep active ones."""
-    if len(marks) <= MOST_MARKS:
-        return list(marks)
-    groups: dict[tuple[str, int], list[Mark]] = {}
-    for mark in sorted(marks, key=lambda mark: mark.sequence):
-        if not mark.active:
-            groups.setdefault((mark.kind, (mark.sequence - window.first) * MOST_MARKS // window.count), []).append(mark)
-    return [mark for mark in marks if mark.active] + [
-        replace(same[-1], text=f"{same[-1].text} ×{len(same)}" if len(same) > 1 else same[-1].text)
-        for same in groups.values()
-    ]
-
-
-def _added_up(steps: Sequence[Step], changes: Sequence[_Change], before: float) -> list[Step]:
-    """The same steps, each with the sum after it: where tool changes are left out, a chart cannot begin anew at them."""
-    at_changes = [change.sequence for change in changes if change.kind == "change"]
-    added, total, life = [], before, None
-    for step in steps:
-        place = bisect_right(at_changes, step.sequence)
-        total = total if life in (None, place) else 0.0
-        life = place
-        if step.total is not None:
-            total = step.total
-        elif step.status in COUNTED:
-            total += step.amount
-        added.append(replace(step, total=total))
-    return added
-
-
-def _alarms(session: Session, current: CurrentCharacteristic, window: Window) -> list[Mark]:
-    rows = session.execute(
-        select(Alarm.sequence, Alarm.kind, Alarm.acknowledged_at)
-        .where(
-            Alarm.machine_id == current.machine.id,
-            Alarm.characteristic_id == current.characteristic.id,
-            Alarm.sequence.between(window.first, window.last),
-        )
-        .order_by(Alarm.id.desc())
-        .limit(MOST_ALARMS)
-    )
-    key = current.characteristic.key
-    return [
-        Mark(sequence, kind, kind_word(kind), reading_link(key, sequence), active=acknowledged_at is None)
-        for sequence, kind, acknowledged_at in rows
-        if sequence is not None
-    ]
 
 
 def _changes(session: Session, current: CurrentCharacteristic, course: ChartData, window: Window) -> list[_Change]:

@@ -11,6 +11,7 @@ from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.wording import result_label
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
+from app.loop.timeline import queries as timeline
 from app.views.characteristic.chart import chart_of, results_of, run_of
 from app.views.characteristic.figures import counting_edges, histogram_figure, result_figure, run_figure, zone_chart
 from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
@@ -44,7 +45,7 @@ def get_zone_chart(
     theme: Theme = "light",
     width: Width = 1240,
 ) -> Response:
-    """The zone chart: readings in their zones, running average, corrections, tool changes, alarms.
+    """The zone chart: readings in their zones, running average, corrections, tool changes, alarms and other events.
 
     Of more readings than can be chart_answer, blocks with their extremes: no extreme is ever thinned away.
     """
@@ -56,7 +57,7 @@ def get_zone_chart(
             current.parameters,
             blocks=chart.blocks,
             steps=chart.steps,
-            marks=chart.marks,
+            events=chart.events,
             hands=chart.hands,
             scale=scale,
             sizes=chart.sizes,
@@ -75,12 +76,13 @@ def get_run_chart(
     characteristic: CharacteristicKey,
     choice: Chosen,
     theme: Theme = "light",
-    width: Width = 1240,  # noqa: ARG001 - every chart is asked with its width
+    width: Width = 1240,
 ) -> Response:
     """Sizes over time, corrected by the empirical value of each reading; of more than 2 000 readings the last 2 000."""
     current, window = _found(session, caller, characteristic, choice)
     points, sizes = run_of(session, current, window)
-    return chart_answer(run_figure(points, current.parameters, sizes=sizes), theme)
+    figure = run_figure(points, current.parameters, sizes=sizes)
+    return chart_answer(timeline.with_events(session, current, figure, width), theme)
 
 
 @router.get("/characteristics/{characteristic}/figures/results", responses=problems(404) | FIGURE, response_model=None)
@@ -93,7 +95,7 @@ def get_result_chart(
         ResultName | None, Query(description="Which one; what the variant of the characteristic yields if left out.")
     ] = None,
     theme: Theme = "light",
-    width: Width = 1240,  # noqa: ARG001 - every chart is asked with its width
+    width: Width = 1240,
 ) -> Response:
     """Results of the measuring variant beside the value: run-out, out-of-roundness, taper, repeatability.
 
@@ -102,7 +104,8 @@ def get_result_chart(
     current, window = _found(session, caller, characteristic, choice)
     name: str = result or next(iter(yielded_by(current.parameters)), "repeat_range")
     points, ranges = results_of(session, current, window, name)
-    return chart_answer(result_figure(name, result_label(name), points, ranges), theme)
+    figure = result_figure(name, result_label(name), points, ranges)
+    return chart_answer(timeline.with_events(session, current, figure, width), theme)
 
 
 @router.get(

@@ -5,7 +5,8 @@ from typing import Annotated
 from fastapi import Query, Response
 
 from app.access.deps import require
-from app.views.compare.chart import course_of
+from app.loop.timeline.figures import with_lane
+from app.views.compare.chart import course_of, events_of
 from app.views.compare.figures import compare_figure
 from app.views.compare.series import SeriesBy, compared
 from app.web.api import FIGURE, Theme, api_router, chart_answer, problems
@@ -27,10 +28,12 @@ def get_comparison(
     of_tolerance: Annotated[bool, Query(description="As a share of half the tolerance, in place of µm.")] = False,
     own_scale: Annotated[bool, Query(description="Each panel reaches as far as its own readings.")] = False,
     theme: Theme = "light",
-    width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels.")] = 1240,  # noqa: ARG001 - every chart is asked with its width
+    width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels.")] = 1240,
 ) -> Response:
     """Readings of several characteristics, or of several versions, tools or periods, on one scale."""
     in_time = by is SeriesBy.CHARACTERISTIC
-    courses = [course_of(session, each, in_time=in_time) for each in compared(session, of, by, choice)]
+    series = compared(session, of, by, choice)
+    courses = [course_of(session, each, in_time=in_time) for each in series]
     figure = compare_figure(courses, overlaid=overlaid, of_tolerance=of_tolerance, own_scale=own_scale)
-    return chart_answer(figure, theme)
+    events = [event for each in series for event in events_of(session, each, figure, in_time=in_time)]
+    return chart_answer(with_lane(figure, events, width), theme)

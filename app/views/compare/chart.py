@@ -1,13 +1,19 @@
 """Data of the chart and the table of compared series. Never writes."""
 
 from collections.abc import Iterator
+from dataclasses import replace
+from datetime import UTC, datetime
 from typing import NamedTuple
 
 from sqlalchemy.orm import Session
 
+from app.charts import Chart
 from app.core.decision.limits import Zone
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Numbers
+from app.loop.timeline import queries as timeline
+from app.loop.timeline.figures import Event, span_of
+from app.loop.timeline.queries import Period
 from app.quality.capability.queries import Judgement, judgement_of
 from app.views.characteristic.chart import reading_link
 from app.views.compare.figures import Course
@@ -55,6 +61,24 @@ def course_of(session: Session, compared: Compared, *, in_time: bool) -> Course:
         [f"/characteristics/{key}?first={block.first}&through={block.last}" for block, _mean in blocks]
         + [reading_link(key, one.sequence) for one in readings],
     )
+
+
+def events_of(session: Session, compared: Compared, chart: Chart, *, in_time: bool) -> list[Event]:
+    """Events of a series on the chart of all of them, each with the name of its series."""
+    current, window = compared.current, compared.window
+    span = span_of(chart)
+    if span is None or not window.count:
+        return []
+    if in_time:
+        start, end = (datetime.fromtimestamp(end, UTC) for end in span)
+        events = timeline.events_in(session, current, Period(start, end))
+    else:
+        events = [
+            replace(event, at=event.at - window.first + 1)
+            for event in timeline.events_by_reading(session, current, window.first, window.last)
+            if isinstance(event.at, int)
+        ]
+    return [replace(event, text=f"{compared.name}: {event.text}") for event in events]
 
 
 def row_of(session: Session, compared: Compared) -> Row:

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from app.charts import to_plotly
 from app.core.decision.limits import Limits, classify
+from app.loop.timeline.figures import Event
 from app.views.characteristic import figures
 from app.views.characteristic.figures import (
     Block,
-    Mark,
     Point,
     SizeAxis,
     Step,
@@ -143,9 +143,9 @@ class TestZoneChart:
 
     def test_corrections_sum_up_and_start_again_with_a_new_tool(self, scale: Any) -> None:
         steps = [Step(2, 1, -0.006, "applied"), Step(3, 2, -0.4, "held"), Step(5, 3, 0.002, "pending")]
-        marks = [Mark(4, "tool_change", "Tool T3 changed")]
+        events = [Event(4, "tool_change", "Tool T3 changed")]
         points = [point(n, 0.0) for n in range(1, 6)]
-        figure = zone_chart(points, SHAFT, steps=steps, marks=marks, scale=scale, total_before=-0.001)
+        figure = zone_chart(points, SHAFT, steps=steps, events=events, scale=scale, total_before=-0.001)
         (offset,) = traces(figure, "offset")
         assert offset["y"] == [-1, -7, -7, 0, 2, 2]
         (corrections,) = traces(figure, "corrections")
@@ -153,8 +153,8 @@ class TestZoneChart:
 
     def test_what_happened_before_the_first_reading_shown_only_counts(self, scale: Any) -> None:
         steps = [Step(2, 1, -0.006, "applied"), Step(101, 2, -0.002, "applied")]
-        marks = [Mark(1, "tool_change", "Tool T3 changed"), Mark(3, "oversize", "Oversize")]
-        figure = zone_chart([point(100, 0.0), point(102, 0.0)], SHAFT, steps=steps, marks=marks, scale=scale)
+        events = [Event(1, "tool_change", "Tool T3 changed"), Event(3, "oversize", "Oversize")]
+        figure = zone_chart([point(100, 0.0), point(102, 0.0)], SHAFT, steps=steps, events=events, scale=scale)
         (offset,) = traces(figure, "offset")
         assert offset["y"] == [-6, -8, -8]
         assert not traces(figure, "events")
@@ -164,15 +164,15 @@ class TestZoneChart:
         figure = zone_chart(
             [point(n, 0.0) for n in range(1, last + 1)],
             SHAFT,
-            marks=[Mark(last + 1, "tool_change", "T3 changed")],
+            events=[Event(last + 1, "tool_change", "T3 changed")],
             scale=scale,
         )
         assert [event["x"] for event in traces(figure, "events")] == [[last + 1]]
         assert figure["layout"]["xaxis"]["range"][1] > last + 1
 
     def test_alarms_and_tool_changes_are_shapes_with_words(self, scale: Any) -> None:
-        marks = [Mark(10, "oversize", "Oversize", "/alarms/1"), Mark(50, "tool_change", "Tool T3 changed")]
-        figure = zone_chart([point(1, 0.0), point(100, 0.0)], SHAFT, marks=marks, scale=scale)
+        events = [Event(10, "oversize", "Oversize", "/alarms/1"), Event(50, "tool_change", "Tool T3 changed")]
+        figure = zone_chart([point(1, 0.0), point(100, 0.0)], SHAFT, events=events, scale=scale)
         (events,) = traces(figure, "events")
         assert events["marker"]["symbol"] == ["triangle-up", "triangle-down-open"]
         assert "Oversize" in texts(figure)

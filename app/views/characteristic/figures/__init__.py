@@ -22,12 +22,11 @@ from app.views.characteristic.figures.results import ResultPoint, ResultRange, r
 from app.views.characteristic.figures.scale import ScaleName, TrueScale, ZoneScale, bands
 from app.views.characteristic.figures.sizes import SizeAxis
 from app.views.characteristic.figures.touches import angle_of, residuals_of, touches_picture
-from app.views.characteristic.figures.zones import Mark, Point, Step, zone_chart
+from app.views.characteristic.figures.zones import Point, Step, zone_chart
 
 __all__ = [
     "Block",
     "HandPoint",
-    "Mark",
     "Point",
     "ResultPoint",
     "ResultRange",

@@ -20,15 +20,16 @@ from app.core.decision.limits import HasLimits, Limits
 from app.language.i18n import _
 from app.language.numbers import um
 from app.language.times import plant_zone, written
+from app.loop.timeline.figures import Event, event_lane
 from app.views.characteristic.figures.blocks import Block, envelope
 from app.views.characteristic.figures.by_hand import HandPoint, hand_marks
 from app.views.characteristic.figures.labels import band_grounds, limit_labels, limit_lines, size_ticks
-from app.views.characteristic.figures.lanes import Mark, Step, event_lane, offset_lane
+from app.views.characteristic.figures.lanes import Step, offset_lane
 from app.views.characteristic.figures.scale import Scale, ScaleName, TrueScale, ZoneScale
 from app.views.characteristic.figures.sizes import SizeAxis, size_lines
 from app.web.theme import ZONE_SYMBOLS, zone_name, zone_role
 
-__all__ = ["Block", "Mark", "Point", "Step", "zone_chart"]
+__all__ = ["Block", "Point", "Step", "zone_chart"]
 
 WIDE = 1500  # pixels from which on there is room for a larger font
 NARROW = 640  # pixels below which there is room for the name and value of a limit only
@@ -60,7 +61,7 @@ def zone_chart(
     *,
     blocks: Sequence[Block] = (),
     steps: Sequence[Step] = (),
-    marks: Sequence[Mark] = (),
+    events: Sequence[Event] = (),
     hands: Sequence[HandPoint] = (),
     scale: ScaleName = "zones",
     sizes: SizeAxis | None = None,
@@ -72,7 +73,7 @@ def zone_chart(
 
     points: readings by ascending sequence. blocks: older ones, thinned; every block's extremes are drawn.
     steps: corrections by ascending sequence of the reading that caused them; total_before: their sum before the first (mm).
-    marks: alarms and tool changes. hands: what was measured by hand. sizes: for the sizes at the left; without them deviations stand there.
+    events: alarms, tool changes and others. hands: what was measured by hand. sizes: for the sizes at the left; without them deviations stand there.
     width: of the chart in pixels, about: decides which words have room.
     ringed: the number of the reading with a ring about it; `newest` is the last one.
     """
@@ -102,7 +103,7 @@ def zone_chart(
         *_beyond(points, ruler, span, pixels),
         *([] if points or blocks else [empty(_("No readings yet"))]),
     ]
-    offsets = offset_lane(steps, marks, span, total_before, brief=brief)
+    offsets = offset_lane(steps, events, span, total_before, brief=brief)
     total = Axis(
         "" if brief else _("Σ correction, µm"),
         ticks=3,
@@ -117,7 +118,7 @@ def zone_chart(
     return Chart(
         [
             Panel(readings, _size_axis(limits, ruler, sizes, letters, brief=brief), READINGS),
-            Panel(event_lane(marks, span, pixels), hidden, EVENTS),
+            Panel(event_lane(events, span, pixels), hidden, EVENTS),
             Panel(offsets, total, OFFSETS),
         ],
         Axis(

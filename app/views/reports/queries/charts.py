@@ -22,7 +22,7 @@ def chart(frame: Frame) -> Section | None:
         frame.parameters,
         blocks=content.blocks,
         steps=content.steps,
-        marks=content.marks,
+        events=content.events,
         hands=content.hands,
         sizes=content.sizes,
         total_before=content.total_before,

@@ -24,6 +24,7 @@ from app.files.documents.content import (
     words,
 )
 from app.language.i18n import _
+from app.loop.timeline import queries as timeline
 from app.quality.control_charts import charts, signals_queries, wording
 from app.quality.control_charts import queries as controls
 from app.quality.control_charts import signals_wording as signals
@@ -247,6 +248,7 @@ def _picture(frame: Frame, baseline: Baseline, view: View) -> Picture:
     figure = control_figure(
         view, key=frame.current.characteristic.key, marked=charts.marked_by(baseline), width=WIDE[0]
     )
+    figure = timeline.with_events(frame.session, frame.current, figure, WIDE[0], lines=False)
     says = _("{chart} of readings {first} to {last}, with centre and limits of baseline {version}.").format(
         chart=name, first=int(view.first[0]), last=int(view.last[-1]), version=baseline.version
     )

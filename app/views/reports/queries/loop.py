@@ -7,6 +7,7 @@ from sqlalchemy import func, select
 from app.files.documents.content import Column, Fact, Picture, Section, Table, count, deviation, moment, size, words
 from app.language.i18n import _
 from app.loop.tables.tools import Correction, ToolEvent
+from app.loop.timeline import queries as timeline
 from app.loop.tools import wording as offsets
 from app.quality.wear import queries as wears
 from app.quality.wear.chart import chart_of
@@ -141,9 +142,9 @@ def wear(frame: Frame) -> Section | None:
     if len(study.now.sequence) or any(len(life.sequence) for life in study.lives):
         says = _("Wear curve: tool wear without the corrections, with the line through the newest readings.")
         chart = chart_of(study)
-        pictures = (
-            Picture("wear", _("Wear curve"), says, wear_figure(chart, width=WIDE[0]), *WIDE, partial(_data, chart)),
-        )
+        drawn = wear_figure(chart, width=WIDE[0])
+        figure = timeline.with_events(frame.session, frame.current, drawn, WIDE[0], lines=False)
+        pictures = (Picture("wear", _("Wear curve"), says, figure, *WIDE, partial(_data, chart)),)
     return Section(
         "wear",
         _("Wear"),

@@ -1,0 +1,237 @@
+"""The lane of events above a chart: tool changes, calibrations, versions of the parameters, alarms. Pure.
+
+Events that would cover each other are one mark with their number; pointed at, it names them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from math import inf
+
+from app.charts import Axis, Bars, Chart, Dots, Note, Panel, Pen, Role, Rule, Series
+from app.language.i18n import _
+from app.language.times import plant_zone, written
+from app.web.theme import ZONE_SYMBOLS
+
+TOOL_CHANGE = "tool_change"
+MANUAL_EDIT = "manual_edit"
+CALIBRATION = "calibration"
+PARAMETERS = "parameters"
+
+LETTER = (
+    6.5  # pixels that a letter of an event takes, about: words that would run into each other are left to the shapes
+)
+RIGHT_ROOM = 200  # pixels that a word may reach out beside the readings
+UPPER, LOWER = 0.5, -0.5  # rows of the events
+APART = 16  # pixels between two marks; what lies closer is one
+MOST_NAMED = 8  # of the events of one mark, when it is pointed at
+MOST_LINES = 40  # upward through the chart; more are a fence
+LANE, BELOW = (0.91, 1.0), 0.88  # of the height of a chart that is given a lane: the lane, and the chart below it
+SHAPES = {
+    TOOL_CHANGE: "triangle-down-open",
+    MANUAL_EDIT: "square-open",
+    CALIBRATION: "circle-open",
+    PARAMETERS: "diamond-open",
+    "tool_worn": ZONE_SYMBOLS["wear"],
+}
+TONES: dict[str, Role] = {
+    TOOL_CHANGE: "correction",
+    MANUAL_EDIT: "correction",
+    CALIBRATION: "ink",
+    PARAMETERS: "ink",
+    "probe_fault": "stop",
+    "tool_worn": "wear",
+}
+SET_UP = (PARAMETERS, CALIBRATION, MANUAL_EDIT, TOOL_CHANGE)  # from what matters least, below the alarms
+
+
+@dataclass(frozen=True)
+class Event:
+    """One event. at: the number of a reading, or a moment. kind: as above, or that of an alarm; text: its word."""
+
+    at: float | datetime
+    kind: str
+    text: str
+    link: str | None = None
+    active: bool = False
+
+    @property
+    def is_alarm(self) -> bool:
+        return self.kind not in SET_UP
+
+    @property
+    def tone(self) -> Role:
+        return TONES.get(self.kind, "attention")
+
+    @property
+    def shape(self) -> str:
+        return SHAPES.get(self.kind) or ZONE_SYMBOLS.get(self.kind, "star-triangle-up")
+
+    @property
+    def weight(self) -> tuple[bool, int]:
+        """How much it matters among others."""
+        return self.active, len(SET_UP) if self.is_alarm else SET_UP.index(self.kind)
+
+
+@dataclass(frozen=True)
+class _Mark:
+    """Events of one place, that of the first; the one that matters most gives the look."""
+
+    events: Sequence[Event]
+
+    @property
+    def main(self) -> Event:
+        return max(reversed(self.events), key=lambda event: event.weight)
+
+    @property
+    def text(self) -> str:
+        if len(self.events) == 1:
+            return self.main.text
+        if len({event.text for event in self.events}) == 1:
+            return f"{self.main.text} ×{len(self.events)}"
+        return _("{n} events").format(n=len(self.events))
+
+    @property
+    def hover(self) -> str:
+        named = [f"<b>{event.text}</b><br>{_place_words(event.at)}" for event in self.events[-MOST_NAMED:]]
+        more = len(self.events) - len(named)
+        return "<br>".join([*([_("{n} more before").format(n=more)] if more else []), *named])
+
+
+def _place_words(at: float | datetime) -> str:
+    if isinstance(at, datetime):
+        return f"{written(at)} {plant_zone().key}"
+    return _("Reading {n}").format(n=round(at))
+
+
+def _number(at: float | datetime) -> float:
+    return at.timestamp() if isinstance(at, datetime) else at
+
+
+def _marks(events: Sequence[Event], span: tuple[float, float], pixels: float) -> list[tuple[_Mark, float]]:
+    """The events in marks that do not cover each other, with their pixels from the left."""
+    per_pixel = (span[1] - span[0]) / pixels
+    marks: list[tuple[list[Event], float]] = []
+    for event in sorted(events, key=lambda event: _number(event.at)):
+        place = (_number(event.at) - span[0]) / per_pixel
+        if marks and place - marks[-1][1] < APART:
+            marks[-1][0].append(event)
+        else:
+            marks.append(([event], place))
+    return [(_Mark(together), place) for together, place in marks]
+
+
+def _rows(marks: Sequence[tuple[_Mark, float]], pixels: float) -> list[tuple[_Mark, float, bool]]:
+    """Each mark with its row and whether its word is written: two rows, and a word gives way to the next mark's shape."""
+    places: list[tuple[_Mark, float, bool]] = []
+    latest = {UPPER: -1, LOWER: -1}  # index of the last mark in the row
+    end = {UPPER: -inf, LOWER: -inf}  # where its word ends, px
+    for mark, place in marks:
+        start = place - 8
+        row = UPPER if end[UPPER] <= start else min(end, key=lambda row: end[row])
+        if end[row] > start:
+            before, _row, _written = places[latest[row]]
+            places[latest[row]] = (before, row, False)
+        stop = start + 20 + LETTER * len(mark.text)
+        shown = stop < pixels + RIGHT_ROOM
+        latest[row], end[row] = len(places), stop if shown else start + 18
+        places.append((mark, row, shown))
+    return places
+
+
+def event_lane(
+    events: Sequence[Event], span: tuple[float, float], pixels: float, *, lines: bool = True
+) -> list[Series | Rule | Note]:
+    """Marks and words of the events within the span, and in the legend what their shapes mean.
+
+    span: of the axis; moments as seconds (Unix time). lines: upward through the chart, at what somebody changed. A word is
+    left out where it would not fit.
+    """
+    within = [event for event in events if span[0] <= _number(event.at) <= span[1]]
+    places = _rows(_marks(within, span, pixels), pixels)
+    if not places:
+        return []
+    main = [mark.main for mark, _row, _written in places]
+    colours = [event.tone for event in main]
+    changed = [event for event in main if not event.is_alarm]
+    return [
+        *(
+            Rule(Pen("correction", 1.25, "dot"), x=event.at, upto=0.94)
+            for event in (changed if lines and len(changed) <= MOST_LINES else [])
+        ),
+        Series(
+            [mark.events[0].at for mark, _row, _written in places],
+            [row for _mark, row, _written in places],
+            dots=Dots([event.shape for event in main], 12, colours, edge=colours),
+            meta="events",
+            hover=[mark.hover for mark, _row, _written in places],
+            links=[event.link for event in main],
+        ),
+        *_legend(within),
+        *(
+            Note(
+                f"<b>{mark.text}</b>" if mark.main.active else mark.text,
+                mark.events[0].at,
+                row,
+                "left",
+                shift=(9, 0),
+                colour=mark.main.tone,
+            )
+            for mark, row, shown in places
+            if shown
+        ),
+    ]
+
+
+def _legend(events: Sequence[Event]) -> list[Series]:
+    """A name for each shape that somebody's changes have, and one for the alarms, whose zones have many."""
+    words = {
+        TOOL_CHANGE: _("Tool change"),
+        MANUAL_EDIT: _("Offset edited"),
+        CALIBRATION: _("Calibration"),
+        PARAMETERS: _("Parameter version"),
+    }
+    kinds = {event.kind if not event.is_alarm else "alarm": event for event in events}
+    return [
+        Series(
+            [event.at],
+            [None],
+            dots=Dots(event.shape, 11, event.tone, event.tone),
+            meta="legend",
+            name=words.get(kind) or _("Alarm"),
+        )
+        for kind, event in sorted(kinds.items())
+    ]
+
+
+def span_of(chart: Chart) -> tuple[float, float] | None:
+    """Ends of the chart's axis, moments as seconds; a little more at the right for what came last. None without points."""
+    ends = chart.x.reach or [
+        value
+        for panel in chart.panels
+        for mark in panel.marks
+        if isinstance(mark, Series | Bars)
+        for value in mark.x
+        if value is not None
+    ]
+    numbers = [_number(value) for value in ends if isinstance(value, int | float | datetime)]
+    if not numbers or min(numbers) == max(numbers):
+        return None
+    low, high = min(numbers), max(numbers)
+    room = 0 if chart.x.reach else 0.02 * (high - low)
+    return low - room, high + room
+
+
+def with_lane(chart: Chart, events: Sequence[Event], width: int, *, lines: bool = True) -> Chart:
+    """The chart with its events in a lane above; without any in its span, as it is. width: in pixels, about."""
+    span = span_of(chart)
+    if span is None:
+        return chart
+    lane = event_lane(events, span, max(width - chart.room.left - chart.room.right, 200), lines=lines)
+    if not lane:
+        return chart
+    hidden = Axis(reach=(-1, 1), grid=False, line=False, labelled=False, fixed=True)
+    panels = [replace(panel, share=(panel.share[0] * BELOW, panel.share[1] * BELOW)) for panel in chart.panels]
+    return replace(chart, panels=[*panels, Panel(lane, hidden, LANE)], room=replace(chart.room, top=max(chart.top, 34)))

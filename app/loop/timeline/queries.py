@@ -1,0 +1,234 @@
+"""Events of a machine or of a characteristic, put on its charts. Never writes."""
+
+from bisect import bisect_right
+from collections.abc import Collection, Iterator
+from dataclasses import replace
+from datetime import UTC, datetime
+from math import ceil, floor
+from typing import NamedTuple
+
+from sqlalchemy import ColumnElement, and_, or_, select, true
+from sqlalchemy.orm import InstrumentedAttribute, Session
+
+from app.charts import Chart
+from app.language.i18n import _
+from app.loop.alarms.kinds import kind_named
+from app.loop.characteristics.queries import CurrentCharacteristic
+from app.loop.tables.alarms import Alarm
+from app.loop.tables.calibration import CalibrationRecord
+from app.loop.tables.characteristics import Characteristic, ParametersVersion
+from app.loop.tables.machines import Machine
+from app.loop.tables.readings import Reading, Stream
+from app.loop.tables.tools import ToolEvent
+from app.loop.timeline.figures import CALIBRATION, MANUAL_EDIT, PARAMETERS, TOOL_CHANGE, Event, span_of, with_lane
+
+MOST = 1_000  # events of each kind, the newest
+MOST_MOMENTS = 600  # readings whose moments say between which of them an event lies: more than marks have room
+
+
+class Period(NamedTuple):
+    """From … to; an open end is None."""
+
+    start: datetime | None
+    end: datetime | None
+
+    def holds(self, column: InstrumentedAttribute[datetime]) -> ColumnElement[bool]:
+        """Lies in it, as a condition on a column of moments."""
+        return and_(
+            true() if self.start is None else column >= self.start, true() if self.end is None else column <= self.end
+        )
+
+
+def with_events(
+    session: Session, current: CurrentCharacteristic, chart: Chart, width: int = 1240, *, lines: bool = True
+) -> Chart:
+    """A chart over the readings of a characteristic, or over time, with the events of the characteristic above it.
+
+    width: in pixels, about. lines: upward at what somebody changed; without them where the chart draws its own.
+    """
+    span = span_of(chart)
+    if span is None:
+        return chart
+    if chart.x.kind == "time":
+        events = events_in(session, current, _period(span))
+    else:
+        events = events_by_reading(session, current, ceil(span[0]), floor(span[1]))
+    return with_lane(chart, events, width, lines=lines)
+
+
+def with_events_of_machine(
+    session: Session,
+    machine: Machine,
+    chart: Chart,
+    width: int = 1240,
+    *,
+    tool: int | None = None,
+    without: Collection[str] = (),
+) -> Chart:
+    """A chart over time with the events of the machine above it: alarms, calibrations, tool changes.
+
+    width: in pixels, about. tool: only of this one. without: kinds that the chart draws itself.
+    """
+    span = span_of(chart)
+    if span is None:
+        return chart
+    period = _period(span)
+    happened = [
+        *_alarms(session, machine, true() if tool is None else Alarm.tool_memory == tool, period),
+        *(_calibrations(session, machine, true(), period) if tool is None else ()),
+        *_tool_events(session, machine, true() if tool is None else ToolEvent.number == tool, period),
+    ]
+    events = [each.event for each in happened if each.event.kind not in without]
+    return with_lane(chart, events, width, lines=False)
+
+
+def _period(span: tuple[float, float]) -> Period:
+    return Period(*(datetime.fromtimestamp(end, UTC) for end in span))
+
+
+def events_in(session: Session, current: CurrentCharacteristic, period: Period) -> list[Event]:
+    """Events of a characteristic, of its tool and of its empirical value, each at its moment."""
+    return [each.event for each in _of_characteristic(session, current, period)]
+
+
+def events_by_reading(session: Session, current: CurrentCharacteristic, first: int, last: int) -> list[Event]:
+    """The same at the numbers of readings: an alarm at the one that raised it, all else at the first that came after it.
+
+    What came after the newest reading stands at the number that the next one will have. Of very many readings the place is
+    exact to as much as a chart can show.
+    """
+    newest = session.scalar(
+        select(Stream.sequence).where(
+            Stream.machine_id == current.machine.id, Stream.characteristic_id == current.characteristic.id
+        )
+    )
+    first, last = max(1, first), min(last, newest or 0)
+    moments = _moments(session, current, first, last)
+    if not moments:
+        return []
+    before, after = _moments(session, current, first - 1, first - 1), _moments(session, current, last + 1, last + 1)
+    period = Period((before or moments)[0][1], after[0][1] if after else None)
+    arrivals = [at for _sequence, at in moments]
+    numbers = [sequence for sequence, _at in moments] + ([] if after else [last + 1])
+    events = []
+    for event, sequence, arrived in _of_characteristic(session, current, period):
+        place = bisect_right(arrivals, arrived)
+        at = sequence or (numbers[place] if place < len(numbers) else None)
+        if at is not None and first <= at <= last + 1:
+            events.append(replace(event, at=at))
+    return events
+
+
+def _moments(session: Session, current: CurrentCharacteristic, first: int, last: int) -> list[tuple[int, datetime]]:
+    """Readings from first to last, evenly spread, with the moments at which they arrived."""
+    stride = max(1, -(-(last - first + 1) // MOST_MOMENTS))
+    rows = session.execute(
+        select(Reading.sequence, Reading.received_at)
+        .where(
+            Reading.machine_id == current.machine.id,
+            Reading.characteristic_id == current.characteristic.id,
+            Reading.sequence.in_([*range(first, last, stride), last]),
+        )
+        .order_by(Reading.sequence)
+    )
+    return [(sequence, at) for sequence, at in rows]
+
+
+class _Happened(NamedTuple):
+    """An event at its moment. sequence: the reading that it belongs to, if it has one; arrived: as this server knew of it."""
+
+    event: Event
+    sequence: int | None
+    arrived: datetime
+
+
+def _of_characteristic(session: Session, current: CurrentCharacteristic, period: Period) -> list[_Happened]:
+    machine, parameters = current.machine, current.parameters
+    concerned = or_(
+        Alarm.characteristic_id == current.characteristic.id,
+        Alarm.characteristic_id.is_(None)
+        & (Alarm.tool_memory.is_(None) | (Alarm.tool_memory == parameters.tool_memory)),
+    )
+    place = (CalibrationRecord.memory == "average") & (CalibrationRecord.location == parameters.average_memory)
+    return [
+        *_alarms(session, machine, concerned, period, current.characteristic),
+        *(_calibrations(session, machine, place, period) if parameters.average_memory else ()),
+        *(_tool_events(session, machine, ToolEvent.number == parameters.tool_memory, period)),
+        *_versions(session, current, period),
+    ]
+
+
+def _alarms(
+    session: Session,
+    machine: Machine,
+    concerned: ColumnElement[bool],
+    period: Period,
+    characteristic: Characteristic | None = None,
+) -> Iterator[_Happened]:
+    """Alarms. characteristic: those of it lead to the reading that raised them."""
+    rows = session.execute(
+        select(Alarm.id, Alarm.kind, Alarm.raised_at, Alarm.acknowledged_at, Alarm.characteristic_id, Alarm.sequence)
+        .where(Alarm.machine_id == machine.id, concerned, period.holds(Alarm.raised_at))
+        .order_by(Alarm.id.desc())
+        .limit(MOST)
+    )
+    for number, kind, raised_at, acknowledged_at, of, reading in rows:
+        sequence = reading if characteristic is not None and of == characteristic.id else None
+        link = f"/characteristics/{characteristic.key}/readings/{sequence}" if characteristic and sequence else None
+        event = Event(raised_at, kind, kind_named(kind).word(), link or f"/alarms/{number}", acknowledged_at is None)
+        yield _Happened(event, sequence, raised_at)
+
+
+def _calibrations(
+    session: Session, machine: Machine, concerned: ColumnElement[bool], period: Period
+) -> Iterator[_Happened]:
+    record = CalibrationRecord
+    rows = session.execute(
+        select(record.number, record.memory, record.location, record.calibrated_at, record.received_at)
+        .where(record.machine_id == machine.id, concerned, period.holds(record.received_at))
+        .order_by(record.number.desc())
+        .limit(MOST)
+    )
+    for number, memory, location, at, received_at in rows:
+        text = _("Calibration {n}").format(n=number)
+        link = f"/calibration/{machine.key}/{memory}s/{location}"
+        yield _Happened(Event(at, CALIBRATION, text, link), None, received_at)
+
+
+def _tool_events(
+    session: Session, machine: Machine, concerned: ColumnElement[bool], period: Period
+) -> Iterator[_Happened]:
+    words = {"change": (TOOL_CHANGE, _("T{number} changed")), "edit": (MANUAL_EDIT, _("T{number} offset edited"))}
+    rows = session.execute(
+        select(ToolEvent.number, ToolEvent.kind, ToolEvent.at)
+        .where(
+            ToolEvent.machine_id == machine.id, ToolEvent.kind != "correction", concerned, period.holds(ToolEvent.at)
+        )
+        .order_by(ToolEvent.id.desc())
+        .limit(MOST)
+    )
+    for number, changed, at in rows:
+        kind, text = words[changed]
+        link = f"/machines/{machine.key}/tools?tool={number}#tool"
+        yield _Happened(Event(at, kind, text.format(number=number), link), None, at)
+
+
+def _versions(session: Session, current: CurrentCharacteristic, period: Period) -> Iterator[_Happened]:
+    """Versions of the parameters, without the first: with it the characteristic began."""
+    version = ParametersVersion
+    rows = session.execute(
+        select(version.version, version.created_at)
+        .where(
+            version.machine_id == current.machine.id,
+            version.characteristic_id == current.characteristic.id,
+            version.version > 1,
+            period.holds(version.created_at),
+        )
+        .order_by(version.version.desc())
+        .limit(MOST)
+    )
+    for number, at in rows:
+        text = _("Parameters version {n}").format(n=number)
+        yield _Happened(
+            Event(at, PARAMETERS, text, f"/characteristics/{current.characteristic.key}#versions"), None, at
+        )

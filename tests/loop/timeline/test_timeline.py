@@ -1,0 +1,102 @@
+"""Events above charts: which are drawn, where, and how they make room for each other."""
+
+import itertools
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+from app.charts import Axis, Chart, Panel, Series, svg, time_axis, to_drawing, to_plotly
+from app.loop.timeline.figures import CALIBRATION, PARAMETERS, TOOL_CHANGE, Event, with_lane
+from tests.shop import Shop
+
+GAUGE: dict[str, Any] = {
+    "average_memory": 5,
+    "gauge_size": 199.852,
+    "touches": [199.870, 199.874, 199.872],
+    "zero_range": 0.001,
+    "averaging_limit": 0.01,
+    "confidence_limit": 1.0,
+    "weighting_factor": 2,
+}
+START = datetime(2026, 11, 2, 6, tzinfo=UTC)
+
+
+def readings(count: int) -> Chart:
+    x = list(range(1, count + 1))
+    return Chart([Panel([Series(x, [0.0] * count, meta="points")])], Axis(reach=(0, count + 1)))
+
+
+def events_of(figure: dict[str, Any]) -> dict[str, Any]:
+    (trace,) = (trace for trace in figure["data"] if trace.get("meta") == "events")
+    return dict(trace)
+
+
+class TestTheLane:
+    def test_each_kind_has_a_shape_that_the_legend_names(self) -> None:
+        events = [
+            Event(10, TOOL_CHANGE, "T3 changed"),
+            Event(40, CALIBRATION, "Calibration 2"),
+            Event(70, PARAMETERS, "Parameters version 2"),
+            Event(90, "oversize", "Oversize", active=True),
+        ]
+        figure = to_plotly(with_lane(readings(100), events, 1200))
+        assert events_of(figure)["x"] == [10, 40, 70, 90]
+        assert len(set(events_of(figure)["marker"]["symbol"])) == 4
+        names = {trace["name"] for trace in figure["data"] if trace.get("showlegend")}
+        assert names == {"Tool change", "Calibration", "Parameter version", "Alarm"}
+
+    def test_what_would_overprint_is_one_mark_that_names_all(self) -> None:
+        events = [Event(n, TOOL_CHANGE, f"T{n} changed") for n in range(500, 512)]
+        events.append(Event(511, "probe_fault", "Probe fault", "/alarms/9"))
+        found = events_of(to_plotly(with_lane(readings(2000), events, 1200)))
+        assert len(found["x"]) == 1
+        assert found["customdata"] == ["/alarms/9"]  # what matters most
+        hover = found.get("text", found.get("hovertext"))[0]
+        assert "5 more before" in hover
+        assert "Probe fault" in hover
+
+    def test_marks_keep_apart_however_many_there_are(self) -> None:
+        events = [Event(n, TOOL_CHANGE, "T3 changed") for n in range(1, 5001)]
+        width = 1200
+        chart = with_lane(readings(5000), events, width)
+        x = events_of(to_plotly(chart))["x"]
+        pixels = (width - chart.room.left - chart.room.right) / 5001
+        assert min(after - before for before, after in itertools.pairwise(x)) * pixels >= 15
+
+    def test_a_chart_without_events_stays_as_it_is(self) -> None:
+        chart = readings(10)
+        assert with_lane(chart, [Event(99, TOOL_CHANGE, "later")], 1200) is chart
+
+    def test_along_time_and_on_paper(self) -> None:
+        moments = [START + timedelta(hours=n) for n in range(5)]
+        chart = Chart([Panel([Series(moments, [0.0] * 5)])], time_axis(moments))
+        chart = with_lane(chart, [Event(moments[2], CALIBRATION, "Calibration 7")], 900)
+        picture = svg(to_drawing(chart, 900, 300), "a chart", "c")
+        assert "Calibration 7" in picture
+        assert "Calibration" in {series["name"] for series in to_plotly(chart)["data"] if series.get("name")}
+
+
+def test_all_kinds_stand_on_the_charts_of_a_characteristic(shop: Shop) -> None:
+    for _ in range(3):
+        shop.read(0.1)
+    shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="new insert")
+    shop.read(0.2)
+    shop.call("POST", f"/machines/{shop.machine}/calibrations", 201, **GAUGE)
+    shop.read(0.3)
+    shop.call("PATCH", f"/characteristics/{shop.characteristic}", parameters={"zero_range": 0.0015}, reason="scatter")
+    shop.read(12.5)
+    for name in ("zones", "control", "run", "wear?last=all"):
+        figure = shop.call("GET", f"/characteristics/{shop.characteristic}/figures/{name}")
+        words = " ".join(events_of(figure).get("text", events_of(figure).get("hovertext")))
+        for event in ("T3 changed", "Calibration 1", "Parameters version 2", "Oversize"):
+            assert event in words, name
+
+
+def test_a_machines_charts_over_time_show_its_alarms(shop: Shop) -> None:
+    calibrations = f"/machines/{shop.machine}/calibrations"
+    shop.call("POST", calibrations, 201, **GAUGE)
+    shop.read(12.5)
+    shop.call("POST", calibrations, 201, **GAUGE)
+    events = events_of(shop.call("GET", f"/machines/{shop.machine}/averages/5/calibration-figure"))
+    words = " ".join(events.get("text", events.get("hovertext")))
+    assert "Oversize" in words
+    assert "Calibration" not in words  # the chart draws them itself
