@@ -33,13 +33,13 @@ START = datetime(2026, 11, 21, 6, 0, tzinfo=UTC)
 EDGES = Limits.of(LIMITS)
 
 
-def story(count: int = 200, seed: int = 1) -> tuple[list[charts.Point], list[charts.Step], list[charts.Mark]]:
+def story(count: int = 200, seed: int = 1) -> tuple[list[charts.Point], list[charts.Step], list[Event]]:
     """A shift on a lathe: wear, corrections, one part too large, a worn tool, a dirty stylus, a new tool."""
     chance = random.Random(seed)
     drift, average = 0.0, 0.0
     points: list[charts.Point] = []
     steps: list[charts.Step] = []
-    marks: list[charts.Mark] = []
+    marks: list[Event] = []
     for n in range(1, count + 1):
         drift += 0.0004
         deviation = drift + chance.gauss(0, 0.0009)

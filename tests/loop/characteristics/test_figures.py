@@ -171,8 +171,8 @@ class TestZoneChart:
         assert figure["layout"]["xaxis"]["range"][1] > last + 1
 
     def test_alarms_and_tool_changes_are_shapes_with_words(self, scale: Any) -> None:
-        events = [Event(10, "oversize", "Oversize", "/alarms/1"), Event(50, "tool_change", "Tool T3 changed")]
-        figure = zone_chart([point(1, 0.0), point(100, 0.0)], SHAFT, events=events, scale=scale)
+        happened = [Event(10, "oversize", "Oversize", "/alarms/1"), Event(50, "tool_change", "Tool T3 changed")]
+        figure = zone_chart([point(1, 0.0), point(100, 0.0)], SHAFT, events=happened, scale=scale)
         (events,) = traces(figure, "events")
         assert events["marker"]["symbol"] == ["triangle-up", "triangle-down-open"]
         assert "Oversize" in texts(figure)

@@ -30,6 +30,11 @@ def events_of(figure: dict[str, Any]) -> dict[str, Any]:
     return dict(trace)
 
 
+def said(events: dict[str, Any]) -> list[str]:
+    """What each mark says when it is pointed at."""
+    return list(events["text"])
+
+
 class TestTheLane:
     def test_each_kind_has_a_shape_that_the_legend_names(self) -> None:
         events = [
@@ -50,7 +55,7 @@ class TestTheLane:
         found = events_of(to_plotly(with_lane(readings(2000), events, 1200)))
         assert len(found["x"]) == 1
         assert found["customdata"] == ["/alarms/9"]  # what matters most
-        hover = found.get("text", found.get("hovertext"))[0]
+        hover = said(found)[0]
         assert "5 more before" in hover
         assert "Probe fault" in hover
 
@@ -86,7 +91,7 @@ def test_all_kinds_stand_on_the_charts_of_a_characteristic(shop: Shop) -> None:
     shop.read(12.5)
     for name in ("zones", "control", "run", "wear?last=all"):
         figure = shop.call("GET", f"/characteristics/{shop.characteristic}/figures/{name}")
-        words = " ".join(events_of(figure).get("text", events_of(figure).get("hovertext")))
+        words = " ".join(said(events_of(figure)))
         for event in ("T3 changed", "Calibration 1", "Parameters version 2", "Oversize"):
             assert event in words, name
 
@@ -97,6 +102,6 @@ def test_a_machines_charts_over_time_show_its_alarms(shop: Shop) -> None:
     shop.read(12.5)
     shop.call("POST", calibrations, 201, **GAUGE)
     events = events_of(shop.call("GET", f"/machines/{shop.machine}/averages/5/calibration-figure"))
-    words = " ".join(events.get("text", events.get("hovertext")))
+    words = " ".join(said(events))
     assert "Oversize" in words
     assert "Calibration" not in words  # the chart draws them itself
