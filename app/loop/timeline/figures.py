@@ -71,7 +71,7 @@ class Event:
 
     @property
     def weight(self) -> tuple[bool, int]:
-        """How much it matters among others."""
+        """Order among others: what matters most is greatest."""
         return self.active, len(SET_UP) if self.is_alarm else SET_UP.index(self.kind)
 
 
