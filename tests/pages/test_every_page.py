@@ -28,6 +28,7 @@ PAGES = {
     "/plant/{machine}": ["/plant/{machine}"],
     "/station/{machine}": ["/station/{machine}", "/station/{machine}?tool=3"],
     "/station/{machine}/alarms/{number}": ["/station/{machine}/alarms/{alarm}?action=noted"],
+    "/station/{machine}/corrections/{number}": ["/station/{machine}/corrections/{waiting}?do=approve"],
     "/station/{machine}/tools/{number}/change": ["/station/{machine}/tools/3/change"],
     "/characteristics/{characteristic}": [
         "/characteristics/{characteristic}",
@@ -314,6 +315,9 @@ def addresses(shop: Shop) -> list[str]:
         "machine": shop.machine,
         "characteristic": shop.characteristic,
         "alarm": alarm,
+        "waiting": shop.call("GET", f"/machines/{shop.machine}/corrections?status=awaiting_approval")["items"][0][
+            "number"
+        ],
         "proposal": shop.call("GET", f"/characteristics/{shop.characteristic}/proposals")["items"][0]["id"],
         "signal": signal,
         **dict(zip(("repeated", "crossed"), (each["id"] for each in studies), strict=True)),

@@ -55,8 +55,8 @@ class Hands:
 
 @pytest.fixture(scope="module")
 def shop(server: Server) -> Shop:
-    """A characteristic with readings of last week, of yesterday and of now, the last one corrected; one correction that
-    waits for approval, and one alarm, each on a tool of its own."""
+    """A characteristic with readings of last week, of yesterday and of now, the last one corrected; two corrections that
+    wait for approval, and one alarm, each on a tool of its own."""
     made = Shop(server)
     noon = datetime.now(UTC).replace(hour=12)
     readings = [
@@ -72,6 +72,8 @@ def shop(server: Server) -> Shop:
     made.read(6.1, part=PART)
     made.add(f"{made.characteristic}-approval", tool_memory=4, average_memory=6, mode="approval")
     made.read(6.0, f"{made.characteristic}-approval")
+    made.add(f"{made.characteristic}-to-do", tool_memory=9, average_memory=10, mode="approval")
+    made.read(6.0, f"{made.characteristic}-to-do")
     made.add(f"{made.characteristic}-oversize", tool_memory=7, average_memory=8)
     made.read(12.5, f"{made.characteristic}-oversize")
     return made
@@ -118,6 +120,18 @@ class TestByTouch:
         hands.tap(dialog.get_by_role("button", name="Approve"))
         expect(page.get_by_role("status").filter(has_text="approved")).to_be_visible()
         assert hands.count == 4
+
+    def test_approve_a_correction_from_the_list_of_what_waits(self, page: Page, shop: Shop, operator: Person) -> None:
+        operator.sign_in(page)
+        page.goto("/todo")
+        hands, about = Hands(page), f"Seat {shop.characteristic}-to-do"
+        hands.tap(page.get_by_role("row").filter(has_text=about).get_by_role("link", name="Approve"))
+        dialog = page.get_by_role("dialog")
+        hands.tap(dialog.get_by_role("radio", name="As expected"))
+        hands.tap(dialog.get_by_role("button", name="Approve"))
+        expect(page.get_by_role("status").filter(has_text="approved")).to_be_visible()
+        expect(page.get_by_role("row").filter(has_text=about)).to_have_count(0)
+        assert hands.count == 3
 
     def test_report_a_tool_change(self, page: Page, shop: Shop, operator: Person) -> None:
         hands = at_the_plant(page, operator)

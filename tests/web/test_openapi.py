@@ -356,6 +356,7 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/sign-in": None,
     "/station": None,
     "/station/{machine}/alarms/{number}": None,  # on a device it is asked who acts: tests/views/station
+    "/station/{machine}/corrections/{number}": None,
     "/station/{machine}/tools/{number}/change": None,
     "/sign-out": None,
     "/signals/{number}": ("comment_signal",),

@@ -11,15 +11,16 @@ from starlette.responses import RedirectResponse
 from app.access.deps import Caller, Operator, Viewer, require
 from app.core.parameters import MOST_LOCATIONS
 from app.core.plausibility import empirical_value_warnings, offset_warnings
-from app.errors import Conflict, Invalid
+from app.errors import Invalid
 from app.language.i18n import _
 from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named
 from app.loop.tables.tools import OPEN
-from app.loop.tools import actions, applying, confirmation, queries, sisters, wording
+from app.loop.tools import actions, confirmation, queries, sisters, wording
 from app.loop.tools.confirmation import Question
 from app.loop.tools.edge_schemas import SisterIn
-from app.loop.tools.schemas import AppliedIn, CorrectionDecisionIn, EmpiricalValueIn, ToolChange, ToolEdit
+from app.loop.tools.form_reader import decide_as_typed
+from app.loop.tools.schemas import EmpiricalValueIn, ToolChange, ToolEdit
 from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.forms import by_field, length, parsed, words
 from app.web.paging import address, part_of
@@ -28,7 +29,7 @@ from app.web.templates import page
 router = APIRouter(include_in_schema=False)
 MOST_IN_QUEUE = 50
 STEPS_ON_PAGE = 10
-QUEUE, FROM_QUEUE = "/corrections", "queue"  # where a decision may have been begun
+LISTS = {"queue": "/corrections", "todo": "/todo"}  # where a decision may have been begun
 
 
 def memory_address(machine: str, **query: Any) -> str:
@@ -124,7 +125,7 @@ def _correction(
         status=error.status if error else 200,
         machine=machine_row,
         row=row,
-        back=QUEUE if came_from == FROM_QUEUE else memory_address(machine, tool=row.correction.tool_memory),
+        back=LISTS.get(came_from or "") or memory_address(machine, tool=row.correction.tool_memory),
         question=confirmation.about_correction(
             row, confirmed_verb, queries.counting_on(session, machine_row, row.correction), came_from
         )
@@ -144,29 +145,17 @@ def decide(
 ) -> Response:
     """Approve, release, reject, or confirm that it was applied. Who comes too late is told how it stands."""
     machine_row, verb = machine_named(session, machine), form.get("do", "")
-    correction = queries.correction(session, machine_row, number)
-    outcome = {"done": verb}
+    tool = queries.correction(session, machine_row, number).tool_memory
+    came_from = form.get("from")
     try:
-        if verb == "applied":
-            applied = parsed(AppliedIn, {"offset_after": length(form.get("offset_after"))})
-            applying.mark_applied(session, machine_row, number, caller, offset_after=applied.offset_after)
-        else:
-            decision = parsed(CorrectionDecisionIn, {"reason": words(form, "reason")})
-            warned = form.get("although_fetched") == "true"
-            actions.decide(
-                session, machine_row, number, confirmation.verb(verb), decision.reason, caller, although_fetched=warned
-            )
-    except Conflict as error:
-        session.refresh(correction)
-        if "fetched_at" in error.more:  # fetched while this was being asked: ask again, with the warning
-            return _correction(request, session, caller, machine, number, verb, form.get("from"), form)
-        sent_twice = correction.decided_by == caller.name and correction.status == actions.INTO.get(verb)
-        outcome = {"done": verb} if sent_twice else {"late": verb}
+        outcome = decide_as_typed(session, machine_row, number, form, caller)
     except Invalid as error:
-        return _correction(request, session, caller, machine, number, verb, form.get("from"), form, error)
-    if form.get("from") == FROM_QUEUE:
-        return RedirectResponse(address(QUEUE, at=machine, n=number, **outcome), 303)
-    return RedirectResponse(memory_address(machine, tool=correction.tool_memory, n=number, **outcome), 303)
+        return _correction(request, session, caller, machine, number, verb, came_from, form, error)
+    if outcome == "fetched":
+        return _correction(request, session, caller, machine, number, verb, came_from, form)
+    if came_from in LISTS:
+        return RedirectResponse(address(LISTS[came_from], at=machine, n=number, **{outcome: verb}), 303)
+    return RedirectResponse(memory_address(machine, tool=tool, n=number, **{outcome: verb}), 303)
 
 
 @router.get("/machines/{machine}/tools/{number}/{what}", dependencies=[require("operator")])

@@ -24,17 +24,21 @@ from app.loop.alarm_response.form_reader import acknowledge_as_typed
 from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.machines.queries import machine_named
+from app.loop.tables.machines import Machine
 from app.loop.tools import actions as tools
 from app.loop.tools import confirmation
 from app.loop.tools import queries as tool_queries
+from app.loop.tools import wording as tool_wording
+from app.loop.tools.form_reader import decide_as_typed
 from app.loop.tools.schemas import ToolChange
 from app.quality.wear.queries import next_event
 from app.settings import Settings
+from app.views.approvals.queries import DECIDED_BY_PEOPLE
 from app.views.characteristic.glance import band_picture
 from app.views.characteristic.wording import state_word
 from app.views.station import queries
 from app.views.station.wording import next_action
-from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, from_this_site
+from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, Word, from_this_site
 from app.web.forms import by_field, length, parsed, words
 from app.web.live import Access, stream
 from app.web.paging import address
@@ -98,8 +102,15 @@ def station_page(
     done: Number = None,
     late: Number = None,
     tool: Number = None,
+    decided: Word = None,
+    too_late: Word = None,
+    n: Number = None,
 ) -> Response:
-    """The machine as it stands. done, late: the alarm of the last action; tool: the tool that was changed."""
+    """The machine as it stands.
+
+    done, late: the alarm of the last action; tool: the tool that was changed. decided, too_late: the verb of what was done
+    about correction ``n``, or had been decided before.
+    """
     station = queries.station(session, machine)
     answer = page(
         request,
@@ -111,6 +122,9 @@ def station_page(
         done=_of_machine(session, station.machine.key, done) if done else None,
         late=_of_machine(session, station.machine.key, late) if late else None,
         tool=confirmation.done("change", tool) if tool else None,
+        said=confirmation.done(decided, n) if decided and n else None,
+        refused=_too_late(session, station.machine, too_late, n) if too_late and n else None,
+        offered=confirmation.offered,
         now=datetime.now(UTC),
         state_word=state_word,
         band=lambda row: band_picture(row.stream.last_deviation, row.parameters, None, row.average),
@@ -206,7 +220,7 @@ def _ask_tool(
     question = confirmation.about_tool(row, machine.key, "change")
     return page(
         request,
-        "station/ask_tool.html",
+        "station/ask.html",
         status=error.status if error else 200,
         machine=machine,
         question=replace(question, send_to=f"/station/{machine.key}/tools/{number}/change"),
@@ -227,6 +241,67 @@ def change_tool(
     except REFUSED as error:
         return _ask_tool(request, session, at, machine, number, form, error)
     return RedirectResponse(address(f"/station/{machine}", tool=number), 303)
+
+
+@router.get("/{machine}/corrections/{number}")
+def ask_correction(
+    request: Request,
+    session: SessionDep,
+    at: Station,
+    machine: str,
+    number: int,
+    do: Annotated[str, Query(max_length=40)] = "",
+) -> Response:
+    """The second touch at a correction that waits for a decision. One that is decided meanwhile leads back."""
+    at.must_act()
+    return _ask_correction(request, session, at, machine, number, do)
+
+
+def _ask_correction(
+    request: Request,
+    session: Session,
+    at: AtStation,
+    key: str,
+    number: int,
+    verb: str,
+    form: Mapping[str, str] = NO_FORM,
+    error: InbandError | None = None,
+) -> Response:
+    machine = machine_named(session, key)
+    row = tool_queries.row_of(session, machine, tool_queries.correction(session, machine, number))
+    if row.correction.status not in DECIDED_BY_PEOPLE:
+        return RedirectResponse(address(f"/station/{key}", too_late=verb or "approve", n=number), 303)
+    if verb not in confirmation.offered(row.correction.status):
+        raise NotFound(_("There is nothing at this address."), _("Go back to the station of the machine."))
+    counting_on = tool_queries.counting_on(session, machine, row.correction)
+    question = confirmation.about_correction(row, confirmation.verb(verb), counting_on)
+    return page(
+        request,
+        "station/ask.html",
+        status=error.status if error else 200,
+        machine=machine,
+        question=replace(question, send_to=f"/station/{machine.key}/corrections/{number}"),
+        **_asked(session, at, form, error),
+    )
+
+
+@router.post("/{machine}/corrections/{number}")
+def decide(request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep) -> Response:
+    """Approve, release or reject a correction. Who comes too late is told how it stands."""
+    machine_row, verb = machine_named(session, machine), confirmation.verb(form.get("do", ""))
+    try:
+        caller = _who(request, at, form)
+        outcome = decide_as_typed(session, machine_row, number, form, caller)
+    except REFUSED as error:
+        return _ask_correction(request, session, at, machine, number, verb, form, error)
+    if outcome == "fetched":
+        return _ask_correction(request, session, at, machine, number, verb, form)
+    said = {"decided": verb} if outcome == "done" else {"too_late": verb}
+    return RedirectResponse(address(f"/station/{machine}", n=number, **said), 303)
+
+
+def _too_late(session: Session, machine: Machine, verb: str, number: int) -> list[str]:
+    return list(tool_wording.refused(tool_queries.correction(session, machine, number), machine.key, verb))
 
 
 def _who(request: Request, at: AtStation, form: Mapping[str, str]) -> Caller:

@@ -9,6 +9,8 @@ from app.core.state import CharacteristicState
 from app.loop.alarm_response import queries as alarms
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.tables.machines import Machine
+from app.views.approvals import queries as approvals
+from app.views.approvals.queries import Waiting
 from app.views.characteristic import state_queries
 from app.views.characteristic.state_queries import CharacteristicRow
 
@@ -19,7 +21,7 @@ URGENCY = {state: place for place, state in enumerate(CharacteristicState)}
 class Station(NamedTuple):
     """Content of the station of a machine: `first` in giant digits, the `others` small; active alarms, the first one first.
 
-    tools: the tools that its characteristics are cut with.
+    tools: the tools that its characteristics are cut with. waiting: corrections to decide about that no active alarm holds.
     """
 
     machine: Machine
@@ -28,6 +30,7 @@ class Station(NamedTuple):
     alarms: Sequence[AlarmRow]
     active: int
     tools: Sequence[int]
+    waiting: Sequence[Waiting]
 
 
 def station(session: Session, machine: str) -> Station:
@@ -44,6 +47,7 @@ def station(session: Session, machine: str) -> Station:
         sorted(active, key=lambda row: row.alarm.characteristic_id != number),
         alarms.active_count(session, group.machine.id),
         sorted({row.parameters.tool_memory for row in rows if row.parameters.tool_memory}),
+        [each for tool in approvals.groups(session, group.machine) for each in tool.waiting if each.alarm is None],
     )
 
 

@@ -16,6 +16,9 @@ def next_action(station: Station) -> str:
         return _ACTIONS[first.state]().format(tool=first.parameters.tool_memory, amount=um(amount))
     if station.active:
         return _("Acknowledge the alarm")
+    if station.waiting:
+        amount = station.waiting[0].row.correction.amount
+        return _("Decide on the correction of {amount}").format(amount=um(amount))
     return _("Nothing to do")
 
 

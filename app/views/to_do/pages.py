@@ -3,11 +3,14 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy.orm import Session
 
 from app.access.deps import Viewer, require
 from app.loop.machines import queries as machines
+from app.loop.tools import confirmation, wording
+from app.loop.tools import queries as tools
 from app.views.to_do import queries
-from app.web.deps import SessionDep, Word
+from app.web.deps import Number, SessionDep, Word
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -15,9 +18,20 @@ router = APIRouter(include_in_schema=False)
 
 @router.get("/todo")
 def to_do_page(
-    request: Request, session: SessionDep, caller: Viewer, machine: Word = None, mine: Annotated[bool, Query()] = False
+    request: Request,
+    session: SessionDep,
+    caller: Viewer,
+    machine: Word = None,
+    mine: Annotated[bool, Query()] = False,
+    at: Word = None,
+    done: Word = None,
+    late: Word = None,
+    n: Number = None,
 ) -> Response:
-    """All that waits, with its next action; of one machine, or what the role of whoever asks may do."""
+    """All that waits, with its next action; of one machine, or what the role of whoever asks may do.
+
+    done, late: the verb of what was decided here about correction ``n`` at machine ``at``, or was decided before.
+    """
     chosen = machines.machine_named(session, machine) if machine else None
     return page(
         request,
@@ -27,7 +41,15 @@ def to_do_page(
         machine=chosen,
         machines=machines.machines(session),
         mine=mine,
+        offered=confirmation.offered,
+        done=confirmation.done(done, n) if done and n else None,
+        late=_too_late(session, at, late, n) if at and late and n else None,
     )
+
+
+def _too_late(session: Session, machine: str, verb: str, number: int) -> list[str]:
+    of_machine = machines.machine_named(session, machine)
+    return list(wording.refused(tools.correction(session, of_machine, number), machine, verb))
 
 
 @router.get("/todo/count", dependencies=[require("viewer")])

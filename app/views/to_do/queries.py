@@ -33,7 +33,7 @@ MOST = 200  # of each kind, on one page
 
 
 class Task(NamedTuple):
-    """One thing that waits. state: for its badge; about: what it is about; role: whoever has it, or a higher one, may do it."""
+    """One thing that waits. state: for its badge; about: what it is about; role: whoever has it, or a higher one, may do it; number: of a correction."""
 
     kind: Kind
     state: str
@@ -45,6 +45,7 @@ class Task(NamedTuple):
     action: str
     path: str
     role: Role
+    number: int | None = None
 
 
 def _held_alone() -> ColumnElement[bool]:
@@ -132,8 +133,9 @@ def _corrections(session: Session, machine: Machine | None) -> Iterator[Task]:
             ),
             correction.created_at,
             _("Decide"),
-            f"/corrections?machine={at.key}",
+            f"/corrections?machine={at.key}#correction-{correction.number}",
             "operator",
+            correction.number,
         )
 
 

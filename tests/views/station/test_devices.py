@@ -177,6 +177,18 @@ class TestWhoActs:
         assert entry["device_id"] is not None
         assert f'value="{milica.name}"' in tablet.open("/tools/3/change")  # to be chosen by one touch from now on
 
+    def test_a_correction_is_approved_by_who_shows_a_badge(self, tablet: Tablet, milica: Person) -> None:
+        shop, key = tablet.shop, f"{tablet.shop.characteristic}-approval"
+        shop.add(key, mode="approval", tool_memory=4, average_memory=6)
+        number = shop.read(6.0, key)["correction"]["number"]
+        assert "Who are you?" in tablet.open(f"/corrections/{number}?do=approve")
+        fields = {"do": "approve", "reason": "As expected"}
+        assert "Wrong name or PIN" in tablet.send(f"/corrections/{number}", 401, **fields)
+        assert shop.correction(number)["status"] == "awaiting_approval"
+        tablet.send(f"/corrections/{number}", **fields, badge=BADGE)
+        assert shop.correction(number)["decided_by"] == milica.name
+        assert _last_entry(shop, "correction approved")["device_id"] is not None
+
     def test_for_one_action(self, tablet: Tablet, milica: Person) -> None:
         tablet.shop.read(12.0)
         tablet.send("/tools/3/change", offset="0", reason="New insert", badge=BADGE)

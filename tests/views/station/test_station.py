@@ -47,6 +47,28 @@ class TestWithoutScripts:
         shop.read(6.0, key)
         assert "Approve the correction of −6.0" in viewer.open(f"/station/{shop.machine}")
 
+    def test_a_correction_is_approved_or_rejected(self, shop: Shop, operator: Person, viewer: Person) -> None:
+        key = f"{shop.characteristic}-approval"
+        shop.add(key, mode="approval", tool_memory=4, average_memory=6)
+        first = shop.read(6.0, key)["correction"]["number"]
+        here = f"/station/{shop.machine}"
+        for verb in ("approve", "rejected"):
+            assert f"{here}/corrections/{first}?do={verb}" in operator.open(here)
+        assert f"{here}/corrections/" not in viewer.open(here)
+        assert f"Approve correction {first}?" in operator.open(f"{here}/corrections/{first}?do=approve")
+        asked_again = operator.send(f"{here}/corrections/{first}", 422, do="approve")
+        assert "Pick a reason" in asked_again
+        text = operator.send(f"{here}/corrections/{first}", do="approve", reason="As expected")
+        assert f"Correction {first} is approved" in text
+        assert shop.correction(first)["decided_by"] == operator.name
+        assert shop.correction(first)["status"] == "pending"
+        second = shop.read(-6.0, key, correction_in_effect=0)["correction"]["number"]
+        operator.send(f"{here}/corrections/{second}", do="rejected", reason="False reading")
+        assert shop.correction(second)["status"] == "rejected"
+        assert "had been decided meanwhile" in operator.send(
+            f"{here}/corrections/{second}", do="approve", reason="As expected"
+        )
+
     def test_an_alarm_is_acknowledged_in_the_name_of_who_is_signed_in(self, shop: Shop, operator: Person) -> None:
         shop.read(12.0)
         alarm = shop.alarms()[0]["id"]

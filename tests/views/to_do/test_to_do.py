@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from playwright.sync_api import Page, expect
 
 from tests.conftest import Server
 from tests.shop import Person, Shop
@@ -54,6 +55,34 @@ def test_each_leads_to_its_next_action(shop: Shop, engineer: Person) -> None:
         r'<a class="button " href="(/(?:alarms|corrections|proposals)[^"]+)"', engineer.open("/todo")
     ):
         engineer.open(path)
+
+
+def test_a_correction_is_decided_from_its_row(shop: Shop, operator: Person, viewer: Person) -> None:
+    shop.add(f"{shop.characteristic}-row", tool_memory=7, average_memory=8, mode="approval")
+    number = shop.read(6.0, f"{shop.characteristic}-row")["correction"]["number"]
+    here = f"/machines/{shop.machine}/corrections/{number}"
+    assert f'href="{here}?do=approve&amp;from=todo"' in operator.open("/todo")
+    assert f'href="{here}?do=approve' not in viewer.open("/todo")
+    fields = {"do": "approve", "reason": "As expected", "from": "todo"}
+    assert f"Correction {number} is approved" in operator.send(here, **fields)
+    fields["do"] = "rejected"
+    shop.correction(number, "applied")
+    assert "had been decided meanwhile" in operator.send(here, **fields)
+
+
+def test_the_count_in_the_bar_follows_proposals(page: Page, shop: Shop, engineer: Person) -> None:
+    engineer.sign_in(page)
+    page.goto("/machines")
+    expect(page.locator("live-status")).to_have_attribute("state", "live")
+    before = counted(engineer.open("/todo/count"))
+    count = page.locator("#to-do-count [data-to-do]")
+    expect(count).to_have_attribute("data-to-do", str(before))
+    proposal = shop.call(
+        "POST", f"/characteristics/{shop.characteristic}/proposals", 201, zero_range=0.003, reason="Fewer still"
+    )
+    expect(count).to_have_attribute("data-to-do", str(before + 1))
+    shop.call("POST", f"/proposals/{proposal['id']}/reject", reason="Too wide")
+    expect(count).to_have_attribute("data-to-do", str(before))
 
 
 def test_old_addresses_lead_on(shop: Shop, operator: Person) -> None:
