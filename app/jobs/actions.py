@@ -12,6 +12,7 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session
 
 from app.db.engine import Database
+from app.db.events import publish
 from app.errors import InbandError
 from app.jobs.tables import JobFailure, JobRun
 
@@ -140,6 +141,7 @@ def note_failure(database: Database, job: str, unit: Unit, error: Exception) -> 
             failures, retry_at = session.execute(
                 upsert.returning(JobFailure.failures, JobFailure.retry_at).execution_options(synchronize_session=False)
             ).one()
+            publish(session, {"kind": "job"})
     except Exception as second:
         raise DatabaseGone(f"{job} at {unit.subject or 'its list'}: {words}") from second
     log.error(
@@ -156,6 +158,7 @@ def note_failure(database: Database, job: str, unit: Unit, error: Exception) -> 
 def end_failure(session: Session, job: str, unit: Unit) -> None:
     """A unit of work succeeded, or is not due any more: its record ends."""
     session.execute(delete(JobFailure).where(JobFailure.job == job, JobFailure.subject == unit.subject))
+    publish(session, {"kind": "job"})
     log.info("periodic job %s no longer fails for %s", job, unit.subject or "all")
 
 

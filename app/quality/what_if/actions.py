@@ -185,4 +185,8 @@ def _note(
 ) -> None:
     key = row.characteristic.key
     record(session, caller.name, action, f"characteristic/{key}", before, after | {"proposal": row.proposal.id}, reason)
-    publish(session, {"kind": "characteristic", "machine": row.machine.key, "characteristic": key})
+    publish(
+        session,
+        {"kind": "characteristic", "machine": row.machine.key, "characteristic": key},
+        {"kind": "proposal", "machine": row.machine.key, "characteristic": key, "id": row.proposal.id},
+    )

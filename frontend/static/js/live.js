@@ -14,7 +14,7 @@
 const URL_OF_EVENTS = document.querySelector("meta[name=events]")?.content ?? "/api/v1/events"; // of a station its own
 const KINDS = [
   "reading", "correction", "alarm", "tool", "average", "calibration", "characteristic", "machine",
-  "form", "work_zero", "alignment", "kinematics", "gauge_study", "baseline", "signal", "report",
+  "form", "work_zero", "alignment", "kinematics", "gauge_study", "baseline", "signal", "report", "proposal", "job",
 ];
 const SILENCE = 15_000; // ms; three heartbeats missed
 const RETRY = 3_000;
