@@ -196,6 +196,7 @@ def form_page(
         request,
         "geometric_form/form.html",
         row=row,
+        machine=machine_named(session, row.machine),
         measurement=row.measurement,
         evaluation=row.evaluation,
         result=row.evaluation.result,
