@@ -1,4 +1,4 @@
-"""What people typed about a correction, on whatever page it was asked, and what comes of it."""
+"""Decisions about a correction as people type them, on whatever page they are asked."""
 
 from collections.abc import Mapping
 from typing import Literal

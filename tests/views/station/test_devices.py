@@ -182,7 +182,7 @@ class TestWhoActs:
         shop.add(key, mode="approval", tool_memory=4, average_memory=6)
         number = shop.read(6.0, key)["correction"]["number"]
         assert "Who are you?" in tablet.open(f"/corrections/{number}?do=approve")
-        fields = {"do": "approve", "reason": "As expected"}
+        fields: dict[str, Any] = {"do": "approve", "reason": "As expected"}
         assert "Wrong name or PIN" in tablet.send(f"/corrections/{number}", 401, **fields)
         assert shop.correction(number)["status"] == "awaiting_approval"
         tablet.send(f"/corrections/{number}", **fields, badge=BADGE)

@@ -1,6 +1,7 @@
 """What waits for a person: one list, one count, wherever it stands."""
 
 import re
+from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -63,7 +64,7 @@ def test_a_correction_is_decided_from_its_row(shop: Shop, operator: Person, view
     here = f"/machines/{shop.machine}/corrections/{number}"
     assert f'href="{here}?do=approve&amp;from=todo"' in operator.open("/todo")
     assert f'href="{here}?do=approve' not in viewer.open("/todo")
-    fields = {"do": "approve", "reason": "As expected", "from": "todo"}
+    fields: dict[str, Any] = {"do": "approve", "reason": "As expected", "from": "todo"}
     assert f"Correction {number} is approved" in operator.send(here, **fields)
     fields["do"] = "rejected"
     shop.correction(number, "applied")
