@@ -3,12 +3,13 @@
 # make lint    style, types, lengths, templates, and the walls between the rooms
 # make bench   the benchmarks; each prints ratios
 # make messages  collect what can be translated into frontend/locale/inband.pot
+# make wheel   what others install: dist/inband-*.whl, and the source beside it
 # make clean   remove what make has made; no data
 
 SHELL := /bin/sh
 .SHELLFLAGS := -eu -c
 .DELETE_ON_ERROR:
-.PHONY: run test lint bench messages clean
+.PHONY: run test lint bench messages wheel clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -37,8 +38,12 @@ bench: $(VENV)/installed-dev $(VENV)/browser
 messages: $(VENV)/installed
 	@$(BIN)/pybabel -q extract -F pyproject.toml --project Inband -o frontend/locale/inband.pot .
 
+wheel: $(VENV)/installed
+	@rm -rf dist
+	@$(BIN)/hatchling build
+
 clean:
-	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "Inband needs Python 3.11 or newer, and there is none on the PATH. Install one, or say where it is: make PYTHON=/path/to/python3" >&2; exit 1; }

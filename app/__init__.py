@@ -3,7 +3,7 @@
 The map of the house, from the top floor down. A room knows only rooms of the floors below it, and of its own floor those that
 stand lower in this list; import-linter holds that. Inside a room: tables (columns), queries (SELECT only), actions (load,
 decide in core, save), schemas (JSON), api and pages (routes), wording (sentences), figures (pure: values in, charts out). Rooms meet
-only through each other's queries and actions. frontend/ and migrations/ lie beside this folder.
+only through each other's queries and actions. frontend/ and migrations/ lie beside this folder, and inside it once installed.
 
     cli              the command `inband`, and the demonstration plant that talks to the public API like real machines
     main.py          create_app(): the wiring
@@ -61,4 +61,10 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
     settings.py      every setting with its meaning; unsafe values are refused
 """
 
+from pathlib import Path
+
 __version__ = "0.1.0"
+
+_HERE = Path(__file__).resolve().parent
+HOUSE = _HERE if (_HERE / "frontend").is_dir() else _HERE.parent
+"""The folder that holds ``frontend/``, ``migrations/`` and ``docs/``: this one where a wheel is installed, else the tree's."""

@@ -11,8 +11,7 @@ import platformdirs
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-HOUSE = Path(__file__).resolve().parent.parent
-"""The tree Inband runs from: ``frontend/`` and ``migrations/`` lie here, beside ``app/``."""
+from app import HOUSE
 
 
 def _postgres_url(url: str) -> str:

@@ -10,10 +10,11 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, get_args
 
+from app import HOUSE
 from app.core.parameters import FIELDS, Field, FieldKind
 from app.errors import InbandError
 from app.loop.characteristics import wording
-from app.settings import HOUSE, Settings
+from app.settings import Settings
 
 PART = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 

@@ -29,10 +29,10 @@ from playwright.sync_api import Browser, Page, Playwright, Request, expect, sync
 from sqlalchemy.orm import Session
 from xdist import plugin as xdist_plugin
 
+from app import HOUSE
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
-from app.settings import HOUSE
 from tests.forked import Forked
 from tests.shop import Person, Shop
 

@@ -13,9 +13,10 @@ from typing import Any
 
 import pytest
 
+from app import HOUSE
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
-from app.settings import HOUSE, Settings
+from app.settings import Settings
 from docs import generate
 from tests.conftest import Server, begun, free_port, wait_ready
 

@@ -1,5 +1,6 @@
 """Common parts of all commands: settings from options and environment, their database, their output."""
 
+import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,14 +26,22 @@ people = Console(stderr=True, highlight=False)
 
 def _tell_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"inband {__version__}")
+        from app.db.migrate import head
+
+        typer.echo(f"inband {__version__} (Python {platform.python_version()}, schema {head()})")
         raise typer.Exit
 
 
 @cli.callback()
 def inband(
     version: Annotated[
-        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version and end.")
+        bool,
+        typer.Option(
+            "--version",
+            callback=_tell_version,
+            is_eager=True,
+            help="Print the versions of the program, of Python and of the schema, and end.",
+        ),
     ] = False,
 ) -> None:
     """Inband decides tool-offset corrections from CNC probe readings."""

@@ -133,8 +133,9 @@ def _rights(rights: "Rights", *, own: bool) -> bool:
     """Say what the role may do, and whether facts are protected. False if something has to be done."""
     if rights.missing:
         _wrong(
-            f"rights: the role {rights.role} lacks {', '.join(rights.missing)}. "
-            "Grant them as the owner of the tables; docs/how-to/run-for-real.md has the statements."
+            f"rights: the role {rights.role} lacks {', '.join(rights.missing)}. As the owner of the tables: "
+            f"GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA public TO {rights.role}; "
+            f"GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO {rights.role};"
         )
     if rights.unprotected:
         _wrong(
@@ -148,7 +149,8 @@ def _rights(rights: "Rights", *, own: bool) -> bool:
     elif own:
         _note(
             f"rights: facts are protected by triggers, but the role {rights.role} could remove these (it owns tables or is a "
-            "superuser). Serve with a role of its own: docs/how-to/run-for-real.md, *A role that cannot alter facts*."
+            "superuser). Serve with a role of its own that may read and write rows only; the source says how, in "
+            "docs/how-to/run-for-real.md, *A role that cannot alter facts*."
         )
     else:
         _well("rights", "facts are protected by triggers; whoever may read the data folder could remove them")

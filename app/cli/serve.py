@@ -9,16 +9,17 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from enum import StrEnum
 from functools import partial
 from multiprocessing import parent_process
+from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app import __version__, logs
+from app import __version__, core, logs
 from app.cli.base import DatabaseUrl, DataDir, cli, migrated, say, settings_from
 from app.db.disk import watch
 from app.errors import InbandError
@@ -100,6 +101,7 @@ def run(
 
     raise_file_limit()
     with _listen(settings) as listening, ExitStack() as stack:
+        _keep_compiled(settings.data_dir)
         database = stack.enter_context(migrated(settings))
         os.environ |= {
             "INBAND_DATABASE_URL": database.dsn,  # for the workers, which make their own Settings
@@ -122,6 +124,22 @@ def run(
         _serve(settings, listening, stack.close)
     log.info("Inband has ended")
     _leave_threads()
+
+
+def _keep_compiled(data_dir: Path) -> None:
+    """Keep compiled loops in the data folder where nothing can be written beside the program: the next start needs them too.
+
+    To be called before Numba is imported, which migrations do.
+    """
+    from app.db.embedded import EmbeddedServerError, make_data_dir
+
+    if "NUMBA_CACHE_DIR" in os.environ or os.access(Path(core.__path__[0]), os.W_OK):
+        return
+    folder = data_dir / "compiled"
+    with suppress(EmbeddedServerError, OSError):  # then each process compiles for itself
+        make_data_dir(data_dir)
+        folder.mkdir(mode=0o700, exist_ok=True)
+        os.environ["NUMBA_CACHE_DIR"] = str(folder)
 
 
 def _log_start(database: "Database", settings: "Settings") -> None:

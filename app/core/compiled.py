@@ -1,8 +1,9 @@
 """`compiled`: a loop over many readings, run as machine code (Numba) and equal to the Python that it is written in.
 
 Compiled code is kept beside the source (``__pycache__``), where that cannot be written in the user's cache folder, or where
-``NUMBA_CACHE_DIR`` says; where nothing can be written it is compiled anew by each process. The first call
-of a process takes some milliseconds from the cache, and some seconds the very first time.
+``NUMBA_CACHE_DIR`` says, which the server sets to a folder of its data (app.cli.serve); where nothing can be written it is
+compiled anew by each process. The first call of a process takes some milliseconds from the cache, and some seconds the very
+first time.
 
 A compiled function may call functions of ours in any file: they are compiled into it, and stay plain for whoever else calls
 them. What is kept is renewed when one of those files changes, so constants are taken from them and from no other file (a

@@ -161,8 +161,7 @@ class EmbeddedServer:
 
     def start(self) -> str:
         """Make the cluster if there is none, start the server if it does not run, and say where it is."""
-        # Root's server runs as somebody else, who must pass through; nothing in it is open to him but what is his.
-        _make_private(self.data_dir, 0o711 if os.geteuid() == 0 else 0o700)
+        make_data_dir(self.data_dir)
         used_before = self._users_lock is not None
         try:
             with self._alone():
@@ -412,6 +411,14 @@ def clusters_in_use() -> set[Path]:
                 if cluster.name == "postgres" and (cluster.parent / "users.lock").exists():
                     clusters.add(cluster.parent)
     return clusters
+
+
+def make_data_dir(path: Path) -> None:
+    """Make the data folder, closed for everybody else. Raises `EmbeddedServerError`.
+
+    Root's server runs as somebody else, who must pass through; nothing in it is open to him but what is his.
+    """
+    _make_private(path, 0o711 if os.geteuid() == 0 else 0o700)
 
 
 def _make_private(path: Path, mode: int = 0o700) -> None:

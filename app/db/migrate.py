@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from psycopg.errors import InsufficientPrivilege
 
+from app import HOUSE
 from app.db.connections import Connections
-from app.settings import HOUSE
 
 if TYPE_CHECKING:  # SQLAlchemy and Alembic: half a second to read, which most commands need not spend
     from alembic.config import Config
@@ -24,7 +24,7 @@ if TYPE_CHECKING:  # SQLAlchemy and Alembic: half a second to read, which most c
 
 LOCK = 7_010_000_833  # any number, the same in every process
 LOCK_PATIENCE = "5s"
-VERSIONS = HOUSE / "migrations" / "versions"
+MIGRATIONS = HOUSE / "migrations"
 OTHERS_TURN = "10min"
 SQUASHED = "0018"
 """Last of the revisions of the first published program. Its tables are those of the first schema, so it is stamped as that."""
@@ -66,7 +66,7 @@ def upgrade(url: str) -> list[str]:
             try:
                 if now == SQUASHED:
                     _stamp(connection)
-                command.upgrade(_config(connection), "head")
+                command.upgrade(config(connection), "head")
                 connection.commit()
             except OperationalError as error:
                 if "lock timeout" not in str(error):
@@ -96,7 +96,7 @@ def current(url: str) -> str | None:
 
 def head() -> str | None:
     """The revision that this program's tables are at: the one migration that no other goes on from."""
-    texts = [path.read_text(encoding="utf-8") for path in VERSIONS.glob("*.py")]
+    texts = [path.read_text(encoding="utf-8") for path in (MIGRATIONS / "versions").glob("*.py")]
     here = {match[1] for source in texts if (match := re.search(r'^revision\b.*?= "(\w+)"', source, re.MULTILINE))}
     heads = here - {
         match[1] for source in texts if (match := re.search(r'^down_revision\b.*?= "(\w+)"', source, re.MULTILINE))
@@ -142,20 +142,23 @@ def connected(url: str) -> Iterator[Connection]:
             yield connection
 
 
-def _config(connection: Connection | None = None) -> Config:
+def config(connection: Connection | None = None) -> Config:
+    """Alembic's configuration, which needs no file: an installed program has none. That of its command is in pyproject.toml."""
     from alembic.config import Config
 
-    return Config(toml_file=HOUSE / "pyproject.toml", attributes={"connection": connection})
+    made = Config(attributes={"connection": connection})
+    made.set_main_option("script_location", str(MIGRATIONS).replace("%", "%%"))
+    return made
 
 
 def _scripts() -> ScriptDirectory:
     from alembic.script import ScriptDirectory
 
     try:
-        return ScriptDirectory.from_config(_config())
+        return ScriptDirectory.from_config(config())
     except Exception as error:
         raise MigrationError(
-            f"the migrations are not in {HOUSE / 'migrations'} ({error}). Inband runs from its tree: clone it and `make run`."
+            f"the migrations are not in {MIGRATIONS} ({error}). This installation is not whole: install Inband again."
         ) from error
 
 

@@ -11,13 +11,14 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
 from gettext import NullTranslations, translation
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from app import HOUSE
 
 if TYPE_CHECKING:
     from babel import Locale
 
-LOCALE_DIR = Path(__file__).resolve().parents[2] / "frontend" / "locale"
+LOCALE_DIR = HOUSE / "frontend" / "locale"
 DEFAULT_LANGUAGE = "en"
 
 _language: ContextVar[str] = ContextVar("language", default=DEFAULT_LANGUAGE)

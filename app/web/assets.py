@@ -20,7 +20,9 @@ from starlette.datastructures import Headers
 from starlette.responses import PlainTextResponse, Response
 from starlette.types import Receive, Scope, Send
 
-STATIC_DIR = Path(__file__).resolve().parents[2] / "frontend" / "static"
+from app import HOUSE
+
+STATIC_DIR = HOUSE / "frontend" / "static"
 PLOTLY = "plotly.min.js"
 FOREVER = "public, max-age=31536000, immutable"
 COMPRESSIBLE = (".js", ".css", ".svg", ".json", ".txt", ".html")

@@ -13,9 +13,8 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute, iter_route_contexts
 
-from app import __version__
+from app import HOUSE, __version__
 from app.errors import PROBLEM_JSON, InbandError, Unexpected
-from app.settings import HOUSE
 from app.web.api import BASE, EVERY_ERROR
 from app.web.deps import SESSION_COOKIE
 

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from functools import cache
 from http import HTTPStatus
-from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
-from app import __version__
+from app import HOUSE, __version__
 from app.errors import InbandError
 from app.language import i18n, numbers, times
 from app.web import period, states, theme
@@ -25,7 +24,7 @@ from app.web.doors import door_of, search_words
 from app.web.paging import address
 from app.web.request_log import note_reason
 
-TEMPLATE_DIR = Path(__file__).resolve().parents[2] / "frontend" / "templates"
+TEMPLATE_DIR = HOUSE / "frontend" / "templates"
 THEME_COOKIE = "inband_theme"
 
 

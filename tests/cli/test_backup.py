@@ -10,8 +10,8 @@ from pathlib import Path
 import psycopg
 import pytest
 
+from app import HOUSE
 from app.db import migrate
-from app.settings import HOUSE
 from tests.conftest import NewDatabase, Server, drop_database, in_database
 from tests.db.first_program import make_first_program
 from tests.shop import Shop

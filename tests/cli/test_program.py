@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from app.settings import HOUSE
+from app import HOUSE
 from tests.conftest import Server
 from tests.shop import Shop
 

@@ -1,4 +1,5 @@
 import os
+import platform
 import re
 import shutil
 import signal
@@ -16,10 +17,9 @@ import httpx
 import psycopg
 import pytest
 
-from app import __version__
+from app import HOUSE, __version__
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
-from app.settings import HOUSE
 from tests.conftest import NewDatabase, RunServer, Server, free_port, in_database, wait_ready
 from tests.db.first_program import make_first_program
 
@@ -264,7 +264,10 @@ def test_a_newer_schema_is_left_alone(new_database: NewDatabase) -> None:
 
 def test_the_version_is_told() -> None:
     done = inband("--version")
-    assert (done.returncode, done.stdout) == (0, f"inband {__version__}\n")
+    assert (done.returncode, done.stdout) == (
+        0,
+        f"inband {__version__} (Python {platform.python_version()}, schema {migrate.head()})\n",
+    )
 
 
 def test_help_and_keys_read_no_more_of_the_program_than_they_need(new_database: NewDatabase) -> None:

@@ -16,8 +16,8 @@ from numba.core.caching import CacheImpl
 from numba.core.registry import CPUDispatcher
 
 import app.core
+from app import HOUSE
 from app.core.compiled import compiled, functions_of, plain
-from app.settings import HOUSE
 
 
 def doubled(values: Any) -> Any:

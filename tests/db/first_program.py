@@ -4,10 +4,8 @@ from pathlib import Path
 
 import psycopg
 from alembic import command
-from alembic.config import Config
 
 from app.db import migrate
-from app.settings import HOUSE
 
 ROWS = Path(__file__).with_suffix(".sql")
 MACHINE_KEY = "inband_xuRe6ynNk1IG5cCi-CewWlYu1_mrDj7ziNiI8_jWCz8"
@@ -29,6 +27,5 @@ def make_first_program(url: str) -> None:
 def move(url: str, revision: str) -> None:
     """Up or down to a revision, as the command ``alembic`` does it."""
     with migrate.connected(url) as connection:
-        config = Config(toml_file=HOUSE / "pyproject.toml", attributes={"connection": connection})
         now = migrate.current(url)
-        (command.downgrade if now and now > revision else command.upgrade)(config, revision)
+        (command.downgrade if now and now > revision else command.upgrade)(migrate.config(connection), revision)

@@ -14,11 +14,11 @@ from tempfile import mkdtemp
 import psycopg
 import pytest
 
+from app import HOUSE
 from app.db import binaries, embedded
 from app.db.binaries import BinariesError, binary
 from app.db.embedded import EmbeddedServer, EmbeddedServerError, _children
 from app.db.run_as import run_as
-from app.settings import HOUSE
 
 AS_ROOT = os.geteuid() == 0
 USE = """

@@ -8,10 +8,10 @@ import psycopg
 import pytest
 from sqlalchemy import make_url
 
+from app import HOUSE
 from app.db import migrate
 from app.db.base import whole_metadata
 from app.db.rights import APPEND_ONLY, WITH_A_LIFE, rights_of
-from app.settings import HOUSE
 from tests.conftest import NewDatabase, RunServer, Server, drop_database
 from tests.db.first_program import make_first_program
 from tests.shop import Shop

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from jinja2 import Environment, nodes
 
-from app.settings import HOUSE
+from app import HOUSE
 from app.web.templates import TEMPLATE_DIR, environment
 
 TEMPLATES = sorted(path.relative_to(TEMPLATE_DIR).as_posix() for path in TEMPLATE_DIR.rglob("*.html"))

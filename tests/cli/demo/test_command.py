@@ -10,7 +10,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from app.settings import HOUSE
+from app import HOUSE
 from tests.conftest import NewDatabase, free_port, wait_ready
 
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app import HOUSE
 from app.core.compiled import plain
 from app.core.spc import scan
 from app.core.spc.chance import average_run_length, chance, per_window
@@ -29,7 +30,6 @@ from app.core.spc.rules import (
 )
 from app.core.spc.shewhart import Chart
 from app.core.spc.shewhart import given as standard
-from app.settings import HOUSE
 
 # Quarters reach every limit exactly, and equal neighbours come up often.
 POINTS = st.lists(st.integers(-14, 14).map(lambda quarter: quarter / 4), min_size=1, max_size=80)

@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
+from app import HOUSE
 from app.access.callers import Caller
 from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
@@ -29,7 +30,6 @@ from app.loop.readings.importing.actions import import_readings
 from app.loop.readings.importing.history import Flawed, Summary
 from app.loop.readings.importing.layout import Wishes, look
 from app.loop.tools import actions as offsets
-from app.settings import HOUSE
 from app.web.openapi import example_of
 from tests.conftest import RunServer
 from tests.loops import in_thread

@@ -14,12 +14,12 @@ import pytest
 from playwright.sync_api import Page, expect
 from starlette.requests import Request
 
-from app import main
+from app import HOUSE, main
 from app.quality.proof import queries, wording
 from app.quality.proof.cases import Case, Value, case_from, cases
 from app.quality.proof.pages import proof_page
 from app.quality.proof.queries import Proof, run
-from app.settings import HOUSE, Settings
+from app.settings import Settings
 from app.web.templates import environment
 from tests import loops
 from tests.conftest import Server
