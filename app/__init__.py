@@ -8,6 +8,8 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
     cli              the command `inband`, and the demonstration plant that talks to the public API like real machines
     main.py          create_app(): the wiring
 
+    plants           several plants in one installation: their list, their addresses, their overview
+
     views            pages that compose several rooms
         reports          a characteristic and a period as page, PDF, spreadsheet; many at once in the background
         search           readings and parts across characteristics, one field for everything

@@ -8,7 +8,6 @@ from functools import partial
 
 from fastapi import APIRouter, FastAPI
 from starlette.middleware.gzip import GZipMiddleware
-from starlette.types import ASGIApp
 
 from app.access import api as people
 from app.access import events_api, keys_api
@@ -58,6 +57,9 @@ from app.loop.tools import edge_pages, edges_api, text_api, text_pages
 from app.loop.tools import jobs as offset_jobs
 from app.loop.tools import pages as offset_pages
 from app.memory import give_back_free_memory, keep_few_arenas
+from app.plants import pages as plants_pages
+from app.plants.prefix import UnderPrefix
+from app.plants.serving import Application, Plants
 from app.quality.capability import actions as capability_actions
 from app.quality.capability import api as capability
 from app.quality.control_charts import api as control
@@ -214,7 +216,7 @@ def keep_for_good() -> None:
     gc.freeze()
 
 
-def create_app(settings: Settings | None = None, ending: Callable[[], None] = lambda: None) -> ASGIApp:
+def create_app(settings: Settings | None = None, ending: Callable[[], None] = lambda: None) -> Plants:
     """Make the application for one server process. Without settings they come from the environment.
 
     ending: called when the application begins to end.
@@ -224,6 +226,31 @@ def create_app(settings: Settings | None = None, ending: Callable[[], None] = la
     if settings.database_url is None:
         raise RuntimeError("no database: `inband serve` starts one, or set INBAND_DATABASE_URL")
     use_zone(settings)
+    front = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, redirect_slashes=False)
+    front.state.settings = settings
+    add_problem_handlers(front, recognise)
+    front.include_router(plants_pages.router)
+    return Plants(settings, create_plant, front, process(ending))
+
+
+@asynccontextmanager
+async def process(ending: Callable[[], None]) -> AsyncIterator[None]:
+    """The work of a server process for all its plants: compiling, the proof, memory given back."""
+    compiling = asyncio.get_running_loop().run_in_executor(None, compile_now)
+    giving_back = asyncio.get_running_loop().create_task(give_back_free_memory(), name="free memory")
+    proving = proofs.begin_later(keep_for_good)
+    gc.collect()
+    keep_for_good()
+    yield
+    ending()
+    proving.cancel()
+    giving_back.cancel()
+    await compiling
+
+
+def create_plant(settings: Settings, prefix: str = "") -> Application:
+    """Make the application of one plant. prefix: the path below which it is served, where there are several."""
+    assert settings.database_url is not None
     connections = Connections(settings.database_url, settings.database_patience)
     database = Database(settings.database_url, pool_size=settings.pool_size, connections=connections)
     # Readings are let in by connections of their own: requests that work for seconds may hold all the others. There are as
@@ -240,16 +267,7 @@ def create_app(settings: Settings | None = None, ending: Callable[[], None] = la
         live.start()
         jobs.start()
         report_worker.start()
-        compiling = asyncio.get_running_loop().run_in_executor(None, compile_now)
-        giving_back = asyncio.get_running_loop().create_task(give_back_free_memory(), name="free memory")
-        proving = proofs.begin_later(keep_for_good)
-        gc.collect()
-        keep_for_good()
         yield
-        ending()
-        proving.cancel()
-        giving_back.cancel()
-        await compiling
         await live.stop()
         await jobs.stop()
         await report_worker.stop()
@@ -265,6 +283,7 @@ def create_app(settings: Settings | None = None, ending: Callable[[], None] = la
         docs_url=None,
         redoc_url=None,
         openapi_url=None,
+        root_path=prefix,
         redirect_slashes=False,  # the framework's own redirect names the host that the request gave; see app.web.problems
     )
     app.state.settings = settings
@@ -280,10 +299,11 @@ def create_app(settings: Settings | None = None, ending: Callable[[], None] = la
     }
     add_problem_handlers(app, recognise)
     app.add_middleware(BodyLimit)
-    app.add_middleware(GZipMiddleware, minimum_size=1024, compresslevel=5, exclude_content_types=NOT_COMPRESSED)
     for router in ROUTERS:
         app.include_router(router)
     app.openapi = partial(document, app, readings.SCHEMAS)  # type: ignore[method-assign]
     app.mount("/static", assets())
-    door = ReadingsDoor(SecurityHeaders(app), keys.lookup, directory, writer, letting_in)
-    return RequestLog(door, settings.slow_request)
+    answers = UnderPrefix(app, prefix) if prefix else app
+    small = GZipMiddleware(answers, minimum_size=1024, compresslevel=5, exclude_content_types=NOT_COMPRESSED)
+    door = ReadingsDoor(SecurityHeaders(small), keys.lookup, directory, writer, letting_in)
+    return Application(app, RequestLog(door, settings.slow_request))

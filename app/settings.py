@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 from zoneinfo import available_timezones
 
 import platformdirs
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, AliasChoices, Field, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from app import HOUSE
@@ -91,12 +91,26 @@ def _shifts(text: str) -> str:
     return ",".join(begins)
 
 
+def _schema(name: str) -> str:
+    if not re.fullmatch(r"[a-z_][a-z0-9_]{0,49}", name) or name.startswith("pg_"):
+        raise ValueError(
+            f"{name!r} is no name of a schema; take up to 50 small letters, digits and _, such as plant_north, and not pg_ at "
+            "the beginning"
+        )
+    return name
+
+
 def is_loopback(host: str) -> bool:
     """Tell if only programs on this computer reach ``host``."""
     try:
         return ip_address(host.strip("[]")).is_loopback
     except ValueError:
         return host == "localhost"
+
+
+def variable_of(field: str) -> str:
+    """Name of the environment variable of a setting."""
+    return f"INBAND_{'SCHEMA' if field == 'schema_name' else field.upper()}"
 
 
 class Settings(BaseSettings):
@@ -110,6 +124,12 @@ class Settings(BaseSettings):
         default=None,
         repr=False,
         description="A PostgreSQL server of your own. Without it Inband starts its own in data_dir.",
+    )
+    schema_name: Annotated[str, AfterValidator(_schema)] | None = Field(
+        default=None,
+        validation_alias=AliasChoices("schema_name", "INBAND_SCHEMA"),  # `schema` is a word of pydantic's own
+        description="Schema of the database in which the tables of this plant lie: one database holds several plants. Without "
+        "it the first of the role's search path, usually public.",
     )
     data_dir: Annotated[Path, AfterValidator(_private_folder)] = Field(
         default_factory=lambda: platformdirs.user_data_path("inband"),

@@ -14,7 +14,7 @@ from app import HOUSE
 from app.core.parameters import FIELDS, Field, FieldKind
 from app.errors import InbandError
 from app.loop.characteristics import wording
-from app.settings import Settings
+from app.settings import Settings, variable_of
 
 PART = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -106,7 +106,7 @@ def _settings() -> str:
     return _table(
         ("variable", "default", "meaning"),
         (
-            (f"`INBAND_{name.upper()}`", _default(name, field), field.description or "")
+            (f"`{variable_of(name)}`", _default(name, field), field.description or "")
             for name, field in Settings.model_fields.items()
         ),
     )

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import httpx
 import pytest
 
-from app.main import create_app
+from app.main import create_plant
 from app.settings import Settings
 from app.web.openapi import example_of
 from tests.conftest import Server
@@ -357,9 +357,7 @@ class Operation(NamedTuple):
 
 @cache
 def document() -> dict[str, Any]:
-    app: Any = create_app(Settings(database_url="postgresql://nobody@localhost/nothing"))
-    while not hasattr(app, "openapi"):
-        app = app.app
+    app = create_plant(Settings(database_url="postgresql://nobody@localhost/nothing")).app
     made: dict[str, Any] = app.openapi()
     return made
 

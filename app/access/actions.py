@@ -54,11 +54,23 @@ def add_person(session: Session, *, name: str, role: str, password: str, actor: 
 
     Raises `Invalid` for a name or password that cannot be used, `Conflict` for a name that is taken or looks like one that is.
     """
-    session.execute(select(func.pg_advisory_xact_lock(7292, 0)))  # of two who look alike, one comes second
-    name = names.of_person(name, queries.names(session))
     _role(role)
     acceptable(password, name)
-    person = Person(name=name, role=role, password_hash=hashed(password))
+    return _added(session, name, role, hashed(password), actor)
+
+
+def add_person_of_another_plant(session: Session, person: Person, role: str, actor: str) -> Person:
+    """Add somebody who may sign in to another plant already, with the same name and password.
+
+    Raises `Invalid` for an unknown role, `Conflict` for a name that is taken or looks like one that is.
+    """
+    return _added(session, person.name, _role(role), person.password_hash, actor)
+
+
+def _added(session: Session, name: str, role: str, password_hash: str, actor: str) -> Person:
+    session.execute(select(func.pg_advisory_xact_lock(7292, 0)))  # of two who look alike, one comes second
+    name = names.of_person(name, queries.names(session))
+    person = Person(name=name, role=role, password_hash=password_hash)
     session.add(person)
     session.flush()
     record(session, actor, "person added", f"person/{name}", None, {"name": name, "role": role})

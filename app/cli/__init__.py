@@ -17,6 +17,7 @@ from app.cli.base import cli, explain, say
 
 PARTS = (
     "app.cli.serve",
+    "app.cli.plants",
     "app.cli.database",
     "app.cli.backup",
     "app.cli.people",

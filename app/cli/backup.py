@@ -28,7 +28,8 @@ def backup(file: File, data_dir: DataDir = None, database_url: DatabaseUrl = Non
         refuse_empty(url)
         unfinished.touch(0o600)  # before there is anything in it that others could read
         try:
-            _run("pg_dump", url, "--format=custom", f"--file={unfinished.absolute()}")
+            alone = [f"--schema={settings.schema_name}"] if settings.schema_name else []
+            _run("pg_dump", url, "--format=custom", f"--file={unfinished.absolute()}", *alone)
         except BaseException:
             unfinished.unlink(missing_ok=True)
             raise
@@ -48,7 +49,9 @@ def restore(file: File, data_dir: DataDir = None, database_url: DatabaseUrl = No
     settings = settings_from(data_dir=data_dir, database_url=database_url)
     with reachable(settings) as url:
         with Connections(url, settings.database_patience) as connections, connections.connect() as connection:
-            tables = connection.execute("SELECT count(*) FROM pg_tables WHERE schemaname = 'public'").fetchone()
+            tables = connection.execute(
+                "SELECT count(*) FROM pg_tables WHERE schemaname = coalesce(%s, 'public')", [settings.schema_name]
+            ).fetchone()
         if tables and tables[0]:
             raise InbandError(
                 "There is something in this database already; a backup is restored into an empty one only.",

@@ -76,32 +76,24 @@ def settings_from(**options: Any) -> "Settings":
 @contextmanager
 def reachable(settings: "Settings") -> Iterator[str]:
     """URL of the database for as long as the block runs: the named one, or the embedded one, created if need be."""
+    from app.db.connections import in_schema, plain_url
     from app.db.embedded import EmbeddedServer
 
-    if settings.database_url is not None:
-        from app.db.connections import plain_url
+    def of_plant(url: str) -> str:
+        return in_schema(url, settings.schema_name) if settings.schema_name else plain_url(url)
 
-        yield plain_url(settings.database_url)
+    if settings.database_url is not None:
+        yield of_plant(settings.database_url)
     else:
         with EmbeddedServer(settings.data_dir) as url:
-            yield url
-
-
-@contextmanager
-def migrated(settings: "Settings") -> Iterator["Database"]:
-    """The database, made if there is none, and brought to the schema of this program."""
-    from app.db.migrate import upgrade
-
-    with reachable(settings) as url:
-        upgrade(url)
-        yield from _opened(url, settings)
+            yield of_plant(url)
 
 
 @contextmanager
 def existing(settings: "Settings") -> Iterator["Database"]:
     """The database of an Inband that is there already; see `existing_url`."""
-    with existing_url(settings) as url:
-        yield from _opened(url, settings)
+    with existing_url(settings) as url, opened(url, settings) as database:
+        yield database
 
 
 @contextmanager
@@ -160,7 +152,9 @@ def refuse_empty(url: str) -> str:
     return revision
 
 
-def _opened(url: str, settings: "Settings") -> Iterator["Database"]:
+@contextmanager
+def opened(url: str, settings: "Settings") -> Iterator["Database"]:
+    """The database at an address, for a command."""
     from app.db.connections import Connections
     from app.db.engine import Database
 
@@ -204,6 +198,8 @@ def explain(error: Exception) -> tuple[str | None, int]:
 
 
 def _setting(problem: Any) -> str:
-    name = str(problem["loc"][0]) if problem["loc"] else ""
+    from app.settings import variable_of
+
+    name = str(problem["loc"][0]).removeprefix("INBAND_").lower() if problem["loc"] else ""
     words = str(problem["msg"]).removeprefix("Value error, ")
-    return f"--{name.replace('_', '-')} / INBAND_{name.upper()}: {words}" if name else words
+    return f"--{name.replace('_', '-')} / {variable_of(name)}: {words}" if name else words

@@ -24,7 +24,8 @@ class Role(StrEnum):
     ADMIN = "admin"
 
 
-def _actor() -> str:
+def actor() -> str:
+    """Whoever runs the command, for the record of changes."""
     return f"command line ({getpass.getuser()})"
 
 
@@ -50,7 +51,7 @@ def add_user(
     from app.access import actions
 
     with existing(settings) as database, database.begin() as session:
-        actions.add_person(session, name=name, role=role.value, password=password, actor=_actor())
+        actions.add_person(session, name=name, role=role.value, password=password, actor=actor())
     where = f" at {settings.public_url}" if settings.public_url else ""  # no other address is known to this command
     say(f"{name} may sign in{where} as {role.value}.")
 
@@ -81,6 +82,6 @@ def add_key(
         connections.connect(options=LIMITS, application_name="inband command") as connection,
     ):
         new_key = insert_key(
-            connection, role=role and role.value, machine=machine, name=name or "command line", actor=_actor()
+            connection, role=role and role.value, machine=machine, name=name or "command line", actor=actor()
         )
     sys.stdout.write(f"{new_key.secret}\n")

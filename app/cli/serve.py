@@ -20,7 +20,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app import __version__, core, logs
-from app.cli.base import DatabaseUrl, DataDir, cli, migrated, say, settings_from
+from app.cli.base import DatabaseUrl, DataDir, cli, opened, reachable, say, settings_from
+from app.cli.plants import migrate_all
 from app.db.disk import watch
 from app.errors import InbandError
 
@@ -97,12 +98,17 @@ def run(
     """Serve until told to end. ``prepare`` runs when the database is migrated, ``beside`` in a thread once we answer."""
     logs.configure(settings.log_level, settings.log_format)
     signal.signal(signal.SIGTERM, _end)  # from the first moment on, so that the database is always ended in order
+    from app.db.connections import in_schema
+    from app.db.migrate import current
+    from app.plants.serving import settings_of
     from app.web.protocol import raise_file_limit
 
     raise_file_limit()
     with _listen(settings) as listening, ExitStack() as stack:
         _keep_compiled(settings.data_dir)
-        database = stack.enter_context(migrated(settings))
+        url = stack.enter_context(reachable(settings))
+        listed = migrate_all(url, settings)
+        database = stack.enter_context(opened(url, settings))
         os.environ |= {
             "INBAND_DATABASE_URL": database.dsn,  # for the workers, which make their own Settings
             "INBAND_DATA_DIR": str(settings.data_dir),
@@ -112,8 +118,11 @@ def run(
             "INBAND_LOG_LEVEL": settings.log_level,
             "INBAND_LOG_FORMAT": settings.log_format,
         }
-        if prepare is not None:
+        if prepare is not None and not (listed and current(url) is None):
             prepare(database, settings)
+        for plant in listed:
+            with opened(in_schema(url, plant.schema), settings) as of_plant:
+                invite_administrator(of_plant, settings_of(plant, settings.model_copy(update={"database_url": url})))
         _log_start(database, settings)
         database.close()
         database.connections.stop()

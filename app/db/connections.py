@@ -17,6 +17,7 @@ import threading
 import time
 from collections.abc import Generator
 from typing import Any, Self
+from urllib.parse import quote, unquote
 
 import psycopg
 from psycopg import AsyncConnection, waiting
@@ -40,6 +41,16 @@ def plain_url(url: str) -> str:
     """The address as libpq and its programs read it, whichever of our ways it was written in."""
     scheme, separator, rest = url.partition("://")
     return f"postgresql://{rest}" if separator and scheme in {"postgres", "postgresql+psycopg"} else url
+
+
+def in_schema(url: str, schema: str) -> str:
+    """The address of the same database with its tables in this schema, alone in the search path."""
+    head, _mark, query = plain_url(url).partition("?")
+    named = [part for part in query.split("&") if part]
+    options = [unquote(part.removeprefix("options=")) for part in named if part.startswith("options=")]
+    others = [part for part in named if not part.startswith("options=")]
+    path = quote(" ".join(dict.fromkeys([*options, f"-c search_path={schema}"])), safe="")
+    return f"{head}?{'&'.join([*others, f'options={path}'])}"
 
 
 def parameters_of(url: str, patience: float = PATIENCE) -> dict[str, Any]:

@@ -10,14 +10,15 @@ import msgspec
 from sqlalchemy import text
 from sqlalchemy.orm import Session
 
-CHANNEL = "inband"
+CHANNEL = "'inband ' || current_schema()"
+"""As SQL. Several plants may lie in one database, each in a schema: of another plant's events nobody is woken."""
 
 # The end of a statement that writes: `changes` is an SQL expression for the list of changes, `after` what the lock waits for.
 # The writer of readings puts it behind its own inserts, so that telling costs it no statement.
 PUBLISHED = f"""
-held AS MATERIALIZED (SELECT pg_advisory_xact_lock(7291, 1) {{after}}),
+held AS MATERIALIZED (SELECT pg_advisory_xact_lock(7291, 'event'::regclass::oid::int4) {{after}}),
 written AS (INSERT INTO event (changes) SELECT {{changes}}::jsonb FROM held RETURNING id)
-SELECT pg_notify('{CHANNEL}', id::text) FROM written
+SELECT pg_notify({CHANNEL}, id::text) FROM written
 """  # noqa: S608 - the channel is our own constant
 _PUBLISH = text("WITH " + PUBLISHED.format(changes="CAST(:changes AS text)", after=""))
 

@@ -60,6 +60,7 @@ def upgrade(url: str) -> list[str]:
                 "if it does not, end it and try again."
             ) from error
         connection.execute(text(f"SET lock_timeout = '{LOCK_PATIENCE}'"))
+        _make_schema(connection)
         now, todo = _revision(connection), _pending(connection)
         connection.commit()  # alembic commits only what it has begun itself
         if todo:
@@ -160,6 +161,24 @@ def _scripts() -> ScriptDirectory:
         raise MigrationError(
             f"the migrations are not in {MIGRATIONS} ({error}). This installation is not whole: install Inband again."
         ) from error
+
+
+def _make_schema(connection: Connection) -> None:
+    """Create the schema that the address names, if there is none."""
+    from sqlalchemy import text
+    from sqlalchemy.exc import ProgrammingError
+
+    there, path = connection.execute(text("SELECT current_schema(), current_setting('search_path')")).one()
+    if there is None:
+        schema = path.split(",")[0].strip(' "')
+        try:
+            connection.execute(text(f'CREATE SCHEMA IF NOT EXISTS "{schema}"'))
+        except ProgrammingError as error:
+            raise MigrationError(
+                f"there is no schema {schema} in this database, and this role may not create it. Name the schema that there is "
+                "in INBAND_SCHEMA, or run `inband migrate` with the role that owns the database."
+            ) from error
+        connection.commit()
 
 
 def _revision(connection: Connection) -> str | None:

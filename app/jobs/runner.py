@@ -20,7 +20,7 @@ from app.jobs.actions import DatabaseGone, PeriodicJob, run_job
 log = logging.getLogger(__name__)
 
 EVERY = 60.0  # s between two runs
-_OURS = "SELECT pg_try_advisory_lock(7291, 2)"
+_OURS = "SELECT pg_try_advisory_lock(7291, 'job_run'::regclass::oid::int4)"
 
 
 class JobRunner:

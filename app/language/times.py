@@ -1,18 +1,19 @@
 """Moments as people read them: in the time zone of the plant, and no other.
 
-The setting `shifts` says when the shifts begin. The setting `timezone` names the zone (INBAND_TIMEZONE; without it that of the computer). Pages, charts, reports, files and
-sentences take it from here, so that all times on a screen are of one zone. A wall-clock time that is there twice, because the
-clocks went back, is written with its offset. JSON keeps RFC 3339 with an offset.
+The setting `timezone` names the zone (INBAND_TIMEZONE; without it that of the computer), the setting `shifts` says when the
+shifts begin. Pages, charts, reports, files and sentences take it from here, so that all times on a screen are of one zone. A
+wall-clock time that is there twice, because the clocks went back, is written with its offset. JSON keeps RFC 3339 with an
+offset.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from datetime import datetime, time, timedelta
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 from zoneinfo import ZoneInfo
 
 if TYPE_CHECKING:  # a fifth of a second to read, which most commands need not spend
@@ -20,26 +21,48 @@ if TYPE_CHECKING:  # a fifth of a second to read, which most commands need not s
 
 SECONDS, MINUTES = "%Y-%m-%d %H:%M:%S", "%Y-%m-%d %H:%M"
 _chosen: ContextVar[ZoneInfo | None] = ContextVar("zone", default=None)
-_of_process: list[ZoneInfo] = []
-_shifts: list[time] = [time(6), time(14), time(22)]
+
+
+class PlantTime(NamedTuple):
+    """The time zone of a plant, and when its shifts begin by its clock."""
+
+    zone: ZoneInfo
+    shifts: Sequence[time]
+
+
+_of_plant: ContextVar[PlantTime | None] = ContextVar("plant time", default=None)
+_of_process: list[PlantTime] = []
 
 
 def use_zone(settings: Settings) -> None:
-    """Take the plant's time zone and the beginnings of its shifts of these settings for the whole process."""
-    _of_process[:] = [ZoneInfo(settings.timezone)]
-    _shifts[:] = [time.fromisoformat(begin) for begin in settings.shifts.split(",")]
+    """Take the plant's time of these settings for the whole process."""
+    _of_process[:] = [plant_time(settings)]
+
+
+def plant_time(settings: Settings) -> PlantTime:
+    """Return the time zone and the shifts that these settings name."""
+    return PlantTime(ZoneInfo(settings.timezone), [time.fromisoformat(begin) for begin in settings.shifts.split(",")])
+
+
+def keep_time_of(plant: PlantTime) -> None:
+    """Take the time of this plant from now on in this task and the tasks and threads that it begins."""
+    _of_plant.set(plant)
 
 
 @cache
-def _usual() -> ZoneInfo:
+def _usual() -> PlantTime:
     from app.settings import computer_timezone
 
-    return ZoneInfo(computer_timezone())
+    return PlantTime(ZoneInfo(computer_timezone()), [time(6), time(14), time(22)])
+
+
+def _time() -> PlantTime:
+    return _of_plant.get() or (_of_process[0] if _of_process else _usual())
 
 
 def plant_zone() -> ZoneInfo:
     """The time zone in which people read and type times."""
-    return _chosen.get() or (_of_process[0] if _of_process else _usual())
+    return _chosen.get() or _time().zone
 
 
 @contextmanager
@@ -66,7 +89,7 @@ def begin_of_shift(at: datetime) -> datetime:
     """The beginning of the shift in which the moment lies."""
     there = local(at)
     days = (there.date(), there.date() - timedelta(1))
-    begins = (datetime.combine(day, begin, plant_zone()) for day in days for begin in reversed(_shifts))
+    begins = (datetime.combine(day, begin, plant_zone()) for day in days for begin in reversed(_time().shifts))
     return next(begin for begin in begins if begin <= there)
 
 

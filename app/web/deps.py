@@ -49,13 +49,13 @@ def get_address(request: Request, settings: SettingsDep) -> str:
     socket. Any other may have been made up, and the link would lead whoever gets it to a stranger.
     """
     if settings.public_url:
-        return settings.public_url
+        return settings.address
     came_by = request.base_url
     own, port = request.scope.get("server") or (settings.host, settings.port)
     if came_by.hostname in {own, "localhost", socket.gethostname().lower()} or is_loopback(came_by.hostname or ""):
         return str(came_by).rstrip("/")
     host = f"[{own}]" if ":" in own else own
-    return f"{came_by.scheme}://{host}" + (f":{port}" if port else "")
+    return f"{came_by.scheme}://{host}" + (f":{port}" if port else "") + str(request.scope.get("root_path", ""))
 
 
 AddressDep = Annotated[str, Depends(get_address)]

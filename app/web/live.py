@@ -121,7 +121,7 @@ class Live:
             listening = False
             try:
                 async with await self._connections.connect_async(application_name="inband-live") as conn:
-                    await conn.execute(f"LISTEN {CHANNEL}")
+                    await _wake_up_on_events(conn)
                     listening = True
                     if self._last is None:
                         self._last = await _newest(conn)
@@ -227,6 +227,12 @@ class Live:
         if len(rows) > MOST_MISSED:
             return [_resync(newest)]
         return _messages([(number, change) for number, changes in rows for change in changes])
+
+
+async def _wake_up_on_events(conn: AsyncConnection[Any]) -> None:
+    cursor = await conn.execute(f"SELECT quote_ident({CHANNEL})")
+    (channel,) = await cursor.fetchone() or ("",)
+    await conn.execute(f"LISTEN {channel}".encode())
 
 
 async def _newest(conn: AsyncConnection[Any]) -> int:

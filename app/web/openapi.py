@@ -108,7 +108,7 @@ def _made(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
         description=DESCRIPTION,
         routes=app.routes,
         tags=[{"name": name, "description": words} for name, words in TAGS.items()],
-        servers=[{"url": "/", "description": "this server"}],
+        servers=[{"url": app.root_path or "/", "description": "this server"}],
         license_info={"name": "MIT", "identifier": "MIT"},
     )
     components = openapi["components"]

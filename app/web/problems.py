@@ -77,7 +77,8 @@ def _to_sign_in(request: Request) -> Response:
     address = request.url.path + (f"?{request.url.query}" if request.url.query else "")
     if request.method not in {"GET", "HEAD"}:
         referer = urlsplit(request.headers.get("referer", ""))
-        address = referer.path if referer.netloc == request.headers.get("host") else "/"
+        below = referer.path.removeprefix(request.scope.get("root_path", ""))
+        address = below if referer.netloc == request.headers.get("host") else "/"
     where = local_path(address)
     return RedirectResponse("/sign-in" if where == "/" else f"/sign-in?next={quote(where, safe='/')}", 303)
 

@@ -83,7 +83,7 @@ def _note(scope: Scope, status: int, seconds: float) -> None:
     client = scope.get("client")
     about = {
         "method": scope["method"],
-        "path": without_secrets(scope["path"]),
+        "path": scope.get("root_path", "") + without_secrets(scope["path"]),
         "status": status,
         "seconds": round(seconds, 4),
         "caller": getattr(caller, "name", None),

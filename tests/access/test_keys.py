@@ -14,7 +14,7 @@ from app.access import actions
 from app.access.keys import KEPT, KeyRing
 from app.db.engine import Database
 from app.loop.machines.keys import caller_of_key
-from app.main import create_app
+from app.main import create_plant
 from app.settings import Settings
 from tests.loops import run
 
@@ -97,7 +97,7 @@ def test_of_many_keys_none_waits_for_another_while_the_database_hangs() -> None:
     with socket.create_server(("127.0.0.1", 0)) as silent:
         threading.Thread(target=hang_up, daemon=True).start()
         where = f"postgresql://nobody@127.0.0.1:{silent.getsockname()[1]}/none?sslmode=disable&gssencmode=disable"
-        door: Any = create_app(Settings(database_url=where))
+        door: Any = create_plant(Settings(database_url=where)).asgi
         while not hasattr(door, "lookup"):
             door = door.app
         begun = time.monotonic()

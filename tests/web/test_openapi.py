@@ -17,7 +17,7 @@ from pydantic import BaseModel, TypeAdapter
 from app.loop.readings.answers import ReadingAnswer
 from app.loop.readings.api import BatchCounts
 from app.loop.readings.schemas import ReadingIn
-from app.main import create_app
+from app.main import create_plant
 from app.settings import Settings
 from app.web.api_docs import _kind, curl, prose
 from app.web.openapi import EXAMPLES, example_of, operations, resolve
@@ -29,10 +29,7 @@ ROLES = ("viewer", "operator", "engineer", "admin")
 
 @pytest.fixture(scope="module")
 def app() -> FastAPI:
-    door: Any = create_app(Settings(database_url="postgresql://nobody@localhost/none"))
-    while not isinstance(door, FastAPI):
-        door = door.app
-    return door
+    return create_plant(Settings(database_url="postgresql://nobody@localhost/none")).app
 
 
 @pytest.fixture(scope="module")

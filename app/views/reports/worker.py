@@ -9,6 +9,7 @@ import asyncio
 import logging
 import threading
 import time
+from contextvars import copy_context
 from datetime import UTC, datetime
 from uuid import uuid4
 
@@ -30,8 +31,8 @@ log = logging.getLogger(__name__)
 EVERY = 2.0  # s between two looks for something to do
 LONGEST_REST = 1.0  # s
 NAME = "making_reports"  # as periodic jobs have one, where it fails
-FAMILY = 7292
-"""Of the advisory locks: (this, number of the job)."""
+LOCK = "'report_job'::regclass::oid::int4, %s"
+"""Key of a job's advisory lock. Each plant has a table of its own, and so numbers of its own."""
 
 
 class ReportWorker:
@@ -47,7 +48,7 @@ class ReportWorker:
 
     def start(self) -> None:
         """Begin to look for something to do."""
-        self._thread = threading.Thread(target=self._go, name="reports", daemon=True)
+        self._thread = threading.Thread(target=copy_context().run, args=(self._go,), name="reports", daemon=True)
         self._thread.start()
 
     def wake(self) -> None:
@@ -94,7 +95,7 @@ class ReportWorker:
                 except Exception as error:  # noqa: BLE001 - recorded; one takes no other along, and is tried again later
                     note_failure(self._database, NAME, Unit(subject), error)
                 finally:
-                    ours.execute("SELECT pg_advisory_unlock(%s, %s)", (FAMILY, number))
+                    ours.execute(f"SELECT pg_advisory_unlock({LOCK})", (number,))
 
     def _make(self, number: int) -> None:
         token = uuid4().hex
@@ -158,5 +159,5 @@ class ReportWorker:
 
 
 def _taken(ours: "psycopg.Connection[tuple[object, ...]]", number: int) -> bool:
-    row = ours.execute("SELECT pg_try_advisory_lock(%s, %s)", (FAMILY, number)).fetchone()
+    row = ours.execute(f"SELECT pg_try_advisory_lock({LOCK})", (number,)).fetchone()
     return row is not None and bool(row[0])

@@ -7,7 +7,7 @@
 //   refresh()           the chart has new content
 //   close()
 
-const READING = /^\/characteristics\/[^/]+\/readings\/\d+$/;
+const READING = /\/characteristics\/[^/]+\/readings\/\d+$/;
 
 const element = (name, className, more = {}) => Object.assign(document.createElement(name), { className }, more);
 

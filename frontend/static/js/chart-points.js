@@ -4,10 +4,12 @@
 //   nearest(chart, points, event)   the one under a finger or the mouse; null if none is near
 //   pressed(plot, callback)         a click or a tap that was no drag
 
+import { here } from "./root.js";
+
 const NEAR = { mouse: 24, pen: 24, touch: 44 }; // px
 const MOVED = 8; // px; a press that moved further was a drag
 
-const linkOf = (custom) => [custom].flat().slice(0, 1).find((link) => typeof link === "string" && link.startsWith("/"));
+const linkOf = (custom) => [custom].flat().slice(0, 1).filter((link) => typeof link === "string" && link.startsWith("/")).map(here)[0];
 
 export function pointsOf({ plot }) {
   const layout = plot._fullLayout;

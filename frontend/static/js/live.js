@@ -11,7 +11,9 @@
 //
 // The server says "heartbeat" every few seconds, so a pulled cable is noticed as well: TCP itself says nothing for minutes.
 
-const URL_OF_EVENTS = document.querySelector("meta[name=events]")?.content ?? "/api/v1/events"; // of a station its own
+import { here } from "./root.js";
+
+const URL_OF_EVENTS = document.querySelector("meta[name=events]")?.content ?? here("/api/v1/events"); // of a station its own
 const KINDS = [
   "reading", "correction", "alarm", "tool", "average", "calibration", "characteristic", "machine",
   "form", "work_zero", "alignment", "kinematics", "gauge_study", "baseline", "signal", "report", "proposal", "job",

@@ -5,6 +5,8 @@
 // "/" focuses the field from anywhere but another field, Escape empties the list and then leaves the field. Arrow keys
 // choose a suggestion, Enter opens it; without a choice Enter sends the form. A combobox with a listbox (WAI-ARIA 1.2).
 
+import { here } from "./root.js";
+
 const PAUSE = 150; // ms after a key until the server is asked
 
 class SearchBox extends HTMLElement {
@@ -68,7 +70,7 @@ class SearchBox extends HTMLElement {
       option.id = `search-hit-${at}`;
       option.setAttribute("role", "option");
       const link = document.createElement("a");
-      link.href = item.path;
+      link.href = here(item.path);
       link.tabIndex = -1;
       const kind = document.createElement("small");
       kind.textContent = this.words[item.kind] ?? item.kind;

@@ -6,6 +6,8 @@
 //   – marks a limit that breaks R33 < R34 ≤ R35/2 ≤ R37 ≤ R36, and says why at the field, in the server's own sentences.
 // The server checks the same again when the form is sent; without this script nothing is lost but the immediacy.
 
+import { here } from "./root.js";
+
 const NAMES = ["nominal", "upper_deviation", "lower_deviation", "target", "tolerance_width",
   "zero_range", "averaging_limit", "wear_limit", "confidence_limit"];
 const ORDER = ["zero_range", "averaging_limit", "tolerance", "wear_limit", "confidence_limit"];
@@ -42,7 +44,7 @@ customElements.define("zone-diagram", class extends HTMLElement {
   /** The server knows the tables of ISO 286. A class that it does not know is refused in words when the form is sent. */
   async fit(size) {
     if (!/[a-z]/i.test(size)) return;
-    const answer = await fetch(`/setup/fit?${new URLSearchParams({ size: size.slice(0, 40) })}`).catch(() => null);
+    const answer = await fetch(`${here("/setup/fit")}?${new URLSearchParams({ size: size.slice(0, 40) })}`).catch(() => null);
     const numbers = answer?.ok ? await answer.json() : {};
     if (this.form.elements.nominal.value !== size) return;
     this.unknown = "nominal" in numbers ? null : size;

@@ -124,9 +124,7 @@ class TestOncePerProcess:
         started = threading.Event()
         monkeypatch.setattr(queries, "cases", lambda: (l75(),) if started.wait(60) else ())
         monkeypatch.setattr(queries, "SETTLED_AFTER", 0.1)
-        app: Any = main.create_app(Settings(database_url=server.database.dsn))
-        while not hasattr(app, "router"):
-            app = app.app
+        app: Any = main.create_app(Settings(database_url=server.database.dsn)).front
 
         async def served() -> None:
             async with app.router.lifespan_context(app):
