@@ -125,7 +125,7 @@ def test_statements_that_write_name_their_columns() -> None:
         f"{path}: {statement[0]}"
         for path in Path(app.__file__).parent.rglob("*.py")
         for statement in re.finditer(
-            r"\b(?:INSERT INTO \w+\b(?!\s*\()|COPY \w+\s+FROM)", path.read_text(encoding="utf-8")
+            r"\b(?:INSERT INTO [\w.]+(?![\w.]|\s*\()|COPY \w+\s+FROM)", path.read_text(encoding="utf-8")
         )
     ]
     assert nameless == []
