@@ -24,7 +24,6 @@ from app.loop.alarm_response.form_reader import acknowledge_as_typed
 from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.machines.queries import machine_named
-from app.loop.tables.machines import Machine
 from app.loop.tools import actions as tools
 from app.loop.tools import confirmation
 from app.loop.tools import queries as tool_queries
@@ -123,7 +122,9 @@ def station_page(
         late=_of_machine(session, station.machine.key, late) if late else None,
         tool=confirmation.done("change", tool) if tool else None,
         said=confirmation.done(decided, n) if decided and n else None,
-        refused=_too_late(session, station.machine, too_late, n) if too_late and n else None,
+        refused=list(tool_wording.refused(tool_queries.correction(session, station.machine, n), machine, too_late))
+        if too_late and n
+        else None,
         offered=confirmation.offered,
         now=datetime.now(UTC),
         state_word=state_word,
@@ -298,10 +299,6 @@ def decide(request: Request, session: SessionDep, at: Station, machine: str, num
         return _ask_correction(request, session, at, machine, number, verb, form)
     said = {"decided": verb} if outcome == "done" else {"too_late": verb}
     return RedirectResponse(address(f"/station/{machine}", n=number, **said), 303)
-
-
-def _too_late(session: Session, machine: Machine, verb: str, number: int) -> list[str]:
-    return list(tool_wording.refused(tool_queries.correction(session, machine, number), machine.key, verb))
 
 
 def _who(request: Request, at: AtStation, form: Mapping[str, str]) -> Caller:
