@@ -16,6 +16,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 from zipfile import ZipFile
 
+import httpx
 import pytest
 import yaml  # type: ignore[import-untyped]
 
@@ -88,6 +89,12 @@ class Installed(Server):
     """A server from the wheel, on the embedded PostgreSQL, as a user who may write into the data folder only."""
 
     data_dir: Path
+
+    def client(self, key: str | None = None, **headers: str) -> httpx.Client:
+        """A client with patience: a first call compiles, and compiled loops of the tree are none of this program."""
+        client = super().client(key, **headers)
+        client.timeout = httpx.Timeout(300)
+        return client
 
 
 @pytest.fixture(scope="module")
@@ -206,12 +213,12 @@ class TestProgram:
         what = f"/api/v1/characteristics/{shop.characteristic}/capability"
         for number in range(60):
             shop.read(number % 3)
-        assert shop.admin.get(what, timeout=300).status_code == 200
+        assert shop.admin.get(what).status_code == 200
         kept = compiled_in(installed.data_dir)
         assert kept
         installed.stop()
         installed.restart()
-        assert shop.admin.get(what, timeout=300).status_code == 200
+        assert shop.admin.get(what).status_code == 200
         assert compiled_in(installed.data_dir) == kept
 
     def test_an_older_program_leaves_the_database_of_a_newer_one_alone(

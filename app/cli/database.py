@@ -4,7 +4,7 @@ import platform
 import re
 from collections.abc import Sequence
 from contextlib import closing
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +21,7 @@ from app.cli.base import (
     say,
     settings_from,
 )
+from app.errors import InbandError
 
 if TYPE_CHECKING:
     import psycopg
@@ -31,18 +32,50 @@ if TYPE_CHECKING:
 
 
 @cli.command()
-def migrate(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
+def migrate(
+    data_dir: DataDir = None,
+    database_url: DatabaseUrl = None,
+    back_to: Annotated[
+        str | None,
+        typer.Option(
+            help="Go back to the schema of an older Inband, which its --version names. Later things are lost."
+        ),
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="With --back-to: what is lost may be lost.")] = False,
+) -> None:
     """Bring the database to the schema of this program."""
     from app.db import migrate as migrations
 
     settings = settings_from(data_dir=data_dir, database_url=database_url)
     refuse_nothing_there(settings)  # an empty database of a server of one's own is migrated: somebody made it
     with reachable(settings) as url:
+        if back_to is not None:
+            _go_back(url, back_to, sure=yes)
+            return
         done = migrations.upgrade(url)
         for revision in done:
             say(f"migrated: {revision}")
         if not done:
             say(f"nothing to do: the database is at {migrations.current(url)}")
+
+
+def _go_back(url: str, revision: str, *, sure: bool) -> None:
+    from app.db import migrate as migrations
+
+    refuse_empty(url)
+    lost = migrations.losses(url, revision)
+    if lost and not sure:
+        raise InbandError(
+            "\n  ".join(
+                [f"To go back to {revision} undoes these migrations, and loses what only they have room for:", *lost]
+            ),
+            "Stop every server on this database and make a backup. Then add --yes.",
+        )
+    for done in migrations.downgrade(url, revision):
+        say(f"undone: {done}")
+    say(
+        f"The database is at {migrations.current(url)}. Start the Inband of that schema now; this one would migrate again."
+    )
 
 
 @cli.command()

@@ -11,15 +11,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from psycopg.errors import InsufficientPrivilege
+from psycopg.errors import InsufficientPrivilege, LockNotAvailable, RaiseException
 
 from app import HOUSE
 from app.db.connections import Connections
 
 if TYPE_CHECKING:  # SQLAlchemy and Alembic: half a second to read, which most commands need not spend
     from alembic.config import Config
-    from alembic.script import ScriptDirectory
+    from alembic.script import Script, ScriptDirectory
     from sqlalchemy import Connection
+    from sqlalchemy.exc import DBAPIError
     from sqlalchemy.schema import SchemaItem
 
 LOCK = 7_010_000_833  # any number, the same in every process
@@ -45,8 +46,56 @@ def upgrade(url: str) -> list[str]:
     if current(url) == head():
         return []
     from alembic import command
+
+    with _alone(url) as connection:
+        _make_schema(connection)
+        now, todo = _revision(connection), _pending(connection)
+        connection.commit()  # alembic commits only what it has begun itself
+        if todo:
+            if now == SQUASHED:
+                _stamp(connection, SQUASHED, _scripts().get_base())
+            command.upgrade(config(connection), "head")
+            connection.commit()
+    return todo
+
+
+def downgrade(url: str, revision: str) -> list[str]:
+    """Take migrations back until the database is at an earlier revision; their names, newest first. All of them or none.
+
+    At `SQUASHED` the first published program finds its database again. Raises `MigrationError`.
+    """
+    from alembic import command
+
+    with _alone(url) as connection:
+        todo = [f"{script.revision} {script.doc.rstrip('.')}" for script in _since(connection, revision)]
+        connection.commit()
+        if todo:
+            connection.begin()  # one transaction for all of them
+            base = _scripts().get_base()
+            command.downgrade(config(connection), base if revision == SQUASHED and base else revision)
+            if revision == SQUASHED:
+                _stamp(connection, base, SQUASHED)
+            connection.commit()
+    return todo
+
+
+def losses(url: str, revision: str) -> list[str]:
+    """Tell what `downgrade` would take back, newest first: the name of each migration, and what it says is lost."""
+    with connected(url) as connection:
+        return [_loss(script) for script in _since(connection, revision)]
+
+
+def _loss(script: Script) -> str:
+    paragraphs = [" ".join(each.split()) for each in script.longdoc.split("\n\n")]
+    lost = [each.removeprefix("`downgrade` ") for each in paragraphs if each.startswith("`downgrade`")]
+    return f"{script.revision} {script.doc.rstrip('.')}" + (f": {lost[0]}" if lost else "")
+
+
+@contextmanager
+def _alone(url: str) -> Iterator[Connection]:
+    """A connection that migrates while no other does; the lock ends with it. What people can mend is said in words."""
     from sqlalchemy import text
-    from sqlalchemy.exc import OperationalError, ProgrammingError
+    from sqlalchemy.exc import DBAPIError, OperationalError
 
     with connected(url) as connection:
         connection.execute(text(f"SET lock_timeout = '{OTHERS_TURN}'"))
@@ -60,31 +109,30 @@ def upgrade(url: str) -> list[str]:
                 "if it does not, end it and try again."
             ) from error
         connection.execute(text(f"SET lock_timeout = '{LOCK_PATIENCE}'"))
-        _make_schema(connection)
-        now, todo = _revision(connection), _pending(connection)
-        connection.commit()  # alembic commits only what it has begun itself
-        if todo:
-            try:
-                if now == SQUASHED:
-                    _stamp(connection)
-                command.upgrade(config(connection), "head")
-                connection.commit()
-            except OperationalError as error:
-                if "lock timeout" not in str(error):
-                    raise
-                raise MigrationError(
-                    f"a table was in use for {LOCK_PATIENCE}, so the database was left as it was. "
-                    "Stop the servers on this database, or try again at a quieter moment."
-                ) from error
-            except ProgrammingError as error:
-                if not isinstance(error.orig, InsufficientPrivilege):
-                    raise
-                driver = connection.connection.driver_connection
-                raise MigrationError(
-                    f"{len(todo)} migration(s) have to run, and the role {driver.info.user if driver else ''} may not change "
-                    "tables. Run `inband migrate` with INBAND_DATABASE_URL of the role that owns them, then start again."
-                ) from error
-        return todo  # the lock ends with the connection
+        try:
+            yield connection
+        except DBAPIError as error:
+            if (words := _in_words(error, connection)) is None:
+                raise
+            raise MigrationError(words) from error
+
+
+def _in_words(error: DBAPIError, connection: Connection) -> str | None:
+    match error.orig:
+        case LockNotAvailable():
+            return (
+                f"a table was in use for {LOCK_PATIENCE}, so the database was left as it was. "
+                "Stop the servers on this database, or try again at a quieter moment."
+            )
+        case InsufficientPrivilege():
+            driver = connection.connection.driver_connection
+            return (
+                f"migrations have to run, and the role {driver.info.user if driver else ''} may not change tables. "
+                "Run `inband migrate` with INBAND_DATABASE_URL of the role that owns them, then start again."
+            )
+        case RaiseException() as refusal:  # a migration that looks at the rows before it goes back
+            return f"the database was left as it was: {refusal.diag.message_primary}"
+    return None
 
 
 def current(url: str) -> str | None:
@@ -187,11 +235,28 @@ def _revision(connection: Connection) -> str | None:
     return MigrationContext.configure(connection).get_current_revision()
 
 
-def _stamp(connection: Connection) -> None:
+def _stamp(connection: Connection, before: str | None, after: str | None) -> None:
     from sqlalchemy import text
 
-    revisions = {"first": _scripts().get_base(), "squashed": SQUASHED}
-    connection.execute(text("UPDATE alembic_version SET version_num = :first WHERE version_num = :squashed"), revisions)
+    change = text("UPDATE alembic_version SET version_num = :after WHERE version_num = :before")
+    connection.execute(change, {"before": before, "after": after})
+
+
+def _since(connection: Connection, revision: str) -> list[Script]:
+    """Migrations that this database has and one at an earlier revision has not, newest first."""
+    _pending(connection)  # a database that this program does not know is refused
+    scripts, now = _scripts(), _revision(connection)
+    if now is None or now == SQUASHED:
+        return []
+    target = scripts.get_base() if revision == SQUASHED else revision
+    there = list(scripts.iterate_revisions(now, "base"))
+    revisions = [script.revision for script in there]
+    if target not in revisions:
+        raise MigrationError(
+            f"there is no way back from {now} to {revision}, only to {', '.join([*revisions[1:], SQUASHED])}. "
+            "`inband --version` of the older program names the revision that it wants."
+        )
+    return there[: revisions.index(target)]
 
 
 def _pending(connection: Connection) -> list[str]:

@@ -241,6 +241,21 @@ def test_an_older_schema_is_not_brought_up_to_date_by_the_way(new_database: NewD
     assert (done.returncode, migrate.current(url)) == (0, migrate.head())
 
 
+def test_an_older_program_gets_its_schema_back_when_somebody_says_what_may_be_lost(new_database: NewDatabase) -> None:
+    url = new_database()
+    make_first_program(url)
+    assert inband("migrate", "--database-url", url).returncode == 0
+    back = ["migrate", "--back-to", migrate.SQUASHED, "--database-url", url]
+    asked = inband(*back)
+    assert asked.returncode == 1
+    assert "0103 Stations: devices bound to machines, PINs and badges of people: loses devices, PINs" in asked.stderr
+    assert "make a backup" in asked.stderr
+    assert migrate.current(url) == migrate.head()
+    done = inband(*back, "--yes")
+    assert (done.returncode, migrate.current(url)) == (0, migrate.SQUASHED), done.stderr
+    assert "undone: 0101 After the review" in done.stderr
+
+
 def test_an_early_schema_is_refused_with_the_way_on(new_database: NewDatabase) -> None:
     url = new_database()
     with psycopg.connect(url, autocommit=True) as connection:

@@ -119,6 +119,36 @@ def test_the_first_program_gets_its_database_back(first_program: str, new_databa
         connection.execute("UPDATE reading SET part = 'SN-1' WHERE sequence = 1")
 
 
+def test_each_migration_goes_there_and_back_with_the_rows_of_the_first_program(first_program: str) -> None:
+    before, steps = rows_of(first_program), [line.split()[0] for line in migrate.upgrade(first_program)]
+    at_head = rows_of(first_program)
+    for revision in ["0100", *steps][-2::-1]:
+        (undone,) = migrate.downgrade(first_program, revision)
+        assert migrate.current(first_program) == revision
+        there = rows_of(first_program)
+        assert undone in migrate.upgrade(first_program)
+        assert rows_of(first_program) == at_head, undone
+        migrate.downgrade(first_program, revision)
+        assert rows_of(first_program) == there, undone
+    assert there == before
+
+
+def test_the_way_back_is_gone_as_a_whole_or_not_at_all(first_program: str) -> None:
+    migrate.upgrade(first_program)
+    with psycopg.connect(first_program, autocommit=True) as connection:
+        connection.execute("INSERT INTO tool (machine_id, number) VALUES (1, 33)")
+    before = rows_of(first_program)
+    with pytest.raises(MigrationError, match=r"left as it was: locations beyond R10"):
+        migrate.downgrade(first_program, "0100")
+    assert (rows_of(first_program), migrate.current(first_program)) == (before, migrate.head())
+
+
+def test_there_is_no_way_back_to_a_schema_that_never_was(first_program: str) -> None:
+    migrate.upgrade(first_program)
+    with pytest.raises(MigrationError, match=rf"no way back from {migrate.head()} to 0042, only to .*0101, 0100, 0018"):
+        migrate.downgrade(first_program, "0042")
+
+
 def test_an_answer_that_the_first_program_does_not_know_becomes_noted(first_program: str) -> None:
     migrate.upgrade(first_program)
     acknowledge = "UPDATE alarm SET acknowledged_at = now(), action = 'measured_by_hand' WHERE acknowledged_at IS NULL"
