@@ -42,7 +42,7 @@ from app.views.characteristic.decisions import Decision, decision, decisions, ve
 from app.views.characteristic.figures import angle_of, residuals_of, touches_picture
 from app.views.characteristic.figures_api import ResultName
 from app.views.characteristic.glance import band_picture
-from app.views.characteristic.wording import state_word
+from app.views.characteristic.wording import next_action, state_word
 from app.web.choice import Choice, ChosenOnPage
 from app.web.deps import Before, FormDep, SessionDep
 from app.web.fields import LARGEST_ID, Reason
@@ -187,6 +187,7 @@ def characteristic_page(
         histogram_url=f"/api/v1{path}/figures/histogram?{urlencode(chosen)}",
         may_edit=caller.may("engineer"),
         state_word=state_word,
+        next_action=next_action,
         action_word=action_word,
     )
 

@@ -1,7 +1,11 @@
-"""The words of the states."""
+"""The words of the states, and of the next action."""
+
+from typing import NamedTuple
 
 from app.core.state import CharacteristicState
 from app.language.i18n import _
+from app.language.numbers import um
+from app.views.characteristic.state_queries import CharacteristicRow
 
 
 def state_word(state: CharacteristicState) -> str:
@@ -21,3 +25,35 @@ def state_word(state: CharacteristicState) -> str:
         CharacteristicState.MEASURE_ONLY: _("Measure only"),
         CharacteristicState.IN_BAND: _("In band"),
     }[state]
+
+
+class NextAction(NamedTuple):
+    """The next action of a person about a characteristic. path: of the page where it is done, None where there is none."""
+
+    words: str
+    path: str | None = None
+
+
+def next_action(row: CharacteristicRow, machine: str) -> NextAction | None:
+    """Return the next action at a characteristic, in words short enough to be read from two metres; None: nothing to do."""
+    path = f"/alarms/{row.alarms[0][0]}" if row.alarms else None
+    waiting = next((each for each in reversed(row.corrections) if each[1] == row.state), None)
+    if waiting is not None and row.state in WAITING:
+        path = path or f"/machines/{machine}/corrections/{waiting[0]}"
+    if row.state in _ACTIONS:
+        amount = um(waiting[2] if waiting else None)
+        return NextAction(_ACTIONS[row.state]().format(tool=row.parameters.tool_memory, amount=amount), path)
+    return NextAction(_("Acknowledge the alarm"), path) if row.alarms else None
+
+
+WAITING = {CharacteristicState.HELD, CharacteristicState.AWAITING_APPROVAL}
+_ACTIONS = {
+    CharacteristicState.PROBE_FAULT: lambda: _("Check the probe and the part"),
+    CharacteristicState.PAUSED: lambda: _("Acknowledge the alarm"),
+    CharacteristicState.TOOL_WORN: lambda: _("Check tool {tool}"),
+    CharacteristicState.HELD: lambda: _("Decide on the held correction"),
+    CharacteristicState.OVERSIZE: lambda: _("Set the part aside"),
+    CharacteristicState.UNDERSIZE: lambda: _("Set the part aside"),
+    CharacteristicState.AWAITING_APPROVAL: lambda: _("Approve the correction of {amount}"),
+    CharacteristicState.NO_DATA: lambda: _("Measure the first part"),
+}

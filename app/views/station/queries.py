@@ -21,7 +21,8 @@ URGENCY = {state: place for place, state in enumerate(CharacteristicState)}
 class Station(NamedTuple):
     """Content of the station of a machine: `first` in giant digits, the `others` small; active alarms, the first one first.
 
-    tools: the tools that its characteristics are cut with. waiting: corrections to decide about that no active alarm holds.
+    tools: the tools that its characteristics are cut with. waiting: corrections to decide about that no active alarm holds,
+    the newest first, as `first` names it.
     """
 
     machine: Machine
@@ -47,7 +48,10 @@ def station(session: Session, machine: str) -> Station:
         sorted(active, key=lambda row: row.alarm.characteristic_id != number),
         alarms.active_count(session, group.machine.id),
         sorted({row.parameters.tool_memory for row in rows if row.parameters.tool_memory}),
-        [each for tool in approvals.groups(session, group.machine) for each in tool.waiting if each.alarm is None],
+        sorted(
+            (each for tool in approvals.groups(session, group.machine) for each in tool.waiting if each.alarm is None),
+            key=lambda each: -each.row.correction.number,
+        ),
     )
 
 

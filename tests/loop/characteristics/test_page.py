@@ -41,6 +41,15 @@ class TestWithoutScripts:
         assert "−6.1\xa0µm" in text
         assert "version 1" in text
 
+    def test_what_to_do_next_and_why_stand_first(self, shop: Shop, viewer: Person) -> None:
+        shop.read(0.2)
+        first = viewer.open(path(shop)).split('class="card charts"')[0]
+        assert "Nothing to do" in first
+        assert "Why: reading 1." in first
+        shop.read(12.5)
+        first = viewer.open(path(shop)).split('class="card charts"')[0]
+        assert f'href="/alarms/{shop.alarms()[0]["id"]}">Set the part aside</a>' in first
+
     def test_pages_of_decisions(self, shop: Shop, viewer: Person) -> None:
         batch = [{"characteristic": shop.characteristic, "measured": 40.0} for _ in range(30)]
         assert shop.admin.post("/api/v1/readings/batch", json=batch).status_code == 201
@@ -197,3 +206,19 @@ class TestInTheBrowser:
             page.goto(where)
             expect(page.locator("main")).to_contain_text(XSS)
             assert page.locator("main b", has_text="Кључ").count() == 0
+
+
+def test_decisions_and_versions_are_folded_until_an_address_names_them(page: Page, shop: Shop, viewer: Person) -> None:
+    shop.read(0.2)
+    viewer.sign_in(page)
+    page.goto(path(shop))
+    decision, versions = page.locator("#reading-1"), page.locator("#versions")
+    expect(page.locator("#now")).to_contain_text("Why: reading 1.")
+    expect(decision).to_be_hidden()
+    expect(versions).to_be_hidden()
+    page.get_by_role("heading", name="Decisions").click()
+    expect(decision).to_be_visible()
+    for name, shown in (("versions", versions), ("reading-1", decision)):
+        page.goto("about:blank")
+        page.goto(f"{path(shop)}#{name}")
+        expect(shown).to_be_visible()
