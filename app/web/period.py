@@ -1,5 +1,6 @@
 """Periods that people often look at, and moments as a field of a form holds them; by the clock of the plant."""
 
+from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
@@ -9,8 +10,9 @@ from app.language.times import begin_of_day, begin_of_shift, local, plant_zone
 
 
 class Period(NamedTuple):
-    """One to choose: without an end it goes on."""
+    """One to choose: without an end it goes on. key: its name in a form."""
 
+    key: str
     name: str
     start: datetime
     end: datetime | None = None
@@ -20,6 +22,11 @@ class Period(NamedTuple):
         """The period as an address says it."""
         return {"from": self.start.isoformat(), "to": self.end.isoformat() if self.end else None}
 
+    @property
+    def choice(self) -> tuple[str, str]:
+        """The period as a field to choose from says it."""
+        return self.key, self.name
+
     def is_chosen(self, start: datetime | None, end: datetime | None) -> bool:
         return (self.start, self.end) == (start, end)
 
@@ -28,15 +35,27 @@ def usual_periods(tool_since: datetime | None = None, now: datetime | None = Non
     """The periods that every page offers. tool_since: the first reading of the tool in the machine."""
     now = now or datetime.now(UTC)
     today, monday = begin_of_day(now), begin_of_day(now, -local(now).weekday())
-    tool = [] if tool_since is None else [Period(_("This tool"), local(tool_since))]
+    tool = [] if tool_since is None else [Period("tool", _("This tool"), local(tool_since))]
     return [
-        Period(_("This shift"), begin_of_shift(now)),
-        Period(_("Today"), today),
-        Period(_("Yesterday"), begin_of_day(now, -1), today),
+        Period("shift", _("This shift"), begin_of_shift(now)),
+        Period("today", _("Today"), today),
+        Period("yesterday", _("Yesterday"), begin_of_day(now, -1), today),
         *tool,
-        Period(_("This week"), monday),
-        Period(_("Last week"), begin_of_day(monday, -7), monday),
+        Period("week", _("This week"), monday),
+        Period("last-week", _("Last week"), begin_of_day(monday, -7), monday),
     ]
+
+
+def with_preset(fields: Mapping[str, str], key: str | None, tool_since: datetime | None = None) -> dict[str, str]:
+    """The fields of a form with the usual period of this key in place of `from`, `to` and `last`; as they are for no such key.
+
+    So a period is chosen without script; with it the fields are filled in at once (period-presets.js).
+    """
+    chosen = next((each for each in usual_periods(tool_since) if each.key == key), None)
+    if chosen is None:
+        return dict(fields)
+    end = chosen.end.isoformat() if chosen.end else ""
+    return {**fields, "from": chosen.start.isoformat(), "to": end, "last": ""}
 
 
 def field(moment: datetime | str | None, *, end: bool = False) -> str:

@@ -182,3 +182,18 @@ def test_a_browser_elsewhere_shows_the_plants_time_too(shop: Shop, server: Serve
     ticks = page.locator("plotly-chart.zones .xtick").all_text_contents()
     assert any(re.match(r"0[23]:", tick) for tick in ticks), ticks
     context.close()
+
+
+def test_a_usual_period_is_chosen_without_script_too(shop: Shop, server: Server) -> None:
+    viewer, about = Person(server, "viewer"), f"/characteristics/{shop.characteristic}"
+    with in_zone(ZoneInfo("Europe/Berlin")):
+        yesterday = next(period for period in usual_periods() if period.key == "yesterday")
+        ends = {"from": field(yesterday.start), "to": field(yesterday.end)}
+    assert '<option value="yesterday">Yesterday</option>' in viewer.open(f"{about}/report")
+    for text in (
+        viewer.open(f"{about}/report?preset=yesterday&last=5&from=&to="),
+        viewer.open(f"{about}/what-if?preset=yesterday&last=1000"),
+        viewer.send("/reports", 422, characteristic=shop.characteristic, preset="yesterday", format="clay"),
+    ):
+        for name, end in ends.items():
+            assert re.search(rf'name="{name}"[^>]*value="{end}"', text), name

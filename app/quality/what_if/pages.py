@@ -28,6 +28,7 @@ from app.web.deps import Before, FormDep, SessionDep, Word
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed
 from app.web.paging import address, part_of
+from app.web.period import with_preset
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -44,7 +45,9 @@ VERBS = {
 def what_if_page(request: Request, session: SessionDep, caller: Viewer, characteristic: str) -> Response:
     """Today's settings and others side by side, the map, and the form to propose them."""
     current = characteristics.characteristic_named(session, characteristic)
-    return _what_if(request, session, caller, current, form_reader.typed_from(request.query_params))
+    asked, tool_since = request.query_params, summaries.tool_since(session, current.characteristic)
+    typed = with_preset(form_reader.typed_from(asked), asked.get("preset"), tool_since)
+    return _what_if(request, session, caller, current, typed)
 
 
 def _what_if(

@@ -23,6 +23,7 @@ from app.views.reports.jobs_api import Number, report_worker
 from app.views.reports.request import SectionName, typed
 from app.web.deps import SessionDep, texts
 from app.web.forms import by_field
+from app.web.period import with_preset
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -53,6 +54,7 @@ async def send_request(request: Request, session: SessionDep, caller: Viewer) ->
 
 def _send(request: Request, session: Session, caller: Caller, form: FormData) -> Response:
     fields = texts(form)
+    fields = with_preset(fields, fields.get("preset"))
     keys = [value for value in form.getlist("characteristic") if isinstance(value, str)]
     try:
         report_request = typed(fields, [value for value in form.getlist("section") if isinstance(value, str)])

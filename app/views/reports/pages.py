@@ -21,6 +21,7 @@ from app.views.reports import queries
 from app.views.reports.request import EVERYTHING, LAST, ReportRequest, SectionName, typed
 from app.web.deps import SessionDep
 from app.web.forms import by_field
+from app.web.period import with_preset
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -37,7 +38,12 @@ def report_page(
 ) -> Response:
     """The report as it is printed, and its files."""
     current = characteristics.characteristic_named(session, characteristic)
-    typed_fields = {name: request.query_params.get(name, "")[:100] for name in FIELDS}
+    tool_since = summaries.tool_since(session, current.characteristic)
+    typed_fields = with_preset(
+        {name: request.query_params.get(name, "")[:100] for name in FIELDS},
+        request.query_params.get("preset"),
+        tool_since,
+    )
     try:
         report_request, problem = typed(typed_fields, section or ()), None
     except Invalid as error:
@@ -53,7 +59,7 @@ def report_page(
         report=report,
         report_request=report_request,
         given=typed_fields,
-        tool_since=summaries.tool_since(session, current.characteristic),
+        tool_since=tool_since,
         errors=_errors(problem),
         sections=[(name.value, queries.title_of(name), name in report_request.sections) for name in SectionName],
         papers=[(Paper.A4.value, "A4"), (Paper.LETTER.value, "Letter")],
