@@ -74,6 +74,20 @@ def test_the_address_shows_the_same_part_and_one_button_the_whole(open_page: Ope
         assert "zoom" not in page.url
 
 
+def test_with_pan_switched_on_dragging_moves(open_page: OpenPage) -> None:
+    with open_page("/chart?zoom=40..60") as page:
+        until(page, DRAWN)
+        pan = page.get_by_role("button", name="Pan")
+        pan.click()
+        expect(pan).to_have_attribute("aria-pressed", "true")
+        dragged(page, 50, 45)
+        until(page, f"Math.abs({SHOWN}[0] - 45) < 1")
+        assert page.evaluate(SHOWN) == pytest.approx([45, 65], abs=1)
+        pan.click()
+        dragged(page, 50, 60)
+        until(page, f"{SHOWN}[1] - {SHOWN}[0] < 12")
+
+
 def test_who_follows_sees_the_new_readings(open_page: OpenPage, show: Show) -> None:
     show.stage.readings = 120
     with open_page("/chart?live=1&zoom=40..60") as page:

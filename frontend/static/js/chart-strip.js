@@ -35,6 +35,13 @@ export class ChartStrip {
     this.follow = button(words.follow, null, () => this.view.follow(!this.view.follows));
     this.follow.title = words.followHelp;
     this.live = chart.hasAttribute("on");
+    this.pan = button(words.pan, null, () => {
+      chart.pan(!chart.pans);
+      this.pan.setAttribute("aria-pressed", chart.pans);
+    });
+    this.pan.title = words.panHelp;
+    this.pan.setAttribute("aria-pressed", "false");
+    if (!matchMedia("(pointer: coarse)").matches) this.root.append(this.pan);
     this.root.append(
       button("−", words.out, () => zoomOut(chart)), button("+", words.in, () => zoomIn(chart)), this.bar, this.follow, this.reset,
     );
