@@ -1,7 +1,7 @@
 """Set-up pages: characteristics and their parameters."""
 
 from collections.abc import Mapping
-from functools import partial
+from functools import cache, partial
 from typing import Annotated, Any
 from urllib.parse import quote
 
@@ -55,7 +55,7 @@ def characteristics_page(
         machines=machines.machines(session, limit=100_000),
         machine=chosen,
         q=named,
-        mode_words=lambda mode: parameter_form.choice("mode", mode.value),
+        mode_words=cache(lambda mode: parameter_form.choice("mode", mode.value)),
     )
 
 
