@@ -283,7 +283,6 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
         docs_url=None,
         redoc_url=None,
         openapi_url=None,
-        root_path=prefix,
         redirect_slashes=False,  # the framework's own redirect names the host that the request gave; see app.web.problems
     )
     app.state.settings = settings
@@ -301,7 +300,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     app.add_middleware(BodyLimit)
     for router in ROUTERS:
         app.include_router(router)
-    app.openapi = partial(document, app, readings.SCHEMAS)  # type: ignore[method-assign]
+    app.openapi = partial(document, app, readings.SCHEMAS, prefix or "/")  # type: ignore[method-assign]
     app.mount("/static", assets())
     answers = UnderPrefix(app, prefix) if prefix else app
     small = GZipMiddleware(answers, minimum_size=1024, compresslevel=5, exclude_content_types=NOT_COMPRESSED)

@@ -35,6 +35,8 @@ EVERY = 3.0  # s between two looks at the list
 class PlantSettings(Settings):
     """The settings of the server as they hold for one plant."""
 
+    plant: str = ""
+    """Its name, which stands beside the program's on every page."""
     prefix: str = ""
 
     @property
@@ -69,6 +71,7 @@ def settings_of(plant: Plant, settings: Settings) -> PlantSettings:
             "database_url": in_schema(settings.database_url, plant.schema),
             "schema_name": plant.schema,
             "prefix": plant.prefix,
+            "plant": plant.name,
         }
     )
 

@@ -73,10 +73,13 @@ def example_of(schema: str) -> Any:
     return json.loads((EXAMPLES / f"{schema}.json").read_bytes())
 
 
-def document(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
-    """The document of this application, made once. ``schemas``: components that routes refer to and FastAPI does not know."""
+def document(app: FastAPI, schemas: Mapping[str, Any], root: str = "/") -> Json:
+    """The document of this application, made once.
+
+    schemas: components that routes refer to and FastAPI does not know. root: where it is served.
+    """
     if app.openapi_schema is None:
-        app.openapi_schema = _made(app, schemas)
+        app.openapi_schema = _made(app, schemas, root)
     return app.openapi_schema
 
 
@@ -100,7 +103,7 @@ def resolve(openapi: Json, part: Json) -> Json:
     return part
 
 
-def _made(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
+def _made(app: FastAPI, schemas: Mapping[str, Any], root: str) -> Json:
     openapi = get_openapi(
         title="Inband",
         version=__version__,
@@ -108,7 +111,7 @@ def _made(app: FastAPI, schemas: Mapping[str, Any]) -> Json:
         description=DESCRIPTION,
         routes=app.routes,
         tags=[{"name": name, "description": words} for name, words in TAGS.items()],
-        servers=[{"url": app.root_path or "/", "description": "this server"}],
+        servers=[{"url": root, "description": "this server"}],
         license_info={"name": "MIT", "identifier": "MIT"},
     )
     components = openapi["components"]

@@ -98,6 +98,7 @@ def render(request: Request, template: str | Template, **context: Any) -> str:
                     "person": getattr(state, "person", None),
                     "csrf": getattr(state, "csrf", ""),
                     "to_do": None,
+                    "plant": getattr(getattr(request.app.state, "settings", None), "plant", ""),
                 }
                 | getattr(state, "waiting", {})
                 | context

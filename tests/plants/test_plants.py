@@ -209,6 +209,7 @@ class TestOverview:
         row.get_by_role("link").click()
         expect(page).to_have_url(f"{server.url}/p/north/")
         page.locator(".who", has_text="Mira").wait_for()
+        expect(page.locator("header .brand").last).to_have_text("North")
 
     def test_a_wrong_password_is_refused_and_recorded(self, server: Server) -> None:
         answer = httpx.post(f"{server.url}/plants/sign-in", data={"name": "Mira", "password": "guessed"}, timeout=60)
