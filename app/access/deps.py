@@ -77,7 +77,7 @@ async def get_caller(request: Request, session: SessionDep) -> Caller:
     browser = await run_in_threadpool(signed_in, session, token, request.app.state.waiting) if token else None
     if browser is None:
         raise NotSignedIn(
-            _("Nobody is signed in."), _("Sign in in the browser, or send a key: Authorization: Bearer YOUR-KEY")
+            _("Not signed in."), _("Sign in in the browser, or send a key: Authorization: Bearer YOUR-KEY")
         )
     _remember(request, browser)
     caller = browser.caller

@@ -135,7 +135,7 @@ class JsonRoute(APIRoute):
             except Invalid:
                 if "authorization" not in request.headers and not request.cookies:
                     raise NotSignedIn(
-                        _("Nobody is signed in."), _("Send a key: Authorization: Bearer YOUR-KEY")
+                        _("Not signed in."), _("Send a key: Authorization: Bearer YOUR-KEY")
                     ) from None
                 raise
             return await handle(read)

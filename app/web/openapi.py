@@ -40,7 +40,7 @@ REQUEST_ID = "9f3c1a70-2b"
 TAGS = {
     "readings": "What the probe measured. The answer says what was decided, why, and what to correct.",
     "offsets": "Tool memory (R10), average memory (R11), and the corrections on their way into the offsets.",
-    "calibration": "Gauge, ring and external gauge: what the machine reads too much, and when to look again.",
+    "calibration": "Gauge, ring and external gauge: the measuring error of each machine, and when calibration is due.",
     "what-if": "Stored readings replayed with other settings, side by side and as a map, and the changes proposed from them.",
     "gauges": "Gauge studies: type 1, bias, linearity, repeatability and reproducibility, and what they say about R33.",
     "kinematics": "Rotary axes by the preset compensation (cycle 452): runs, what to enter, drift, back-ups.",
@@ -56,7 +56,7 @@ TAGS = {
     "search": "Machines, characteristics, tools, alarms, parts and pages by their names.",
     "overview": "What needs attention first: every characteristic ranked, with the reasons.",
     "reports": "What is handed over about a characteristic and a period: JSON, PDF, XLSX, CSV; of many at once in the background.",
-    "wear": "True wear behind the corrections, how long an edge will do, and whether a loop runs after its own scatter.",
+    "wear": "True wear behind the corrections, how long an edge will last, and whether a loop over-corrects.",
     "events": "What changes, as it changes.",
     "keys": "Keys by which machines and other programs call.",
     "people": "People who sign in, and invitations.",

@@ -222,12 +222,12 @@ def model_means(study: Study) -> str:
             if study.stable is False
             else _("too little is known to call it in control")
         )
-        return _("The mean and the scatter hold, yet {why}: quote {index}, not Cp and Cpk.").format(
+        return _("The mean and the scatter hold, yet {why}: report {index}, not Cp and Cpk.").format(
             why=why, index=index
         )
     match which:
         case Model.A1 | Model.A2 if study.quote == "cpk":
-            return _("Cp and Cpk may be quoted, and what was is what will be: 6 sigma hold 99.73 % of the parts.")
+            return _("Cp and Cpk may be reported, and describe future parts too: 6 sigma hold 99.73 % of the parts.")
         case Model.A1 | Model.A2 if study.quote == "ppk":
             return _(
                 "Quote {index}: the process is steady, yet its scatter from part to part is not known well enough."

@@ -45,7 +45,7 @@ def kinds() -> list[tuple[str, str, str, str]]:
     """Kinds to choose from: key, name, what it answers, what it takes."""
     return [
         ("type_one", kind("type_one"), _("Does the probe repeat well enough for this tolerance?"), _("one part of known size, 25 to 50 readings of it")),
-        ("grr", kind("grr"), _("How much of the scatter is the probe's own, how much the parts'?"), _("10 parts, 2 or 3 operators or set-ups, 2 or 3 readings each")),
+        ("grr", kind("grr"), _("How much variation comes from the probe, how much from the parts?"), _("10 parts, 2 or 3 operators or set-ups, 2 or 3 readings each")),
         ("bias", kind("bias"), _("Does the probe read too much or too little?"), _("one part of known size, 10 readings and more")),
         ("linearity", kind("linearity"), _("Is the measuring error the same at all sizes?"), _("5 parts of known sizes over the range, 10 readings each")),
     ]  # fmt: skip

@@ -36,8 +36,8 @@ class ForecastOut(BaseModel):
     """Parts until the line reaches a limit; 0 is reached."""
 
     towards: Literal["wear", "tolerance", "offset"] = Field(
-        description="wear: R37, had nothing been corrected since the tool change. tolerance: out of tolerance, if nothing were "
-        "corrected from now on. offset: the sum of corrections reaches max_total."
+        description="wear: R37, without corrections since the tool change. tolerance: out of tolerance, without "
+        "corrections from now on. offset: the sum of corrections reaches max_total."
     )
     limit: float = Field(description="Where the limit lies on the wear curve.")
     parts: float

@@ -273,7 +273,7 @@ def rows(answer_figures: Sequence[Figures], quotes: Sequence[Mapping[str, Any]] 
         line(_("Mean size of one"), lambda f: plain_um(f.mean_size)),
         line(_("Rejects"), lambda f: f.rejects),
         line(_("Ppk (as if normal)"), lambda f: number(f.ppk)),
-        (_("To be quoted"), [quoted(quote) for quote in quotes]),
+        (_("Index to report"), [quoted(quote) for quote in quotes]),
         line(_("Spread s"), lambda f: plain_um(f.spread, 2)),
         line(_("Mean deviation"), lambda f: um(f.mean, 2)),
         line(_("Largest deviation"), lambda f: plain_um(f.largest)),

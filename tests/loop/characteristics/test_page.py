@@ -71,7 +71,7 @@ class TestWithoutScripts:
     def test_what_was_decided_on_another_value_says_so(self, shop: Shop, viewer: Person) -> None:
         shop.read(20.0)
         shop.read(20.5, correction_in_effect=0)
-        assert "counts as +0.5" in viewer.open(path(shop))
+        assert "+0.5 after pending corrections" in viewer.open(path(shop))
         text = viewer.open(path(shop, "/readings/2"))
         assert "The part was cut before correction" in text
         assert "Decided on" in text

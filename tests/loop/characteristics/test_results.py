@@ -192,7 +192,7 @@ class TestPages:
         assert box is not None
         assert box["height"] >= 48
         good.click()
-        dialog.get_by_role("button", name="Keep").click()
+        dialog.get_by_role("button", name="Save").click()
         page.get_by_text("40.0021").first.wait_for()
         (kept,) = shop.call("GET", f"/readings/{shop.characteristic}/1")["by_hand"]
         assert (kept["measured"], kept["verdict"], kept["by"]) == (40.0021, "good", operator.name)

@@ -161,7 +161,7 @@ def test_the_model_in_time_and_which_number_it_allows(shop: Shop) -> None:
     push(shop, quiet(250, seed=5), "steady")
     found = of(shop, characteristic="steady")
     assert (found["in_time"]["model"], found["stable"], found["quote"]) == ("A1", True, "cpk")
-    assert "Cp and Cpk may be quoted" in found["in_time"]["means"]
+    assert "Cp and Cpk may be reported" in found["in_time"]["means"]
 
     # Heavy tails: the mean and the scatter hold, yet a rule fires more often than chance explains. The model says no other
     # than the verdict of stability and the index named to be quoted.

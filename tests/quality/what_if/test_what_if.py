@@ -187,7 +187,7 @@ def test_the_truth_is_quoted_as_on_the_page_of_capability_and_replays_by_the_sam
         pytest.approx(page["quoted"]["value"]),
     )
     text = Person(server, "viewer").open(f"/characteristics/{shop.characteristic}/what-if")
-    assert "To be quoted" in text
+    assert "Index to report" in text
     assert f"pk {page['quoted']['value']:.2f}" in text
 
 

@@ -116,7 +116,7 @@ def look(path: Path, wishes: Wishes, name: str | None = None, *, complete: bool 
     if wishes.encoding not in {None, *delimited.ENCODINGS}:
         raise wrong("encoding", _("Choose one of {names}.").format(names=", ".join(delimited.ENCODINGS)))
     if wishes.delimiter is not None and (len(wishes.delimiter) != 1 or wishes.delimiter in '"\r\n'):
-        raise wrong("delimiter", _("Cells are parted by one sign, such as ; or a tabulator."))
+        raise wrong("delimiter", _("The column separator is one sign, such as ; or a tabulator."))
     ending = Path(name or path.name).suffix.lower()
     try:
         if ending in {".ndjson", ".jsonl", ".json"}:

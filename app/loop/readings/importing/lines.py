@@ -106,7 +106,7 @@ def _csv(path: Path, layout: Layout) -> Found:
 
 def _width(cells: int, width: int, delimiter: str) -> str:
     sign = {"\t": _("tabulator"), ",": _("comma"), ";": _("semicolon")}.get(delimiter, delimiter)
-    text = _("has {cells} columns, the header has {width}; cells are parted by {sign}.").format(
+    text = _("has {cells} columns, the header has {width}; the column separator is {sign}.").format(
         cells=cells, width=width, sign=sign
     )
     if delimiter == "," and cells > width:

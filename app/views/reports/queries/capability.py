@@ -22,9 +22,9 @@ def capability(frame: Frame) -> Section:
         return Section("capability", title, warnings=(why,))
     word, _tone = wording.verdict(study.quoted)
     if study.quote == "none":
-        verdict = _("No index may be quoted: {why}.").format(why=wording.why_not(study.quoting.why))
+        verdict = _("Do not report an index: {why}.").format(why=wording.why_not(study.quoting.why))
     else:
-        verdict = _("{verdict}: quote {index} = {value}. Intervals hold with {confidence} confidence.").format(
+        verdict = _("{verdict}: report {index} = {value}. Intervals hold with {confidence} confidence.").format(
             verdict=word,
             index=wording.index_name(study.quote),
             value=wording.index(study.quoted),
