@@ -54,3 +54,28 @@ def test_the_server_filters_by_name_where_a_list_has_pages(shop: Shop, viewer: P
     assert listed(f"q=ring-b&machine={shop.machine}") == ["ring-b"]
     assert listed("q=ring&machine=sorted-0") == []
     assert listed("q=zzz") == []
+
+
+@pytest.mark.browser
+def test_a_choice_in_a_row_counts_by_what_is_chosen(server: Server, shop: Shop, page: Page) -> None:
+    for number in range(12):
+        server.person(f"clerk-{number}", "viewer")
+    Person(server, "engineer")
+    Person(server, "admin").sign_in(page)
+    page.goto("/setup/people")
+    rows = page.locator("#all-people tbody tr:visible")
+    page.get_by_label("Show rows with").fill("engineer-")
+    expect(rows).to_have_count(1)
+    role = rows.get_by_role("combobox").evaluate("choice => choice.selectedOptions[0].text")
+    page.get_by_label("Show rows with").fill(role)
+    expect(rows).to_have_count(1)
+    page.get_by_label("Show rows with").fill("clerk-1")
+    expect(rows).to_have_count(3)  # clerk-1, clerk-10, clerk-11
+
+
+def test_the_record_of_changes_is_filtered_by_any_word_of_it(shop: Shop, engineer: Person) -> None:
+    shop.call("PATCH", f"/machines/{shop.machine}", name="Lathe renamed")
+    assert engineer.open("/setup/audit?q=MACHINE%20CHANGED").count("machine changed") == 1
+    assert "machine changed" not in engineer.open("/setup/audit?q=ring-a")
+    assert "characteristic/ring-a" in engineer.open("/setup/audit?q=ring-a")
+    assert "Nothing recorded here" in engineer.open("/setup/audit?q=%25")

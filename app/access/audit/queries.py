@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import select
+from sqlalchemy import or_, select
 from sqlalchemy.orm import Session
 
 from app.access.audit.tables import AuditEntry
@@ -13,18 +13,25 @@ def entries(
     *,
     subject: str | None = None,
     actor: str | None = None,
+    text: str | None = None,
     person: int | None = None,
     key: int | None = None,
     before: int | None = None,
     limit: int = 100,
 ) -> Sequence[AuditEntry]:
-    """The newest first. ``person`` and ``key``: by their numbers. ``subject`` takes what lies below it too: `tool/lathe-1` has `tool/lathe-1/3`."""
+    """The newest first. ``person`` and ``key``: by their numbers. ``subject`` takes what lies below it too: `tool/lathe-1` has `tool/lathe-1/3`.
+
+    ``text``: anywhere in who, what or why, in capitals or not.
+    """
     query = select(AuditEntry).order_by(AuditEntry.id.desc()).limit(limit)
     if subject:
         below = subject.rstrip("/") + "/"
         query = query.where((AuditEntry.subject == subject) | AuditEntry.subject.startswith(below, autoescape=True))
     if actor:
         query = query.where(AuditEntry.actor == actor)
+    if text:
+        places = (AuditEntry.actor, AuditEntry.action, AuditEntry.subject, AuditEntry.why)
+        query = query.where(or_(*(place.icontains(text, autoescape=True) for place in places)))
     if person is not None:
         query = query.where(AuditEntry.person_id == person)
     if key is not None:

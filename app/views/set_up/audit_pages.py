@@ -19,17 +19,23 @@ SHOWN = 100
 
 @router.get("/setup/audit")
 def audit_page(
-    request: Request, session: SessionDep, caller: Engineer, subject: str = "", actor: str = "", before: str = ""
+    request: Request,
+    session: SessionDep,
+    caller: Engineer,
+    subject: str = "",
+    actor: str = "",
+    q: str = "",
+    before: str = "",
 ) -> Response:
-    subject, actor = subject.strip()[:200], actor.strip()[:200]
+    subject, actor, text = (typed.replace("\0", "").strip()[:200] for typed in (subject, actor, q))
     cursor = int(before) if before.isascii() and before.isdigit() and int(before) <= LARGEST_ID else None
-    entries = queries.entries(session, subject=subject, actor=actor, before=cursor, limit=SHOWN + 1)
+    entries = queries.entries(session, subject=subject, actor=actor, text=text, before=cursor, limit=SHOWN + 1)
     part = part_of(
         entries,
         SHOWN,
         cursor,
         lambda entry: entry.id,
-        partial(address, "/setup/audit", subject=subject or None, actor=actor or None),
+        partial(address, "/setup/audit", subject=subject or None, actor=actor or None, q=text or None),
     )
     return setup_page(
         request,
@@ -39,6 +45,7 @@ def audit_page(
         entries=[(entry, changes(entry.before, entry.after)) for entry in part.rows],
         subject=subject,
         actor=actor,
+        q=text,
         part=part,
     )
 

@@ -4,19 +4,24 @@
 //   th[data-fixed]    a column that is not sorted
 //   td[data-value]    what is sorted by in place of the text
 //
-// Numbers sort as numbers (−12.5, 1,234.5 µm), times of <time-ago> by their moment, words as people sort them. A second click
-// turns the order. Without script the table is as the server made it. A live part that is fetched again keeps order and filter.
+// Numbers sort as numbers (−12.5, 1,234.5 µm), times of <time-ago> by their moment, words as people sort them, a choice by what is
+// chosen. A second click turns the order. Without script the table is as the server made it. A live part that is fetched again keeps order and filter.
 
 const LONG = 12; // rows; about a screen
 const collator = new Intl.Collator(document.documentElement.lang || "en", { numeric: true, sensitivity: "base" });
 const kept = new Map(); // of each table: {column, descending, filter}
+
+function textOf(cell) {
+  const choice = cell.querySelector("select");
+  return (choice ? choice.selectedOptions[0]?.text ?? "" : cell.textContent).trim();
+}
 
 function valueOf(cell) {
   if (!cell) return "";
   if (cell.dataset.value) return cell.dataset.value;
   const at = cell.querySelector("time, time-ago");
   const moment = at?.getAttribute("datetime") ?? at?.getAttribute("at");
-  return moment ?? cell.textContent.trim();
+  return moment ?? textOf(cell);
 }
 
 function numberOf(text) {
@@ -48,7 +53,7 @@ function sort(table, column, descending) {
 function filter(table, text) {
   const words = text.toLowerCase().split(/\s+/).filter(Boolean);
   for (const row of table.tBodies[0].rows) {
-    const own = row.textContent.toLowerCase();
+    const own = [...row.cells].map(textOf).join(" ").toLowerCase();
     row.hidden = !words.every((word) => own.includes(word));
   }
 }
