@@ -53,6 +53,7 @@ class AlarmSound extends HTMLElement {
   connectedCallback() {
     this.button = document.createElement("button");
     this.button.type = "button";
+    this.button.className = "button";
     this.button.addEventListener("click", () => this.choose(!isOn()));
     this.replaceChildren(this.button);
     this.show();
