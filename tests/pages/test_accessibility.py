@@ -150,3 +150,16 @@ def test_targets_beside_the_machine_are_as_large_as_a_finger(
     for address in OPERATOR_PAGES:
         look(address.format(**values))
     assert small == {}
+
+
+def test_contrast_themes_of_the_system_show_what_is_chosen(page: Page, shop: Shop, admin: Person) -> None:
+    page.emulate_media(forced_colors="active")
+    admin.sign_in(page)
+    opened(page, f"/characteristics/{shop.characteristic}")
+    for choice in page.locator("nav.choice").all():
+        grounds = choice.locator("a").evaluate_all(
+            "links => links.map((link) => getComputedStyle(link).backgroundColor + (link.ariaCurrent ? ' chosen' : ''))"
+        )
+        assert len(set(grounds)) == 2, grounds
+    chart = page.locator("plotly-chart").first  # marks and bands on their own ground
+    assert chart.evaluate("chart => getComputedStyle(chart).forcedColorAdjust") == "none"
