@@ -134,9 +134,7 @@ class JsonRoute(APIRoute):
                     read.value = read_json(body, request.headers.get("content-type"))
             except Invalid:
                 if "authorization" not in request.headers and not request.cookies:
-                    raise NotSignedIn(
-                        _("Not signed in."), _("Send a key: Authorization: Bearer YOUR-KEY")
-                    ) from None
+                    raise NotSignedIn(_("Not signed in."), _("Send a key: Authorization: Bearer YOUR-KEY")) from None
                 raise
             return await handle(read)
 

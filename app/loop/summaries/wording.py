@@ -187,7 +187,9 @@ def _study_part(what: str) -> str:
 def caution(which: Caution) -> str:
     """A caution that belongs to a number."""
     return {
-        Caution.FEW_READINGS: _("Fewer than 100 readings: the number is preliminary; report it with its interval only."),
+        Caution.FEW_READINGS: _(
+            "Fewer than 100 readings: the number is preliminary; report it with its interval only."
+        ),
         Caution.NOT_IN_CONTROL: _(
             "More readings lie beyond 3 sigma than chance explains: the process is not in control, so this describes past parts only; do not use it to predict."
         ),
