@@ -17,7 +17,7 @@ from psycopg import AsyncConnection
 from starlette.requests import Request
 from starlette.responses import StreamingResponse
 
-from app.db.connections import Connections
+from app.db.connections import TRIFLE, Connections
 from app.db.events import CHANNEL
 from app.db.outage import Outage
 
@@ -62,6 +62,7 @@ class Live:
         self._clients: dict[asyncio.Queue[Message | None], Access] = {}
         self._opened = asyncio.Event()  # the first page, after a time without
         self._last: int | None = None  # the last event that was passed on; None before the journal was seen
+        self._server: tuple[Any, ...] | None = None  # whose journal that was
         self._tasks: list[asyncio.Task[None]] = []
         self.closing = asyncio.Event()
 
@@ -123,8 +124,7 @@ class Live:
                 async with await self._connections.connect_async(application_name="inband-live") as conn:
                     await _wake_up_on_events(conn)
                     listening = True
-                    if self._last is None:
-                        self._last = await _newest(conn)
+                    await self._look_whose(conn)
                     outage.is_over()
                     while True:
                         await self._pass_on(conn)
@@ -139,6 +139,13 @@ class Live:
             except Exception:
                 log.exception("unhandled error in live events")
                 await asyncio.sleep(1)
+
+    async def _look_whose(self, conn: AsyncConnection[Any]) -> None:
+        """See which server answers. The journal of another one may lack what was passed on, and number other events so."""
+        server = await (await conn.execute(TRIFLE)).fetchone()
+        if self._last is None or server != self._server:
+            self._last, self._server = await _newest(conn), server
+            self._let_go()  # whoever comes back loads anew
 
     async def _rest(self) -> None:
         if self._clients:

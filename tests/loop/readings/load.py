@@ -26,6 +26,12 @@ class Sender:
     """Readings that were sent more than once."""
     repeated: int = 0
     """Of those: readings that had been stored although the answer was lost (200)."""
+    alone: bool = False
+    """Nobody else sends readings of this characteristic: when its numbers go back, what was answered is sent again."""
+    lost: int = 0
+    """Readings that were answered, were gone afterwards, and have been stored anew."""
+    longest: float = 0.0
+    """Seconds that one reading took at most."""
 
     def run(self, stop: threading.Event | None = None) -> "Sender":
         """Send them all. An answer other than 200, 201 or 503 fails."""
@@ -35,28 +41,47 @@ class Sender:
         for reading in self.readings:
             if stop is not None and stop.is_set():
                 break
-            body, tries, deadline = json.dumps(reading), 0, time.monotonic() + self.patience
-            while True:
-                tries += 1
-                status = 0
-                try:
-                    connection.request("POST", "/api/v1/readings", body, {"Authorization": f"Bearer {self.key}"})
-                    answer = connection.getresponse()
-                    status, text = answer.status, answer.read()
-                except (OSError, HTTPException):
-                    connection.close()
-                if status in {200, 201}:
-                    break
-                assert status in {0, 503}, text
-                assert time.monotonic() < deadline, "not answered in all this time"
-                time.sleep(0.1)
-            self.again += tries > 1
-            self.repeated += status == 200
-            self.answers.append(json.loads(text))
+            answer = self._send(connection, reading)
+            if self.alone and self.answers and answer["sequence"] <= self.answers[-1]["sequence"]:
+                self._send_again(connection, answer["sequence"])
+            self.answers.append(answer)
             if self.pause:
                 time.sleep(self.pause)
         connection.close()
         return self
+
+    def _send(self, connection: HTTPConnection, reading: dict[str, Any]) -> dict[str, Any]:
+        """Send a reading until it is answered; the answer."""
+        body, tries, begun = json.dumps(reading), 0, time.monotonic()
+        while True:
+            tries += 1
+            status, text = 0, b""
+            try:
+                connection.request("POST", "/api/v1/readings", body, {"Authorization": f"Bearer {self.key}"})
+                answer = connection.getresponse()
+                status, text = answer.status, answer.read()
+            except (OSError, HTTPException):
+                connection.close()
+            if status in {200, 201}:
+                break
+            assert status in {0, 503}, text
+            assert time.monotonic() < begun + self.patience, "not answered in all this time"
+            time.sleep(0.1)
+        self.again += tries > 1
+        self.repeated += status == 200
+        self.longest = max(self.longest, time.monotonic() - begun)
+        answered: dict[str, Any] = json.loads(text)
+        return answered
+
+    def _send_again(self, connection: HTTPConnection, gone_from: int) -> None:
+        """The readings that were answered with this number or a higher one are gone: another server answers now, which lacks them."""
+        gone = [answer for answer in self.answers if answer["sequence"] >= gone_from]
+        kept = len(self.answers) - len(gone)
+        self.answers[kept:] = [
+            self._send(connection, {name: answer[name] for name in ("characteristic", "measured", "key")})
+            for answer in gone
+        ]
+        self.lost += len(gone)
 
 
 def all_at_once(senders: list[Sender], stop: threading.Event | None = None) -> list[Sender]:

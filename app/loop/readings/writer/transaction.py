@@ -19,11 +19,12 @@ from app.loop.readings.schemas import MOST_ERRORS, ReadingIn
 from app.loop.readings.writer.columnar import FEWEST, ColumnarReadings, Outcome, decide_in_columns
 from app.loop.readings.writer.decide import decide_one_by_one
 from app.loop.readings.writer.load import ParametersCache, load
-from app.loop.readings.writer.pending import PendingWrites, Verdict
+from app.loop.readings.writer.pending import PendingWrites, Stored, Verdict
 from app.loop.readings.writer.save import save
 from app.loop.readings.writer.snapshot import Snapshot
 
 ROLLBACK = (("ROLLBACK",),)
+COMMIT = (("COMMIT",),)
 
 
 class CommitLost(Exception):
@@ -78,7 +79,9 @@ async def transact(
                 raise CommitLost(outcomes) from error
             raise
     else:
-        await pipeline.run(ROLLBACK)
+        # A reading that is known already may be here alone: a commit that was broken off while it waited for its standby is
+        # seen, and gone with this server. Having locked a machine, this commit waits for the standby too, and for all before it.
+        await pipeline.run(COMMIT if any(isinstance(outcome, Stored) for outcome in outcomes) else ROLLBACK)
     pending.settle()
     return outcomes
 
