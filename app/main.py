@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 from starlette.middleware.gzip import GZipMiddleware
 
 from app.access import api as people
@@ -16,8 +16,9 @@ from app.access.audit import api as audit
 from app.access.deps import recognise
 from app.access.keys import KeyRing
 from app.access.queries import still_granted
-from app.db.connections import Connections
+from app.db.connections import Connections, in_schema
 from app.db.engine import Database
+from app.db.replica import Replica
 from app.geometry.alignment import api as alignments
 from app.geometry.alignment import pages as alignment_pages
 from app.geometry.alignment import pictures_api as alignment_pictures
@@ -99,9 +100,11 @@ from app.views.station import pages as station_pages
 from app.views.to_do import pages as to_do_pages
 from app.views.to_do.queries import COUNT as TO_DO_COUNT
 from app.web import api_docs, health
+from app.web.deps import may_read_replica
 from app.web.limits import BodyLimit
 from app.web.live import Live
 from app.web.openapi import document
+from app.web.own_changes import OwnChanges
 from app.web.problems import add_problem_handlers
 from app.web.request_log import RequestLog
 from app.web.security import SecurityHeaders
@@ -186,6 +189,26 @@ ROUTERS: tuple[APIRouter, ...] = (
     report_job_pages.router,
 )
 
+# Heavy reading that changes nothing: charts, statistics, reports, exports, searches. A copy of the database will do for it.
+FROM_REPLICA = (
+    figures_api.router,
+    statistics.router,
+    capability.router,
+    capability_pages.router,
+    compare.router,
+    compare_pages.router,
+    overview.router,
+    overview_pages.router,
+    search.router,
+    search_pages.router,
+    reading_list.router,
+    wear.router,
+    reports.router,
+    report_points.router,
+    report_pages.router,
+    control.router,
+)
+
 # What is done once a minute; see app.jobs.
 JOBS: tuple[PeriodicJob, ...] = (
     *offset_jobs.JOBS,
@@ -214,6 +237,15 @@ def keep_for_good() -> None:
     tenth of a second at best, and half a second while pages compute. So nothing is collected before: that is such a round.
     """
     gc.freeze()
+
+
+def _replica(settings: Settings, database: Database) -> Replica | None:
+    url = settings.read_database_url
+    if url is None:
+        return None
+    if settings.schema_name is not None:
+        url = in_schema(url, settings.schema_name)
+    return Replica(url, database, pool_size=settings.pool_size, most_behind=settings.read_most_behind)
 
 
 def create_app(settings: Settings | None = None, ending: Callable[[], None] = lambda: None) -> Plants:
@@ -256,6 +288,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     # Readings are let in by connections of their own: requests that work for seconds may hold all the others. There are as
     # many as threads that look up: where the database is away, nobody waits half a minute for a connection of somebody else.
     letting_in = Database(settings.database_url, pool_size=4, overflow=-1, connections=connections)
+    replica = _replica(settings, database)
     keys, directory = KeyRing(letting_in, caller_of_key), Directory(letting_in)
     writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(database, JOBS)
     report_worker = ReportWorker(database)
@@ -263,6 +296,8 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         connections.start()
+        if replica is not None:
+            replica.start()
         writer.start()
         live.start()
         jobs.start()
@@ -272,6 +307,8 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
         await jobs.stop()
         await report_worker.stop()
         await writer.stop()
+        if replica is not None:
+            replica.stop()
         letting_in.close()
         database.close()
         connections.stop()
@@ -287,19 +324,22 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     )
     app.state.settings = settings
     app.state.database = database
+    app.state.replica = replica
     app.state.key_ring = keys
     app.state.directory = directory
     app.state.writer = writer
     app.state.live = live
     app.state.report_worker = report_worker
-    app.state.metrics = health.registry(database, settings.data_dir)
+    app.state.metrics = health.registry(database, settings.data_dir, replica)
     app.state.waiting = {
         "to_do": TO_DO_COUNT.scalar_subquery(),
     }
     add_problem_handlers(app, recognise)
     app.add_middleware(BodyLimit)
     for router in ROUTERS:
-        app.include_router(router)
+        app.include_router(router, dependencies=[Depends(may_read_replica)] if router in FROM_REPLICA else [])
+    if replica is not None:
+        app.add_middleware(OwnChanges, replica=replica, secure=settings.secure_cookies)
     app.openapi = partial(document, app, readings.SCHEMAS, prefix or "/")  # type: ignore[method-assign]
     app.mount("/static", assets())
     answers = UnderPrefix(app, prefix) if prefix else app

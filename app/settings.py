@@ -131,6 +131,17 @@ class Settings(BaseSettings):
         description="Schema of the database in which the tables of this plant lie: one database holds several plants. Without "
         "it the first of the role's search path, usually public.",
     )
+    read_database_url: Annotated[str, AfterValidator(_postgres_url)] | None = Field(
+        default=None,
+        repr=False,
+        description="A standby of that server, for charts, reports, exports and searches. Without it they read the server itself.",
+    )
+    read_most_behind: float = Field(
+        default=10.0,
+        ge=0.5,
+        le=3600,
+        description="Seconds that the standby may be behind; beyond that, charts and reports read the server itself.",
+    )
     data_dir: Annotated[Path, AfterValidator(_private_folder)] = Field(
         default_factory=lambda: platformdirs.user_data_path("inband"),
         description="Where Inband keeps what it stores, the embedded PostgreSQL included.",

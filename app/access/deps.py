@@ -14,6 +14,7 @@ from typing import Annotated, Any, NamedTuple
 
 from fastapi import Depends, Request
 from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 
 from app.access.audit.actions import acts
@@ -21,7 +22,7 @@ from app.access.callers import Caller, Role
 from app.access.devices import Device, device_of
 from app.access.keys import KeyRing
 from app.access.queries import SignedIn, signed_in
-from app.db.engine import Database
+from app.db.engine import Database, database_of
 from app.errors import NotAllowed, NotSignedIn
 from app.language.i18n import _
 from app.web.deps import SAFE_METHODS, SESSION_COOKIE, STATION_COOKIE, SessionDep
@@ -74,7 +75,7 @@ async def get_caller(request: Request, session: SessionDep) -> Caller:
         acts(caller.person_id, caller.key_id)
         return caller
     token = request.cookies.get(SESSION_COOKIE)
-    browser = await run_in_threadpool(signed_in, session, token, request.app.state.waiting) if token else None
+    browser = await run_in_threadpool(_browser, request, session, token) if token else None
     if browser is None:
         raise NotSignedIn(
             _("Not signed in."), _("Sign in in the browser, or send a key: Authorization: Bearer YOUR-KEY")
@@ -85,6 +86,15 @@ async def get_caller(request: Request, session: SessionDep) -> Caller:
     if request.method not in SAFE_METHODS:
         await _check_token(request, caller.csrf)
     return caller
+
+
+def _browser(request: Request, session: Session, token: str) -> SignedIn | None:
+    """Look up who is signed in, always where it is written: no copy may let in whoever was signed out or disabled just now."""
+    primary = database_of(session).copy_of
+    if primary is None:
+        return signed_in(session, token, request.app.state.waiting)
+    with primary.begin() as own:
+        return signed_in(own, token, request.app.state.waiting)
 
 
 def _remember(request: Request, browser: SignedIn) -> None:

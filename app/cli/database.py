@@ -3,7 +3,7 @@
 import platform
 import re
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from app.db.engine import Database
     from app.db.rights import Rights
     from app.jobs.tables import JobFailure
+    from app.settings import Settings
 
 
 @cli.command()
@@ -131,6 +132,7 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
             raise
         _wrong(words)
         raise typer.Exit(status) from None
+    away = _replica(settings)
     full = shortage(settings.data_dir)
     if full:
         _wrong(full)
@@ -150,8 +152,44 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
     if not failing:
         _well("background jobs", "none fails")
     protected = rights is None or _rights(rights, own=settings.database_url is not None)
-    if failing or full or not protected:
+    if failing or full or away or not protected:
         raise typer.Exit(1)
+
+
+def _replica(settings: "Settings") -> bool:
+    """Say how the replica is that charts and reports read, if one is named. True if it is away."""
+    from sqlalchemy.exc import OperationalError
+
+    from app.db.connections import Connections
+    from app.db.engine import Database
+    from app.db.replication import lag_of
+
+    if settings.read_database_url is None or settings.database_url is None:
+        return False
+    urls = (settings.database_url, settings.read_database_url)
+    try:
+        with ExitStack() as stack:
+            written, read = (
+                stack.enter_context(
+                    closing(
+                        Database(
+                            url, pool_size=1, connections=Connections(url, settings.database_patience, of_several=of)
+                        )
+                    )
+                )
+                for url, of in zip(urls, ("read-write", "prefer-standby"), strict=True)
+            )
+            lag = lag_of(written, read)
+            place = read.connections.place
+    except OperationalError as error:
+        _wrong(f"replica: it cannot be read, so charts and reports read the server that is written to: {error.orig}")
+        return True
+    if lag.in_recovery:
+        words = "it has everything" if lag.bytes <= 0 else f"{lag.bytes / 1e6:,.1f} MB behind"
+        _well("replica", f"{words}; it is read while it is at most {settings.read_most_behind:g} s behind ({place})")
+    else:
+        _note(f"replica: {place} is no standby: charts and reports disturb the server that is written to.")
+    return False
 
 
 def _condition(database: "Database") -> "tuple[Sequence[JobFailure], Rights | None]":

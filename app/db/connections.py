@@ -53,10 +53,11 @@ def in_schema(url: str, schema: str) -> str:
     return f"{head}?{'&'.join([*others, f'options={path}'])}"
 
 
-def parameters_of(url: str, patience: float = PATIENCE) -> dict[str, Any]:
+def parameters_of(url: str, patience: float = PATIENCE, of_several: str = "read-write") -> dict[str, Any]:
     """The parameters of libpq for an address, with our limits where it sets none itself.
 
-    Of several hosts the one that can be written to is taken. Raises psycopg's `ProgrammingError`.
+    of_several: `target_session_attrs` where there are several hosts; usually the one that can be written to is taken. Raises
+    psycopg's `ProgrammingError`.
     """
     named = conninfo_to_dict(plain_url(url))
     seconds = max(2, round(patience))
@@ -69,19 +70,19 @@ def parameters_of(url: str, patience: float = PATIENCE) -> dict[str, Any]:
         "tcp_user_timeout": seconds * 1000,  # ms; no wait for the kernel's quarter of an hour
     }
     if hosts > 1:
-        usual["target_session_attrs"] = "read-write"
+        usual["target_session_attrs"] = of_several
     return usual | named
 
 
 class Connections:
     """The way of one process to one database; ``start`` begins the watch, without which nothing ever counts as silent."""
 
-    def __init__(self, url: str, patience: float = PATIENCE) -> None:
+    def __init__(self, url: str, patience: float = PATIENCE, *, of_several: str = "read-write") -> None:
         self.patience = patience
         self.silent = False
         self.age = 0
         """Rises when connections made before are of no use any more."""
-        self._parameters = parameters_of(url, patience)
+        self._parameters = parameters_of(url, patience, of_several)
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
 

@@ -27,14 +27,17 @@ class Database:
         overflow: int | None = None,
         application_name: str = "inband",
         connections: Connections | None = None,
+        copy_of: "Database | None" = None,
     ) -> None:
         """pool_size: connections kept open. overflow: how many more there may be at once; as many again if left out, -1: any.
 
-        connections: those of the process, if they are watched; else some of its own, which are not.
+        connections: those of the process, if they are watched; else some of its own, which are not. copy_of: where what is read
+        here is written.
         """
         self.dsn = plain_url(url)
         """For psycopg itself and PostgreSQL's programs. Holds the password; not for logs."""
         self.connections = connections or Connections(url)
+        self.copy_of = copy_of
         self.engine = create_engine(
             "postgresql+psycopg://",
             creator=lambda: self.connections.connect(options=LIMITS, application_name=application_name),

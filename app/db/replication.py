@@ -5,6 +5,8 @@ from typing import NamedTuple
 from sqlalchemy import text
 from sqlalchemy.orm import Session
 
+from app.db.engine import Database
+
 _SERVER = text(
     "SELECT current_setting('synchronous_standby_names'), current_setting('synchronous_commit'), current_setting('fsync'),"
     " pg_has_role('pg_read_all_stats', 'USAGE')"
@@ -48,6 +50,26 @@ def replication_of(session: Session) -> Replication:
     return Replication(names.strip(), commit, fsync == "on", visible, standbys)
 
 
+class Lag(NamedTuple):
+    """Lag of a replica, in bytes of the log; in_recovery: it is a standby."""
+
+    bytes: int
+    in_recovery: bool
+
+
+def lag_of(written: Database, read: Database) -> Lag:
+    """Lag of the copy that is read behind the server that is written to. Raises SQLAlchemy's `OperationalError`."""
+    with written.begin() as session:
+        place = session.scalar(text("SELECT pg_current_wal_flush_lsn()::text"))
+    with read.begin() as session:
+        replayed = "CASE WHEN pg_is_in_recovery() THEN pg_last_wal_replay_lsn() ELSE pg_current_wal_flush_lsn() END"
+        behind, in_recovery = session.execute(
+            text(f"SELECT (CAST(:place AS pg_lsn) - {replayed})::bigint, pg_is_in_recovery()"),
+            {"place": place},
+        ).one()
+    return Lag(int(behind or 0), bool(in_recovery))
+
+
 def advice_on(replication: Replication) -> list[str]:
     """Sentences about what an administrator should know or change; none where every answered reading is on two servers."""
     advice = []
@@ -75,7 +97,13 @@ def advice_on(replication: Replication) -> list[str]:
     elif replication.standbys and not synchronous:
         advice.append(
             "No standby is synchronous: one that is promoted may lack the readings that were answered last. "
-            "synchronous_standby_names makes every commit wait until a standby has it."
+            "synchronous_standby_names makes every commit wait until a standby has it: with two standbys, 'ANY 1 (a, b)' with "
+            "their names lets either of them be away."
+        )
+    elif synchronous and len([standby for standby in replication.standbys if standby.state == "streaming"]) == 1:
+        advice.append(
+            "One standby is connected, and every commit waits for it: while it is away, whatever is to be stored is answered "
+            "503. With a second one, synchronous_standby_names 'ANY 1 (a, b)' with their names lets either of them be away."
         )
     return advice
 

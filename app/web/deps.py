@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from starlette.datastructures import FormData
 
 from app.db.engine import Database
+from app.db.replica import MustSee, Replica
 from app.errors import FieldError, Invalid, NotAllowed
 from app.language.i18n import _
 from app.settings import Settings, is_loopback
@@ -23,13 +24,45 @@ SESSION_COOKIE = "inband_session"
 STATION_COOKIE = "inband_station"
 """Of a device that is bound to a machine; sent to the pages below /station only."""
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+WRITTEN_COOKIE = "inband_written"
+"""Place in the log of the database at which the last change of this browser ends; see `app.web.own_changes`."""
+EVENT_HEADER = "X-Inband-Event"
+"""Number of the live event that made a page look again."""
+
+
+def may_read_replica(request: Request) -> None:
+    """For routes whose reading is heavy: what they only read may come from a copy of the database."""
+    request.state.may_read_replica = request.method in SAFE_METHODS
 
 
 def get_session(request: Request) -> Iterator[Session]:
-    """One transaction for the request, committed before the answer leaves."""
+    """One transaction for the request, committed before the answer leaves; on the copy of the database, nothing but reading."""
+    replica: Replica | None = request.app.state.replica
+    if replica is not None and getattr(request.state, "may_read_replica", False):
+        wanted = _must_see(request)
+        reading = None if wanted is None else replica.begin(wanted)
+        if reading is not None:
+            request.state.behind = replica.behind
+            with reading:
+                yield reading
+            return
     database: Database = request.app.state.database
     with database.begin() as session:
         yield session
+
+
+def _must_see(request: Request) -> MustSee | None:
+    """Return what a copy must have for this request; None if it has to be answered by the server that is written to.
+
+    `Cache-Control: no-cache` asks for that: a page that is loaded anew, or a program that reads what it has just written.
+    """
+    if "no-cache" in request.headers.get("cache-control", ""):
+        return None
+    return MustSee(_place(request.cookies.get(WRITTEN_COOKIE)), _place(request.headers.get(EVENT_HEADER)))
+
+
+def _place(text: str | None) -> int:
+    return min(int(text), LARGEST_ID) if text and text.isascii() and text.isdigit() and len(text) < 20 else 0
 
 
 SessionDep = Annotated[Session, Depends(get_session, scope="function")]

@@ -15,6 +15,7 @@ from starlette.responses import Response
 
 from app.db.disk import free
 from app.db.engine import Database
+from app.db.replica import Replica
 from app.web.api import EVERY_ERROR
 
 router = APIRouter(tags=["health"], generate_unique_id_function=lambda route: route.name)
@@ -32,11 +33,12 @@ def live() -> dict[str, str]:
 
 @router.get("/health/ready", responses=_says({"status": "ready"}) | {503: EVERY_ERROR[503]})
 def ready(request: Request) -> dict[str, str]:
-    """The process answers and reaches its database."""
+    """The process answers and reaches its database. Where there is a replica: how far it is behind."""
     database: Database = request.app.state.database
     with database.begin() as session:
         session.execute(text("SELECT 1"))
-    return {"status": "ready"}
+    replica: Replica | None = request.app.state.replica
+    return {"status": "ready"} | ({} if replica is None else {"replica": replica.in_words()})
 
 
 @router.get(
@@ -104,6 +106,23 @@ FROM job_run r FULL JOIN (SELECT job, count(*) AS failing FROM job_failure GROUP
 """
 
 
+class Behind(Collector):
+    """The copy of the database that charts and reports read."""
+
+    def __init__(self, replica: Replica) -> None:
+        self._replica = replica
+
+    def collect(self) -> Iterable[Metric]:
+        behind = GaugeMetricFamily(
+            "inband_replica_behind_seconds", "Seconds that the replica lags; absent while it is away."
+        )
+        if self._replica.behind is not None:
+            behind.add_metric([], self._replica.behind)
+        used = GaugeMetricFamily("inband_replica_used", "1 while charts, reports and searches read the replica.")
+        used.add_metric([], float(self._replica.usable))
+        return behind, used
+
+
 class Disk(Collector):
     """Room on the disk of the data directory."""
 
@@ -117,10 +136,12 @@ class Disk(Collector):
         return (room,)
 
 
-def registry(database: Database, data_dir: Path) -> Any:
-    """The metrics of one application: those of the plant, of its process, and of its disk."""
+def registry(database: Database, data_dir: Path, replica: Replica | None) -> Any:
+    """The metrics of one application: those of the plant, of its process, of its disk, and of its replica."""
     collectors = CollectorRegistry()
     collectors.register(Plant(database))
+    if replica is not None:
+        collectors.register(Behind(replica))
     collectors.register(Disk(data_dir))
     ProcessCollector(registry=collectors)
     PlatformCollector(registry=collectors)

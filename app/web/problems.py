@@ -4,7 +4,7 @@ import logging
 import re
 from collections.abc import Awaitable, Callable, Collection, Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 from urllib.parse import quote, urlsplit
 
 import psycopg
@@ -13,6 +13,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.routing import iter_route_contexts
 from sqlalchemy import exc as sql
 from starlette.exceptions import HTTPException
+from starlette.middleware.exceptions import ExceptionMiddleware
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -188,6 +189,8 @@ async def _database(request: Request, error: Exception) -> Response:
     state = getattr(cause, "sqlstate", None) or ""
     away = isinstance(cause, psycopg.OperationalError | psycopg.InterfaceError) or isinstance(error, sql.TimeoutError)
     if away or (isinstance(error, sql.DBAPIError) and error.connection_invalidated):
+        if getattr(request.state, "behind", None) is not None:
+            return _read_elsewhere(request, error)
         if _in_commit(request, error):
             look = _(
                 "Wait a moment, load the page or the list again, and see whether it was stored before you repeat it."
@@ -206,6 +209,16 @@ async def _database(request: Request, error: Exception) -> Response:
             request, Invalid(_("A value of the request cannot be stored."), _("Correct it and send it again."))
         )
     return incident(request, error)
+
+
+def _read_elsewhere(request: Request, error: Exception) -> Response:
+    """Answer the same request from the server that is written to: the copy it was reading has ended the query or is gone."""
+    request.app.state.replica.failed(error)
+    request.state.behind = None
+    again: Any = ExceptionMiddleware(
+        request.app.router, request.app.exception_handlers
+    )  # all that is asked of it: to be called
+    return cast("Response", again)
 
 
 def _in_commit(request: Request, error: Exception) -> bool:

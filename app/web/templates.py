@@ -16,6 +16,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
 from app import HOUSE, __version__
+from app.db.replica import Replica
 from app.errors import InbandError
 from app.language import i18n, numbers, times
 from app.web import period, states, theme
@@ -26,6 +27,8 @@ from app.web.request_log import note_reason
 
 TEMPLATE_DIR = HOUSE / "frontend" / "templates"
 THEME_COOKIE = "inband_theme"
+TELL_LAG = 2.0
+"""Seconds that the copy of the database may be behind before pages say so."""
 
 
 @cache
@@ -81,6 +84,12 @@ def chosen_theme(request: Request) -> str:
     return chosen if chosen in ("light", "dark") else "auto"
 
 
+def _replica_lag(request: Request) -> float | None:
+    """Seconds that charts and reports are old, where that is worth a word."""
+    replica: Replica | None = getattr(getattr(request.scope.get("app"), "state", None), "replica", None)
+    return replica.behind if replica is not None and replica.usable and (replica.behind or 0) >= TELL_LAG else None
+
+
 def render(request: Request, template: str | Template, **context: Any) -> str:
     """The text of a template for this request."""
     state = request.state
@@ -99,6 +108,7 @@ def render(request: Request, template: str | Template, **context: Any) -> str:
                     "csrf": getattr(state, "csrf", ""),
                     "to_do": None,
                     "plant": getattr(getattr(request.app.state, "settings", None), "plant", ""),
+                    "replica_lag": _replica_lag(request),
                 }
                 | getattr(state, "waiting", {})
                 | context

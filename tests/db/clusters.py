@@ -9,7 +9,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -40,12 +40,12 @@ def wait_for(condition: Callable[[], Any], what: str, seconds: float = 60) -> No
 
 
 class Cluster:
-    """Three servers."""
+    """So many servers."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, names: Sequence[str] = NODES) -> None:
         self.quorum = False
         """Every commit waits until one of the standbys has it; else no commit waits for any."""
-        self.nodes = [EmbeddedServer(folder / name, dict(ALWAYS)) for name in NODES]
+        self.nodes = [EmbeddedServer(folder / name, dict(ALWAYS)) for name in names]
         self.primary = self.nodes[0]
         self._places = ",".join(node.url.partition("host=")[2].partition("&")[0] for node in self.nodes)
         self.url = f"postgresql://inband@/inband?host={self._places}&port=5432"
@@ -57,7 +57,7 @@ class Cluster:
         return [node for node in self.nodes if node is not self.primary and node.pid is not None]
 
     def start(self) -> None:
-        """Make the three of them, and begin."""
+        """Make them all, and begin."""
         migrate.upgrade(self.primary.start())
         others = [node for node in self.nodes if node is not self.primary]
         for node in others:
@@ -74,20 +74,25 @@ class Cluster:
     def ask_for(self, *, quorum: bool) -> None:
         """Let commits wait for one of the standbys, or for none: here, and on whichever is promoted."""
         self.quorum = quorum
-        names = f"ANY 1 ({', '.join(NODES)})" if quorum else ""
+        names = f"ANY 1 ({', '.join(node.data_dir.name for node in self.nodes)})" if quorum else ""
         for node in self.nodes:
             with psycopg.connect(node.url, autocommit=True) as connection:
                 connection.execute(f"ALTER SYSTEM SET synchronous_standby_names = '{names}'")
                 connection.execute("SELECT pg_reload_conf()")
         states = "SELECT count(*) FROM pg_stat_replication WHERE sync_state = 'quorum'"
-        wait_for(lambda: self.ask(self.primary, states) == (len(NODES) - 1) * quorum, "they know")
+        wait_for(lambda: self.ask(self.primary, states) == (len(self.nodes) - 1) * quorum, "they know")
         time.sleep(0.3)  # every backend has heard of it
 
     def mend(self) -> None:
         """Bring back whoever is away; there must be one that is written to."""
         for node in self.nodes:
-            if node.pid is None:
+            if node.pid is not None:
+                continue
+            if (node.cluster / "standby.signal").exists():
+                node.start()
+            else:
                 self.rejoin(node)
+        self.wait_until_whole()
 
     def stop(self) -> None:
         """End whatever runs."""
@@ -95,8 +100,8 @@ class Cluster:
             node.stop()
 
     def wait_until_whole(self) -> None:
-        """Until both standbys receive what is written."""
-        wait_for(lambda: self.ask(self.primary, STREAMING) == len(NODES) - 1, "two standbys receive")
+        """Until every standby receives what is written."""
+        wait_for(lambda: self.ask(self.primary, STREAMING) == len(self.nodes) - 1, "all standbys receive")
 
     def ask(self, node: EmbeddedServer, query: str) -> Any:
         """The one value that a query returns there."""
@@ -190,9 +195,9 @@ def _touch(path: Path, node: EmbeddedServer) -> None:
 
 
 @contextmanager
-def cluster(folder: Path) -> Iterator[Cluster]:
-    """Three servers that run, and end with the block."""
-    made = Cluster(folder)
+def cluster(folder: Path, names: Sequence[str] = NODES) -> Iterator[Cluster]:
+    """Servers that run, and end with the block."""
+    made = Cluster(folder, names)
     try:
         made.start()
         yield made

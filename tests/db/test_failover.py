@@ -45,14 +45,14 @@ def servers(three: Cluster) -> Iterator[Cluster]:
 
 @pytest.fixture(scope="module")
 def inband(three: Cluster, run_server: RunServer) -> Iterator[Server]:
-    with run_server(three.url) as running:
+    with run_server(three.url, workers=1) as running:
         yield running
 
 
 @pytest.fixture(scope="module")
 def other(three: Cluster, run_server: RunServer) -> Iterator[Server]:
     """A second process on the same database."""
-    with run_server(three.url) as running:
+    with run_server(three.url, workers=1) as running:
         yield running
 
 

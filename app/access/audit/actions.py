@@ -5,7 +5,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from app.access.audit.entry_actions import NOBODY, Acting, acting, write
-from app.db.engine import driver_connection
+from app.db.engine import Database, driver_connection
 
 __all__ = ["NOBODY", "Acting", "acts", "record"]
 
@@ -32,4 +32,9 @@ def record(
     (`characteristic/shaft-d40`, `tool/lathe-1/3`). Secrets and passwords are never part of before and after. ``by``: whose
     name ``actor`` is; without it, whoever sent this request.
     """
+    database: Database | None = session.info.get("database")
+    if database is not None and database.copy_of is not None:  # what was only read has no transaction to be noted in
+        with database.copy_of.begin() as own:
+            write(driver_connection(own), actor, action, subject, before, after, why, by=by)
+        return
     write(driver_connection(session), actor, action, subject, before, after, why, by=by)

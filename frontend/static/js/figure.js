@@ -1,5 +1,6 @@
 // Figures (Plotly's JSON, as the server makes it): how they are fetched, and what they say of their x axis.
 
+import { afterEvent } from "./live.js";
 import { theme } from "./theme-switch.js";
 
 // Plotly shows times as they are written. They come in the time zone of the plant: without the offset they are its wall clock.
@@ -73,7 +74,7 @@ export async function fetchFigure(src, width, part = null) {
     url.searchParams.set("first", Math.max(1, Math.floor(low - (high - low) / 2)));
     url.searchParams.set("through", Math.max(1, Math.ceil(high + (high - low) / 2)));
   }
-  const answer = await fetch(url, { headers: { Accept: "application/json" }, signal: AbortSignal.timeout(60_000) });
+  const answer = await fetch(url, { headers: { Accept: "application/json", ...afterEvent() }, signal: AbortSignal.timeout(60_000) });
   if (!answer.ok) throw new Error(`${answer.status}`);
   return wallClock(await answer.json());
 }

@@ -11,7 +11,7 @@
 // Fires "livepart" (bubbles) after each swap.
 
 import { coalesced } from "./coalesce.js";
-import { subscribe } from "./live.js";
+import { afterEvent, subscribe } from "./live.js";
 import { age } from "./times.js";
 
 const key = (element) => element.id || element.dataset.key || element.name || "";
@@ -40,7 +40,7 @@ class LivePart extends HTMLElement {
     if (this.busy) return void setTimeout(() => this.isConnected && this.refresh(), 1_000);
     try {
       const answer = await fetch(this.getAttribute("src") || location.href, {
-        headers: { "X-Live-Part": this.id || "yes" },
+        headers: { "X-Live-Part": this.id || "yes", ...afterEvent() },
         signal: AbortSignal.timeout(60_000), // a line that swallows everything would keep the part from ever asking again
       });
       if (!answer.ok) throw new Error(`${answer.status}`);

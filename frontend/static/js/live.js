@@ -29,6 +29,7 @@ let heard = performance.now();
 let hasHeartbeat = false;
 let wasLost = false;
 let retry = 0;
+let newest = ""; // number of the last event
 
 function hear() {
   heard = performance.now();
@@ -56,8 +57,12 @@ function matches(words, event) {
     (kind === "*" || kind === event.kind) && (!key || key === event.machine || key === event.characteristic));
 }
 
+// For what is fetched because of an event: a copy of the database that lacks it must not answer.
+export const afterEvent = () => (newest ? { "X-Inband-Event": newest } : {});
+
 function deliver(kind, message) {
   hear();
+  newest = message.lastEventId || newest;
   let data = {};
   try {
     data = JSON.parse(message.data);

@@ -1,0 +1,203 @@
+"""Charts, statistics, reports and searches read a standby, as long as it has what they must show."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any
+
+import httpx
+import psycopg
+import pytest
+from fastapi.routing import APIRoute
+
+from app import HOUSE
+from app.main import FROM_REPLICA
+from tests.conftest import RunServer, Server
+from tests.db.clusters import Cluster, cluster
+from tests.loop.readings.record import rows
+from tests.loop.readings.test_broken import until
+from tests.shop import PARAMETERS, Person, Shop
+
+MOST_BEHIND = 6.0  # s
+BEHIND = "X-Inband-Behind"
+
+
+@pytest.fixture(scope="module")
+def servers() -> Iterator[Cluster]:
+    """One that is written to, and its standby."""
+    folder = Path(mkdtemp(prefix="inband-"))  # a short path: a socket's may not be long
+    folder.chmod(0o711)
+    with cluster(folder, ("one", "two")) as made:
+        yield made
+    shutil.rmtree(folder)
+
+
+@pytest.fixture(scope="module")
+def server(servers: Cluster, run_server: RunServer) -> Iterator[Server]:
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("INBAND_READ_DATABASE_URL", servers.nodes[1].url)
+        environment.setenv("INBAND_READ_MOST_BEHIND", str(MOST_BEHIND))
+        with run_server(servers.nodes[0].url, workers=1) as running:
+            yield running
+
+
+@pytest.fixture
+def shop(server: Server) -> Shop:
+    made = Shop(server)
+    for deviation in (1.0, 6.0, 2.0, -3.0):
+        made.read(deviation, part=f"P-{made.characteristic}")
+    until(lambda: BEHIND in ask(made).headers, 30)
+    return made
+
+
+def ask(shop: Shop, client: httpx.Client | None = None, **headers: str) -> httpx.Response:
+    """Statistics of the characteristic."""
+    path = f"/api/v1/characteristics/{shop.characteristic}/statistics"
+    answer = (client or shop.admin).get(path, headers=headers)
+    assert answer.status_code in {200, 404}, answer.text
+    return answer
+
+
+@contextmanager
+def paused(servers: Cluster) -> Iterator[None]:
+    """The standby receives, and shows nothing of it."""
+    rows(servers.nodes[1].url, "SELECT pg_wal_replay_pause()")
+    until(lambda: rows(servers.nodes[1].url, "SELECT pg_get_wal_replay_pause_state()") == [("paused",)])
+    try:
+        yield
+    finally:
+        rows(servers.nodes[1].url, "SELECT pg_wal_replay_resume()")
+
+
+def addresses(shop: Shop) -> Iterator[str]:
+    """Each address of heavy reading, with and without numbers of things that there are not."""
+    known = {
+        "characteristic": shop.characteristic,
+        "machine": shop.machine,
+        "part": f"P-{shop.characteristic}",
+        "form": "pdf",
+    }
+    for router in FROM_REPLICA:
+        for route in router.routes:
+            if isinstance(route, APIRoute) and "GET" in (route.methods or ()):
+                yield re.sub(r"\{(\w+)[^}]*\}", lambda name: known.get(name[1], "1"), route.path)
+
+
+def test_every_heavy_reading_is_done_there(shop: Shop, server: Server) -> None:
+    viewer = Person(server, "viewer")
+    for address in addresses(shop):
+        query = {"q": "shaft", "characteristic": shop.characteristic, "level": "5", "format": "csv"}
+        until(lambda: BEHIND in ask(shop, viewer.browser).headers)  # signing in was a change of theirs
+        answer = viewer.browser.get(address, params=query)
+        assert answer.status_code < 500, f"{address}: {answer.text}"
+        assert BEHIND in answer.headers or answer.status_code in {401, 404, 422}, address
+
+
+def test_what_is_to_be_acted_on_is_read_where_it_is_written(shop: Shop) -> None:
+    for address in (f"/alarms?machine={shop.machine}", f"/machines/{shop.machine}"):
+        answer = shop.admin.get(f"/api/v1{address}")
+        assert (answer.status_code, BEHIND in answer.headers) == (200, False), address
+
+
+def test_a_report_that_is_fetched_is_in_the_record_of_changes(shop: Shop, servers: Cluster) -> None:
+    answer = shop.admin.get(f"/api/v1/characteristics/{shop.characteristic}/report.csv")
+    assert (answer.status_code, BEHIND in answer.headers) == (200, True)
+    written = "SELECT 1 FROM audit_entry WHERE action = 'report written' AND subject = %s"
+    assert rows(servers.nodes[0].url, written, f"characteristic/{shop.characteristic}")
+
+
+def test_a_person_sees_their_own_change_and_others_are_told_how_old_it_is(
+    shop: Shop, server: Server, servers: Cluster
+) -> None:
+    author, reader = Person(server, "engineer"), Person(server, "viewer")
+    until(lambda: all(BEHIND in ask(shop, person.browser).headers for person in (author, reader)))
+    found = re.search(r'<meta name="csrf" content="([^"]+)"', author.open("/alarms"))
+    assert found is not None
+    token = found[1]
+    address = f"/api/v1/search?q={shop.characteristic}-new"
+    with paused(servers):
+        added = {"key": f"{shop.characteristic}-new", "name": "New", "machine": shop.machine, "parameters": PARAMETERS}
+        made = author.browser.post("/api/v1/characteristics", json=added, headers={"X-CSRF-Token": token})
+        assert made.status_code == 201, made.text
+        assert BEHIND in reader.browser.get(address).headers
+        assert f"{shop.characteristic}-new" not in reader.browser.get(address).text
+        answer = author.browser.get(address)
+        assert BEHIND not in answer.headers or f"{shop.characteristic}-new" in answer.text
+        fresh = reader.browser.get(address, headers={"Cache-Control": "no-cache"})
+        assert BEHIND not in fresh.headers
+        assert f"{shop.characteristic}-new" in fresh.text
+        after = reader.browser.get(address, headers={"X-Inband-Event": str(newest_event(servers))})
+        assert f"{shop.characteristic}-new" in after.text, "the page looks again because of an event"
+        until(lambda: "of the database that they are read from is behind" in reader.open("/overview"))
+    until(lambda: BEHIND in ask(shop, author.browser).headers)
+    assert "of the database that they are read from is behind" not in reader.open("/overview")
+
+
+def newest_event(servers: Cluster) -> int:
+    return int(rows(servers.nodes[0].url, "SELECT max(id) FROM event")[0][0])
+
+
+def state(server: Server) -> tuple[Any, bool]:
+    """What health says of the replica, and whether the metrics say that it is read."""
+    text = server.client().get("/metrics").text
+    return server.client().get("/health/ready").json()["replica"], "\ninband_replica_used 1.0" in text
+
+
+def test_one_that_lags_too_far_is_not_read(shop: Shop, server: Server, servers: Cluster) -> None:
+    assert state(server)[1]
+    with paused(servers):
+        shop.read(1.0)
+        until(lambda: not state(server)[1], 30)
+        assert "the server that is written to is read" in state(server)[0]
+        assert BEHIND not in ask(shop).headers
+        assert "inband_replica_behind_seconds" in server.client().get("/metrics").text
+    until(lambda: BEHIND in ask(shop).headers)
+    assert state(server) == ("0.0 s behind", True)
+
+
+def test_one_that_is_away_is_not_missed(shop: Shop, server: Server, servers: Cluster) -> None:
+    servers.kill(servers.nodes[1])
+    try:
+        for _again in range(5):
+            assert BEHIND not in ask(shop).headers
+        until(lambda: state(server) == ("away; the server that is written to is read", False))
+        assert "not the replica" in server.stderr.read_text()
+    finally:
+        servers.nodes[1].start()
+    until(lambda: BEHIND in ask(shop).headers, 30)
+
+
+def test_a_query_that_it_ends_is_answered_by_the_other(shop: Shop, servers: Cluster) -> None:
+    """As when what it reads is about to be cleaned away (a conflict with recovery)."""
+    waiting = "FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND application_name = 'inband'"
+    with ThreadPoolExecutor(1) as pool, psycopg.connect(servers.nodes[0].url) as locking:
+        locking.execute("LOCK TABLE reading IN ACCESS EXCLUSIVE MODE")
+        locked = "SELECT 1 FROM pg_locks WHERE mode = 'AccessExclusiveLock' AND relation = 'reading'::regclass"
+        until(lambda: rows(servers.nodes[1].url, locked), 30)
+        answer = pool.submit(shop.admin.get, f"/api/v1/readings?characteristic={shop.characteristic}")
+        until(lambda: rows(servers.nodes[1].url, f"SELECT 1 {waiting}"), 30)
+        rows(servers.nodes[1].url, f"SELECT pg_terminate_backend(pid) {waiting}")
+        locking.rollback()
+        answered = answer.result()
+    assert answered.status_code == 200, answered.text
+    assert BEHIND not in answered.headers
+    assert len(answered.json()["items"]) == 4
+
+
+def test_the_check_tells_how_far_it_is_behind(shop: Shop, servers: Cluster) -> None:
+    environment = os.environ | {"INBAND_READ_DATABASE_URL": servers.nodes[1].url}
+    command = [sys.executable, "-m", "app", "check", "--database-url", servers.nodes[0].url]
+    done = subprocess.run(command, cwd=HOUSE, env=environment, capture_output=True, text=True)
+    assert re.search(
+        r"replica: (it has everything|[\d.]+ MB behind); it is read while it is at most 10 s behind", done.stdout
+    )
+    environment["INBAND_READ_DATABASE_URL"] = servers.nodes[0].url
+    done = subprocess.run(command, cwd=HOUSE, env=environment, capture_output=True, text=True)
+    assert "is no standby" in " ".join(done.stdout.split())
