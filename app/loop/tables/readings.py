@@ -19,11 +19,16 @@ from sqlalchemy import (
     Integer,
     SmallInteger,
     func,
+    literal_column,
     text,
 )
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
+
+PART_BEGINS = (3, 8)
+"""Letters at the beginning of a part's name that are found by an index."""
+_BLOCK_RANGES = {"pages_per_range": 64, "autosummarize": "on"}
 
 
 class Stream(Base):
@@ -67,15 +72,35 @@ class Reading(Base):
             unique=True,
             postgresql_where=text("key IS NOT NULL"),
         ),
-        # Parts by name or its beginning, under any collation; the time gives the newest first without sorting.
+        # Block ranges, for readings lie in the order of their arrival: next to nothing per reading, where a tree would cost
+        # a batch a quarter of its speed. Parts by name and, for the search, by how it begins.
+        Index(
+            "reading_received_idx",
+            "received_at",
+            "measured_at",
+            "zone",
+            "action",
+            postgresql_using="brin",
+            postgresql_ops={
+                "received_at": "timestamptz_minmax_multi_ops",
+                "measured_at": "timestamptz_minmax_multi_ops",
+                "zone": "text_bloom_ops (n_distinct_per_range = 16)",
+                "action": "text_bloom_ops (n_distinct_per_range = 16)",
+            },
+            postgresql_with=_BLOCK_RANGES,
+        ),
         Index(
             "reading_part_idx",
             "part",
-            "received_at",
-            postgresql_ops={"part": "text_pattern_ops"},
-            postgresql_where=text("part IS NOT NULL"),
+            *(literal_column(f'"left"(part, {letters})').label(f"first_{letters}") for letters in PART_BEGINS),
+            postgresql_using="brin",
+            postgresql_ops={
+                "part": "text_bloom_ops (n_distinct_per_range = 2500)",
+                "first_3": "text_bloom_ops (n_distinct_per_range = 64)",
+                "first_8": "text_bloom_ops (n_distinct_per_range = 600)",
+            },
+            postgresql_with=_BLOCK_RANGES,
         ),
-        Index("reading_received_idx", "machine_id", "received_at"),
     )
 
     machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)

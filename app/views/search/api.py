@@ -43,6 +43,7 @@ def search(
 ) -> SearchOut:
     """Machines, characteristics, tools, alarms, parts and pages by their names.
 
-    Parts are found by the beginning of their name; *report* before a name finds the report of a characteristic.
+    Parts are found by their whole name, or by its first three letters or more among the newest half a million readings;
+    *report* before a name finds the report of a characteristic.
     """
     return SearchOut.model_validate({"items": [hit._asdict() for hit in queries.hits(session, q, caller)]})

@@ -1,9 +1,9 @@
 """One search for all that has a name: machines, characteristics, tools, alarms, parts, pages. Never writes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
-from sqlalchemy import ColumnElement, Select, case, func, or_, select, text
+from sqlalchemy import ColumnElement, Select, case, func, literal_column, or_, select
 from sqlalchemy.orm import Session
 
 from app.access.callers import Caller
@@ -11,8 +11,9 @@ from app.language.i18n import _
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
-from app.loop.tables.readings import Stream
+from app.loop.tables.readings import PART_BEGINS, Reading, Stream
 from app.loop.tables.tools import Tool
+from app.views.search import readings
 from app.views.search.doors import doors
 from app.views.search.parts import part_path
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL
@@ -21,18 +22,7 @@ from app.web.states import word_of
 Kind = Literal["machine", "characteristic", "tool", "alarm", "report", "part", "page"]
 MOST_OF_A_KIND = 6
 ACTIVE_ALARMS = 500  # that are looked through by their kind
-_AFTER_THE_LAST = chr(0x10FFFF)
-
-# The names of parts in the order of their bytes, one step of the index each, however many readings a part has.
-_PARTS = text("""
-WITH RECURSIVE named AS (
-    (SELECT part FROM reading WHERE part ~>=~ :low AND part ~<~ :high ORDER BY part USING ~<~ LIMIT 1)
-    UNION ALL
-    SELECT (SELECT part FROM reading WHERE part ~>~ named.part AND part ~<~ :high ORDER BY part USING ~<~ LIMIT 1)
-    FROM named WHERE named.part IS NOT NULL
-)
-SELECT part FROM named WHERE part IS NOT NULL LIMIT :most
-""")
+LOOKED_THROUGH = 500_000  # readings, about: the newest, for parts whose name begins as typed
 
 
 class Hit(NamedTuple):
@@ -131,13 +121,36 @@ def _number(term: str, *signs: str, most: int) -> int | None:
 
 
 def _parts(session: Session, term: str) -> Iterator[Hit]:
-    """Parts whose name begins so, in the letters as typed, in capitals or in small letters."""
-    names: list[str] = []
-    for beginning in dict.fromkeys((term, term.upper(), term.lower())):
-        span = {"low": beginning, "high": beginning + _AFTER_THE_LAST, "most": MOST_OF_A_KIND}
-        names += session.scalars(_PARTS, span)
-    for part in list(dict.fromkeys(names))[:MOST_OF_A_KIND]:
+    """The part of this name, or those whose name begins so; in the letters as typed, in capitals or in small letters."""
+    typed = list(dict.fromkeys((term, term.upper(), term.lower())))
+    names = [name for name in typed if readings.found(session, readings.Filters(part=name), "newest", None, 1)]
+    for part in names or sorted(_beginning(session, typed)[:MOST_OF_A_KIND]):
         yield Hit("part", part, part, part_path(part))
+
+
+def _beginning(session: Session, typed: Sequence[str]) -> list[str]:
+    """Names of parts among the newest readings that begin in one of these ways; none of a beginning too short for the index."""
+    letters = min(map(len, typed))
+    if letters < min(PART_BEGINS):
+        return []
+    conditions = [or_(*(func.starts_with(Reading.part, each) for each in typed))]
+    for most in PART_BEGINS:
+        if most <= letters:
+            first = func.left(Reading.part, literal_column(str(most)))
+            conditions.append(first.in_([each[:most] for each in typed]))
+    last = readings.last_arrival(session)
+    stored = session.scalar(select(func.sum(Stream.sequence))) or 0
+    if stored > LOOKED_THROUGH:
+        share = LOOKED_THROUGH / float(stored)
+        conditions.append(Reading.received_at >= last - share * (last - readings.first_arrival(session)))
+    query = select(Reading.part).group_by(Reading.part).order_by(func.max(Reading.received_at).desc())
+    names: dict[str, None] = {}
+    for window in readings.windows("newest", last):
+        found = session.scalars(query.where(*conditions, *window).limit(MOST_OF_A_KIND))
+        names |= dict.fromkeys(name for name in found if name is not None)
+        if len(names) >= MOST_OF_A_KIND:
+            break
+    return list(names)
 
 
 def _pages(term: str, caller: Caller) -> Iterator[Hit]:

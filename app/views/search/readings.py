@@ -1,15 +1,18 @@
 """Stored readings by characteristic, machine, part, time, zone and action, oldest or newest first. Never writes.
 
 Of one characteristic they come in the order of their numbers; of several in the order of their arrival. `from` and `to` are
-times of measurement. A reading is received at the earliest `AHEAD` before its clock says that it was measured.
+times of measurement.
+
+The index knows from when to when the readings of each block range came, not their order. So a list across characteristics
+is read in windows of time, from where it begins and ever wider ones, until the page is full: see `windows`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Any, Literal, NamedTuple
 
-from sqlalchemy import ColumnElement, Select, and_, lateral, select, tuple_
-from sqlalchemy.orm import Session, aliased
+from sqlalchemy import ColumnElement, Select, func, select, tuple_
+from sqlalchemy.orm import Session
 
 from app.core.decision.limits import Zone
 from app.core.decision.step import Action
@@ -19,15 +22,15 @@ from app.loop.characteristics.queries import characteristic_named
 from app.loop.readings import queries as readings
 from app.loop.readings.records import Entry, Record
 from app.loop.summaries.queries import window_of
-from app.loop.tables.machines import Machine
-from app.loop.tables.readings import Reading
-from app.web.fields import AHEAD, LARGEST_ID, LARGEST_SERIAL
+from app.loop.tables.readings import Reading, Stream
+from app.web.fields import EARLIEST, LARGEST_ID, LARGEST_SERIAL
 
 Order = Literal["oldest", "newest"]
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
 _LATEST = (datetime(9999, 12, 31, tzinfo=UTC) - _EPOCH) // _MICROSECOND
 _MOST = (_LATEST, LARGEST_SERIAL, LARGEST_SERIAL, LARGEST_ID)
+FIRST_WINDOW, WIDER, WINDOWS = timedelta(minutes=1), 8, 8  # the eighth is four years wide, one more holds the rest
 
 
 class Filters(NamedTuple):
@@ -41,19 +44,20 @@ class Filters(NamedTuple):
     zones: Sequence[Zone] = ()
     actions: Sequence[Action] = ()
 
-    def on(self, reading: type[Reading]) -> list[ColumnElement[bool]]:
+    @property
+    def conditions(self) -> list[ColumnElement[bool]]:
         """The conditions, but for the characteristic and the machine."""
         conditions: list[ColumnElement[bool]] = []
         if self.part is not None:
-            conditions.append(reading.part == self.part)
+            conditions.append(Reading.part == self.part)
         if self.start is not None:
-            conditions.append(reading.measured_at >= self.start)
+            conditions.append(Reading.measured_at >= self.start)
         if self.end is not None:
-            conditions.append(reading.measured_at <= self.end)
+            conditions.append(Reading.measured_at <= self.end)
         if self.zones:
-            conditions.append(reading.zone.in_(self.zones))
+            conditions.append(Reading.zone.in_(self.zones))
         if self.actions:
-            conditions.append(reading.action.in_(self.actions))
+            conditions.append(Reading.action.in_(self.actions))
         return conditions
 
 
@@ -70,11 +74,16 @@ def found(session: Session, filters: Filters, order: Order, after: str | None, l
     at = None if after in (None, "0") else _numbers(after or "", 1 if filters.entry is not None else 4)
     if filters.entry is not None:
         query = _of_one(session, filters.entry, filters, order, at[0] if at else None)
-    elif filters.part is not None:
-        query = _of_part(filters, order, at)
-    else:
-        query = _of_machines(filters, order, at, limit)
-    return [Record(*row) for row in session.execute(query.limit(limit))]
+        return [Record(*row) for row in session.execute(query.limit(limit))]
+    query = _of_several(filters, order, at)
+    if filters.part is not None:  # the index finds it wherever it is
+        return [Record(*row) for row in session.execute(query.limit(limit))]
+    rows: list[Record] = []
+    for window in windows(order, _begin(session, filters, order, at)):
+        rows += [Record(*row) for row in session.execute(query.where(*window).limit(limit - len(rows)))]
+        if len(rows) >= limit:
+            break
+    return rows
 
 
 def _numbers(cursor: str, count: int) -> list[int]:
@@ -95,7 +104,7 @@ def _of_one(session: Session, entry: Entry, filters: Filters, order: Order, at: 
     conditions = [
         Reading.machine_id == entry.machine_id,
         Reading.characteristic_id == entry.characteristic_id,
-        *filters.on(Reading),
+        *filters.conditions,
     ]
     if filters.start is not None or filters.end is not None:
         characteristic = characteristic_named(session, entry.characteristic).characteristic
@@ -107,46 +116,71 @@ def _of_one(session: Session, entry: Entry, filters: Filters, order: Order, at: 
     return select(*readings.COLUMNS).where(*conditions).order_by(column)
 
 
-def _of_part(filters: Filters, order: Order, at: Sequence[int] | None) -> Select[Any]:
-    conditions = [*filters.on(Reading), *_beyond(Reading, order, at)]
+def _of_several(filters: Filters, order: Order, at: Sequence[int] | None) -> Select[Any]:
+    """By arrival, after the reading of the cursor."""
+    place = (Reading.received_at, Reading.machine_id, Reading.characteristic_id, Reading.sequence)
+    conditions = filters.conditions
     if filters.machine_id is not None:
         conditions.append(Reading.machine_id == filters.machine_id)
-    return select(*readings.COLUMNS).where(*conditions).order_by(*_in_order(Reading, order))
+    if at is not None:  # the time stands by itself as well, for the index
+        cursor = (_arrival(at), *at[1:])
+        if order == "oldest":
+            conditions += [Reading.received_at >= cursor[0], tuple_(*place) > cursor]
+        else:
+            conditions += [Reading.received_at <= cursor[0], tuple_(*place) < cursor]
+    in_order = [column if order == "oldest" else column.desc() for column in place]
+    return select(*readings.COLUMNS).where(*conditions).order_by(*in_order)
 
 
-def _of_machines(filters: Filters, order: Order, at: Sequence[int] | None, limit: int) -> Select[Any]:
-    """The first of each machine by arrival, and of them all the first: each machine's come out of its index in order."""
-    inner = aliased(Reading)
-    conditions = [inner.machine_id == Machine.id, *filters.on(inner), *_beyond(inner, order, at)]
-    if filters.start is not None:
-        conditions.append(inner.received_at >= filters.start - AHEAD)
-    of_machine = select(inner).where(and_(*conditions)).order_by(*_in_order(inner, order)).limit(limit)
-    reading = aliased(Reading, lateral(of_machine))
-    columns = [getattr(reading, name) for name in Record._fields]
-    query = select(*columns).select_from(Machine).join(reading, Machine.id == reading.machine_id)
-    if filters.machine_id is not None:
-        query = query.where(Machine.id == filters.machine_id)
-    return query.order_by(*_in_order(reading, order))
+def _arrival(at: Sequence[int]) -> datetime:
+    return _EPOCH + at[0] * _MICROSECOND
 
 
-def _place(reading: type[Reading]) -> tuple[Any, ...]:
-    return reading.received_at, reading.machine_id, reading.characteristic_id, reading.sequence
+def _begin(session: Session, filters: Filters, order: Order, at: Sequence[int] | None) -> datetime:
+    """The time about which the list begins: of the cursor or of the first reading in this order, within the period."""
+    if at is not None:
+        first = _arrival(at)
+    else:
+        first = (first_arrival if order == "oldest" else last_arrival)(session, filters.machine_id)
+    period = filters.start if order == "oldest" else filters.end
+    begin = first if period is None else (max if order == "oldest" else min)(first, period)
+    return min(max(begin, EARLIEST), datetime.now(UTC))
 
 
-def _in_order(reading: type[Reading], order: Order) -> list[Any]:
-    return [column if order == "oldest" else column.desc() for column in _place(reading)]
+def last_arrival(session: Session, machine_id: int | None = None) -> datetime:
+    """The time of arrival of the newest reading, of all or of a machine; now without readings. About: clocks are set."""
+    query = select(func.max(Stream.last_received_at))
+    if machine_id is not None:
+        query = query.where(Stream.machine_id == machine_id)
+    return session.scalar(query) or datetime.now(UTC)
 
 
-def _beyond(reading: type[Reading], order: Order, at: Sequence[int] | None) -> list[ColumnElement[bool]]:
-    """After the reading of the cursor. The time stands by itself as well, for the index."""
-    if at is None:
-        return []
-    moment, *numbers = at
-    received_at = _EPOCH + moment * _MICROSECOND
-    place, cursor = tuple_(*_place(reading)), (received_at, *numbers)
-    if order == "oldest":
-        return [reading.received_at >= received_at, place > cursor]
-    return [reading.received_at <= received_at, place < cursor]
+def first_arrival(session: Session, machine_id: int | None = None) -> datetime:
+    """The time of arrival of the oldest reading; as above."""
+    of_stream = (Reading.machine_id == Stream.machine_id) & (Reading.characteristic_id == Stream.characteristic_id)
+    query = select(func.coalesce(func.min(Reading.received_at), func.now())).select_from(Stream)
+    query = query.join(Reading, of_stream & (Reading.sequence == 1))
+    if machine_id is not None:
+        query = query.where(Stream.machine_id == machine_id)
+    return session.execute(query).scalar_one()
+
+
+def windows(order: Order, begin: datetime) -> Iterator[list[ColumnElement[bool]]]:
+    """Conditions on the time of arrival, one window after the other in this order: together they hold all time.
+
+    The first window also holds whatever lies before `begin`; each is wider than the one before, so that few are needed
+    where readings are rare and few readings are read in vain where they are dense.
+    """
+    edge, width = None, FIRST_WINDOW if order == "oldest" else -FIRST_WINDOW
+    for number in range(WINDOWS + 1):
+        window = []
+        if edge is not None:
+            window.append(Reading.received_at >= edge if order == "oldest" else Reading.received_at < edge)
+        if number < WINDOWS:
+            edge = (edge or begin) + width
+            window.append(Reading.received_at < edge if order == "oldest" else Reading.received_at >= edge)
+            width *= WIDER
+        yield window
 
 
 def answers(session: Session, records: Sequence[Record]) -> list[dict[str, Any]]:
