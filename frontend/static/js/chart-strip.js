@@ -36,8 +36,9 @@ export class ChartStrip {
     this.follow.title = words.followHelp;
     this.live = chart.hasAttribute("on");
     this.pan = button(words.pan, null, () => {
-      chart.pan(!chart.pans);
-      this.pan.setAttribute("aria-pressed", chart.pans);
+      this.pans = !this.pans;
+      this.pan.setAttribute("aria-pressed", this.pans);
+      if (chart.drawn) window.Plotly.relayout(chart.plot, { dragmode: this.dragmode(this.usual) });
     });
     this.pan.title = words.panHelp;
     this.pan.setAttribute("aria-pressed", "false");
@@ -46,6 +47,13 @@ export class ChartStrip {
       button("−", words.out, () => zoomOut(chart)), button("+", words.in, () => zoomIn(chart)), this.bar, this.follow, this.reset,
     );
     this.bar.addEventListener("pointerdown", (event) => this.grab(event));
+  }
+
+  // What dragging by the mouse does, usually as the figure says; fingers pan by two.
+  dragmode(usual = "zoom") {
+    this.usual = usual;
+    if (matchMedia("(pointer: coarse)").matches) return false;
+    return this.pans && usual ? "pan" : usual;
   }
 
   get isShown() {

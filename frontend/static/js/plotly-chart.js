@@ -90,8 +90,7 @@ class PlotlyChart extends HTMLElement {
       while (this.plot._dragging) await new Promise((resolve) => setTimeout(resolve, 100)); // a box that is being drawn
       if (!this.isConnected) return;
       const layout = this.movable ? withRange(figure.layout, this.ends()) : figure.layout;
-      this.drags = matchMedia("(pointer: coarse)").matches ? false : (layout.dragmode ?? "zoom");
-      await Plotly.react(this.plot, figure.data, { ...layout, dragmode: this.dragmode }, { ...CONFIG, doubleClick: !this.movable && "reset" });
+      await Plotly.react(this.plot, figure.data, { ...layout, dragmode: this.strip.dragmode(layout.dragmode) }, { ...CONFIG, doubleClick: !this.movable && "reset" });
       if (!this.drawn) this.listen();
       this.drawn = true;
       this.width = width;
@@ -103,16 +102,6 @@ class PlotlyChart extends HTMLElement {
       this.trouble.say(error);
       setTimeout(() => this.isConnected && this.refresh(), 5_000);
     }
-  }
-
-  // By the mouse; the strip has the switch. Fingers pan by two.
-  get dragmode() {
-    return this.pans && this.drags ? "pan" : this.drags;
-  }
-
-  pan(pans) {
-    this.pans = pans;
-    if (this.drawn) window.Plotly.relayout(this.plot, { dragmode: this.dragmode });
   }
 
   // What is shown, as Plotly writes it (and writes into it).
