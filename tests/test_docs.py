@@ -16,7 +16,7 @@ import pytest
 from app import HOUSE
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
-from app.settings import Settings
+from app.settings import Settings, variable_of
 from docs import generate
 from tests.conftest import Server, begun, free_port, wait_ready
 
@@ -137,7 +137,7 @@ class TestReadme:
         for name, _command in generate.commands():
             assert f"`{name}`" in text
         for name in Settings.model_fields:
-            assert f"`INBAND_{name.upper()}`" in text
+            assert f"`{variable_of(name)}`" in text
 
     def test_the_help_names_the_same_commands(self) -> None:
         done = subprocess.run(
