@@ -36,7 +36,7 @@ from app.db.engine import Database
 from tests.forked import Forked
 from tests.shop import Person, Shop
 
-for name in [name for name in os.environ if name.startswith(("INBAND_", "PG"))]:
+for name in [name for name in os.environ if name.startswith(("INBAND_", "PG")) and name != "INBAND_TEST_CITUS"]:
     del os.environ[name]  # no test may meet a real installation
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # hundreds of servers start; each would compile the whole house anew
 

@@ -100,10 +100,9 @@ def _place(address: str) -> str:
 
 
 def _remember(session: Session, person: Person, places: Sequence[str]) -> None:
+    row = insert(KnownPlace).values([{"person_id": person.id, "place": place} for place in places])
     session.execute(
-        insert(KnownPlace)
-        .values([{"person_id": person.id, "place": place} for place in places])
-        .on_conflict_do_update(index_elements=["person_id", "place"], set_={"last_at": func.now()})
+        row.on_conflict_do_update(index_elements=["person_id", "place"], set_={"last_at": row.excluded.last_at})
     )
     of_person = KnownPlace.person_id == person.id
     latest = select(KnownPlace.place).where(of_person).order_by(KnownPlace.last_at.desc()).limit(PLACES)

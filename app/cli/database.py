@@ -84,6 +84,7 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
     """Look at configuration, database and migrations, and say what is wrong and what to do. Changes nothing."""
     from sqlalchemy import text
 
+    from app.db import citus
     from app.db import migrate as migrations
     from app.db.binaries import advice as release_advice
     from app.db.binaries import binaries
@@ -112,6 +113,7 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
                 ).one()
                 replication = replication_of(session)
                 driver: psycopg.Connection = session.connection().connection.driver_connection  # type: ignore[assignment]
+                distributed = citus.in_words(driver)
                 answering = f"{driver.info.host} port {driver.info.port}"
                 todo = migrations.pending(url)
                 failing, rights = ([], None) if todo else _condition(database)
@@ -119,6 +121,8 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
             if settings.database_url is None:
                 where += f", programs of {binaries().folder}"
             _well("database", f"PostgreSQL {version}, {size}, {where}")
+            if distributed:
+                _well("Citus", distributed)
             if advice_on_release := release_advice(_release(version), embedded=settings.database_url is None):
                 _note(f"database: {advice_on_release}")
             if settings.database_url is not None:

@@ -7,7 +7,7 @@ import typer
 
 from app.cli.base import DatabaseUrl, DataDir, cli, reachable, refuse_nothing_there, say, settings_from
 from app.cli.people import Role, actor
-from app.errors import Invalid, NotFound
+from app.errors import Conflict, Invalid, NotFound
 
 if TYPE_CHECKING:
     from app.plants.registry import Plant
@@ -77,7 +77,8 @@ def add_plant(
 
 @plant.command("list")
 def list_plants(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
-    """Print every plant: key, name, schema, address, revision of its schema."""
+    """Print every plant: key, name, schema, address, revision of its schema; with Citus its node."""
+    from app.db import citus
     from app.db.connections import Connections, in_schema
     from app.db.migrate import current
     from app.plants import registry
@@ -87,10 +88,13 @@ def list_plants(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> N
     with reachable(settings) as url:
         with Connections(url) as connections, connections.connect(application_name="inband command") as connection:
             listed = registry.plants(connection)
+            distributed = citus.version(connection) is not None
+            places = {each.key: citus.node_of(connection, each.schema) for each in listed} if distributed else {}
         for each in listed:
             of_plant = settings_of(each, settings.model_copy(update={"database_url": url}))
             revision = current(in_schema(url, each.schema)) or "no Inband in this schema"
-            sys.stdout.write(f"{each.key}\t{each.name}\t{each.schema}\t{of_plant.address}\t{revision}\n")
+            place = f"\t{places[each.key] or 'coordinator'}" if places else ""
+            sys.stdout.write(f"{each.key}\t{each.name}\t{each.schema}\t{of_plant.address}\t{revision}{place}\n")
     if not listed:
         say(
             "There is no plant on the list: this server serves the one in its own schema. `inband plant add` adds others."
@@ -143,6 +147,47 @@ def add_member(
         with opened(in_schema(url, there.schema), settings) as database, database.begin() as session:
             actions.add_person_of_another_plant(session, person, role.value, actor())
     say(f"{person.name} may sign in to {there.name} as {role.value}, with the password of {here.name}.")
+
+
+@plant.command("move")
+def move_plant(
+    key: Key,
+    to: Annotated[str, typer.Argument(help="The node, as HOST:PORT; `inband check` lists them.", envvar="INBAND_NODE")],
+    data_dir: DataDir = None,
+    database_url: DatabaseUrl = None,
+) -> None:
+    """Move a plant to another node of a database that Citus distributes. Readings wait only at the end of it."""
+    import psycopg
+
+    from app.db import citus
+    from app.db.connections import Connections
+    from app.plants import registry
+
+    settings = _settings(data_dir, database_url)
+    with (
+        reachable(settings) as url,
+        Connections(url) as connections,
+        connections.connect(autocommit=True, application_name="inband command") as connection,
+    ):
+        moved = registry.plant_named(connection, key)
+        if citus.version(connection) is None:
+            raise Invalid(
+                "This database has no Citus, so there is no other node.",
+                "docs/how-to/citus.md says how it is set up. Without it a plant moves to another server by a backup: "
+                f"INBAND_SCHEMA={moved.schema} inband backup, and restore there.",
+            )
+        known = citus.nodes(connection)
+        node = next((each for each in known if str(each) == to), None)
+        if node is None:
+            raise NotFound(f"There is no node {to}.", f"There are: {', '.join(map(str, known))}.")
+        try:
+            citus.move(connection, moved.schema, node)
+        except psycopg.Error as error:
+            raise Conflict(
+                f"Citus could not move {moved.name}: {str(error).splitlines()[0]}.",
+                "It stays where it was. docs/how-to/citus.md names what each node needs.",
+            ) from None
+    say(f"{moved.name} lies on {node}.")
 
 
 def migrate_all(url: str, settings: "Settings") -> "list[Plant]":

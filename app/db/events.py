@@ -14,13 +14,15 @@ CHANNEL = "'inband ' || current_schema()"
 """As SQL. Several plants may lie in one database, each in a schema: of another plant's events nobody is woken."""
 
 # The end of a statement that writes: `changes` is an SQL expression for the list of changes, `after` what the lock waits for.
+WRITTEN = """
+held AS MATERIALIZED (SELECT pg_advisory_xact_lock(7291, 'event'::regclass::oid::int4) {after}),
+written AS (INSERT INTO event (changes) SELECT {changes}::jsonb FROM held RETURNING id)
+"""
 # The writer of readings puts it behind its own inserts, so that telling costs it no statement.
-PUBLISHED = f"""
-held AS MATERIALIZED (SELECT pg_advisory_xact_lock(7291, 'event'::regclass::oid::int4) {{after}}),
-written AS (INSERT INTO event (changes) SELECT {{changes}}::jsonb FROM held RETURNING id)
-SELECT pg_notify({CHANNEL}, id::text) FROM written
-"""  # noqa: S608 - the channel is our own constant
-_PUBLISH = text("WITH " + PUBLISHED.format(changes="CAST(:changes AS text)", after=""))
+PUBLISHED = f"{WRITTEN} SELECT pg_notify({CHANNEL}, id::text) FROM written"  # noqa: S608 - made of constants
+_WRITE = text("WITH " + WRITTEN.format(changes="CAST(:changes AS text)", after="") + "SELECT FROM written")
+# By itself: with Citus the table may lie on another node, where nobody listens.
+_NOTIFY = text(f"SELECT pg_notify({CHANNEL}, '')")
 
 
 def publish(session: Session, *changes: dict[str, Any]) -> None:
@@ -29,4 +31,5 @@ def publish(session: Session, *changes: dict[str, Any]) -> None:
     Call it last in a transaction: commits of other transactions that publish wait until this one ends.
     """
     session.flush()
-    session.execute(_PUBLISH, {"changes": msgspec.json.encode(changes).decode()})
+    session.execute(_WRITE, {"changes": msgspec.json.encode(changes).decode()})
+    session.execute(_NOTIFY)

@@ -24,8 +24,10 @@ _names = count()
 class Pipeline:
     """One connection and the statements that have been prepared on it."""
 
-    def __init__(self, connection: WatchedAsyncConnection) -> None:
+    def __init__(self, connection: WatchedAsyncConnection, *, distributed: bool = False) -> None:
+        """distributed: the tables may lie on another node (`app.db.citus`), where nobody listens for notifications."""
         self.connection = connection
+        self.distributed = distributed
         self.until: float | None = None
         """By the clock of the event loop: when waiting for an answer ends. None: as long as the database is heard."""
         self._prepared: dict[str, bytes] = {}

@@ -132,8 +132,8 @@ def note_failure(database: Database, job: str, unit: Unit, error: Exception) -> 
     changed = {
         "failures": JobFailure.failures + 1,
         "error": words,
-        "last_at": func.now(),
-        "retry_at": func.now() + again,
+        "last_at": row.excluded.last_at,  # not now(): Citus takes no such function here
+        "retry_at": row.excluded.last_at + again,
     }
     upsert = row.on_conflict_do_update(index_elements=["job", "subject"], set_=changed)
     try:
@@ -164,7 +164,9 @@ def end_failure(session: Session, job: str, unit: Unit) -> None:
 
 def _note_run(session: Session, job: str, seconds: float, units: int) -> None:
     values = {"finished_at": func.now(), "seconds": seconds, "units": units}
-    session.execute(insert(JobRun).values(job=job, **values).on_conflict_do_update(index_elements=["job"], set_=values))
+    row = insert(JobRun).values(job=job, **values)
+    again = {name: row.excluded[name] for name in values}
+    session.execute(row.on_conflict_do_update(index_elements=["job"], set_=again))
 
 
 def _words(error: Exception) -> str:

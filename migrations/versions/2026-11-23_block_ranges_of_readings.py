@@ -18,32 +18,43 @@ down_revision: str | None = "0103"
 branch_labels = None
 depends_on = None
 
-# The range at the end, not full yet, loses its summary again: with it, each reading that comes would write it anew.
-UPGRADE = """
-DROP INDEX IF EXISTS reading_part_idx, reading_received_idx;
-CREATE INDEX reading_received_idx ON reading USING brin (
-    received_at timestamptz_minmax_multi_ops,
-    measured_at timestamptz_minmax_multi_ops,
-    zone text_bloom_ops (n_distinct_per_range = 16),
-    action text_bloom_ops (n_distinct_per_range = 16)
-) WITH (pages_per_range = 64, autosummarize = on);
-CREATE INDEX reading_part_idx ON reading USING brin (
-    part text_bloom_ops (n_distinct_per_range = 2500),
-    "left"(part, 3) text_bloom_ops (n_distinct_per_range = 64),
-    "left"(part, 8) text_bloom_ops (n_distinct_per_range = 600)
-) WITH (pages_per_range = 64, autosummarize = on);
-SELECT brin_desummarize_range(index, greatest(pg_relation_size('reading') / current_setting('block_size')::int - 1, 0))
-FROM unnest(ARRAY['reading_received_idx', 'reading_part_idx']::regclass[]) AS index;
-"""
+UPGRADE = (
+    "DROP INDEX IF EXISTS reading_part_idx",  # one by one: a plant may lie on a node of Citus
+    "DROP INDEX IF EXISTS reading_received_idx",
+    """
+    CREATE INDEX reading_received_idx ON reading USING brin (
+        received_at timestamptz_minmax_multi_ops,
+        measured_at timestamptz_minmax_multi_ops,
+        zone text_bloom_ops (n_distinct_per_range = 16),
+        action text_bloom_ops (n_distinct_per_range = 16)
+    ) WITH (pages_per_range = 64, autosummarize = on)
+    """,
+    """
+    CREATE INDEX reading_part_idx ON reading USING brin (
+        part text_bloom_ops (n_distinct_per_range = 2500),
+        "left"(part, 3) text_bloom_ops (n_distinct_per_range = 64),
+        "left"(part, 8) text_bloom_ops (n_distinct_per_range = 600)
+    ) WITH (pages_per_range = 64, autosummarize = on)
+    """,
+    # The range at the end, not full yet, loses its summary again: with it, each reading that comes would write it anew.
+    """
+    SELECT brin_desummarize_range(index, greatest(pg_relation_size('reading') / current_setting('block_size')::int - 1, 0))
+    FROM unnest(ARRAY['reading_received_idx', 'reading_part_idx']::regclass[]) AS index
+    """,
+)
+DOWNGRADE = (
+    "DROP INDEX reading_received_idx",
+    "DROP INDEX reading_part_idx",
+    "CREATE INDEX reading_part_idx ON reading (part text_pattern_ops, received_at) WHERE part IS NOT NULL",
+    "CREATE INDEX reading_received_idx ON reading (machine_id, received_at)",
+)
 
 
 def upgrade() -> None:
-    op.execute(UPGRADE)
+    for command in UPGRADE:
+        op.execute(command)
 
 
 def downgrade() -> None:
-    op.execute(
-        "DROP INDEX reading_received_idx, reading_part_idx;"
-        " CREATE INDEX reading_part_idx ON reading (part text_pattern_ops, received_at) WHERE part IS NOT NULL;"
-        " CREATE INDEX reading_received_idx ON reading (machine_id, received_at)"
-    )
+    for command in DOWNGRADE:
+        op.execute(command)

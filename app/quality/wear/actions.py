@@ -130,11 +130,11 @@ def _note(session: Session, wear: Wear, changed: int) -> None:
         "widening": wear.record.widening if wear.record else None,
     }
     where = {"machine_id": wear.current.machine.id, "characteristic_id": wear.current.characteristic.id}
+    row = insert(Outlook).values(**where, **values)
     session.execute(
-        insert(Outlook)
-        .values(**where, **values)
-        .on_conflict_do_update(index_elements=["machine_id", "characteristic_id"], set_=values)
-        .execution_options(synchronize_session=False)
+        row.on_conflict_do_update(
+            index_elements=["machine_id", "characteristic_id"], set_={name: row.excluded[name] for name in values}
+        ).execution_options(synchronize_session=False)
     )
 
 

@@ -6,6 +6,7 @@ from time import monotonic
 
 import psycopg
 
+from app.db.citus import CITUS
 from app.db.connections import LIMITS
 from app.db.engine import Database
 from app.db.pipeline import Pipeline
@@ -18,11 +19,18 @@ LAST_ATTEMPT = 0.2  # of the patience, for the one attempt of whoever comes when
 # each time, the planning would cost more than the work.
 PLANNER = "-c plan_cache_mode=force_generic_plan -c enable_seqscan=off -c enable_sort=off -c enable_hashjoin=off"
 
+# Citus finds the node of a statement by its values, and for a plan for any values none: *could not create distributed plan*.
+PLANNER_OF_CITUS = "SET plan_cache_mode = force_custom_plan"
+
 
 async def connect(database: Database) -> Pipeline:
     """Open a connection for readings: statements prepared at their first use, transactions by our own word."""
     connections = database.connections
-    return Pipeline(await connections.connect_async(options=f"{LIMITS} {PLANNER}", application_name="inband-readings"))
+    connection = await connections.connect_async(options=f"{LIMITS} {PLANNER}", application_name="inband-readings")
+    distributed = await (await connection.execute(CITUS)).fetchone() is not None
+    if distributed:
+        await connection.execute(PLANNER_OF_CITUS)
+    return Pipeline(connection, distributed=distributed)
 
 
 class WriterConnection:

@@ -64,7 +64,7 @@ class ReadingStore:
                     readings,
                     all_or_nothing=all_or_nothing,
                     optimistic=optimistic,
-                    notify=notify,
+                    notify=notify and not pipeline.distributed,
                 )
             except CommitLost as lost:
                 self._snapshot = Snapshot()
@@ -101,6 +101,8 @@ class ReadingStore:
                 self.unnotified = not notify
                 if notify:
                     self._notified_at = monotonic()
+                    if pipeline.distributed:
+                        await self.connection.send(NOTIFY)
                 return outcomes
 
     async def notify(self) -> None:
