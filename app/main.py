@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
 
-from fastapi import APIRouter, Depends, FastAPI
+from fastapi import APIRouter, Depends, FastAPI, Request
 from starlette.middleware.gzip import GZipMiddleware
 
 from app.access import api as people
@@ -260,9 +260,13 @@ def create_app(settings: Settings | None = None, ending: Callable[[], None] = la
     use_zone(settings)
     front = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, redirect_slashes=False)
     front.state.settings = settings
-    add_problem_handlers(front, recognise)
+    add_problem_handlers(front, _nobody)
     front.include_router(plants_pages.router)
     return Plants(settings, create_plant, front, process(ending))
+
+
+async def _nobody(_request: Request) -> None:
+    """Recognise nobody: above all plants there are no people."""
 
 
 @asynccontextmanager
