@@ -90,6 +90,12 @@ def _replica_lag(request: Request) -> float | None:
     return replica.behind if replica is not None and replica.usable and (replica.behind or 0) >= TELL_LAG else None
 
 
+def _plant(request: Request) -> str:
+    """Name of the plant, where there are several; an error before the application has none."""
+    app = request.scope.get("app")
+    return str(getattr(getattr(app.state, "settings", None), "plant", "")) if app else ""
+
+
 def render(request: Request, template: str | Template, **context: Any) -> str:
     """The text of a template for this request."""
     state = request.state
@@ -107,7 +113,7 @@ def render(request: Request, template: str | Template, **context: Any) -> str:
                     "person": getattr(state, "person", None),
                     "csrf": getattr(state, "csrf", ""),
                     "to_do": None,
-                    "plant": getattr(getattr(request.app.state, "settings", None), "plant", ""),
+                    "plant": _plant(request),
                     "replica_lag": _replica_lag(request),
                 }
                 | getattr(state, "waiting", {})

@@ -21,7 +21,7 @@ from tests.shop import Person, Shop
 
 SIZES = {"desk": (1280, 800), "large": (1920, 1080), "panel": (800, 1280), "phone": (390, 844)}
 # Zoomed to 200 %, a screen has letters of twice the size and half as many pixels of the page (WCAG 1.4.4).
-SIZES |= {"desk-zoomed": (640, 400), "phone-zoomed": (195, 422)}
+SIZES |= {"desk-zoomed": (640, 400)}
 
 # By the address of the route: how it is opened, as a function of the shop.
 PAGES = {

@@ -178,7 +178,7 @@ def test_a_browser_elsewhere_shows_the_plants_time_too(shop: Shop, server: Serve
     Person(server, "viewer").sign_in(page)
     page.goto(f"/characteristics/{shop.characteristic}?scale=time")
     page.wait_for_selector("plotly-chart.zones .xtick")
-    assert "25 Oct 2026 03:30:00" in page.locator("main").inner_text()
+    expect(page.locator("main")).to_contain_text("25 Oct 2026 03:30:00")
     ticks = page.locator("plotly-chart.zones .xtick").all_text_contents()
     assert any(re.match(r"0[23]:", tick) for tick in ticks), ticks
     context.close()

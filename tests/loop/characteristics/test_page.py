@@ -169,7 +169,7 @@ class TestInTheBrowser:
     def test_an_opened_decision_stays_open_when_a_new_one_arrives(self, shop: Shop, viewer: Person, page: Page) -> None:
         shop.read(6.1)
         viewer.sign_in(page)
-        page.goto(path(shop))
+        page.goto(path(shop) + "#decisions")
         page.locator("#reading-1 summary").click()
         expect(page.locator("#reading-1 .reason")).to_be_visible()
         shop.read(0.2)

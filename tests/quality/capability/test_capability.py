@@ -174,7 +174,7 @@ def test_the_model_in_time_and_which_number_it_allows(shop: Shop) -> None:
     assert (found["in_control"], found["constant_in_time"]) == (False, True)
     assert found["stability"].startswith("Not in control")
     assert "the process is not in control (run rules). Ppk" in found["cautions"][0]
-    assert "quote Ppk by percentiles, not Cp and Cpk" in found["in_time"]["means"]
+    assert "report Ppk by percentiles, not Cp and Cpk" in found["in_time"]["means"]
     page = shop.admin.get("/characteristics/tails/capability?last=all").text
     assert found["in_time"]["means"] in page
     report = shop.admin.get("/characteristics/tails/report?section=capability&last=all").text
