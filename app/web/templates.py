@@ -114,6 +114,7 @@ def render(request: Request, template: str | Template, **context: Any) -> str:
                     "csrf": getattr(state, "csrf", ""),
                     "to_do": None,
                     "plant": _plant(request),
+                    "plant_root": request.scope.get("root_path", ""),
                     "replica_lag": _replica_lag(request),
                 }
                 | getattr(state, "waiting", {})

@@ -193,7 +193,7 @@ class TestInTheBrowser:
         page.get_by_role("link", name="50", exact=True).click()
         page.wait_for_url(lambda url: "last=50" in url and "scale=true" in url)
         page.get_by_role("link", name="Over time").click()
-        eventually(page, f"{PLOT}.data?.some(t => t.meta === 'run')")
+        eventually(page, f"{PLOT}?.data?.some(t => t.meta === 'run')")
 
     def test_names_are_text_everywhere(self, shop: Shop, operator: Person, page: Page) -> None:
         key = f"{shop.characteristic}-x"
