@@ -58,11 +58,11 @@ def sign_in(database: Database, name: str, password: str, address: str, hours: i
     Runs transactions of its own, because a failure must be kept although the request fails.
     Raises `SignInRefused`, or `TooManyRequests` after too many failures.
     """
-    name = name.replace("\0", "").strip()[:400].encode(errors="replace").decode()
+    name = _typed(name)
     place, here = _place(address), f"device {digest(device).hex()}"
     counted_as = names.as_stored(name).casefold()[:200]
     with database.begin() as session:
-        person = queries.person_named(session, names.as_stored(name)) or queries.person_named(session, name)
+        person = _person(session, name)
         known_here = person is not None and device != "" and queries.known_place(session, person.id, here)
         counted_at = here if known_here else place
         known = known_here or (person is not None and queries.known_place(session, person.id, place))
@@ -84,6 +84,21 @@ def sign_in(database: Database, name: str, password: str, address: str, hours: i
         by = Acting(person_id=person.id)
         record(session, person.name, "signed in", f"person/{person.name}", after={"address": address}, by=by)
         return begin_session(session, person.id, hours)._replace(device=new_device)
+
+
+def knows(database: Database, name: str) -> bool:
+    """Tell if somebody of this name, as typed, may be known here: for a sign-in to several plants."""
+    with database.begin() as session:
+        return _person(session, _typed(name)) is not None
+
+
+def _typed(name: str) -> str:
+    """The name as far as it can be stored."""
+    return name.replace("\0", "").strip()[:400].encode(errors="replace").decode()
+
+
+def _person(session: Session, name: str) -> Person | None:
+    return queries.person_named(session, names.as_stored(name)) or queries.person_named(session, name)
 
 
 def _place(address: str) -> str:

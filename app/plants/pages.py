@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from app.access import queries as people
-from app.access.sign_in import SignedIn, SignInRefused, sign_in
+from app.access.sign_in import SignedIn, SignInRefused, knows, sign_in
 from app.db.engine import Database
 from app.errors import InbandError, NotFound
 from app.language.i18n import _
@@ -91,8 +91,7 @@ def _database(served: Served) -> Database:
 
 def _knows(served: Served, name: str) -> bool:
     try:
-        with _database(served).begin() as session:
-            return people.person_named(session, name.replace("\0", "").strip()) is not None
+        return knows(_database(served), name)
     except (SQLAlchemyError, Error):
         return False
 
