@@ -91,11 +91,15 @@ def _shifts(text: str) -> str:
     return ",".join(begins)
 
 
+TAKEN_SCHEMAS = frozenset({"inband", "information_schema"})
+"""The list of plants lies in the first."""
+
+
 def _schema(name: str) -> str:
-    if not re.fullmatch(r"[a-z_][a-z0-9_]{0,49}", name) or name.startswith("pg_"):
+    if not re.fullmatch(r"[a-z_][a-z0-9_]{0,49}", name) or name.startswith("pg_") or name in TAKEN_SCHEMAS:
         raise ValueError(
-            f"{name!r} is no name of a schema; take up to 50 small letters, digits and _, such as plant_north, and not pg_ at "
-            "the beginning"
+            f"{name!r} cannot be the schema of a plant; take up to 50 small letters, digits and _, such as plant_north, no digit "
+            f"and no pg_ at the beginning, and not {' or '.join(sorted(TAKEN_SCHEMAS))}"
         )
     return name
 

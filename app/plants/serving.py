@@ -153,6 +153,7 @@ class Plants:
         self._served: dict[str, Served] = {}
         self._listed: Sequence[Plant] = []
         self._not_migrated: set[str] = set()
+        self._told: dict[str, str] = {}
         self._outage = Outage(log, "looks at the list of plants")
         front.state.plants = self
         front.router.lifespan_context = self._lifespan
@@ -197,7 +198,10 @@ class Plants:
     async def _follow(self) -> None:
         while True:
             await asyncio.sleep(EVERY)
-            await self._look()
+            try:
+                await self._look()
+            except Exception:
+                log.exception("unhandled error in following the list of plants")
 
     async def _look(self) -> None:
         try:
@@ -214,10 +218,7 @@ class Plants:
                 log.info("plant %s is not served any more", key)
         for plant in listed:
             if plant.key in self._not_migrated:
-                log.error(
-                    "plant %s is not served: its schema is of another Inband; `inband migrate` brings it here",
-                    plant.key,
-                )
+                self._tell(plant, "its schema is of another Inband; `inband migrate` brings it here")
             elif plant.key not in self._served:
                 self._begin(plant)
         self._served = {plant.key: self._served[plant.key] for plant in listed if plant.key in self._served}
@@ -237,10 +238,17 @@ class Plants:
         try:
             self._served[plant.key] = served = Served(plant, self.settings, self._make)
         except ValidationError as error:
-            log.error("plant %s cannot be served: %s", plant.key, error.errors()[0]["msg"])  # noqa: TRY400 - said in words
+            self._tell(plant, error.errors()[0]["msg"])
             return
         served.begin()
+        self._told.pop(plant.key, None)
         log.info("plant %s is served at %s", plant.key, served.settings.address if plant.prefix else plant.host)
+
+    def _tell(self, plant: Plant, why: str) -> None:
+        """Log once why a plant is not served; the list is looked at every few seconds."""
+        if self._told.get(plant.key) != why:
+            self._told[plant.key] = why
+            log.error("plant %s is not served: %s", plant.key, why)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve a request."""
