@@ -135,7 +135,9 @@ class TestPlantOnANode:
         assert push(client, 2) == before + 1
         with psycopg.connect(coordinator) as connection:
             assert citus.node_of(connection, "far") == other
-            assert "far" not in citus.in_words(connection)
+            assert "this plant lies on the coordinator" in citus.in_words(connection)
+        with psycopg.connect(url) as connection:
+            assert f"this plant lies on {other}" in citus.in_words(connection)
         with pytest.raises(NotFound, match="no node"):
             commands.move_plant("far", "nowhere:5432", data_dir=None, database_url=coordinator)
 

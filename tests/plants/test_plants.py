@@ -22,6 +22,7 @@ from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from app.plants import registry
 from tests.conftest import NewDatabase, RunServer, Server, drop_database
+from tests.pages.test_accessibility import violations
 from tests.shop import PARAMETERS
 
 PASSWORD = "correct horse battery"
@@ -115,24 +116,19 @@ class TestOnePlantKnowsNothingOfAnother:
 
     def test_events_stay_in_their_plant(self, server: Server) -> None:
         north, south = client_of(server, "north"), client_of(server, "south")
-        for client in (north, south):
-            set_up(client, "bore", "mill-1")
+        set_up(north, "bore-north", "mill-1")
+        set_up(south, "bore-south", "mill-1")
         with south.stream("GET", "/api/v1/events") as events:
             lines = events.iter_lines()
             assert any(line == "event: hello" for line in lines)
-            read(north, 3, "bore")
-            read(south, 5, "bore")
-            seen = [line for line in (next(lines) for _ in range(40)) if line.startswith("data:") and "bore" in line]
-            assert seen, "the reading of this plant was not told"
-        with in_plant(server, "south") as session:
-            count = (
-                session.connection()
-                .exec_driver_sql(
-                    "SELECT count(*) FROM reading r JOIN machine m ON m.id = r.machine_id WHERE m.key = 'mill-1'"
-                )
-                .scalar()
-            )
-        assert count == 1
+            read(north, 3, "bore-north")
+            read(south, 5, "bore-south")
+            told = []
+            for line in lines:
+                told.append(line)
+                if "bore-south" in line:
+                    break
+        assert "bore-north" not in "".join(told)
 
     def test_times_are_those_of_the_plant(self, server: Server) -> None:
         pages = [get(f"{server.url}/p/{key}/sign-in").text for key in ("north", "south")]
@@ -203,6 +199,7 @@ class TestOverview:
         page.fill("[name=name]", "Mira")
         page.fill("[name=password]", PASSWORD)
         page.click("button:has-text('Sign in')")
+        assert violations(page) == {}
         row = page.locator("tr", has_text="North")
         expect(row.locator("td").nth(1)).to_contain_text("1")
         expect(page.locator("tr", has_text="South")).not_to_contain_text("not signed in")
@@ -309,6 +306,13 @@ class TestList:
     def test_what_no_address_can_hold_is_refused(self, plant: registry.Plant) -> None:
         with pytest.raises(Invalid):
             registry.check(plant)
+
+    @pytest.mark.parametrize("schema", ["inband", "information_schema", "pg_own", "2nd"])
+    def test_schemas_of_others_are_refused(self, database: Database, schema: str) -> None:
+        with pytest.raises(ValueError, match="cannot be the schema of a plant"):
+            commands.add_plant(
+                "x", None, schema, None, timezone=None, shifts=None, data_dir=None, database_url=database.dsn
+            )
 
     def test_a_refused_plant_leaves_nothing(self, database: Database) -> None:
         with pytest.raises(ValueError, match="no time zone"):
