@@ -1,0 +1,259 @@
+"""AQDEF files (Q-DAS ASCII transfer format) read: `.dfq`, or a description `.dfd` with its values `.dfx`.
+
+A line is `Kxxxx/i value`: K1… belongs to a part, K2…, K3… and K8… to the characteristic i, K4… to catalogues, K0001 to K0099 to
+measured values. Without an index it is 1; index 0 is all. Values stand in K lines, or in one line for all characteristics:
+`aqdef_values` takes both. A file is read twice, once for what it
+describes and once for its values, one line after the other: however long it is, little of it is in memory.
+Sources: the fields and catalogues as Hexagon lists them for *Q-DAS ASCII Transfer Format*, version 12; how files deviate
+from that is known from what public readers take.
+"""
+
+import codecs
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple, TextIO
+
+from app.files.formats import delimited
+from app.files.formats.delimited import Unusable
+from app.language.i18n import _
+
+ENDINGS = {".dfq", ".dfd", ".dfx"}
+COUNTING_KINDS = {1, 5, 6}
+"""K2004: attribute, kind of fault, list of faults."""
+MOST_REMARKS = 200
+LINE = re.compile(r"[Kk](\d{4,5})(?:/(\d*)(?:/(\d*))?)?(?:[ \t]+(.*))?", re.DOTALL)
+_WHO = {"K1001", "K2001", "K2002"}
+_FAMILIES = set("1234580")
+
+
+class Remark(NamedTuple):
+    """Something about a line that a person should know. wrong: its value cannot be taken; else it is only said."""
+
+    line: int
+    field: str
+    value: str
+    reason: str
+    wrong: bool = False
+
+    def __str__(self) -> str:
+        where = _("line {line}").format(line=self.line) + (f", {self.field}" if self.field else "")
+        return f"{where}: {f'{self.value!r} ' if self.value else ''}{self.reason}"
+
+
+@dataclass
+class Characteristic:
+    """One characteristic of a file: its index, the index of its part, and its fields by K number."""
+
+    index: int
+    part: int
+    fields: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def number(self) -> str:
+        """K2001."""
+        return self.fields.get("K2001", "")
+
+    @property
+    def name(self) -> str:
+        """K2002."""
+        return self.fields.get("K2002", "")
+
+    @property
+    def counts(self) -> bool:
+        """Tell if parts are counted (K2004), not measured."""
+        kind = self.fields.get("K2004", "")
+        return kind.isdigit() and int(kind) in COUNTING_KINDS
+
+
+@dataclass
+class Description:
+    """The lines of a file that describe: parts, characteristics, catalogues."""
+
+    encoding: str = "utf-8"
+    declared: int | None = None  # K0100
+    parts: dict[int, dict[str, str]] = field(default_factory=dict)
+    characteristics: dict[int, Characteristic] = field(default_factory=dict)
+    catalogues: dict[str, dict[int, str]] = field(default_factory=dict)
+    others: dict[tuple[str, int], str] = field(default_factory=dict)
+    remarks: list[Remark] = field(default_factory=list)
+
+    def part_of(self, characteristic: Characteristic) -> Mapping[str, str]:
+        """The fields of its part."""
+        return self.parts.get(characteristic.part, {})
+
+    def named(self, catalogue: str, number: int | None) -> str:
+        """The text of a catalogue's entry (`K4093`, 3), else its number as text, else nothing."""
+        if number is None:
+            return ""
+        return self.catalogues.get(catalogue, {}).get(number, "") or (str(number) if number else "")
+
+
+@dataclass(frozen=True)
+class Source:
+    """The file of a description, and the file of its values where that is another one."""
+
+    description: Path
+    values: Path | None = None
+    encoding: str | None = None  # as somebody says; else found out
+
+    @classmethod
+    def at(cls, path: Path, encoding: str | None = None) -> "Source":
+        """The file, or the pair that it belongs to: the other one lies beside it. Raises `Unusable`."""
+        ending = path.suffix.lower()
+        if ending not in {".dfd", ".dfx"}:
+            return cls(path, None, encoding)
+        wanted = ".dfx" if ending == ".dfd" else ".dfd"
+        for other in sorted(path.parent.iterdir()):
+            if other.stem.lower() == path.stem.lower() and other.suffix.lower() == wanted:
+                return cls(*((path, other) if ending == ".dfd" else (other, path)), encoding)
+        if ending == ".dfx":
+            raise Unusable(
+                _("The description of these values ({name}) does not lie beside them.").format(name=f"{path.stem}.dfd")
+            )
+        return cls(path, None, encoding)
+
+
+def describe(source: Source) -> Description:
+    """The description of a file. Raises `Unusable` for what is no AQDEF, or several files one after the other."""
+    found = Description(encoding=source.encoding or encoding_of(source.description))
+    reader = _Describing(found)
+    try:
+        with open_text(source.description, found.encoding) as file:
+            for number, line in enumerate(file, 1):
+                reader.take(number, line)
+    except UnicodeError:
+        raise Unusable(_("This is not {encoding} text.").format(encoding=found.encoding.upper())) from None
+    reader.end()
+    return found
+
+
+def encoding_of(path: Path) -> str:
+    """By the byte order mark; else UTF-8 if the whole file is, else the one whose letters fit best, as a rule Windows-1252."""
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    with path.open("rb") as file:
+        start = file.read(4)
+        if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            return "utf-16"
+        file.seek(0)
+        try:
+            while block := file.read(1 << 20):
+                decoder.decode(block)
+            decoder.decode(b"", final=True)
+        except UnicodeDecodeError:
+            guessed = delimited.encoding_of(path)
+            return "cp1252" if guessed.startswith("utf-8") else guessed
+    return "utf-8-sig"
+
+
+def open_text(path: Path, encoding: str) -> TextIO:
+    """The file as lines, whether they end with CR and LF, LF or CR."""
+    return path.open(encoding=encoding, errors="strict" if encoding.startswith("utf") else "replace", newline=None)
+
+
+class _Describing:
+    """Takes the lines that describe, and passes over the values."""
+
+    def __init__(self, found: Description) -> None:
+        self.found = found
+        self._part = 1
+        self._values_came = self._any = False
+        self._lines: dict[tuple[str, int], int] = {}
+        self._all_parts: dict[str, str] = {}
+        self._all_characteristics: dict[str, str] = {}
+
+    def take(self, number: int, line: str) -> None:
+        line = line.strip(" \t\r\n\x1a\ufeff")
+        if line[:1] not in {"K", "k"}:
+            self._values_came = self._values_came or line[:1] not in {"", "#"}
+            return
+        if line[1:3] == "00":
+            self._values_came = self._any = True
+            return
+        match = LINE.fullmatch(line)
+        if match is None:
+            self._remark(number, "", line[:40], _("is too short or no K field; it is passed over"))
+            return
+        self._any = True
+        key, index, value = f"K{match[1]}", int(match[2] or 1), (match[4] or "").strip()
+        if match[3] is not None:
+            self._remark(
+                number, key, value, _("has the number of a value, which only values have; that is passed over")
+            )
+        family = match[1][0] if len(match[1]) == 4 else ""
+        if family == "1":
+            self._of_part(number, key, index, value, indexed=bool(match[2]))
+        elif family in {"2", "3", "8"}:
+            self._of_characteristic(number, key, index, value)
+        elif family == "4":
+            self.found.catalogues.setdefault(key, {})[index] = value
+        elif key == "K0100":
+            self.found.declared = int(value) if value.isascii() and value.isdigit() else None
+        else:
+            if family not in _FAMILIES:
+                self._remark(number, key, value[:40], _("is no field that is known here; it is kept and not used"))
+            self.found.others[key, index] = value
+
+    def _of_part(self, line: int, key: str, index: int, value: str, *, indexed: bool) -> None:
+        if index == 0:
+            self._all_parts[key] = value
+            return
+        if not indexed:
+            index = self._part
+            before = self.found.parts.get(index, {})
+            described = any(each.part == index for each in self.found.characteristics.values())
+            if key in before and described and before[key] != value and key == "K1001":
+                index = max(self.found.parts) + 1
+        self._part = index
+        self._put(line, key, index, value, self.found.parts.setdefault(index, {}))
+
+    def _of_characteristic(self, line: int, key: str, index: int, value: str) -> None:
+        if index == 0:
+            self._all_characteristics[key] = value
+            return
+        known = self.found.characteristics.get(index)
+        if known is None:
+            known = self.found.characteristics[index] = Characteristic(index, self._part)
+        self._put(line, key, index, value, known.fields)
+
+    def _put(self, line: int, key: str, index: int, value: str, fields: dict[str, str]) -> None:
+        before = fields.get(key)
+        if before is not None and before != value:
+            if key in _WHO and self._values_came:
+                raise Unusable(
+                    _(
+                        "{key}/{index} is {value} here and was {before} above, with values between: several files stand one "
+                        "after the other. Part them."
+                    ).format(key=key, index=index, value=repr(value), before=repr(before)),
+                    line,
+                )
+            first = self._lines.get((key, index), 0)
+            self._remark(
+                line,
+                f"{key}/{index}",
+                value[:40],
+                _("is written twice, in line {line} too; the last one counts").format(line=first),
+            )
+        self._lines[key, index] = line
+        fields[key] = value
+
+    def _remark(self, line: int, key: str, value: str, reason: str) -> None:
+        if len(self.found.remarks) < MOST_REMARKS:
+            self.found.remarks.append(Remark(line, key, value, reason))
+
+    def end(self) -> None:
+        found = self.found
+        if not self._any:
+            raise Unusable(_("This is no AQDEF file: no line begins with a K field such as K0100."))
+        for index in range(1, min(found.declared or 0, 100_000) + 1):
+            if index not in found.characteristics:
+                found.characteristics[index] = Characteristic(index, self._part)
+        found.characteristics = dict(sorted(found.characteristics.items()))
+        for characteristic in found.characteristics.values():
+            found.parts.setdefault(characteristic.part, {})
+            for key, value in self._all_characteristics.items():
+                characteristic.fields.setdefault(key, value)
+        for fields in found.parts.values():
+            for key, value in self._all_parts.items():
+                fields.setdefault(key, value)

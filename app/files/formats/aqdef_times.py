@@ -1,0 +1,118 @@
+"""Times in AQDEF files (K0004): more than thirty spellings of wall-clock times without a zone, and the hour that is there twice."""
+
+import re
+from datetime import UTC, datetime, timedelta, timezone
+from functools import lru_cache
+from typing import Literal, cast
+from zoneinfo import ZoneInfo
+
+from app.files.formats.cell_values import Unreadable
+from app.language.i18n import _
+
+DayOrder = Literal["month_first", "day_first"]
+"""Which of the two comes first in dates with slashes."""
+_DATE = re.compile(
+    r"(\d{1,4})([./-])(\d{1,2})\2(\d{1,4})\.?"
+    r"(?:[/ .T]\s*(\d{1,2}):(\d{1,2})(?::(\d{1,2})(?:[.,](\d{1,9}))?)?(?:\s*([AaPp])\.?[Mm]\.?)?"
+    r"\s*([Zz]|[+-]\d{2}:?\d{2})?)?",
+    re.ASCII,
+)
+_CENTURY = 70  # two digits from here on are of the last century
+
+
+@lru_cache(maxsize=4096)
+def time_of(text: str, order: DayOrder | None = None) -> datetime:
+    """The time that a text names; without a zone unless it names its offset. Raises `Unreadable`.
+
+    Dots part day, month and year; strokes month, day and year (`order` says otherwise); hyphens year, month and day. Whichever
+    of them has four digits at one end is the year there. Two digits are a year from 1970 to 2069.
+
+    >>> time_of("12.08.1999/15:23:45").isoformat(), time_of("8/12/99 3:23 PM").isoformat()
+    ('1999-08-12T15:23:45', '1999-08-12T15:23:00')
+    >>> time_of("26-11-23.6:05").isoformat(), time_of("2026-11-23T06:05:00.5+01:00").isoformat()
+    ('2026-11-23T06:05:00', '2026-11-23T06:05:00.500000+01:00')
+    """
+    match = _DATE.fullmatch(text.strip())
+    if match is None:
+        raise Unreadable(_("is not a time; AQDEF writes it as 23.11.2026/06:05:00"))
+    first, sign, second, third, hour, minute, seconds, fraction, half, offset = match.groups()
+    year, month, day = _in_order(first, sign, second, third, order)
+    hours = int(hour or 0)
+    if half:
+        hours = hours % 12 + (12 if half in "pP" else 0)
+    try:
+        return datetime(
+            year,
+            month,
+            day,
+            hours,
+            int(minute or 0),
+            int(seconds or 0),
+            int((fraction or "0")[:6].ljust(6, "0")),
+            _zone(offset),
+        )
+    except ValueError as error:
+        raise Unreadable(_("is not a time: {error}").format(error=error)) from None
+
+
+def _in_order(first: str, sign: str, second: str, third: str, order: DayOrder | None) -> tuple[int, int, int]:
+    """Year, month, day."""
+    if len(first) > 2 or (sign == "-" and len(third) <= 2):
+        return _year(first), int(second), int(third)
+    if sign == "/" and order != "day_first":
+        if order is None and int(first) > 12:
+            raise Unreadable(
+                _(
+                    "has no month {month}: dates with / are read as month/day/year; say it if the day comes first"
+                ).format(month=first)
+            )
+        return _year(third), int(first), int(second)
+    return _year(third), int(second), int(first)
+
+
+def _year(text: str) -> int:
+    year = int(text)
+    if len(text) > 2:
+        return year
+    return year + (1900 if year >= _CENTURY else 2000)
+
+
+def _zone(offset: str | None) -> timezone | None:
+    if not offset:
+        return None
+    if offset in "Zz":
+        return UTC
+    minutes = int(offset[1:3]) * 60 + int(offset[-2:])
+    return timezone(timedelta(minutes=-minutes if offset[0] == "-" else minutes))
+
+
+def is_slashed(text: str) -> bool:
+    """Tell if day and month of a date could be exchanged."""
+    return "/" in text[:5] and not text[:4].isdigit()
+
+
+class WallClock:
+    """The moments of wall-clock times in the order of a file.
+
+    When clocks go back an hour is there twice: a time of it that would lie before the one above it is of the second time. A
+    time that clocks leave out is of a clock that was not put forward yet.
+    """
+
+    def __init__(self, zone: ZoneInfo) -> None:
+        self._zone = zone
+        self._last: datetime | None = None
+
+    def moment(self, local: datetime) -> datetime:
+        """The moment with its offset, of a time with or without one."""
+        at = local if local.tzinfo is not None else self._in_zone(local)
+        self._last = at.astimezone(UTC)
+        return at
+
+    def _in_zone(self, local: datetime) -> datetime:
+        first, second = local.replace(tzinfo=self._zone, fold=0), local.replace(tzinfo=self._zone, fold=1)
+        chosen = first
+        if first.utcoffset() != second.utcoffset() and self._last is not None:
+            early, late = first.astimezone(UTC), second.astimezone(UTC)
+            if early < self._last <= late:
+                chosen = second
+        return local.replace(tzinfo=timezone(cast("timedelta", chosen.utcoffset())))

@@ -1,0 +1,275 @@
+"""The values of AQDEF files, one after the other: out of K lines, or out of lines that hold one of every characteristic.
+
+In such a line characteristics are parted by the character 15 and the fields of a value (`FIELDS`) by the character 20.
+"""
+
+import re
+from collections.abc import Iterator
+from datetime import datetime
+from typing import NamedTuple
+
+from app.core.number_text import NotANumber, read_number
+from app.files.formats.aqdef import LINE, Description, Remark, Source, encoding_of, open_text
+from app.files.formats.aqdef_times import DayOrder, is_slashed, time_of
+from app.files.formats.cell_values import Unreadable
+from app.files.formats.delimited import Unusable
+from app.language.i18n import _
+
+OF_CHARACTERISTIC, OF_FIELD = "\x0f", "\x14"
+FIELDS = ("K0001", "K0002", "K0004", "K0005", "K0006", "K0007", "K0008", "K0010", "K0011", "K0012")
+COUNTED = ("K0020", "K0021", "")
+"""What stands before the attribute in place of the value where parts are counted, not measured."""
+HELD = {"K0004", "K0006", "K0007", "K0008", "K0010", "K0012"}
+"""Fields that hold on in a line for all characteristics, and below it, until another value is said."""
+VALUE_FIELDS = {
+    *FIELDS,
+    "K0009",
+    "K0014",
+    "K0015",
+    "K0016",
+    "K0017",
+    "K0020",
+    "K0021",
+    "K0053",
+    "K0080",
+    "K0081",
+    "K0097",
+} | {f"K00{number}" for number in range(54, 64)}
+NO_VALUE = {255, 256}
+"""K0002: missing, deleted. Any other than 0: there, but not to be evaluated."""
+
+
+class Value(NamedTuple):
+    """One value of one characteristic: the line where it begins, and its fields as they are written."""
+
+    characteristic: int
+    line: int
+    fields: dict[str, str]
+
+
+class Measured(NamedTuple):
+    """A value read. measured: in the unit of its characteristic. at: without a zone unless the file names an offset.
+
+    attribute: K0002, 0 for a good one. Numbers are those of the file's catalogues, 0 for none.
+    """
+
+    measured: float
+    attribute: int
+    at: datetime | None
+    part: str
+    batch: str
+    order: str
+    nest: int
+    operator: int
+    machine: int
+    gauge: int
+    events: tuple[int, ...]
+    process: str
+
+
+def values(source: Source, description: Description) -> Iterator[Value | Remark]:
+    """Every value in the order of the file, and what cannot be read, with its line."""
+    path = source.values or source.description
+    encoding = source.encoding or (encoding_of(path) if source.values else description.encoding)
+    reading = _Reading(description)
+    try:
+        with open_text(path, encoding) as file:
+            for number, line in enumerate(file, 1):
+                yield from reading.take(number, line)
+    except UnicodeError:
+        raise Unusable(_("This is not {encoding} text.").format(encoding=encoding.upper())) from None
+    yield from reading.end()
+
+
+class _Reading:
+    """Takes the lines of values. A value is complete when the next one of its characteristic begins."""
+
+    def __init__(self, description: Description) -> None:
+        self._characteristics = description.characteristics
+        self._open: dict[int, Value] = {}
+        self._counted: dict[tuple[int, int], Value] = {}  # with a number of their own: their fields stand anywhere
+        self._for_all: dict[str, str] = {}
+        self._closed = False  # by a field for all: what comes next is another row
+        self._held: dict[str, str] = {}
+        self._begins: str | None = None
+
+    def take(self, number: int, line: str) -> Iterator[Value | Remark]:
+        line = line.strip(" \t\r\n\x1a\ufeff")
+        if not line:
+            return
+        if line[0] in "Kk":
+            if line[1:3] == "00":
+                yield from self._field(number, line)
+        elif OF_FIELD in line or OF_CHARACTERISTIC in line or _is_number(line):
+            yield from self._row(number, line)
+        else:
+            yield Remark(number, "", line[:40], _("is neither a K field nor a value; it is passed over"))
+
+    def end(self) -> Iterator[Value]:
+        yield from self._all_open()
+        yield from self._counted.values()
+
+    def _all_open(self) -> Iterator[Value]:
+        yield from sorted(self._open.values(), key=lambda value: value.line)
+        self._open.clear()
+        self._closed = False
+
+    def _row(self, number: int, line: str) -> Iterator[Value | Remark]:
+        """Read a line that holds a value of each characteristic, in the order of their indices."""
+        yield from self._all_open()
+        self._for_all.clear()
+        for index, portion in enumerate(line.split(OF_CHARACTERISTIC), 1):
+            if not portion.strip():
+                continue
+            characteristic = self._characteristics.get(index)
+            if characteristic is None:
+                yield self._nobody(number, index, portion.split(OF_FIELD)[0])
+                continue
+            cells = [cell.strip() for cell in portion.split(OF_FIELD)]
+            known = "K2004" in characteristic.fields
+            counts = characteristic.counts if known else len(cells) > len(FIELDS)
+            names = COUNTED + FIELDS[1:] if counts else FIELDS
+            if len(cells) > len(names):
+                yield Remark(
+                    number,
+                    "",
+                    portion[:40].replace(OF_FIELD, "|"),
+                    _("has more fields than are known; the rest is passed over"),
+                )
+            fields = {name: cell for name, cell in zip(names, cells, strict=False) if name and cell}
+            if "K0006" in fields:
+                fields["K0006"] = fields["K0006"].removeprefix("#")
+            self._held |= {name: cell for name, cell in fields.items() if name in HELD}
+            self._open[index] = Value(index, number, self._held | fields)
+
+    def _nobody(self, number: int, index: int, value: str) -> Remark:
+        most = len(self._characteristics)
+        reason = _("belongs to characteristic {index}, but the file describes {most}").format(index=index, most=most)
+        return Remark(number, "K0001", value[:40], reason, wrong=True)
+
+    def _field(self, number: int, line: str) -> Iterator[Value | Remark]:
+        match = LINE.fullmatch(line)
+        if match is None or len(match[1]) != 4:
+            yield Remark(number, "", line[:40], _("is too short or no K field; it is passed over"))
+            return
+        key, index, value = f"K{match[1]}", int(match[2] or 1), (match[4] or "").strip()
+        if key not in VALUE_FIELDS:
+            yield Remark(number, key, value[:40], _("is no field that is known here; it is kept and not used"))
+        if key == "K0006":
+            value = value.removeprefix("#")
+        if index == 0:
+            self._closed = bool(self._open)
+            if not self._open:
+                self._for_all[key] = value
+            for each in self._open.values():
+                each.fields.setdefault(key, value)
+            return
+        if index not in self._characteristics:
+            yield self._nobody(number, index, value)
+        elif match[3]:
+            each = self._counted.setdefault((index, int(match[3])), Value(index, number, {}))
+            each.fields[key] = value
+        else:
+            yield from self._of_one(number, key, index, value)
+
+    def _of_one(self, number: int, key: str, index: int, value: str) -> Iterator[Value | Remark]:
+        first = "K0020" if self._characteristics[index].counts else "K0001"
+        self._begins = self._begins or (key if key in {"K0001", "K0002", "K0004"} else first)
+        current = self._open.get(index)
+        if current is not None and key in current.fields and key in {first, self._begins}:
+            if self._closed:
+                yield from self._all_open()
+            else:
+                yield self._open.pop(index)
+            self._for_all = {}
+            current = None
+        elif current is not None and self._closed and key in {first, self._begins}:
+            yield from self._all_open()
+            current = None
+        elif current is None and self._closed:
+            yield from self._all_open()
+        if current is None:
+            self._open[index] = Value(index, number, dict(self._for_all) | {key: value})
+            return
+        if current.fields.get(key, value) != value:
+            yield Remark(number, f"{key}/{index}", value[:40], _("is written twice for one value; the last one counts"))
+        current.fields[key] = value
+
+
+def read_value(value: Value, order: DayOrder | None = None) -> "Measured | Remark | None":
+    """The fields of a value as what they mean; None where nothing was measured (K0002 says missing or deleted).
+
+    order: which comes first in dates with slashes, day or month.
+    """
+    fields, name = value.fields, "K0001"
+    try:
+        name = "K0002"
+        attribute = _whole(fields.get(name, ""))
+        if attribute in NO_VALUE:
+            return None
+        name = "K0001"
+        measured = number_of(fields.get(name, ""))
+        name = "K0004"
+        at = time_of(fields[name], order) if fields.get(name) else None
+        nest = _whole(fields.get(name := "K0007", ""))
+        operator = _whole(fields.get(name := "K0008", ""))
+        machine = _whole(fields.get(name := "K0010", ""))
+        gauge = _whole(fields.get(name := "K0012", ""))
+        name = "K0005"
+        events = tuple(_whole(each) for each in re.split(r"[,; ]+", fields.get(name, "")) if each.strip())
+    except Unreadable as error:
+        return Remark(value.line, f"{name}/{value.characteristic}", fields.get(name, "")[:40], str(error), wrong=True)
+    return Measured(
+        measured,
+        attribute,
+        at,
+        fields.get("K0014", ""),
+        fields.get("K0006", ""),
+        fields.get("K0053", ""),
+        nest,
+        operator,
+        machine,
+        gauge,
+        tuple(each for each in events if each),
+        fields.get("K0011", ""),
+    )
+
+
+def has_doubtful_date(value: Value) -> bool:
+    """Tell if day and month of its time could be exchanged."""
+    return is_slashed(value.fields.get("K0004", ""))
+
+
+def number_of(text: str) -> float:
+    """A number with a point or a comma. Raises `Unreadable`.
+
+    >>> number_of("10,023"), number_of("6.00100000000000E+0000")
+    (10.023, 6.001)
+    """
+    try:
+        return read_number(text)
+    except NotANumber:
+        reason = _("is empty") if not text.strip() else _("is not a number")
+        raise Unreadable(reason) from None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        read_number(text)
+    except NotANumber:
+        return False
+    return True
+
+
+def _whole(text: str) -> int:
+    """A whole number, 0 where nothing is said; a name in a catalogue's place is none."""
+    text = text.strip()
+    if not text:
+        return 0
+    try:
+        value = read_number(text)
+    except NotANumber:
+        value = 0.5
+    if value != int(value):
+        raise Unreadable(_("is not a whole number"))
+    return int(value)

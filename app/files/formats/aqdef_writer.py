@@ -1,0 +1,334 @@
+"""AQDEF files (Q-DAS ASCII transfer format) written: one line for each part, with a value of every characteristic measured on it.
+
+Fields, their lengths and catalogues are those of version 12; see `app.files.formats.aqdef`. Whether a system takes a file is
+said by its certification, which this is not.
+"""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from decimal import Decimal
+from enum import IntEnum
+from pathlib import Path
+from typing import NamedTuple
+
+from app.files.formats.aqdef_values import OF_CHARACTERISTIC, OF_FIELD
+from app.language.i18n import _
+
+LENGTHS = {
+    "K1001": 30, "K1002": 80, "K1053": 40, "K1081": 24, "K1082": 40, "K1085": 40, "K1086": 40, "K2001": 20, "K2002": 80,
+    "K2142": 20, "K2402": 40, "K4062": 40, "K4063": 100, "K4072": 40, "K4073": 80, "K4092": 50, "K4093": 50, "K4222": 40,
+    "K4223": 100, "K4242": 40, "K4243": 100, "K0014": 40, "K0053": 20,
+}  # fmt: skip
+"""Characters that a field holds."""
+MISSING = 255
+SAME_PART = timedelta(hours=1)
+"""Readings of a part further apart than this are of two measurements."""
+_SIGNS = re.compile(r"[\x00-\x1f\x7f-\x9f;]+")
+
+
+class Validity(IntEnum):
+    """K0002 of a value that is there."""
+
+    GOOD = 0
+    INVALID = 129
+    IMPLAUSIBLE = 290
+
+
+class LimitKind(IntEnum):
+    """K2120 and K2121: none, a limit, or one that nature sets (a form error is never below 0)."""
+
+    NONE = 0
+    LIMIT = 1
+    NATURAL = 2
+
+
+class Part(NamedTuple):
+    """Number (K1001), name (K1002), machine (K1081, K1082), place (K1085) and operation (K1086)."""
+
+    number: str
+    name: str
+    machine: str = ""
+    machine_name: str = ""
+    place: str = ""
+    operation: str = ""
+
+
+class Described(NamedTuple):
+    """A characteristic as the file describes it. Lengths in its unit. part: the place of its part in the list of parts."""
+
+    part: int
+    number: str
+    name: str
+    nominal: float | None
+    lower: float | None
+    upper: float | None
+    unit: str = "mm"
+    decimals: int = 4
+    importance: int | None = None
+    gauge: str = ""
+
+    @property
+    def lower_kind(self) -> LimitKind:
+        """K2120: a lower limit of 0 below a nominal size of 0 is that of a form error."""
+        if self.lower is None:
+            return LimitKind.NONE
+        natural = self.lower == 0 and (self.upper or 0) > 0 and not self.nominal
+        return LimitKind.NATURAL if natural else LimitKind.LIMIT
+
+
+class Written(NamedTuple):
+    """A value. characteristic: its place in the list. at: by the clock of the plant. process: parameters by name."""
+
+    characteristic: int
+    measured: float
+    at: datetime
+    validity: Validity = Validity.GOOD
+    part: str = ""
+    events: Sequence[str] = ()
+    order: str = ""
+    nest: int = 0
+    operator: str = ""
+    machine: str = ""
+    gauge: str = ""
+    process: Mapping[str, float] = {}
+
+
+@dataclass
+class Catalogues:
+    """Texts that values name by number: those of the events, machines, gauges, operators and process parameters."""
+
+    events: Sequence[str] = ()
+    machines: Sequence[tuple[str, str]] = ()
+    gauges: Sequence[tuple[str, str]] = ()
+    operators: Sequence[str] = ()
+    process: Sequence[str] = ()
+
+
+@dataclass
+class Outcome:
+    """Numbers of values and lines written, and remarks on what was shortened or replaced."""
+
+    values: int = 0
+    lines: int = 0
+    remarks: list[str] = field(default_factory=list)
+
+
+def write(
+    path: Path,
+    parts: Sequence[Part],
+    characteristics: Sequence[Described],
+    values: Iterable[Written],
+    catalogues: Catalogues,
+) -> Outcome:
+    """Write a `.dfq` under a temporary name and rename it when it is complete.
+
+    values: of each characteristic in their order. Windows-1252 where that has all letters, else UTF-8 with its mark.
+    """
+    draft = path.with_name(f".{path.name}.part")
+    done = Outcome()
+    try:
+        with draft.open("w", encoding="utf-8", newline="") as file:
+            header = _Header(done)
+            file.writelines(f"{line}\r\n" for line in header.lines(parts, characteristics, catalogues))
+            texts = _Values(len(characteristics), catalogues, done)
+            file.writelines(f"{line}\r\n" for line in texts.lines(values))
+        _settle_encoding(draft)
+        draft.replace(path)
+    finally:
+        draft.unlink(missing_ok=True)
+    return done
+
+
+def _settle_encoding(path: Path) -> None:
+    """Make Windows-1252 of the UTF-8 where it can be; else put the mark before it. Plain ASCII is both."""
+    content = path.read_bytes()
+    if content.isascii():
+        return
+    try:
+        path.write_bytes(content.decode().encode("cp1252"))
+    except UnicodeEncodeError:
+        path.write_bytes(b"\xef\xbb\xbf" + content)
+
+
+class _Texts:
+    """Texts that fit into their fields."""
+
+    def __init__(self, done: Outcome) -> None:
+        self._done = done
+        self._told: set[tuple[str, str]] = set()
+
+    def fit(self, key: str, text: str) -> str:
+        plain = _SIGNS.sub(lambda signs: "," if signs[0] == ";" else " ", text).strip()
+        most = LENGTHS[key]
+        short = plain[:most].rstrip()
+        if short != text.strip() and (key, text) not in self._told and len(self._told) < 100:
+            self._told.add((key, text))
+            if short != plain:
+                reason = _("{key} holds {most} characters: {text} is written as {short}.")
+            else:
+                reason = _("{text} has signs that {key} cannot hold: it is written as {short}.")
+            self._done.remarks.append(reason.format(key=key, most=most, text=repr(text), short=repr(short)))
+        return short
+
+
+class _Header(_Texts):
+    """Lines that describe."""
+
+    def lines(
+        self, parts: Sequence[Part], characteristics: Sequence[Described], catalogues: Catalogues
+    ) -> Iterator[str]:
+        yield f"K0100 {len(characteristics)}"
+        for number, part in enumerate(parts, 1):
+            for key, text in zip(("K1001", "K1002", "K1081", "K1082", "K1085", "K1086"), part, strict=True):
+                if text or key in {"K1001", "K1002"}:
+                    yield f"{key}/{number} {self.fit(key, text)}"
+            taken: set[str] = set()
+            for index, described in enumerate(characteristics, 1):
+                if described.part == number - 1:
+                    yield from self._characteristic(index, described, taken)
+        yield from self._catalogue("K4060", "machines", ("K4062", "K4063"), catalogues.machines)
+        yield from self._catalogue("K4070", "gauges", ("K4072", "K4073"), catalogues.gauges)
+        yield from self._catalogue(
+            "K4090", "operators", ("K4092", "K4093"), [(name, name) for name in catalogues.operators]
+        )
+        for key, name, fields, texts in (
+            ("K4220", "events", ("K4222", "K4223"), catalogues.events),
+            ("K4240", "process parameters", ("K4242", "K4243"), catalogues.process),
+        ):
+            yield from self._catalogue(key, name, fields, [(str(at), text) for at, text in enumerate(texts, 1)])
+
+    def _characteristic(self, index: int, described: Described, taken: set[str]) -> Iterator[str]:
+        number = self.fit("K2001", described.number)
+        for other in range(2, len(taken) + 3):  # two that were cut to the same
+            if number not in taken:
+                break
+            number = f"{described.number[: LENGTHS['K2001'] - 4]}~{other}"
+        taken.add(number)
+        yield f"K2001/{index} {number}"
+        yield f"K2002/{index} {self.fit('K2002', described.name)}"
+        yield f"K2004/{index} 0"
+        if described.importance is not None:
+            yield f"K2005/{index} {described.importance}"
+        yield f"K2022/{index} {described.decimals}"
+        for key, value in (("K2101", described.nominal), ("K2110", described.lower), ("K2111", described.upper)):
+            if value is not None:
+                yield f"{key}/{index} {plain_number(value)}"
+        if described.nominal is not None:
+            for key, value in (("K2112", described.lower), ("K2113", described.upper)):
+                if value is not None:
+                    yield f"{key}/{index} {plain_number(round(value - described.nominal, 9))}"
+        yield f"K2120/{index} {described.lower_kind.value}"
+        yield f"K2121/{index} {(LimitKind.NONE if described.upper is None else LimitKind.LIMIT).value}"
+        yield f"K2142/{index} {self.fit('K2142', described.unit)}"
+        if described.gauge:
+            yield f"K2402/{index} {self.fit('K2402', described.gauge)}"
+
+    def _catalogue(
+        self, key: str, name: str, fields: tuple[str, str], entries: Sequence[tuple[str, str]]
+    ) -> Iterator[str]:
+        if entries:
+            yield f"{key}/1 Inband {name}"
+        for number, texts in enumerate(entries, 1):
+            for one, text in zip(fields, texts, strict=True):
+                yield f"{one}/{number} {self.fit(one, text)}"
+
+
+@dataclass
+class _Line:
+    """The values of one part; `number` counts the lines."""
+
+    number: int
+    part: str
+    order: str
+    begun: datetime
+    values: dict[int, Written] = field(default_factory=dict)
+
+
+class _Values(_Texts):
+    """Lines of values. Those of one part come into one line where that leaves the order of each characteristic as it is."""
+
+    def __init__(self, count: int, catalogues: Catalogues, done: Outcome) -> None:
+        super().__init__(done)
+        self._count = count
+        self._fields = 3  # of a value: at least itself, its attribute and its time
+        self._events = {text: at for at, text in enumerate(catalogues.events, 1)}
+        self._machines = {text: at for at, (text, _name) in enumerate(catalogues.machines, 1)}
+        self._gauges = {text: at for at, (text, _name) in enumerate(catalogues.gauges, 1)}
+        self._operators = {text: at for at, text in enumerate(catalogues.operators, 1)}
+        self._process = {text: at for at, text in enumerate(catalogues.process, 1)}
+
+    def lines(self, values: Iterable[Written]) -> Iterator[str]:
+        waiting: list[_Line] = []
+        newest = [0] * self._count
+        count = 0
+        for value in values:
+            self._done.values += 1
+            while waiting and value.at - waiting[0].begun > SAME_PART:
+                yield from self._texts_of(waiting.pop(0))
+            at = value.characteristic
+            line = next((each for each in waiting if self._joins(value, each, newest[at])), None)
+            if line is None:
+                count += 1
+                line = _Line(count, value.part, value.order, value.at)
+                waiting.append(line)
+                if len(waiting) > 1000:  # a batch that was measured in one hour
+                    yield from self._texts_of(waiting.pop(0))
+            line.values[at] = value
+            newest[at] = line.number
+        for line in waiting:
+            yield from self._texts_of(line)
+
+    def _joins(self, value: Written, line: _Line, newest: int) -> bool:
+        return (
+            bool(value.part)
+            and line.part == value.part
+            and line.order == value.order
+            and value.characteristic not in line.values
+            and line.number > newest
+        )
+
+    def _texts_of(self, line: _Line) -> Iterator[str]:
+        self._done.lines += 1
+        missing = f"0{OF_FIELD}{MISSING}"
+        last = max(line.values)
+        yield OF_CHARACTERISTIC.join(
+            self._portion(line.values[at]) if at in line.values else missing for at in range(last + 1)
+        )
+        if line.part:
+            yield f"K0014/0 {self.fit('K0014', line.part)}"
+        if line.order:
+            yield f"K0053/0 {self.fit('K0053', line.order)}"
+
+    def _portion(self, value: Written) -> str:
+        process = ",".join(
+            f"{self._process[name]}/{plain_number(number)}"
+            for name, number in value.process.items()
+            if name in self._process
+        )
+        cells = [
+            plain_number(value.measured),
+            str(value.validity.value),
+            value.at.strftime("%d.%m.%Y/%H:%M:%S"),
+            ",".join(str(self._events[text]) for text in value.events if text in self._events),
+            "",
+            str(value.nest),
+            str(self._operators.get(value.operator, 0)),
+            str(self._machines.get(value.machine, 0)),
+            process,
+            str(self._gauges.get(value.gauge, 0)),
+        ]
+        # What is not said holds on from the value before: a field that was filled once is always written from then on.
+        self._fields = max(self._fields, *(at for at, cell in enumerate(cells, 1) if cell not in {"", "0"}))
+        return OF_FIELD.join(cells[: self._fields])
+
+
+def plain_number(value: float) -> str:
+    """A number without an exponent and without zeros behind it.
+
+    >>> plain_number(39.99810), plain_number(1e-06), plain_number(-0.0), plain_number(40.0)
+    ('39.9981', '0.000001', '0', '40')
+    """
+    text = format(Decimal(repr(value or 0.0)), "f")
+    return text.rstrip("0").rstrip(".") if "." in text else text

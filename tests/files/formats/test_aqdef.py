@@ -1,0 +1,275 @@
+"""AQDEF files as the programs of many makers write them, and what is said of those that do not fit."""
+# ruff: noqa: DTZ001 - the files name no zone
+
+from datetime import datetime
+from pathlib import Path
+from zoneinfo import ZoneInfo
+
+import pytest
+
+from app.files.formats import aqdef, aqdef_values
+from app.files.formats.aqdef import Remark, Source
+from app.files.formats.aqdef_times import WallClock, time_of
+from app.files.formats.aqdef_values import Measured, Value
+from app.files.formats.cell_values import Unreadable
+from app.files.formats.delimited import Unusable
+
+F, C = aqdef_values.OF_FIELD, aqdef_values.OF_CHARACTERISTIC
+HEAD = ["K0100 2", "K1001 08/15", "K2001/1 D40", "K2002/1 Seat", "K2001/2 L12", "K2002/2 Length"]
+
+
+def parsed(
+    tmp_path: Path, lines: list[str], *, end: str = "\r\n", encoding: str = "utf-8"
+) -> tuple[aqdef.Description, list[Value | Remark]]:
+    path = tmp_path / "file.dfq"
+    path.write_bytes(end.join([*lines, ""]).encode(encoding))
+    source = Source.at(path)
+    description = aqdef.describe(source)
+    return description, list(aqdef_values.values(source, description))
+
+
+def numbers(found: list[Value | Remark]) -> list[tuple[int, str | None]]:
+    return [(each.characteristic, each.fields.get("K0001")) for each in found if isinstance(each, Value)]
+
+
+def good(value: Value | Remark) -> Measured:
+    assert isinstance(value, Value)
+    measured = aqdef_values.read_value(value)
+    assert isinstance(measured, Measured)
+    return measured
+
+
+@pytest.mark.parametrize("end", ["\r\n", "\n", "\r"])
+def test_values_in_one_line_for_all_characteristics(tmp_path: Path, end: str) -> None:
+    rows = [
+        f"39,998{F}0{F}12.08.2026/15:23:45{F}3,7{F}#123{F}4{F}2{F}1{F}1/0,5{F}9{C}12.01",
+        f"4.0001E+0001{F}129{F}12.08.2026/15:24:00{C}{F}255",
+    ]
+    _description, found = parsed(tmp_path, HEAD + rows, end=end)
+    first, second, third, missing = found
+    assert good(first) == Measured(
+        39.998, 0, datetime(2026, 8, 12, 15, 23, 45), "", "123", "", 4, 2, 1, 9, (3, 7), "1/0,5"
+    )
+    assert (good(second).measured, good(second).at, good(second).nest) == (12.01, datetime(2026, 8, 12, 15, 23, 45), 4)
+    assert (good(third).measured, good(third).attribute) == (40.001, 129)
+    assert isinstance(missing, Value)
+    assert aqdef_values.read_value(missing) is None
+    assert [each.line for each in found] == [7, 7, 8, 8]
+
+
+def test_values_in_lines_of_their_own(tmp_path: Path) -> None:
+    rows = ["K0001/1 1", "K0004/1 1.2.2026/3:04:05", "K0001/1 1.1", "K0001/2 2", "K0002/2 290", "K0001/2 2.1"]
+    _description, found = parsed(tmp_path, HEAD + rows)
+    assert numbers(found) == [(1, "1"), (2, "2"), (1, "1.1"), (2, "2.1")]
+    assert good(found[0]).at == datetime(2026, 2, 1, 3, 4, 5)
+
+
+def test_no_index_is_the_first_and_zero_is_all(tmp_path: Path) -> None:
+    lines = [
+        "K0100 2",
+        "K1002/0 Shaft",
+        "K1001 A",
+        "K1001/2 B",
+        "K1002/2 Own",
+        "K2001 D40",
+        "K2001/2 L12",
+        "K2142/0 mm",
+        "K2022/2 3",
+        "K2022/0 4",
+    ]
+    description, _found = parsed(tmp_path, lines)
+    assert description.parts == {1: {"K1001": "A", "K1002": "Shaft"}, 2: {"K1001": "B", "K1002": "Own"}}
+    assert [each.fields["K2142"] for each in description.characteristics.values()] == ["mm", "mm"]
+    assert [each.fields["K2022"] for each in description.characteristics.values()] == ["4", "3"]
+
+
+def test_fields_of_all_belong_to_the_values_above_them(tmp_path: Path) -> None:
+    rows = [
+        "K0001/1 1",
+        "K0001/2 3",
+        "K0014/0 SN-1",
+        "K0001/1 2",
+        "K0014/0 SN-2",
+        "K0001/1 5",
+        "K0001/2 6",
+        "K0014/0 SN-3",
+    ]
+    _description, found = parsed(tmp_path, HEAD + rows)
+    parts = [
+        (each.characteristic, each.fields["K0001"], each.fields["K0014"]) for each in found if isinstance(each, Value)
+    ]
+    assert parts == [(1, "1", "SN-1"), (2, "3", "SN-1"), (1, "2", "SN-2"), (1, "5", "SN-3"), (2, "6", "SN-3")]
+
+
+def test_fields_below_a_line_belong_to_its_values(tmp_path: Path) -> None:
+    rows = [f"1{F}0{C}2{F}0", "K0014/0 SN-1", "K0097/1 {A}", f"3{F}0", "K0014/0 SN-2"]
+    _description, found = parsed(tmp_path, HEAD + rows)
+    assert [each.fields.get("K0014") for each in found if isinstance(each, Value)] == ["SN-1", "SN-1", "SN-2"]
+
+
+def test_a_field_before_the_values_belongs_to_the_next_ones(tmp_path: Path) -> None:
+    _description, found = parsed(tmp_path, [*HEAD, "K0014/0 SN-1", "K0001/1 1", "K0001/1 2"])
+    assert [each.fields.get("K0014") for each in found if isinstance(each, Value)] == ["SN-1", None]
+
+
+def test_values_with_numbers_of_their_own(tmp_path: Path) -> None:
+    _description, found = parsed(tmp_path, [*HEAD, "K0001/1/1 5", "K0001/1/2 6", "K0014/1/1 A", "K0014/1/2 B"])
+    assert [(each.fields["K0001"], each.fields["K0014"]) for each in found if isinstance(each, Value)] == [
+        ("5", "A"),
+        ("6", "B"),
+    ]
+
+
+def test_parts_with_values_after_each_and_without_indices(tmp_path: Path) -> None:
+    lines = ["K0100 2", "K1001 A", "K2001/1 D40", "K0001/1 1", "K1001 B", "K2001/2 D40", "K0001/2 2"]
+    description, found = parsed(tmp_path, lines)
+    assert [description.part_of(each)["K1001"] for each in description.characteristics.values()] == ["A", "B"]
+    assert numbers(found) == [(1, "1"), (2, "2")]
+
+
+def test_counted_parts_have_another_layout(tmp_path: Path) -> None:
+    lines = [*HEAD, "K2004/2 1", f"39.99{F}0{C}100000{F}1{F}{F}0{F}12.08.2026/15:23:45"]
+    description, found = parsed(tmp_path, lines)
+    assert description.characteristics[2].counts
+    assert isinstance(found[1], Value)
+    assert found[1].fields == {"K0020": "100000", "K0021": "1", "K0002": "0", "K0004": "12.08.2026/15:23:45"}
+
+
+def test_more_values_than_characteristics_are_refused_by_line(tmp_path: Path) -> None:
+    _description, found = parsed(tmp_path, [*HEAD, f"1{F}0{C}2{F}0{C}3{F}0", "K0001/7 5"])
+    wrong = [each for each in found if isinstance(each, Remark)]
+    assert [(each.line, each.wrong) for each in wrong] == [(7, True), (8, True)]
+    assert str(wrong[0]) == "line 7, K0001: '3' belongs to characteristic 3, but the file describes 2"
+
+
+def test_characteristics_without_values_and_without_a_name(tmp_path: Path) -> None:
+    description, found = parsed(tmp_path, ["K0100 3", "K1001 A", "K2001/1 D40"])
+    assert (list(description.characteristics), found) == ([1, 2, 3], [])
+
+
+def test_what_is_not_understood_is_said_and_kept(tmp_path: Path) -> None:
+    lines = [
+        "\ufeffK0100 2",
+        "K10",
+        "K1001 A",
+        "K2001/1 D40",
+        "K2001/1 D41",
+        "K9876/1 x",
+        "K12345 y",
+        "what",
+        "K0099/1 z",
+    ]
+    description, found = parsed(tmp_path, lines)
+    said = [str(each) for each in [*description.remarks, *found] if isinstance(each, Remark)]
+    assert said == [
+        "line 2: 'K10' is too short or no K field; it is passed over",
+        "line 5, K2001/1: 'D41' is written twice, in line 4 too; the last one counts",
+        "line 6, K9876: 'x' is no field that is known here; it is kept and not used",
+        "line 7, K12345: 'y' is no field that is known here; it is kept and not used",
+        "line 8: 'what' is neither a K field nor a value; it is passed over",
+        "line 9, K0099: 'z' is no field that is known here; it is kept and not used",
+    ]
+    assert description.others["K9876", 1] == "x"
+
+
+def test_a_field_written_twice_for_a_value(tmp_path: Path) -> None:
+    _description, found = parsed(tmp_path, [*HEAD, "K0001/1 1", "K0014/1 A", "K0014/1 B", "K0001/1 2"])
+    assert "written twice for one value" in str(found[0])
+    assert [each.fields.get("K0014") for each in found if isinstance(each, Value)] == ["B", None]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
+def test_letters(tmp_path: Path, encoding: str) -> None:
+    description, _found = parsed(
+        tmp_path, ["K0100 1", "K2002/1 Länge Ø", *["K2092/1 ascii"] * 70_000], encoding=encoding
+    )
+    assert description.characteristics[1].name == "Länge Ø"
+
+
+def test_letters_that_come_late_count_too(tmp_path: Path) -> None:
+    description, found = parsed(tmp_path, [*HEAD, *["K0001/1 1"] * 130_000, "K0014/1 Stück"], encoding="cp1252")
+    assert description.encoding == "cp1252"
+    assert isinstance(found[-1], Value)
+    assert found[-1].fields["K0014"] == "Stück"
+
+
+def test_several_files_one_after_the_other_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(Unusable, match="several files stand one after the other") as refusal:
+        parsed(tmp_path, [*HEAD, "K0001/1 1", "K0100 2", "K1001 08/15", "K2001/1 D35"])
+    assert refusal.value.line == 10
+
+
+@pytest.mark.parametrize("content", ["", "measured,part\n39.9,1\n", "\x00\x01\x02"])
+def test_other_files_are_refused(tmp_path: Path, content: str) -> None:
+    with pytest.raises(Unusable, match="no AQDEF file"):
+        parsed(tmp_path, [content])
+
+
+def test_a_pair_is_found_by_either_file(tmp_path: Path) -> None:
+    (tmp_path / "a.DFD").write_text("\n".join(HEAD))
+    (tmp_path / "a.dfx").write_text(f"1{F}0{C}2{F}0\n")
+    for name in ("a.DFD", "a.dfx"):
+        source = Source.at(tmp_path / name)
+        found = list(aqdef_values.values(source, aqdef.describe(source)))
+        assert numbers(found) == [(1, "1"), (2, "2")]
+    (tmp_path / "b.dfx").write_text("1")
+    with pytest.raises(Unusable, match=r"b\.dfd"):
+        Source.at(tmp_path / "b.dfx")
+
+
+def spellings() -> list[tuple[str, datetime]]:
+    found = []
+    for year in ("26", "2026"):
+        for date in (f"3.4.{year}", f"4/3/{year}", f"{year}-4-3"):
+            for between in ("/", " ", "."):
+                found += [
+                    (f"{date}{between}7:08:09", datetime(2026, 4, 3, 7, 8, 9)),
+                    (f"{date}{between}7:08", datetime(2026, 4, 3, 7, 8)),
+                ]
+    return [*found, ("2026-04-03T07:08:09", datetime(2026, 4, 3, 7, 8, 9)), ("03.04.2026", datetime(2026, 4, 3))]
+
+
+@pytest.mark.parametrize(("text", "at"), spellings())
+def test_times(text: str, at: datetime) -> None:
+    assert time_of(text) == at
+
+
+def test_day_before_month_has_to_be_said() -> None:
+    assert time_of("3/4/2026 7:08").month == 3
+    assert time_of("3/4/2026 7:08", "day_first").month == 4
+    with pytest.raises(Unreadable, match="has no month 23"):
+        time_of("23/4/2026 7:08")
+    with pytest.raises(Unreadable, match="is not a time"):
+        time_of("31.2.2026/7:08")
+    with pytest.raises(Unreadable, match="is not a time"):
+        time_of("yesterday")
+
+
+def test_the_hour_that_is_there_twice_goes_by_the_order_of_the_file() -> None:
+    clock = WallClock(ZoneInfo("Europe/Berlin"))
+    local = [
+        datetime(2026, 10, 25, 2, 30),
+        datetime(2026, 10, 25, 2, 59),
+        datetime(2026, 10, 25, 2, 10),
+        datetime(2026, 10, 25, 3, 0),
+    ]
+    assert [clock.moment(at).isoformat()[11:] for at in local] == [
+        "02:30:00+02:00",
+        "02:59:00+02:00",
+        "02:10:00+01:00",
+        "03:00:00+01:00",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("field", "said"),
+    [
+        ("K0002/1 a", "line 7, K0002/1: 'a' is not a whole number"),
+        ("K0004/1 32.1.2026/0:0", "line 7, K0004/1: '32.1.2026/0:0' is not a time: day is out of range for month"),
+        ("K0007/1 x", "line 7, K0007/1: 'x' is not a whole number"),
+    ],
+)
+def test_fields_that_cannot_be_read_are_named(tmp_path: Path, field: str, said: str) -> None:
+    _description, found = parsed(tmp_path, [*HEAD, "K0001/1 1", field])
+    assert isinstance(found[0], Value)
+    assert str(aqdef_values.read_value(found[0])) == said

@@ -1,0 +1,155 @@
+"""AQDEF files as they are written: what comes back, here and by a reader that others have written."""
+# ruff: noqa: DTZ001 - the files name no zone
+
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from aqdefreader.file import DfqFile
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.files.formats import aqdef, aqdef_values
+from app.files.formats.aqdef import Source
+from app.files.formats.aqdef_values import Measured, Value
+from app.files.formats.aqdef_writer import Catalogues, Described, Part, Validity, Written, write
+
+BEGIN = datetime(2026, 11, 23, 6, 0, 0)
+PARTS = [Part("08/15", "Shaft", "lathe-1", "Lathe 1"), Part("4711", "Bush")]
+SEAT = Described(0, "shaft-d40", "Seat Ø40", 40.0, 39.984, 40.0, gauge="Probe")
+ROUNDNESS = Described(0, "shaft-rnd", "Roundness", None, 0.0, 0.005)
+BORE = Described(1, "bush-d8", "Bore", 8.0, 8.0, 8.015)
+CATALOGUES = Catalogues(
+    ["correction sent", "tool changed"],
+    [("lathe-1", "Lathe 1")],
+    [("probe", "Probe")],
+    ["Eva"],
+    ["offset", "correction"],
+)
+
+
+def read(path: Path) -> tuple[aqdef.Description, list[tuple[int, Measured]]]:
+    source = Source.at(path)
+    description = aqdef.describe(source)
+    found = []
+    for value in aqdef_values.values(source, description):
+        assert isinstance(value, Value)
+        measured = aqdef_values.read_value(value)
+        if measured is not None:
+            assert isinstance(measured, Measured)
+            found.append((value.characteristic, measured))
+    return description, found
+
+
+def values() -> list[Written]:
+    second = timedelta(seconds=1)
+    return [
+        Written(0, 39.9981, BEGIN, part="SN-1", events=("tool changed", "correction sent"), machine="lathe-1", gauge="probe",
+                process={"offset": -0.0061, "correction": 17}, operator="Eva", nest=2, order="A-7"),
+        Written(1, 0.0021, BEGIN + second, part="SN-1", order="A-7"),
+        Written(0, 41.2, BEGIN + second, Validity.IMPLAUSIBLE, part="SN-2"),
+        Written(2, 8.004, BEGIN + second, part="SN-3"),
+        Written(2, 8.005, BEGIN + second),
+        Written(0, 39.999, BEGIN + second),
+    ]  # fmt: skip
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "out.dfq"
+    done = write(path, PARTS, [SEAT, ROUNDNESS, BORE], values(), CATALOGUES)
+    assert (done.values, done.lines, done.remarks) == (6, 5, [])
+    assert [each.name for each in tmp_path.iterdir()] == ["out.dfq"]
+    assert path.read_bytes().count(b"\r\n") == path.read_bytes().count(b"\n")
+    description, found = read(path)
+    assert description.encoding == "cp1252"
+    seat, roundness, bore = description.characteristics.values()
+    assert (seat.name, seat.fields["K2110"], seat.fields["K2112"], seat.fields["K2120"]) == (
+        "Seat Ø40",
+        "39.984",
+        "-0.016",
+        "1",
+    )
+    assert (roundness.fields["K2120"], roundness.fields["K2121"], "K2101" in roundness.fields) == ("2", "1", False)
+    assert description.part_of(bore)["K1001"] == "4711"
+    assert [(at, each.measured, each.part) for at, each in found] == [
+        (1, 39.9981, "SN-1"), (2, 0.0021, "SN-1"), (1, 41.2, "SN-2"), (3, 8.004, "SN-3"), (3, 8.005, ""), (1, 39.999, ""),
+    ]  # fmt: skip
+    first = found[0][1]
+    assert (first.at, first.nest, first.order, first.process) == (BEGIN, 2, "A-7", "1/-0.0061,2/17")
+    assert [description.named("K4223", event) for event in first.events] == ["tool changed", "correction sent"]
+    assert (description.named("K4063", first.machine), description.named("K4073", first.gauge)) == ("Lathe 1", "Probe")
+    assert description.named("K4092", first.operator) == "Eva"
+    assert found[2][1].attribute == 290
+
+
+def test_another_reader_finds_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "out.dfq"
+    write(path, PARTS[:1], [SEAT, ROUNDNESS], [each for each in values() if each.characteristic < 2], CATALOGUES)
+    seat, roundness = DfqFile(path.read_text("cp1252").splitlines()).get_part(0).get_characteristics()
+    assert seat.get_data("K2002") == "Seat Ø40"
+    found = [
+        (each.value, each.attribute, each.datetime, each.nest_no, each.machine_no) for each in seat.get_measurements()
+    ]
+    later = BEGIN + timedelta(seconds=1)
+    assert found == [(39.9981, 0, BEGIN, 2, 1), (41.2, 290, later, 0, 0), (39.999, 0, later, 0, 0)]
+    first = seat.get_measurements()[0]
+    assert (first.event, first.process_parameter, first.control_no) == ("2,1", "1/-0.0061,2/17", 1)
+    assert [(each.value, each.datetime) for each in roundness.get_measurements()] == [(0.0021, later)]
+    capsys.readouterr()
+
+
+def test_texts_are_made_to_fit_and_it_is_said(tmp_path: Path) -> None:
+    long = "bearing-seat-of-the-main-shaft"
+    twice = [Described(0, f"{long}-{side}", "Ø\x0f40\x14", 40.0, 39.9, 40.1) for side in ("a", "b")]
+    path = tmp_path / "out.dfq"
+    done = write(path, [Part("1" * 31, "Шахта")], twice, [Written(0, 40.0, BEGIN, part="S;N\r\n1")], Catalogues())
+    description, found = read(path)
+    first, second = description.characteristics.values()
+    assert (first.number, second.number) == ("bearing-seat-of-the-", "bearing-seat-of-~2")
+    assert (first.name, found[0][1].part) == ("Ø 40", "S,N 1")
+    assert description.encoding == "utf-8-sig"
+    assert "K1001 holds 30 characters" in done.remarks[0]
+    assert any("has signs that K0014 cannot hold" in remark for remark in done.remarks)
+
+
+def test_nothing_is_left_where_it_fails(tmp_path: Path) -> None:
+    def failing() -> Any:
+        yield values()[0]
+        raise OSError("gone")
+
+    with pytest.raises(OSError, match="gone"):
+        write(tmp_path / "out.dfq", PARTS, [SEAT], failing(), CATALOGUES)
+    assert list(tmp_path.iterdir()) == []
+
+
+MOMENTS = st.integers(0, 20_000).map(lambda seconds: BEGIN + timedelta(seconds=seconds))
+WRITTEN = st.builds(
+    Written,
+    characteristic=st.integers(0, 2),
+    measured=st.floats(-1e5, 1e5).map(lambda value: round(value, 9) or 0.0),
+    at=MOMENTS,
+    validity=st.sampled_from(Validity),
+    part=st.one_of(st.just(""), st.sampled_from(["A", "B", "C"]), st.text("äЖx ;\x0f", max_size=50)),
+    events=st.lists(st.sampled_from(CATALOGUES.events), unique=True),
+    order=st.sampled_from(["", "A-7"]),
+    nest=st.integers(0, 12),
+    machine=st.sampled_from(["", "lathe-1"]),
+)
+
+
+@settings(max_examples=40)
+@given(st.lists(WRITTEN, max_size=30))
+def test_every_value_comes_back_in_its_order(tmp_path_factory: pytest.TempPathFactory, written: list[Written]) -> None:
+    path = tmp_path_factory.mktemp("aqdef") / "out.dfq"
+    write(path, PARTS, [SEAT, ROUNDNESS, BORE], written, CATALOGUES)
+    description, found = read(path)
+    for index in range(3):
+        mine = [each for each in written if each.characteristic == index]
+        back = [each for at, each in found if at == index + 1]
+        assert [(each.measured, each.attribute, each.at, each.nest, each.order) for each in back] == [
+            (each.measured, each.validity, each.at, each.nest, each.order) for each in mine
+        ]
+        assert [tuple(description.named("K4223", event) for event in each.events) for each in back] == [
+            tuple(each.events) for each in mine
+        ]
