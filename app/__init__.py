@@ -55,6 +55,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
     jobs             periodic background jobs, once a minute: run, retried, and those that fail
     db               PostgreSQL: engine, column types, migrations, the embedded server
     language         translation, and the writing of numbers, units and times
+    client           inband_client, which programs beside the machines call a server with; a distribution of its own
     core             the decisions themselves, pure: parameters R10-R37, zones, running average, statistics, geometry
 
     errors.py        every error that people or machines may see
