@@ -40,6 +40,7 @@ from app.loop.calibration import api as calibration
 from app.loop.calibration import jobs
 from app.loop.calibration import pages as calibration_pages
 from app.loop.characteristics import api as characteristics
+from app.loop.connections import api as connections_api
 from app.loop.faults import api as faults
 from app.loop.machines import api as machines
 from app.loop.machines import keys_api as machine_keys
@@ -114,6 +115,7 @@ from app.web.templates import assets
 ROUTERS: tuple[APIRouter, ...] = (
     machines.router,
     faults.router,
+    connections_api.router,
     characteristics.router,
     figures_api.router,
     statistics.router,

@@ -185,6 +185,19 @@ class Settings(BaseSettings):
     )
     session_hours: int = Field(default=12, ge=1, le=24 * 31, description="Hours until a browser must sign in again.")
 
+    bridge_silent_after: float = Field(
+        default=60.0,
+        ge=10,
+        le=86_400,
+        description="Seconds without a heartbeat after which a bridge counts as silent; the alarm comes within the next two minutes.",
+    )
+    bridge_backlog_after: float = Field(
+        default=300.0,
+        ge=10,
+        le=86_400 * 7,
+        description="Seconds that the oldest reading may wait in a bridge before it counts as backing up.",
+    )
+
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         default="info", description="The least that is logged: debug, info, warning or error."
     )

@@ -96,6 +96,7 @@ class ApiKey(Base):
     role: Mapped[str | None]
     machine_id: Mapped[int | None] = mapped_column(ForeignKey("machine.id"), index=True)
     created_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    last_used_at: Mapped[datetime | None]  # to the minute
     revoked_at: Mapped[datetime | None]
 
 

@@ -49,6 +49,7 @@ TAGS = {
     "forms": "Form and position of features from their touches: deviation, verdict, uncertainty, touches that do not belong.",
     "programs": "Program text of the controls: read, written, and fetched where a machine has no network.",
     "alarms": "What needs a person, and what that person did about it.",
+    "connections": "Bridges beside the machines: their heartbeats, how each machine is connected, and what waits there.",
     "machines": "The machines that push readings.",
     "characteristics": "What is measured, by which R parameters it is judged, and its charts.",
     "statistics": "What a run of readings amounts to.",

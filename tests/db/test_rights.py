@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Iterator
+from typing import Any
 
 import psycopg
 import pytest
@@ -29,6 +30,7 @@ PASSING = {
     "browser_session",
     "calibration_plan",
     "capability_verdict",
+    "connection",
     "event",
     "fixture",
     "invitation",
@@ -81,6 +83,9 @@ def test_a_role_that_only_writes_rows_serves(server: Server) -> None:
     shop = Shop(server)
     number = shop.read(60)["correction"]["number"]
     shop.call("POST", f"/corrections/{shop.machine}/{number}/applied", client=shop.machine_client)
+    heartbeat: dict[str, Any] = {"version": "1", "state": "online", "waiting": 0}
+    told = shop.call("POST", f"/machines/{shop.machine}/heartbeat", client=shop.machine_client, **heartbeat)
+    assert told["server"]["last_event"] > 0, "it may see where the server stands"
     with server.database.begin() as session:
         rights = rights_of(session.connection())
     assert (rights.role, rights.owner, rights.missing, rights.unprotected) == (ROLE, False, [], [])

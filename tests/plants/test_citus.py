@@ -115,6 +115,16 @@ class TestPlantOnANode:
     def test_pages_are_read_from_it(self, client: httpx.Client, path: str) -> None:
         assert client.get(path).status_code == 200
 
+    def test_a_heartbeat_hears_of_the_node_that_holds_the_plant(self, client: httpx.Client, coordinator: str) -> None:
+        push(client, 1)
+        beat = {"version": "1", "state": "online", "waiting": 0}
+        told = [client.post("/api/v1/machines/lathe-1/heartbeat", json=beat).json()["server"] for _ in range(2)]
+        with psycopg.connect(coordinator) as connection:
+            (newest,) = connection.execute("SELECT max(id) FROM far.event").fetchone() or (0,)
+            (own,) = connection.execute("SELECT (pg_control_system()).system_identifier::text").fetchone() or ("",)
+        assert told[0]["last_event"] >= newest
+        assert told[0]["system"] == told[1]["system"] != own
+
     def test_live_events_are_told_at_once(self, client: httpx.Client) -> None:
         threading.Timer(1, push, (client, 3)).start()
         with client.stream("GET", "/api/v1/events") as events:

@@ -124,3 +124,4 @@ class Correction(Base):
     fetched_at: Mapped[datetime | None]  # as program text, which may be run at any time from then on
     fetched_by: Mapped[str | None]
     fetched_as: Mapped[str | None]  # the form of the text and its check sum
+    mapping: Mapped[str | None]  # hash of the mapping by which a bridge converted it for the control

@@ -1,0 +1,168 @@
+"""Heartbeats and connections as JSON."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic_core import PydanticCustomError
+
+from app.core.parameters import MOST_LOCATIONS
+from app.language.i18n import _
+from app.web.fields import LARGEST_SERIAL, Body, Length, Moment, Text200, one_line
+
+ConnectionState = Literal[
+    "starting", "online", "control_away", "wrong_machine", "counters_lost", "full", "held", "configuration"
+]
+STATE_MEANS = (
+    "`starting`: nothing is known of the control yet; `online`: it answers; `control_away`: it does not; `wrong_machine`: "
+    "another machine answers; `counters_lost`: the counters of its ring began anew; `full`: the bridge's store is full and "
+    "nothing is fetched; `held`: it is on hold and writes nothing; `configuration`: the bridge cannot work as it is set up."
+)
+MOST_QUARANTINED = 20
+MOST_PLACES = 500
+_FIRST, _LAST = datetime(1970, 1, 2, tzinfo=UTC), datetime(2200, 1, 1, tzinfo=UTC)
+
+
+def _storable(moment: datetime) -> datetime:
+    if not _FIRST <= moment <= _LAST:
+        raise PydanticCustomError(
+            "moment", _("lies before 1970 or after 2200; check the clock of the bridge's computer")
+        )
+    return moment
+
+
+AnyMoment = Annotated[Moment, AfterValidator(_storable)]
+"""A time by a clock that may be wrong: a bridge is heard all the same."""
+Sentence = Annotated[str, StringConstraints(strip_whitespace=True, max_length=1000), AfterValidator(one_line)]
+Count = Annotated[int, Field(strict=True, ge=0, le=LARGEST_SERIAL)]
+MappingHash = Annotated[
+    Text200,
+    Field(max_length=64, description="Hash of the mapping by which the bridge converts; any text up to 64 characters."),
+]
+
+
+class LocationIn(BaseModel):
+    """One location of the tool memory in the bridge's mapping, and its touch test."""
+
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+    tool_memory: Annotated[int, Field(strict=True, ge=1, le=MOST_LOCATIONS, description="R10")]
+    mapping: MappingHash | None = None
+    proved_at: Annotated[
+        AnyMoment | None, Field(description="When the touch test proved this mapping; null: not yet.")
+    ] = None
+    offset: Annotated[Length | None, Field(description="The offset that the control held last, mm.")] = None
+
+
+class QuarantinedIn(BaseModel):
+    """A reading that the server has refused, and that the bridge keeps in its quarantine."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    key: Annotated[Text200, Field(description="Key of the reading.")]
+    characteristic: Annotated[Text200 | None, Field(description="Characteristic that it was sent for.")] = None
+    reason: Annotated[Sentence, Field(description="Why it was refused, in words.")]
+    at: Annotated[AnyMoment, Field(description="When.")]
+
+
+class HeartbeatIn(Body):
+    """Heartbeat of a bridge, every ten seconds. Fields that this server does not know are passed over."""
+
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+    version: Annotated[Text200, Field(description="Of the bridge.")]
+    state: Annotated[ConnectionState, Field(description=STATE_MEANS)]
+    detail: Annotated[Sentence | None, Field(description="One sentence of the bridge about this state.")] = None
+    waiting: Annotated[Count, Field(description="Readings that wait in the bridge.")]
+    oldest_waiting_at: Annotated[
+        AnyMoment | None, Field(description="When the oldest of them came in, by the bridge's clock.")
+    ] = None
+    sent_at: Annotated[
+        AnyMoment | None,
+        Field(
+            description="Now, by the bridge's clock: the age of the oldest counts from it. If left out, the server's."
+        ),
+    ] = None
+    quarantined: Annotated[Count, Field(description="Readings that the server has refused.")] = 0
+    quarantine: Annotated[
+        list[QuarantinedIn],
+        Field(default_factory=list, max_length=MOST_QUARANTINED, description="The newest of them, at most 20."),
+    ]
+    clock_offset: Annotated[
+        float | None, Field(ge=-1e9, le=1e9, description="The control's clock less the bridge's, s; null: unknown.")
+    ] = None
+    kind: Annotated[
+        Text200 | None, Field(max_length=32, description="How it reaches the control: opcua, haas, dprnt, ...")
+    ] = None
+    started_at: Annotated[AnyMoment | None, Field(description="When the bridge started, by its clock.")] = None
+    mapping: MappingHash | None = None
+    hold_all: Annotated[bool, Field(strict=True, description="true: it gives no correction to the control.")] = False
+    identity: Annotated[Text200 | None, Field(description="The serial number that the control has answered.")] = None
+    locations: Annotated[
+        list[LocationIn],
+        Field(default_factory=list, max_length=MOST_PLACES, description="What it may write to."),
+    ]
+
+
+class ServerOut(BaseModel):
+    """Mark of the server's database. After a restore or a failover one of the first two is another, or the last is
+    smaller than it was: then readings of the last minutes may be lost here, and the bridge sends them again by their keys.
+    """
+
+    system: Annotated[str, Field(description="PostgreSQL's system identifier.")]
+    timeline: Annotated[int, Field(description="Its timeline; each failover begins another.")]
+    last_event: Annotated[int, Field(description="Number of the last event.")]
+
+
+class HeartbeatOut(BaseModel):
+    """Answer to a heartbeat."""
+
+    received_at: datetime
+    server: ServerOut
+
+
+class LocationOut(BaseModel):
+    """One location of the tool memory in the bridge's mapping, and its touch test."""
+
+    tool_memory: int
+    mapping: str | None
+    proved_at: datetime | None
+    offset: float | None
+
+
+class QuarantinedOut(BaseModel):
+    """A reading that the server has refused."""
+
+    key: str
+    characteristic: str | None
+    reason: str
+    at: datetime
+
+
+class ConnectionOut(BaseModel):
+    """The connection of one machine, as its bridge told it last."""
+
+    machine: str
+    name: Annotated[str, Field(description="What people call the machine.")]
+    silent: Annotated[bool, Field(description="No heartbeat for longer than INBAND_BRIDGE_SILENT_AFTER.")]
+    age: Annotated[float, Field(description="Seconds since the last heartbeat.")]
+    received_at: datetime
+    state: Annotated[ConnectionState, Field(description=STATE_MEANS)]
+    since: Annotated[datetime, Field(description="Since when it is in this state.")]
+    detail: Annotated[str | None, Field(description="What the bridge said of it.")]
+    error: Annotated[str | None, Field(description="The last error, in the bridge's words; it may be over.")]
+    error_at: datetime | None
+    version: str
+    kind: str | None
+    started_at: datetime | None
+    waiting: int
+    oldest_waiting_at: datetime | None
+    oldest_waiting: Annotated[float | None, Field(description="Age of the oldest reading that waits, s.")]
+    backing_up: Annotated[bool, Field(description="It waits longer than INBAND_BRIDGE_BACKLOG_AFTER, or is full.")]
+    quarantined: int
+    quarantine: list[QuarantinedOut]
+    clock_offset: float | None
+    mapping: str | None
+    hold_all: bool
+    identity: str | None
+    locations: list[LocationOut]
