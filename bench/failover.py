@@ -4,7 +4,8 @@ Three PostgreSQL servers (quorum `ANY 1`), two `inband serve`, 16 machines that 
 server that is written to is killed (SIGKILL, all of its processes), the standby that has received most is promoted, and
 the old one comes back by pg_rewind. At the end every answered reading has to be in the record once, the numbers without
 gaps, and the corrections those of a replay. With --asynchronous no commit waits for a standby: machines that see their
-numbers go back send again what was answered. ``python -m bench.failover [--rounds 10] [--asynchronous]``
+numbers go back send again what was answered. With --patroni the servers are Patroni's, which promotes and rewinds by itself;
+`patroni` and `etcd` have to be installed. ``python -m bench.failover [--rounds 10] [--asynchronous | --patroni]``
 """
 
 import argparse
@@ -18,7 +19,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, TypeVar
 
 import httpx
 
@@ -26,7 +27,8 @@ from app.access.keys import add_key
 from app.core.parameters import read
 from app.db.engine import Database
 from bench.plant import free_port, wait_until_ready
-from tests.db.clusters import Cluster, cluster, wait_for
+from tests.db.clusters import cluster, wait_for
+from tests.db.managed import MISSING, managed
 from tests.loop.readings.load import Sender, all_at_once, scattered
 from tests.loop.readings.record import history, must_be_stored, must_hold, must_replay
 from tests.shop import PARAMETERS
@@ -34,6 +36,40 @@ from tests.shop import PARAMETERS
 MACHINES, SPINDLES = 4, 4
 AT_WORK = 1.0  # s of load before each kill
 BEHIND = 0.3  # s that an asynchronous standby lacks when the other server ends
+PATIENCE = 180.0  # s that a machine sends a reading again: Patroni promotes nobody before its key has run out
+
+
+class Node(Protocol):
+    """One server."""
+
+    data_dir: Path
+
+    @property
+    def url(self) -> str:
+        """Of the database on this server."""
+
+
+AnyNode = TypeVar("AnyNode", bound=Node)
+
+
+class Servers(Protocol[AnyNode]):
+    """Servers, one of which is written to."""
+
+    quorum: bool
+    primary: AnyNode
+    url: str
+
+    def fall_behind(self) -> None:
+        """Nothing more leaves the one that is written to."""
+
+    def kill(self, node: AnyNode, /) -> None:
+        """Kill it, as if the computer had gone."""
+
+    def promote(self) -> AnyNode:
+        """Let another be written to, or wait until one is."""
+
+    def rejoin(self, node: AnyNode, /) -> str:
+        """Bring it back as a standby; what pg_rewind said."""
 
 
 class Round(NamedTuple):
@@ -57,7 +93,9 @@ class Result(NamedTuple):
     longest: float
 
 
-def play(servers: Cluster, urls: Sequence[str], rounds: int, *, at_work: float = AT_WORK, run: str = "m") -> Result:
+def play(
+    servers: Servers[AnyNode], urls: Sequence[str], rounds: int, *, at_work: float = AT_WORK, run: str = "m"
+) -> Result:
     """Play so many rounds on servers that run, with `inband serve` at these addresses, and check the record.
 
     Raises `AssertionError` for a reading that is lost or doubled, a gap, a decision that a replay does not take.
@@ -93,7 +131,7 @@ def names(run: str) -> list[str]:
     return [f"{run}{machine}-s{spindle}" for machine in range(MACHINES) for spindle in range(SPINDLES)]
 
 
-def crew(servers: Cluster, urls: Sequence[str], run: str) -> list[Sender]:
+def crew(servers: Servers[AnyNode], urls: Sequence[str], run: str) -> list[Sender]:
     """Set up the machines; one sender for each characteristic, which has its tool and its average to itself."""
     database = Database(servers.url, pool_size=1)
     with database.begin() as session:
@@ -121,13 +159,18 @@ def crew(servers: Cluster, urls: Sequence[str], run: str) -> list[Sender]:
     database.close()
     return [
         Sender(
-            urls[at % len(urls)], keys[name.partition("-")[0]], scattered(name, 10_000_000, at), pause=0.01, alone=True
+            urls[at % len(urls)],
+            keys[name.partition("-")[0]],
+            scattered(name, 10_000_000, at),
+            patience=PATIENCE,
+            pause=0.01,
+            alone=True,
         )
         for at, name in enumerate(names(run))
     ]
 
 
-def one(servers: Cluster, senders: list[Sender], ended: Callable[[], bool]) -> Round:
+def one(servers: Servers[AnyNode], senders: list[Sender], ended: Callable[[], bool]) -> Round:
     """Kill, promote, bring back."""
     old, before = servers.primary, sum(len(sender.answers) for sender in senders)
     if not servers.quorum:
@@ -148,11 +191,11 @@ def served(senders: list[Sender], ended: Callable[[], bool]) -> None:
     wait_for(
         lambda: ended() or all(len(s.answers) > count + 1 for s, count in zip(senders, before, strict=True)),
         "everybody is served",
-        120,
+        PATIENCE,
     )
 
 
-def check(servers: Cluster, senders: list[Sender], run: str) -> int:
+def check(servers: Servers[AnyNode], senders: list[Sender], run: str) -> int:
     """Check the record on the server that is written to, and count its corrections."""
     url = servers.primary.url
     must_be_stored(url, [answer for sender in senders for answer in sender.answers])
@@ -163,16 +206,9 @@ def check(servers: Cluster, senders: list[Sender], run: str) -> int:
     return sum(must_replay(read(PARAMETERS)[0], history(url, name)) for name in names(run))
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=10)
-    parser.add_argument("--asynchronous", action="store_true")
-    arguments = parser.parse_args()
+def behind_two(servers: Servers[AnyNode], folder: Path, rounds: int) -> Result:
+    """Play the rounds with two `inband serve` of their own."""
     with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="inband-")))
-        folder.chmod(0o711)
-        servers = stack.enter_context(cluster(folder))
-        servers.ask_for(quorum=not arguments.asynchronous)
         urls = []
         for number in range(2):
             port = free_port()
@@ -187,7 +223,29 @@ def main() -> None:
             stack.callback(process.terminate)
             urls.append(f"http://127.0.0.1:{port}")
             wait_until_ready(urls[-1], process)
-        result = play(servers, urls, arguments.rounds)
+        return play(servers, urls, rounds)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=10)
+    parser.add_argument("--asynchronous", action="store_true")
+    parser.add_argument("--patroni", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.patroni and MISSING:
+        parser.error(f"--patroni needs {' and '.join(MISSING)}. Install the packages patroni and etcd-server.")
+    if arguments.patroni and arguments.asynchronous:
+        parser.error("--asynchronous is not for --patroni: Patroni promotes nobody who lacks what was answered.")
+    with tempfile.TemporaryDirectory(prefix="inband-") as name:
+        folder = Path(name)
+        folder.chmod(0o711)
+        if arguments.patroni:
+            with managed(folder) as kept:
+                result = behind_two(kept, folder, arguments.rounds)
+        else:
+            with cluster(folder) as servers:
+                servers.ask_for(quorum=not arguments.asynchronous)
+                result = behind_two(servers, folder, arguments.rounds)
     print("round  promoted  answered before  seconds until all were served again  pg_rewind")
     for number, each in enumerate(result.rounds, 1):
         last = each.rewound.strip().splitlines()[-1:] or ["-"]
