@@ -50,6 +50,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         tables           the tables of the loop: one schema under one lock
     access           people, sign-in, sessions, roles, keys, the record of changes
 
+    bridge           the program beside machines that cannot speak REST; it speaks the public API like any client
     web              the browser kit: templates, problem pages, live events
     files            file formats in and out; reports as picture, PDF, spreadsheet, CSV, JSON
     charts           what a chart shows, described once; drawn in the browser and on paper

@@ -12,7 +12,8 @@ What makes it safe:
 * a slot counts when its two sequence numbers agree and its check sum fits, so that a slot read while it is being written is
   left for the next time (the NC clears ``seq``, writes the payload, ``check``, ``seq2``, and ``seq`` last);
 * the NC does not write while all slots wait for the acknowledgement, so that nothing is overwritten unseen;
-* the number of a correction is written last, and the NC answers each number once.
+* the number of a correction is written last, and the NC answers each number once: an offset that is already the wanted one
+  counts as set, so that a power loss between setting and answering does no harm.
 """
 
 from collections.abc import Sequence
@@ -83,7 +84,10 @@ class Unit(IntEnum):
 
 
 class Answer(IntEnum):
-    """The answer of the NC program to a number in the mailbox."""
+    """The answer of the NC program to a number in the mailbox.
+
+    After ``CHECK_WRONG`` and ``ON_HOLD`` the number stays unanswered: the NC looks at it again the next time.
+    """
 
     APPLIED = 0
     OFFSET_DIFFERS = 1
@@ -278,9 +282,9 @@ def to_fetch(block: Block, stored: int) -> tuple[Slot, ...]:
     """The readings after the last stored one that follow without a gap, oldest first.
 
     stored: the highest contiguous sequence stored. A slot that is still being written ends the row: it and those after it
-    are left for the next time.
+    are left for the next time. So is a slot beyond ``written``: after a power loss the NC writes that sequence again.
     """
-    later = [slot for slot in block.slots if slot.sequence > stored]
+    later = [slot for slot in block.slots if stored < slot.sequence <= block.written]
     if not later or later[0].sequence != stored + 1:
         return ()
     last = 1

@@ -1,0 +1,16 @@
+"""The bridge: one process beside machines that cannot speak REST.
+
+It fetches readings from the controls, keeps them durably, sends them to the server, and brings corrections back. It speaks
+the public API through ``inband_client`` and imports nothing of the server.
+
+    configuration    one TOML file: the server, the machines, what each number of a control means
+    links            what a kind of control has to do for the bridge, and how it says what failed
+    registers        ring, mailbox and direct writes, for every control whose registers can be read and written
+    kinds            the protocols, one module each
+    store            readings kept until the server has them, corrections on their way, the quarantine: SQLite
+    guards           the bridge's own limits for a correction, whatever the server says
+    control_side     the task that talks to one control
+    server_side      the task that talks to the server for one machine
+    program          all machines together, each with its own tasks
+    simulators       one model of a machine, behind each protocol
+"""

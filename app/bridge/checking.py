@@ -1,0 +1,86 @@
+"""The check of a configuration against the server and the controls: nothing is changed anywhere."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from typing import NamedTuple
+
+from inband_client import AsyncClient, Forbidden, NotFound, ProblemError, Unauthorized
+
+from app.bridge.configuration import Configuration, Machine
+from app.bridge.links import LinkError, Position
+from app.bridge.program import link_of
+
+
+class Finding(NamedTuple):
+    """One line: about what, what was found, and whether it is good."""
+
+    about: str
+    words: str
+    good: bool
+
+    def __str__(self) -> str:
+        """Mark, subject, sentence."""
+        return f"{'✓' if self.good else '✗'} {self.about}: {self.words}"
+
+
+async def check(configuration: Configuration) -> list[Finding]:
+    """What the server says to each key, and what each control answers; machines are asked at the same time."""
+    found = await asyncio.gather(*(_of_machine(configuration, machine) for machine in configuration.machines))
+    return [finding for findings in found for finding in findings]
+
+
+async def _of_machine(configuration: Configuration, machine: Machine) -> list[Finding]:
+    return [finding async for finding in _server(configuration, machine)] + [
+        finding async for finding in _control(machine)
+    ]
+
+
+async def _server(configuration: Configuration, machine: Machine) -> AsyncIterator[Finding]:
+    url = configuration.server.url
+    async with AsyncClient(url, machine.secret, verify=configuration.server.ca or True, patience=0.0) as client:
+        try:
+            await client.get(f"/machines/{machine.key}")
+            yield Finding(machine.key, f"the server {url} knows the machine and its key", True)
+            for number, key in machine.characteristics.items():
+                try:
+                    found = await client.get(f"/characteristics/{key}")
+                except NotFound:
+                    yield Finding(machine.key, f"characteristic {number} = {key!r} does not exist at the server", False)
+                    continue
+                if found["machine"] != machine.key:
+                    words = f"characteristic {number} = {key!r} belongs to {found['machine']}"
+                    yield Finding(machine.key, words, False)
+                elif machine.corrections != "none" and found["parameters"]["tool_memory"] not in {
+                    location.tool_memory for location in machine.location
+                }:
+                    memory = found["parameters"]["tool_memory"]
+                    yield Finding(
+                        machine.key, f"{key} corrects tool memory {memory}, which has no location here", False
+                    )
+        except (Unauthorized, Forbidden) as error:
+            yield Finding(machine.key, f"the server refuses the key: {error.detail} Make a new one in Set-up.", False)
+        except ProblemError as error:
+            yield Finding(machine.key, f"the server {url}: {error.detail}", False)
+
+
+async def _control(machine: Machine) -> AsyncIterator[Finding]:
+    link = link_of(machine)
+    try:
+        async with asyncio.timeout(machine.patience):
+            identity = await link.connect()
+        if machine.identity not in {None, identity}:
+            yield Finding(machine.key, f"machine {identity!r} answers at this address, not {machine.identity!r}", False)
+            return
+        named = "" if machine.identity else f"; put identity = {identity!r} into the configuration"
+        yield Finding(machine.key, f"the control answers as {identity!r}{named}", True)
+        async with asyncio.timeout(machine.patience):
+            received = await link.fetch(Position())
+            yield Finding(machine.key, f"{len(received)} readings wait at the control", True)
+            for memory, offset in (await link.offsets()).items():
+                yield Finding(machine.key, f"tool memory {memory} holds {offset:.4f} mm", True)
+    except TimeoutError:
+        yield Finding(machine.key, f"the control has not answered for {machine.patience:g} s", False)
+    except LinkError as error:
+        yield Finding(machine.key, str(error), False)
+    finally:
+        await link.close()

@@ -1,0 +1,87 @@
+"""The task that talks to one control: readings into the store, corrections offered, answers noted."""
+
+import asyncio
+import logging
+import time
+
+from app.bridge.links import LinkError, WrongMachine
+from app.bridge.store import StoreError
+from app.bridge.unit import Unit
+
+log = logging.getLogger(__name__)
+FIRST_PAUSE, LONGEST_PAUSE = 0.5, 15.0  # s between attempts to connect
+OFFSETS_EVERY = 10.0  # s: an operator's edit is noticed within this time
+FULL_EVERY = 5.0  # s
+
+
+async def run(unit: Unit) -> None:
+    """Work with the control until cancelled; whatever fails is said, and tried again."""
+    pause = FIRST_PAUSE
+    while True:
+        began = unit.polls
+        try:
+            await _connected(unit)
+        except (LinkError, StoreError) as error:
+            unit.say(error.state if isinstance(error, LinkError) else "full", str(error))
+        except TimeoutError:
+            unit.say("control_away", f"The control has not answered for {unit.machine.patience:g} s.")
+        except Exception as error:
+            log.exception("%s", unit.machine.key)
+            unit.say("control_away", f"{type(error).__name__}: {error}")
+        finally:
+            await _closed(unit)
+        pause = FIRST_PAUSE if unit.polls > began else min(2 * pause, LONGEST_PAUSE)
+        await asyncio.sleep(pause)
+
+
+async def _closed(unit: Unit) -> None:
+    try:
+        async with asyncio.timeout(unit.machine.patience):
+            await unit.link.close()
+    except Exception:
+        log.exception("%s: closing the connection", unit.machine.key)
+
+
+async def _connected(unit: Unit) -> None:
+    machine, link, store = unit.machine, unit.link, unit.store
+    async with asyncio.timeout(machine.patience):
+        unit.identity = await link.connect()
+    if machine.identity is not None and unit.identity != machine.identity:
+        raise WrongMachine(
+            f"At this address machine {unit.identity!r} answers, not {machine.identity!r}: look at address and network."
+            " Nothing is fetched or written."
+        )
+    position = await store.position(machine.key)
+    answered: int | None = None
+    offsets_at = full_at = 0.0
+    full = False
+    while True:
+        if time.monotonic() >= full_at:
+            full, full_at = store.is_full, time.monotonic() + FULL_EVERY
+        if full:
+            raise StoreError(
+                f"The store holds {store.largest / 1e6:g} MB, its largest size: nothing is fetched until the server has"
+                " taken readings. They wait at the control."
+            )
+        async with asyncio.timeout(machine.patience):
+            received = await link.fetch(position)
+        if received:
+            await store.add(machine.key, received)
+            position = received[-1].position or position
+            unit.news.set()
+            async with asyncio.timeout(machine.patience):
+                await link.acknowledge(received)
+        async with asyncio.timeout(machine.patience):
+            for outcome in await link.outcomes():
+                if outcome.number != answered and await store.answered(machine.key, outcome):
+                    unit.news.set()
+                answered = outcome.number
+            await link.offer(unit.orders)
+        if time.monotonic() >= offsets_at:
+            async with asyncio.timeout(machine.patience):
+                if offsets := await link.offsets():
+                    await store.held(machine.key, offsets)
+            offsets_at = time.monotonic() + OFFSETS_EVERY
+        unit.polls += 1
+        unit.say("held" if unit.hold_all else "online", " ".join(unit.held_back))
+        await asyncio.sleep(machine.interval)

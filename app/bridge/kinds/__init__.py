@@ -1,0 +1,35 @@
+"""Kinds of controls, by the name that the configuration gives them.
+
+Each module has ``Settings`` (a msgspec Struct: the kind's own table), ``link(machine)``, and ``NUMBERED = True`` where the
+control knows characteristics by numbers. It is imported when a machine needs it: some need a library that is an extra.
+"""
+
+from importlib import import_module
+from types import ModuleType
+from typing import Final
+
+KINDS: Final[dict[str, str]] = {}
+"""Names and modules."""
+EXTRAS: Final = {"opcua": "opcua", "mqtt": "mqtt", "heidenhain": "heidenhain"}
+"""Kinds that need an extra of the package."""
+
+
+class KindError(ValueError):
+    """A kind that does not exist, or whose library is not installed."""
+
+
+def kind_named(name: str) -> ModuleType:
+    """The module of a kind.
+
+    Raises `KindError`.
+    """
+    if name not in KINDS:
+        raise KindError(f"kind = {name!r} is not known; known are {', '.join(sorted(KINDS))}.")
+    try:
+        return import_module(KINDS[name])
+    except ModuleNotFoundError as error:
+        if name not in EXTRAS:
+            raise
+        raise KindError(
+            f"kind = {name!r} needs {error.name}, which is not installed. Install inband[{EXTRAS[name]}]."
+        ) from error

@@ -1,0 +1,132 @@
+"""The interface between the bridge and a kind of control, and the errors that a kind reports.
+
+Lengths are mm in Inband's sense on this side: a kind, or `app.bridge.registers` for it, converts by the location's mapping.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+
+class LinkError(Exception):
+    """A control cannot be worked with now. The words say what is wrong and what to do; ``state`` is the heartbeat's."""
+
+    state: ClassVar[str] = "control_away"
+
+
+class ControlAway(LinkError):
+    """No connection, or no answer; tried again by itself."""
+
+
+class WrongMachine(LinkError):
+    """Another machine answers at this address."""
+
+    state = "wrong_machine"
+
+
+class CountersLost(LinkError):
+    """The control's counters went back or lost readings; a person has to look."""
+
+    state = "counters_lost"
+
+
+class Misconfigured(LinkError):
+    """The control does not know what the configuration names, or works in another unit."""
+
+    state = "configuration"
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """How far the ring of a control has been stored.
+
+    epoch: None before the first contact. generation: counts how often a person has accepted counters that went back.
+    """
+
+    epoch: int | None = None
+    sequence: int = 0
+    generation: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """One reading as it came from a control.
+
+    key: names it for ever. body: the reading as ``POST /readings`` takes it, without the key. position: in the ring, where
+    the control has one. fault: a sentence why it is no reading for the server; it goes to the quarantine. mark: what the
+    kind needs to acknowledge it.
+    """
+
+    key: str
+    body: dict[str, Any]
+    position: Position | None = None
+    fault: str | None = None
+    mark: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """A correction that the control is to take: absolute offsets before and after it, mm."""
+
+    number: int
+    tool_memory: int
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of an order. offset: the one that the control holds now, mm, None where it does not say.
+
+    differs: the offset was neither the one before the correction nor the one after it.
+    """
+
+    number: int
+    applied: bool
+    offset: float | None = None
+    reason: str = ""
+    differs: bool = False
+
+
+@dataclass(slots=True)
+class Clock:
+    """The control's clock minus the bridge's, seconds; None until it is known."""
+
+    offset: float | None = None
+
+
+class Link(Protocol):
+    """One control. Calls come one at a time; a call that fails raises `LinkError`, and the link is connected anew."""
+
+    clock: Clock
+
+    async def connect(self) -> str:
+        """Connect, and answer the control's identity: a serial number, or what is nearest to one."""
+
+    async def close(self) -> None:
+        """Disconnect; never raises."""
+
+    async def fetch(self, stored: Position) -> Sequence[Received]:
+        """New readings, oldest first; empty if there are none. They stay at the control until they are acknowledged."""
+
+    async def acknowledge(self, received: Sequence[Received]) -> None:
+        """Say that these are stored durably."""
+
+    async def offer(self, orders: Sequence[Order]) -> None:
+        """Make these known to the control, oldest first, and no others. Offering the same again changes nothing."""
+
+    async def outcomes(self) -> Sequence[Outcome]:
+        """What the control has answered last. May repeat itself."""
+
+    async def offsets(self) -> dict[int, float]:
+        """The offsets that the control holds, by tool memory, mm; empty where they cannot be read."""
+
+
+class OffsetAccess(Protocol):
+    """A link that can write an offset directly: needed for the touch test, and for ``corrections = "direct"``."""
+
+    async def read_offset(self, tool_memory: int) -> float:
+        """The offset, mm."""
+
+    async def write_offset(self, tool_memory: int, offset: float) -> None:
+        """Set the offset, mm."""

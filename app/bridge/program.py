@@ -1,0 +1,70 @@
+"""The whole program: all machines of a configuration, each with its own tasks."""
+
+import asyncio
+import contextlib
+import logging
+from pathlib import Path
+
+from inband_client import AsyncClient
+
+from app.bridge import control_side, server_side
+from app.bridge.configuration import Configuration, Machine
+from app.bridge.kinds import kind_named
+from app.bridge.links import Link
+from app.bridge.store import Store, StoreError
+from app.bridge.unit import Unit
+
+log = logging.getLogger(__name__)
+TIDY_EVERY = 600.0  # s
+
+
+def link_of(machine: Machine) -> Link:
+    """The link to a machine's control."""
+    link: Link = kind_named(machine.kind).link(machine)
+    return link
+
+
+def store_of(configuration: Configuration) -> Store:
+    """The store that the configuration names. Raises `StoreError`."""
+    return Store(Path(configuration.store.file), configuration.store.largest)
+
+
+async def run(configuration: Configuration, store: Store) -> None:
+    """Run all machines until cancelled."""
+    async with contextlib.AsyncExitStack() as stack:
+        tasks = []
+        for machine in configuration.machines:
+            client = await stack.enter_async_context(
+                AsyncClient(
+                    configuration.server.url,
+                    machine.secret,
+                    verify=configuration.server.ca or True,
+                    patience=0.0,
+                )
+            )
+            unit = Unit(machine, link_of(machine), store, configuration.hold_all)
+            for name, work in (
+                ("control", control_side.run(unit)),
+                ("server", server_side.run(unit, client, configuration.server)),
+                ("heartbeat", server_side.beat(unit, client, configuration.server)),
+            ):
+                tasks.append(asyncio.create_task(work, name=f"{machine.key} {name}"))
+        tasks.append(asyncio.create_task(_tidy(store, configuration.store.keep * 3600), name="tidy"))
+        log.info("%d machines, server %s", len(configuration.machines), configuration.server.url)
+        try:
+            await asyncio.gather(*tasks)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def _tidy(store: Store, keep: float) -> None:
+    while True:
+        try:
+            deleted = await store.tidy(keep)
+            if deleted:
+                log.info("deleted %d readings that the server has had for %g h", deleted, keep / 3600)
+        except StoreError as error:
+            log.warning("%s", error)
+        await asyncio.sleep(TIDY_EVERY)

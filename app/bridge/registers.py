@@ -1,0 +1,344 @@
+"""Ring, mailbox and direct writes, for every control whose registers and tool offsets can be read and written."""
+
+import asyncio
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from typing import Protocol
+
+from app.bridge.configuration import Location, Machine
+from app.bridge.guards import location_of
+from app.bridge.links import (
+    Clock,
+    ControlAway,
+    CountersLost,
+    Misconfigured,
+    Order,
+    Outcome,
+    Position,
+    Received,
+)
+from app.core.ring import (
+    FIRST_SLOT,
+    INCH,
+    SIZE,
+    SLOT_SIZE,
+    SLOTS,
+    Answer,
+    Block,
+    BlockError,
+    Mail,
+    Register,
+    Slot,
+    Status,
+    Unit,
+    mail_registers,
+    read_block,
+    slot_of,
+    to_fetch,
+    went_back,
+)
+
+HEADS = tuple(range(FIRST_SLOT))
+FRESH = 2.0  # polls: a reading that was not there so long ago was measured just now
+DAY = 86_400.0  # s
+FAULTS = {
+    Status.NO_TRIGGER: "The probe did not trigger (status 1): there is no size.",
+    Status.MARKED: "The NC program has marked the reading as not valid (status 3).",
+}
+REFUSALS = {
+    Answer.OFFSET_DIFFERS: "The control holds another offset than expected.",
+    Answer.NOT_POSSIBLE: "The control has no such tool, edge or offset (answer 3).",
+    Answer.STEP_TOO_LARGE: "The step is larger than the NC program allows (answer 4).",
+}
+
+
+class Registers(Protocol):
+    """A control's registers. Places count from 0, from the block's first register; values are the control's own."""
+
+    whole: bool
+    """Whether one read brings the whole block; else only what is needed is read."""
+
+    async def connect(self) -> str:
+        """Connect, and answer the control's identity. Raises `LinkError`, as all do."""
+
+    async def close(self) -> None:
+        """Disconnect; never raises."""
+
+    async def read(self, places: Sequence[int]) -> list[float]:
+        """Registers of the block, in the order of the places."""
+
+    async def write(self, place: int, value: float) -> None:
+        """Write one register of the block."""
+
+    async def read_offset(self, location: Location) -> float | None:
+        """The control's offset of a location, in its own unit and sense; None where it cannot be read."""
+
+    async def write_offset(self, location: Location, value: float) -> None:
+        """Set the control's offset of a location."""
+
+    async def against_writing(self, location: Location) -> str | None:
+        """A reason why the offset must not be written now (program running, tool in use); None if it may be."""
+
+
+class RegisterLink:
+    """A control with a register block: a `Link` and an `OffsetAccess`."""
+
+    def __init__(self, machine: Machine, registers: Registers) -> None:
+        self.machine = machine
+        self.registers = registers
+        self.clock = Clock()
+        self._block: Block | None = None
+        self._polled: tuple[datetime, int] | None = None
+        self._direct: list[Outcome] = []
+
+    async def connect(self) -> str:
+        """Connect, and answer the control's identity."""
+        self._block = self._polled = None
+        self._direct = []
+        return await self.registers.connect()
+
+    async def close(self) -> None:
+        """Disconnect."""
+        await self.registers.close()
+
+    # --- readings
+
+    async def fetch(self, stored: Position) -> Sequence[Received]:
+        """The readings in the ring that follow the last stored one."""
+        now = datetime.now().astimezone()
+        block = self._block = await self._read(stored.sequence)
+        known = stored.epoch is not None
+        if not known:  # the first contact: what is acknowledged was fetched by somebody before
+            first = max(min(block.ack, block.written), block.written - SLOTS)
+            stored = Position(block.epoch, first, stored.generation)
+        if reason := went_back(block, stored.sequence, stored.epoch):
+            raise CountersLost(
+                f"{reason} Look at the control, then run “inband bridge accept-counters {self.machine.key}”."
+            )
+        slots = to_fetch(block, stored.sequence)
+        fresh = (
+            self._polled is not None
+            and (now - self._polled[0]).total_seconds() < FRESH * self.machine.interval + 1
+            and block.written - self._polled[1] <= 1
+        )
+        received = [self._received(slot, stored, now, fresh=fresh) for slot in slots]
+        self._polled = (now, slots[-1].sequence if slots else stored.sequence)
+        if known and not slots and block.ack != stored.sequence:
+            await self._write(Register.ACK, stored.sequence)  # the acknowledgement was lost
+        return received
+
+    async def acknowledge(self, received: Sequence[Received]) -> None:
+        """Write the highest stored sequence where the NC waits for it, and read it back."""
+        if received and (last := received[-1].position):
+            await self._write(Register.ACK, last.sequence)
+
+    async def _read(self, stored: int) -> Block:
+        """The block; from a control that is read number by number only the heads and the slots that matter."""
+        if self.registers.whole:
+            registers = await self.registers.read(range(SIZE))
+        else:
+            registers = [0.0] * SIZE
+            registers[:FIRST_SLOT] = await self.registers.read(HEADS)
+            written = round(registers[Register.WRITTEN])
+            for sequence in range(max(stored + 1, written - SLOTS + 1), written + 1):
+                first = FIRST_SLOT + SLOT_SIZE * slot_of(sequence)
+                registers[first : first + SLOT_SIZE] = await self.registers.read(range(first, first + SLOT_SIZE))
+        try:
+            block = read_block(registers)
+        except BlockError as error:
+            raise Misconfigured(str(error)) from error
+        says = {Unit.MM: "mm", Unit.INCH: "inch"}.get(Unit(block.unit)) if block.unit in {1, 2} else None
+        if says != self.machine.unit:
+            raise Misconfigured(
+                f"The control says that it works in {says or f'unit {block.unit}'}, the configuration says unit ="
+                f" {self.machine.unit!r}. Nothing is fetched or corrected until they agree."
+            )
+        return block
+
+    def _received(self, slot: Slot, stored: Position, now: datetime, *, fresh: bool) -> Received:
+        characteristic = self.machine.characteristics.get(str(slot.characteristic))
+        measured = slot.measured * (INCH if self.machine.unit == "inch" else 1.0)
+        body: dict[str, object] = {
+            "characteristic": characteristic,
+            "measured": round(measured, 9),
+            "correction_in_effect": slot.in_effect,
+        }
+        if slot.part:
+            body["part"] = str(slot.part)
+        if slot.status == Status.FIRST_MOVE:
+            body["first_move_triggered"] = True
+        if at := self._measured_at(slot, now, fresh=fresh):
+            body["measured_at"] = at.isoformat()
+        fault = (
+            FAULTS.get(Status(slot.status)) if slot.status in list(Status) else f"Status {slot.status} is not known."
+        )
+        if characteristic is None:
+            fault = (
+                f"The control sends characteristic {slot.characteristic}, which machine.{self.machine.key}.characteristics"
+                " does not name."
+            )
+        position = Position(stored.epoch, slot.sequence, stored.generation)
+        again = f".{stored.generation}" if stored.generation else ""  # counters that went back name new readings
+        return Received(f"{self.machine.key}:{stored.epoch}{again}:{slot.sequence}", body, position, fault)
+
+    def _measured_at(self, slot: Slot, now: datetime, *, fresh: bool) -> datetime | None:
+        """When it was measured: now if it was not there at the last poll; else by the control's clock, if that is known."""
+        if slot.time is not None and fresh:
+            midnight = now.replace(hour=0, minute=0, second=0, microsecond=0)
+            ahead = slot.time - (now - midnight).total_seconds()
+            self.clock.offset = (ahead + DAY / 2) % DAY - DAY / 2
+        if fresh:
+            return now
+        if slot.time is None or self.clock.offset is None:
+            return None
+        there = now + timedelta(seconds=self.clock.offset)
+        at = there.replace(hour=0, minute=0, second=0, microsecond=0) + timedelta(seconds=slot.time)
+        at -= timedelta(seconds=self.clock.offset)
+        return min(at, now) if at <= now + timedelta(seconds=5) else at - timedelta(days=1)
+
+    # --- corrections
+
+    async def offer(self, orders: Sequence[Order]) -> None:
+        """Put the oldest order into the mailbox, or write it directly; take back what is no longer wanted."""
+        if self.machine.corrections == "none":
+            return
+        if self.machine.corrections == "direct":
+            for order in orders[:1]:
+                await self._set_directly(order)
+            return
+        block = self._block
+        if block is None:
+            return
+        open_number = block.mail.number if block.mail.number != block.answered else 0
+        wanted = orders[0] if orders else None
+        if wanted is None:
+            if open_number:
+                await self._write(Register.MAIL_NUMBER, block.answered)
+            return
+        if block.answered == wanted.number:
+            return
+        if open_number == wanted.number and block.answer != Answer.CHECK_WRONG:
+            return
+        if (
+            open_number
+        ):  # a newer one waits for the next poll: first the old one is taken back, and its answer looked for
+            await self._write(Register.MAIL_NUMBER, block.answered)
+            return
+        for place, value in mail_registers(self._mail(wanted)):
+            await self._write(place, value)
+
+    def _mail(self, order: Order) -> Mail:
+        location = location_of(self.machine, order.tool_memory)
+        assert location is not None  # the guards have seen to it
+        unit = self.machine.unit
+        return Mail(
+            order.number,
+            location.tool,
+            location.edge,
+            self.parameter(location),
+            round(location.to_control(order.before, unit), 6),
+            round(location.to_control(order.after, unit), 6),
+        )
+
+    def parameter(self, location: Location) -> int:
+        """The number by which the NC program knows the register."""
+        numbered = getattr(self.registers, "parameter", None)
+        return numbered(location) if numbered else 1
+
+    async def outcomes(self) -> Sequence[Outcome]:
+        """The NC program's last answer, or those of direct writes."""
+        if self._direct:
+            return list(self._direct)
+        block = self._block
+        if block is None or not block.answered or self.machine.corrections != "control":
+            return []
+        held = self._held_after(block)
+        if block.answer == Answer.APPLIED:
+            return [Outcome(block.answered, applied=True, offset=held)]
+        if block.answer not in set(REFUSALS):
+            return []
+        reason = REFUSALS[Answer(block.answer)]
+        return [Outcome(block.answered, False, held, reason, block.answer == Answer.OFFSET_DIFFERS)]
+
+    def _held_after(self, block: Block) -> float | None:
+        """The offset after the last answer, if the mailbox still says which location it was about."""
+        if block.mail.number != block.answered:
+            return None
+        for location in self.machine.location:
+            same = (block.mail.tool, block.mail.edge) == (location.tool, location.edge)
+            if same and self.parameter(location) == block.mail.parameter:
+                return location.from_control(block.offset, self.machine.unit)
+        return None
+
+    async def _set_directly(self, order: Order) -> None:
+        """Compare and set: the offset before becomes the one after; anything else is left alone and reported.
+
+        Run again after a crash it reads first: an offset that is already the one after is only reported.
+        """
+        if any(outcome.number == order.number for outcome in self._direct):
+            return
+        location = location_of(self.machine, order.tool_memory)
+        assert location is not None  # the guards have seen to it
+        before, after = (location.to_control(value, self.machine.unit) for value in (order.before, order.after))
+        tolerance = abs(location.to_control(self.machine.tolerance, self.machine.unit))
+        held = await self._offset_of(location)
+        if abs(held - before) <= tolerance < abs(held - after):
+            if await self.registers.against_writing(location):
+                return
+            await self.registers.write_offset(location, round(after, 6))
+            await asyncio.sleep(self.machine.interval)  # a control shows a new value only after its next sampling tick
+            held = await self._offset_of(location)
+        offset = location.from_control(held, self.machine.unit)
+        if abs(held - after) <= tolerance:
+            await self._write(Register.APPLIED, order.number)
+            self._direct = [Outcome(order.number, applied=True, offset=offset)]
+        else:
+            reason = f"The control holds {held:.4f}, expected was {before:.4f}."
+            self._direct = [Outcome(order.number, False, offset, reason, differs=True)]
+
+    # --- offsets
+
+    async def offsets(self) -> dict[int, float]:
+        """Every location's offset, mm."""
+        found = {}
+        for location in self.machine.location:
+            value = await self.registers.read_offset(location)
+            if value is not None:
+                found[location.tool_memory] = location.from_control(value, self.machine.unit)
+        return found
+
+    async def read_offset(self, tool_memory: int) -> float:
+        """The offset of one location, mm."""
+        location = self._location(tool_memory)
+        return location.from_control(await self._offset_of(location), self.machine.unit)
+
+    async def write_offset(self, tool_memory: int, offset: float) -> None:
+        """Set the offset of one location, mm. Raises `ControlAway` where it must not be written now."""
+        location = self._location(tool_memory)
+        if reason := await self.registers.against_writing(location):
+            raise ControlAway(reason)
+        await self.registers.write_offset(location, round(location.to_control(offset, self.machine.unit), 6))
+
+    def _location(self, tool_memory: int) -> Location:
+        location = location_of(self.machine, tool_memory)
+        if location is None:
+            raise Misconfigured(f"Tool memory {tool_memory} has no location in the configuration.")
+        return location
+
+    async def _offset_of(self, location: Location) -> float:
+        value = await self.registers.read_offset(location)
+        if value is None:
+            raise Misconfigured(
+                f'The offset of tool {location.tool}, {location.register}, cannot be read: use corrections = "control".'
+            )
+        return value
+
+    async def _write(self, place: Register, value: float) -> None:
+        """Write a register of the block and read it back."""
+        await self.registers.write(place, float(value))
+        [found] = await self.registers.read([place])
+        if abs(found - value) > max(2e-6, 2e-7 * abs(value)):  # eight digits, six decimals
+            raise ControlAway(
+                f"Register +{int(place)} ({place.name.lower()}) holds {found:g} after {value:g} was written: may the"
+                " bridge write it, and does another program?"
+            )

@@ -1,0 +1,274 @@
+"""The tasks that talk to the server for one machine: readings up, corrections down, the heartbeat."""
+
+import asyncio
+import contextlib
+import json
+import logging
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from inband_client import (
+    AsyncClient,
+    Conflict,
+    Correction,
+    Forbidden,
+    Invalid,
+    NotFound,
+    ProblemError,
+    TooLarge,
+    Unauthorized,
+    Unavailable,
+)
+
+from app import __version__
+from app.bridge.configuration import Server
+from app.bridge.guards import against
+from app.bridge.links import Order
+from app.bridge.store import Intent, StoreError, Waiting
+from app.bridge.unit import Unit
+
+log = logging.getLogger(__name__)
+REFUSED = (Conflict, Invalid, NotFound, TooLarge)
+SHORTEST_PAUSE, LONGEST_PAUSE = 1.0, 30.0  # s
+AWAY = (Unauthorized, Forbidden, Unavailable)
+TOGETHER = 100  # readings of a backlog in one request
+NOTICED = 0.0005  # mm: what an offset may differ by without being told
+
+
+async def run(unit: Unit, client: AsyncClient, server: Server) -> None:
+    """Send what waits, bring corrections, until cancelled; whatever fails is said, and tried again."""
+    while True:
+        unit.news.clear()
+        pause, trouble, away = server.ask, None, False
+        for step in (_tell, _forward, _ask):
+            try:
+                await step(unit, client)
+            except Exception as error:  # noqa: BLE001 - said below; one step that fails holds up no other
+                waits, trouble = _sentence(unit, error)
+                pause = max(pause, waits)
+                if away := isinstance(error, AWAY):
+                    break
+        unit.complain(trouble)
+        if away:
+            await asyncio.sleep(pause)
+            continue
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(pause):
+                await unit.news.wait()
+
+
+def _sentence(unit: Unit, error: Exception) -> tuple[float, str]:
+    """Seconds to wait, and what is wrong in words."""
+    match error:
+        case Unauthorized() | Forbidden():
+            return LONGEST_PAUSE, (
+                f"The server refuses the key of {unit.machine.key}: {error.detail} Make a new key in Set-up, Machines."
+            )
+        case Unavailable():
+            waits = min(max(error.retry_after or SHORTEST_PAUSE, SHORTEST_PAUSE), LONGEST_PAUSE)
+            return waits, f"The server does not answer: {error.detail}"
+        case ProblemError() | StoreError():
+            return LONGEST_PAUSE, str(error)
+    log.error("%s", unit.machine.key, exc_info=error)
+    return LONGEST_PAUSE, f"{type(error).__name__}: {error}"
+
+
+# --- readings
+
+
+async def _forward(unit: Unit, client: AsyncClient) -> None:
+    """Everything that waits, oldest first."""
+    while rows := await unit.store.waiting(unit.machine.key, TOGETHER):
+        if len(rows) > 1:
+            try:
+                await client.push_many([row.body | {"key": row.key} for row in rows])
+            except REFUSED:
+                pass  # one of them: each by itself, below
+            else:
+                await unit.store.sent(unit.machine.key, [row.id for row in rows])
+                continue
+        for row in rows:
+            await _push(unit, client, row)
+
+
+async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> None:
+    try:
+        await client.push(row.body | {"key": row.key})
+    except REFUSED as error:
+        await unit.store.refuse(unit.machine.key, row.id, str(error))
+        log.warning("%s: reading %s is in the quarantine: %s", unit.machine.key, row.key, error)
+    else:
+        await unit.store.sent(unit.machine.key, [row.id])
+
+
+# --- corrections
+
+
+async def _tell(unit: Unit, client: AsyncClient) -> None:
+    """The control's answers, and offsets that somebody has changed at the control."""
+    key = unit.machine.key
+    for intent in await unit.store.intents(key, "answered"):
+        await _tell_one(unit, client, intent)
+        await unit.store.set_intent(key, intent.order.number, "told")
+    for tool_memory, offset in (await unit.store.untold(key, NOTICED)).items():
+        await client.report_offset(key, tool_memory, round(offset, 6))
+        await unit.store.told(key, tool_memory, offset)
+
+
+async def _tell_one(unit: Unit, client: AsyncClient, intent: Intent) -> None:
+    key, order, outcome = unit.machine.key, intent.order, intent.outcome
+    assert outcome is not None  # it is answered
+    held = None if outcome.offset is None else round(outcome.offset, 6)
+    try:
+        if outcome.applied:
+            await client.confirm(key, order.number, offset_after=held, mapping=intent.mapping)
+            return
+    except Conflict as error:  # it was superseded while the control took it
+        log.warning("%s: correction %d is in the offset, but %s", key, order.number, error)
+    else:
+        if not outcome.differs:
+            await client.reject(key, order.number, outcome.reason)
+            return
+    if held is not None:
+        await client.report_offset(key, order.tool_memory, held)
+
+
+async def _ask(unit: Unit, client: AsyncClient) -> None:
+    """The pending corrections, through the guards; what the control may have, and why others wait."""
+    machine, store = unit.machine, unit.store
+    if machine.corrections == "none":
+        return
+    pending = await client.pending(machine.key)
+    closed = {intent.order.number for intent in await store.intents(machine.key, "told")}
+    known = await store.known(machine.key)
+    held = (
+        unit.hold_all
+        or await store.fact("", "hold_all") is not None
+        or await store.fact(machine.key, "hold") is not None
+    )
+    orders: list[Order] = []
+    waiting: list[str] = []
+    now = datetime.now(UTC)
+    for correction in pending:
+        order = _order(correction)
+        if correction.number in closed:
+            await client.reject(
+                machine.key, order.number, "The control has refused this correction; its offset was reported."
+            )
+            continue
+        verdict = against(order, correction.created_at or now, now, machine, known, held)
+        if verdict is None:
+            orders.append(order)
+        elif verdict.final:
+            await client.reject(machine.key, order.number, verdict.reason)
+        else:
+            waiting.append(verdict.reason)
+            break  # the order of corrections is theirs: what stands behind waits too
+    unit.held_back = tuple(waiting)
+    await _intend(unit, orders)
+
+
+async def _intend(unit: Unit, orders: Sequence[Order]) -> None:
+    """Note what is offered before the control hears of it, and what is taken back."""
+    key = unit.machine.key
+    wanted = {order.number for order in orders}
+    for intent in await unit.store.intents(key, "open"):
+        if intent.order.number not in wanted:
+            await unit.store.set_intent(key, intent.order.number, "withdrawn")
+    for order in orders[:1]:
+        location = next(place for place in unit.machine.location if place.tool_memory == order.tool_memory)
+        await unit.store.intend(key, order, unit.machine.mapping_hash(location))
+    unit.orders = tuple(orders[:1])
+
+
+def _order(correction: Correction) -> Order:
+    after = correction.offset_expected or 0.0
+    return Order(correction.number, correction.tool_memory, round(after - correction.amount, 6), round(after, 6))
+
+
+# --- heartbeat
+
+
+async def beat(unit: Unit, client: AsyncClient, server: Server) -> None:
+    """Tell the server how the machine is doing, until cancelled; and send again what it may have lost."""
+    while True:
+        try:
+            answer = await client.heartbeat(unit.machine.key, **await heartbeat(unit))
+            await _look_back(unit, answer.get("server") or {})
+        except ProblemError as error:
+            log.debug("%s: heartbeat: %s", unit.machine.key, error)
+        except Exception:
+            log.exception("%s: heartbeat", unit.machine.key)
+        await asyncio.sleep(server.heartbeat)
+
+
+async def heartbeat(unit: Unit) -> dict[str, Any]:
+    """The fields of a heartbeat."""
+    machine, store = unit.machine, unit.store
+    counts = await store.counts(machine.key)
+    known = await store.known(machine.key)
+    quarantine = await store.quarantine(machine.key) if counts.quarantined else []
+    locations = []
+    for location in machine.location:
+        here = known.get(location.tool_memory)
+        mapping = machine.mapping_hash(location)
+        proved = here is not None and here.proved == mapping
+        locations.append(
+            {
+                "tool_memory": location.tool_memory,
+                "mapping": mapping,
+                "proved_at": _moment(here.proved_at) if here is not None and proved else None,
+                "offset": None if here is None else here.offset,
+            }
+        )
+    return {
+        "version": __version__,
+        "kind": machine.kind,
+        "state": unit.state,
+        "detail": unit.detail or unit.trouble,
+        "waiting": counts.waiting,
+        "oldest_waiting_at": _moment(counts.oldest),
+        "quarantined": counts.quarantined,
+        "quarantine": [
+            {
+                "key": each.key,
+                "characteristic": each.body.get("characteristic"),
+                "reason": each.reason[:500],
+                "at": _moment(each.at),
+            }
+            for each in quarantine
+        ],
+        "clock_offset": unit.link.clock.offset,
+        "started_at": unit.started_at,
+        "mapping": machine.mapping_hash(),
+        "hold_all": unit.hold_all,
+        "identity": unit.identity,
+        "locations": locations,
+    }
+
+
+def _moment(seconds: float | None) -> datetime | None:
+    return None if seconds is None else datetime.fromtimestamp(seconds, UTC)
+
+
+async def _look_back(unit: Unit, server: dict[str, Any]) -> None:
+    """Let readings wait again that a server has had which is not that one any more: restored, or failed over.
+
+    Keys make it harmless: what the server still has is answered as before.
+    """
+    if not server:
+        return
+    key = unit.machine.key
+    seen = json.loads(await unit.store.fact(key, "server") or "null")
+    if seen is not None:
+        changed = [seen.get(name) for name in ("system", "timeline")] != [
+            server.get(name) for name in ("system", "timeline")
+        ]
+        if changed or (server.get("last_event") or 0) < (seen.get("last_event") or 0):
+            again = await unit.store.send_again(key)
+            log.warning(
+                "%s: the server went back in time (restored or failed over): %d readings are sent again", key, again
+            )
+            unit.news.set()
+    await unit.store.note(key, "server", json.dumps(server))

@@ -1,0 +1,33 @@
+"""Simulated controls: one model of a machine, behind each protocol. For trying, for the demonstration plant, and for tests.
+
+Each module has ``serve(model, port)``, which answers a `Simulator`.
+"""
+
+from importlib import import_module
+from types import ModuleType
+from typing import Final, Protocol
+
+SIMULATORS: Final[dict[str, str]] = {}
+"""Kinds that can be simulated, and the module of each."""
+
+
+class Simulator(Protocol):
+    """A simulated control that is running."""
+
+    port: int
+
+    def table(self) -> dict[str, object]:
+        """What a machine's table in the configuration needs to reach it: ``kind``, the kind's own table, and more."""
+
+    async def stop(self) -> None:
+        """End it."""
+
+
+def simulator_named(name: str) -> ModuleType:
+    """The module of a simulator.
+
+    Raises `LookupError` for a kind that has none; `ModuleNotFoundError` where a library is not installed.
+    """
+    if name not in SIMULATORS:
+        raise LookupError(f"No simulated control of kind {name!r}; there are {', '.join(sorted(SIMULATORS))}.")
+    return import_module(SIMULATORS[name])

@@ -1,0 +1,244 @@
+"""One model of a machine: registers, tool offsets, the NC program, a person at the panel, and power that may fail.
+
+The NC program is a generator that stops after every register it writes: whoever drives it decides what happens in between – a
+bridge that reads half a slot, a power loss, an operator. What the model has measured and applied, it remembers as the truth
+that a test compares with. Offsets and sizes are in the control's unit.
+"""
+
+import asyncio
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Final, NamedTuple
+
+from app.core.ring import (
+    FIRST_SLOT,
+    HIGHEST_EPOCH,
+    INCH,
+    LAYOUT,
+    SIZE,
+    SLOT_SIZE,
+    SLOTS,
+    Answer,
+    Field,
+    Register,
+    Slot,
+    Status,
+    Unit,
+    mail_check,
+    read_block,
+    slot_of,
+    slot_registers,
+)
+
+Steps = Iterator[None]
+TOLERANCE: Final = 0.0006
+"""The NC program takes an offset for the expected one within this, in the control's unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Feature:
+    """A characteristic that the machine cuts and measures.
+
+    number: in the ring. register: the offset it is cut with; parameter: its number in the mailbox. holds: diameter or radius,
+    as in a location. wear: growth of the size per part; noise: standard deviation of a measurement.
+    """
+
+    number: int = 1
+    nominal: float = 40.0
+    tool: int = 3
+    edge: int = 1
+    register: str = "wear_length_1"
+    parameter: int = 1
+    holds: str = "diameter"
+    sign: int = 1
+    bias: float = 0.004
+    wear: float = 0.0004
+    noise: float = 0.0008
+
+
+class Applied(NamedTuple):
+    """A correction that the NC program has put into an offset."""
+
+    number: int
+    before: float
+    after: float
+
+
+@dataclass(slots=True)
+class Model:
+    """A machine. battery: registers and offsets survive a power loss."""
+
+    features: tuple[Feature, ...] = (Feature(),)
+    unit: Unit = Unit.MM
+    serial: str = "SIM-0001"
+    seed: int = 1
+    clock_ahead: float = 0.0
+    registers: list[float] = field(default_factory=lambda: [0.0] * SIZE)
+    offsets: dict[tuple[int, int, str], float] = field(default_factory=dict)
+    in_effect: dict[int, int] = field(default_factory=dict)
+    parts: int = 0
+    running: bool = False
+    tool_in_spindle: int = 0
+    on_hold: bool = False
+    written: list[tuple[int, Slot]] = field(default_factory=list)
+    applied: list[Applied] = field(default_factory=list)
+    refused: list[tuple[int, Answer]] = field(default_factory=list)
+    edits: list[tuple[tuple[int, int, str], float]] = field(default_factory=list)
+    chance: random.Random = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Seed the noise, and set every offset to 0."""
+        self.chance = random.Random(self.seed)  # noqa: S311 - noise of a measurement
+        for feature in self.features:
+            self.offsets.setdefault(_place(feature), 0.0)
+
+    # --- the NC program
+
+    def part(self) -> Steps:
+        """One part: take a correction, cut, measure every characteristic, write the readings."""
+        self.running = True
+        yield from self.set_up()
+        yield from self.take_correction()
+        self.parts += 1
+        for feature in self.features:
+            self.tool_in_spindle = feature.tool
+            self.in_effect[feature.tool] = round(self.registers[Register.APPLIED])
+            yield
+            yield from self.send(feature.number, self.size(feature), feature.tool)
+        self.tool_in_spindle = 0
+        self.running = False
+
+    def set_up(self) -> Steps:
+        """Begin a new epoch where the counters are 0; the layout is written last."""
+        if self.registers[Register.LAYOUT] == LAYOUT:
+            return
+        for place, value in (
+            (Register.EPOCH, self.chance.randint(1, HIGHEST_EPOCH)),
+            (Register.UNIT, self.unit),
+            (Register.LAYOUT, LAYOUT),
+        ):
+            self.registers[place] = float(value)
+            yield
+
+    def send(self, characteristic: int, measured: float, tool: int, status: int = Status.GOOD) -> Steps:
+        """Write a reading into the ring: wait for a free slot, payload, check sum, sequence last."""
+        while self.registers[Register.WRITTEN] - self.registers[Register.ACK] >= SLOTS:
+            yield
+        sequence = round(self.registers[Register.WRITTEN]) + 1
+        slot = Slot(
+            sequence,
+            characteristic,
+            round(measured, 6),
+            self.in_effect.get(tool, 0),
+            self.parts,
+            tool,
+            status,
+            self._time_of_day(),
+        )
+        first = FIRST_SLOT + SLOT_SIZE * slot_of(sequence)
+        content = slot_registers(slot)
+        self.registers[first + Field.SEQ] = 0.0
+        yield
+        for place in (*range(Field.CHARACTERISTIC, Field.CHECK), Field.CHECK, Field.SEQ2):
+            self.registers[first + place] = content[place]
+            yield
+        self.registers[first + Field.SEQ] = float(sequence)
+        yield
+        self.written.append((round(self.registers[Register.EPOCH]), slot))
+        self.registers[Register.WRITTEN] = float(sequence)
+        yield
+
+    def take_correction(self) -> Steps:
+        """Take the mailbox at a safe point. Whatever is answered is answered once; the number last."""
+        block = read_block(self.registers)
+        mail = block.mail
+        if mail.number in {0, block.answered}:
+            return
+        yield
+        if abs(mail_check(mail) - block.mail_check) > 1.5:
+            self.registers[Register.ANSWER] = Answer.CHECK_WRONG
+            return
+        if self.on_hold:
+            self.registers[Register.ANSWER] = Answer.ON_HOLD
+            return
+        place = self._mailed(mail.tool, mail.edge, mail.parameter)
+        if place is None:
+            yield from self._answer(mail.number, Answer.NOT_POSSIBLE, 0.0)
+            return
+        held = self.offsets[place]
+        tolerance = TOLERANCE / (INCH if self.unit == Unit.INCH else 1.0)
+        if abs(held - mail.expected) > tolerance and abs(held - mail.value) > tolerance:
+            yield from self._answer(mail.number, Answer.OFFSET_DIFFERS, held)
+            return
+        if abs(held - mail.value) > tolerance or not self._has_applied(mail.number):
+            self.offsets[place] = mail.value
+            self.applied.append(Applied(mail.number, held, mail.value))
+            yield
+        self.registers[Register.APPLIED] = float(mail.number)
+        yield
+        yield from self._answer(mail.number, Answer.APPLIED, self.offsets[place])
+
+    def _answer(self, number: int, answer: Answer, held: float) -> Steps:
+        if answer is not Answer.APPLIED:
+            self.refused.append((number, answer))
+        self.registers[Register.OFFSET] = held
+        yield
+        self.registers[Register.ANSWER] = float(answer)
+        yield
+        self.registers[Register.ANSWERED] = float(number)
+        yield
+
+    def _has_applied(self, number: int) -> bool:
+        return bool(self.applied) and self.applied[-1].number == number
+
+    def _mailed(self, tool: int, edge: int, parameter: int) -> tuple[int, int, str] | None:
+        for feature in self.features:
+            if (feature.tool, feature.edge, feature.parameter) == (tool, edge, parameter):
+                return _place(feature)
+        return None
+
+    def size(self, feature: Feature) -> float:
+        """The size that is cut and measured now, in the control's unit: nominal, wear of the tool, and its offset."""
+        scale = INCH if self.unit == Unit.INCH else 1.0
+        offset = self.offsets[_place(feature)] * feature.sign * (2.0 if feature.holds == "radius" else 1.0)
+        error = feature.bias + feature.wear * self.parts + self.chance.gauss(0.0, feature.noise)
+        return feature.nominal / scale + error / scale + offset
+
+    def _time_of_day(self) -> float:
+        now = datetime.now()  # noqa: DTZ005 - a control knows no zone
+        seconds = now.hour * 3600 + now.minute * 60 + now.second
+        return float(round(seconds + self.clock_ahead) % 86_400)
+
+    # --- what happens to a machine
+
+    def edit(self, place: tuple[int, int, str], offset: float) -> None:
+        """Set an offset by hand at the panel."""
+        self.offsets[place] = offset
+        self.edits.append((place, offset))
+
+    def power_loss(self, *, battery: bool = True) -> None:
+        """Stop the program wherever it stands; without a battery every register is 0 afterwards."""
+        self.running = False
+        self.tool_in_spindle = 0
+        if not battery:
+            self.registers[:] = [0.0] * SIZE
+
+    def truth(self) -> dict[str, float]:
+        """Every reading that was written completely: key in the ring (epoch:sequence) and size."""
+        return {f"{epoch}:{slot.sequence}": slot.measured for epoch, slot in self.written}
+
+
+def _place(feature: Feature) -> tuple[int, int, str]:
+    return feature.tool, feature.edge, feature.register
+
+
+async def live(model: Model, cycle: float) -> None:
+    """Make parts, one every ``cycle`` seconds, until cancelled."""
+    while True:
+        for _ in model.part():
+            await asyncio.sleep(
+                0 if model.registers[Register.WRITTEN] - model.registers[Register.ACK] < SLOTS else 0.05
+            )
+        await asyncio.sleep(cycle)

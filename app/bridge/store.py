@@ -1,0 +1,458 @@
+"""The store: readings until the server has them, corrections on their way to the control, the quarantine. SQLite.
+
+Everything is durable (WAL, ``synchronous=FULL``) when a call returns. Calls that come together share one commit: a thread of
+its own takes whatever waits, writes it in one transaction, and lets all of them go on.
+"""
+
+import asyncio
+import json
+import queue
+import sqlite3
+import threading
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final, NamedTuple, TypeVar
+
+from app.bridge.guards import Known
+from app.bridge.links import Order, Outcome, Position, Received
+
+T = TypeVar("T")
+SCHEMA: Final = """
+CREATE TABLE IF NOT EXISTS reading (
+    id INTEGER PRIMARY KEY, machine TEXT NOT NULL, key TEXT NOT NULL, body TEXT NOT NULL,
+    state TEXT NOT NULL CHECK (state IN ('waiting', 'sent', 'quarantined')),
+    reason TEXT, at REAL NOT NULL, sent_at REAL, UNIQUE (machine, key)
+);
+CREATE INDEX IF NOT EXISTS reading_state ON reading (machine, state, id);
+CREATE INDEX IF NOT EXISTS reading_sent ON reading (sent_at) WHERE state = 'sent';
+CREATE TABLE IF NOT EXISTS ring (
+    machine TEXT PRIMARY KEY, epoch INTEGER, sequence INTEGER NOT NULL, generation INTEGER NOT NULL
+);
+CREATE TABLE IF NOT EXISTS intent (
+    machine TEXT NOT NULL, number INTEGER NOT NULL, tool_memory INTEGER NOT NULL, before REAL NOT NULL, after REAL NOT NULL,
+    mapping TEXT NOT NULL, state TEXT NOT NULL CHECK (state IN ('open', 'answered', 'told', 'withdrawn')),
+    applied INTEGER, held REAL, differs INTEGER, reason TEXT, at REAL NOT NULL, PRIMARY KEY (machine, number)
+);
+CREATE TABLE IF NOT EXISTS location (
+    machine TEXT NOT NULL, tool_memory INTEGER NOT NULL, held REAL, told REAL, proved TEXT, proved_at REAL,
+    PRIMARY KEY (machine, tool_memory)
+);
+CREATE TABLE IF NOT EXISTS fact (machine TEXT NOT NULL, name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (machine, name));
+"""
+PAGE_ROWS: Final = 200
+ALL: Final = ""
+"""The machine of facts that hold for all."""
+
+
+class StoreError(Exception):
+    """The store cannot be written: disk full, no rights, damaged. Nothing was acknowledged to a control."""
+
+
+class Waiting(NamedTuple):
+    """A reading that the server does not have yet."""
+
+    id: int
+    key: str
+    body: dict[str, Any]
+    at: float
+
+
+class Quarantined(NamedTuple):
+    """A reading that the server, or the bridge, refuses, with the reason. at: when it came, seconds since 1970."""
+
+    key: str
+    body: dict[str, Any]
+    reason: str
+    at: float
+
+
+class Counts(NamedTuple):
+    """Readings of a machine: waiting, when the oldest of them came, quarantined."""
+
+    waiting: int
+    oldest: float | None
+    quarantined: int
+
+
+class Intent(NamedTuple):
+    """A correction that was made known to the control. mapping: the hash it was converted by."""
+
+    order: Order
+    state: str
+    mapping: str
+    outcome: Outcome | None
+
+
+class Store:
+    """The store in one file. All methods may be called from any thread; those that are awaited, from one event loop."""
+
+    def __init__(self, file: Path, largest: float = 500.0) -> None:
+        """file: made if it is missing. largest: MB. Raises `StoreError`."""
+        self.file = file
+        self.largest = largest * 1e6
+        self._jobs: queue.SimpleQueue[tuple[Callable[[sqlite3.Connection], Any], Future[Any]] | None] = (
+            queue.SimpleQueue()
+        )
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            self._database = sqlite3.connect(file, isolation_level=None, check_same_thread=False, timeout=10)
+            self._database.execute("PRAGMA journal_mode=WAL")
+            self._database.execute("PRAGMA synchronous=FULL")
+            self._database.executescript(SCHEMA)
+        except (OSError, sqlite3.Error) as error:
+            raise StoreError(
+                f"The store {file} cannot be opened: {error}. It needs a folder that can be written."
+            ) from error
+        self._thread = threading.Thread(target=self._work, name="store", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Write what waits, and close."""
+        self._jobs.put(None)
+        self._thread.join()
+        self._database.close()
+
+    # --- readings
+
+    async def add(self, machine: str, received: Sequence[Received]) -> int:
+        """Store readings of a machine and how far its ring is stored, durably; the number of new ones.
+
+        A key that is known stays as it is: nothing comes twice.
+        """
+        now = time.time()
+
+        def write(database: sqlite3.Connection) -> int:
+            rows = [
+                (machine, each.key, json.dumps(each.body), "quarantined" if each.fault else "waiting", each.fault, now)
+                for each in received
+            ]
+            before = database.total_changes
+            database.executemany(
+                "INSERT INTO reading (machine, key, body, state, reason, at) VALUES (?, ?, ?, ?, ?, ?)"
+                " ON CONFLICT (machine, key) DO NOTHING",
+                rows,
+            )
+            added = database.total_changes - before
+            if last := received[-1].position:
+                database.execute(
+                    "INSERT INTO ring (machine, epoch, sequence, generation) VALUES (?, ?, ?, ?)"
+                    " ON CONFLICT (machine) DO UPDATE SET epoch = excluded.epoch, sequence = excluded.sequence",
+                    (machine, last.epoch, last.sequence, last.generation),
+                )
+            return added
+
+        return await self._run(write) if received else 0
+
+    async def waiting(self, machine: str, most: int = 100) -> list[Waiting]:
+        """The oldest readings that the server does not have yet."""
+        rows = await self._run(
+            lambda database: database.execute(
+                "SELECT id, key, body, at FROM reading WHERE machine = ? AND state = 'waiting' ORDER BY id LIMIT ?",
+                (machine, most),
+            ).fetchall()
+        )
+        return [Waiting(number, key, json.loads(body), at) for number, key, body, at in rows]
+
+    async def sent(self, machine: str, numbers: Sequence[int]) -> None:
+        """The server has these."""
+        now = time.time()
+        await self._run(
+            lambda database: database.executemany(
+                "UPDATE reading SET state = 'sent', sent_at = ?, reason = NULL WHERE machine = ? AND id = ?",
+                [(now, machine, number) for number in numbers],
+            )
+        )
+
+    async def refuse(self, machine: str, number: int, reason: str) -> None:
+        """Put one into the quarantine."""
+        await self._run(
+            lambda database: database.execute(
+                "UPDATE reading SET state = 'quarantined', reason = ? WHERE machine = ? AND id = ?",
+                (reason, machine, number),
+            )
+        )
+
+    async def send_again(self, machine: str) -> int:
+        """Let everything wait again that the server had: it went back in time. How many."""
+        return await self._run(
+            lambda database: (
+                database.execute(
+                    "UPDATE reading SET state = 'waiting', sent_at = NULL WHERE machine = ? AND state = 'sent'",
+                    (machine,),
+                ).rowcount
+            )
+        )
+
+    async def quarantine(self, machine: str, most: int = 20) -> list[Quarantined]:
+        """The quarantine, newest first."""
+        rows = await self._run(
+            lambda database: database.execute(
+                "SELECT key, body, reason, at FROM reading WHERE machine = ? AND state = 'quarantined' ORDER BY id DESC LIMIT ?",
+                (machine, most),
+            ).fetchall()
+        )
+        return [Quarantined(key, json.loads(body), reason, at) for key, body, reason, at in rows]
+
+    async def release(self, machine: str, key: str | None, *, drop: bool) -> int:
+        """Send one of the quarantine (all with None) again, or drop it. How many."""
+        chosen = "machine = ? AND state = 'quarantined'" + ("" if key is None else " AND key = ?")
+        values = (machine,) if key is None else (machine, key)
+        statement = (
+            f"DELETE FROM reading WHERE {chosen}"  # noqa: S608 - chosen is one of two texts above
+            if drop
+            else f"UPDATE reading SET state = 'waiting', reason = NULL WHERE {chosen}"  # noqa: S608
+        )
+        return await self._run(lambda database: database.execute(statement, values).rowcount)
+
+    async def counts(self, machine: str) -> Counts:
+        """How many wait, since when, and how many are in the quarantine."""
+        rows = await self._run(
+            lambda database: database.execute(
+                "SELECT state, count(*), min(at) FROM reading WHERE machine = ? AND state <> 'sent' GROUP BY state",
+                (machine,),
+            ).fetchall()
+        )
+        found = {state: (number, oldest) for state, number, oldest in rows}
+        waiting, oldest = found.get("waiting", (0, None))
+        return Counts(waiting, oldest, found.get("quarantined", (0, None))[0])
+
+    async def position(self, machine: str) -> Position:
+        """How far the ring of the machine is stored."""
+        row = await self._run(
+            lambda database: database.execute(
+                "SELECT epoch, sequence, generation FROM ring WHERE machine = ?", (machine,)
+            ).fetchone()
+        )
+        return Position(*row) if row else Position()
+
+    async def accept_counters(self, machine: str) -> None:
+        """Take whatever the control counts at the next contact as its new beginning: a person has looked."""
+        await self._run(
+            lambda database: database.execute(
+                "UPDATE ring SET epoch = NULL, sequence = 0, generation = generation + 1 WHERE machine = ?", (machine,)
+            )
+        )
+
+    async def tidy(self, keep: float) -> int:
+        """Delete what the server has had for ``keep`` seconds. How many."""
+        before = time.time() - keep
+        return await self._run(
+            lambda database: (
+                database.execute("DELETE FROM reading WHERE state = 'sent' AND sent_at < ?", (before,)).rowcount
+            )
+        )
+
+    @property
+    def is_full(self) -> bool:
+        """Whether what is stored has reached its largest size. Space that was freed counts as free."""
+        with suppress(sqlite3.Error):
+            [pages], [free], [size] = (
+                self._database.execute(f"PRAGMA {name}").fetchone()
+                for name in ("page_count", "freelist_count", "page_size")
+            )
+            return bool((pages - free) * size >= self.largest)
+        return False
+
+    # --- corrections
+
+    async def intend(self, machine: str, order: Order, mapping: str) -> None:
+        """Note a correction before the control hears of it. One that was withdrawn may be offered again."""
+        await self._run(
+            lambda database: database.execute(
+                "INSERT INTO intent (machine, number, tool_memory, before, after, mapping, state, at)"
+                " VALUES (?, ?, ?, ?, ?, ?, 'open', ?) ON CONFLICT (machine, number) DO UPDATE"
+                " SET state = 'open', before = excluded.before, after = excluded.after, mapping = excluded.mapping"
+                " WHERE state = 'withdrawn'",
+                (machine, order.number, order.tool_memory, order.before, order.after, mapping, time.time()),
+            )
+        )
+
+    async def answered(self, machine: str, outcome: Outcome) -> bool:
+        """Note the control's answer; whether it is a new one. What it holds now is known from here on."""
+
+        def write(database: sqlite3.Connection) -> bool:
+            changed = database.execute(
+                "UPDATE intent SET state = 'answered', applied = ?, held = ?, differs = ?, reason = ?"
+                " WHERE machine = ? AND number = ? AND state IN ('open', 'withdrawn')",
+                (outcome.applied, outcome.offset, outcome.differs, outcome.reason, machine, outcome.number),
+            ).rowcount
+            if changed and outcome.offset is not None:
+                database.execute(
+                    "INSERT INTO location (machine, tool_memory, held)"
+                    " SELECT machine, tool_memory, held FROM intent WHERE machine = ? AND number = ?"
+                    " ON CONFLICT (machine, tool_memory) DO UPDATE SET held = excluded.held, told = excluded.held",
+                    (machine, outcome.number),
+                )
+            return bool(changed)
+
+        return await self._run(write)
+
+    async def set_intent(self, machine: str, number: int, state: str) -> None:
+        """``told`` when the server has heard the answer, ``withdrawn`` when the control is no longer offered it."""
+        await self._run(
+            lambda database: database.execute(
+                "UPDATE intent SET state = ? WHERE machine = ? AND number = ? AND state = ?",
+                (state, machine, number, "answered" if state == "told" else "open"),
+            )
+        )
+
+    async def intents(self, machine: str, state: str) -> list[Intent]:
+        """Corrections in a state, oldest number first."""
+        rows = await self._run(
+            lambda database: database.execute(
+                "SELECT number, tool_memory, before, after, state, mapping, applied, held, differs, reason FROM intent"
+                " WHERE machine = ? AND state = ? ORDER BY number",
+                (machine, state),
+            ).fetchall()
+        )
+        return [
+            Intent(
+                Order(number, memory, before, after),
+                found,
+                mapping,
+                None if applied is None else Outcome(number, bool(applied), held, reason or "", bool(differs)),
+            )
+            for number, memory, before, after, found, mapping, applied, held, differs, reason in rows
+        ]
+
+    # --- locations and facts
+
+    async def known(self, machine: str) -> dict[int, Known]:
+        """Offset and proof of each location."""
+        rows = await self._run(
+            lambda database: database.execute(
+                "SELECT tool_memory, held, proved, proved_at FROM location WHERE machine = ?", (machine,)
+            ).fetchall()
+        )
+        return {memory: Known(held, proved, proved_at) for memory, held, proved, proved_at in rows}
+
+    async def held(self, machine: str, offsets: dict[int, float]) -> None:
+        """Note the offsets that were read from the control."""
+        await self._run(
+            lambda database: database.executemany(
+                "INSERT INTO location (machine, tool_memory, held) VALUES (?, ?, ?)"
+                " ON CONFLICT (machine, tool_memory) DO UPDATE SET held = excluded.held",
+                [(machine, memory, offset) for memory, offset in offsets.items()],
+            )
+        )
+
+    async def untold(self, machine: str, least: float) -> dict[int, float]:
+        """Offsets whose last reading differs by more than ``least`` from what the server was told, without those on which a
+        correction is open.
+        """
+        rows = await self._run(
+            lambda database: database.execute(
+                "SELECT tool_memory, held FROM location WHERE machine = ? AND held IS NOT NULL"
+                " AND (told IS NULL OR abs(held - told) > ?) AND tool_memory NOT IN"
+                " (SELECT tool_memory FROM intent WHERE machine = ? AND state IN ('open', 'answered'))",
+                (machine, least, machine),
+            ).fetchall()
+        )
+        return dict(rows)
+
+    async def told(self, machine: str, tool_memory: int, offset: float) -> None:
+        """The server has heard which offset the control holds."""
+        await self._run(
+            lambda database: database.execute(
+                "UPDATE location SET told = ? WHERE machine = ? AND tool_memory = ?", (offset, machine, tool_memory)
+            )
+        )
+
+    async def prove(self, machine: str, tool_memory: int, mapping: str | None) -> None:
+        """Note that a touch test has proved a mapping; with None, that it has not."""
+        now = None if mapping is None else time.time()
+        await self._run(
+            lambda database: database.execute(
+                "INSERT INTO location (machine, tool_memory, proved, proved_at) VALUES (?, ?, ?, ?)"
+                " ON CONFLICT (machine, tool_memory) DO UPDATE SET proved = excluded.proved, proved_at = excluded.proved_at",
+                (machine, tool_memory, mapping, now),
+            )
+        )
+
+    async def fact(self, machine: str, name: str) -> str | None:
+        """A fact that was noted, such as the server's time line; None if it was not."""
+        row = await self._run(
+            lambda database: database.execute(
+                "SELECT value FROM fact WHERE machine = ? AND name = ?", (machine, name)
+            ).fetchone()
+        )
+        return row[0] if row else None
+
+    async def note(self, machine: str, name: str, value: str | None) -> None:
+        """Note a fact; None forgets it."""
+        await self._run(
+            lambda database: (
+                database.execute(
+                    "INSERT INTO fact (machine, name, value) VALUES (?, ?, ?)"
+                    " ON CONFLICT (machine, name) DO UPDATE SET value = excluded.value",
+                    (machine, name, value),
+                )
+                if value is not None
+                else database.execute("DELETE FROM fact WHERE machine = ? AND name = ?", (machine, name))
+            )
+        )
+
+    # --- the thread
+
+    async def _run(self, job: Callable[[sqlite3.Connection], T]) -> T:
+        done: Future[T] = Future()
+        self._jobs.put((job, done))
+        return await asyncio.wrap_future(done)
+
+    def _work(self) -> None:
+        ending = False
+        while not ending:
+            jobs = [self._jobs.get()]
+            while not self._jobs.empty():
+                jobs.append(self._jobs.get())
+            ending = None in jobs
+            self._together([job for job in jobs if job is not None])
+
+    def _together(self, jobs: list[tuple[Callable[[sqlite3.Connection], Any], Future[Any]]]) -> None:
+        """Do these in one transaction; if it fails, each by itself, so that one cannot take the others along."""
+        try:
+            results = self._transaction([job for job, _ in jobs])
+        except Exception as error:  # noqa: BLE001 - handed to whoever waits for it
+            if len(jobs) == 1:
+                _settle(jobs[0][1], error=_in_words(error, self.file))
+                return
+            for job in jobs:
+                self._together([job])
+            return
+        for (_, done), result in zip(jobs, results, strict=True):
+            _settle(done, result)
+
+    def _transaction(self, jobs: list[Callable[[sqlite3.Connection], Any]]) -> list[Any]:
+        self._database.execute("BEGIN IMMEDIATE")
+        try:
+            results = [job(self._database) for job in jobs]
+            self._database.execute("COMMIT")
+        except BaseException:
+            with suppress(sqlite3.Error):
+                self._database.execute("ROLLBACK")
+            raise
+        return results
+
+
+def _settle(done: "Future[Any]", result: Any = None, error: BaseException | None = None) -> None:
+    """Hand over a result; nobody waits any more where the task was cancelled."""
+    if not done.set_running_or_notify_cancel():
+        return
+    if error is None:
+        done.set_result(result)
+    else:
+        done.set_exception(error)
+
+
+def _in_words(error: BaseException, file: Path) -> BaseException:
+    if not isinstance(error, sqlite3.Error):
+        return error
+    words = str(error)
+    if "full" in words:
+        return StoreError(f"The disk of {file} is full: free space. Nothing is fetched from the controls until then.")
+    return StoreError(
+        f"The store {file} cannot be written: {words}. Nothing is fetched from the controls until it can."
+    )

@@ -1,0 +1,53 @@
+"""What the tasks of one machine share: its link, what is offered to the control, and how it is doing."""
+
+import asyncio
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+
+from app.bridge.configuration import Machine
+from app.bridge.links import Link, Order
+from app.bridge.store import Store
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(slots=True)
+class Unit:
+    """One machine.
+
+    orders: corrections that passed the guards; the control side offers them. news: something waits for the server. state and
+    detail: the control's side, as the heartbeat tells it. held_back: sentences why corrections wait. trouble: the server's
+    side, None while it answers.
+    """
+
+    machine: Machine
+    link: Link
+    store: Store
+    hold_all: bool = False
+    identity: str | None = None
+    orders: Sequence[Order] = ()
+    news: asyncio.Event = field(default_factory=asyncio.Event)
+    state: str = "starting"
+    detail: str = ""
+    held_back: tuple[str, ...] = ()
+    trouble: str | None = None
+    started_at: datetime = field(default_factory=lambda: datetime.now(UTC))
+    polls: int = 0
+
+    def say(self, state: str, detail: str = "") -> None:
+        """Note how the control's side is doing; a change is logged."""
+        if (state, detail) != (self.state, self.detail):
+            level = logging.INFO if state in {"online", "starting"} else logging.WARNING
+            log.log(level, "%s: %s%s", self.machine.key, state, f": {detail}" if detail else "")
+        self.state, self.detail = state, detail
+
+    def complain(self, trouble: str | None) -> None:
+        """Note how the server's side is doing; a change is logged."""
+        if trouble != self.trouble:
+            if trouble is None:
+                log.info("%s: the server answers", self.machine.key)
+            else:
+                log.warning("%s: %s", self.machine.key, trouble)
+        self.trouble = trouble

@@ -1,0 +1,255 @@
+"""``inband bridge …``: the program beside machines that cannot speak REST."""
+
+import asyncio
+import contextlib
+import logging
+import signal
+from collections.abc import Callable, Coroutine
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.cli.base import cli, say
+from app.errors import InbandError
+
+if TYPE_CHECKING:
+    from app.bridge.configuration import Configuration
+    from app.bridge.store import Store
+
+bridge = typer.Typer(help="Connect machines that cannot speak REST.", invoke_without_command=True)
+cli.add_typer(bridge, name="bridge")
+
+ConfigFile = Annotated[
+    Path, typer.Option("--config", envvar="INBAND_BRIDGE_CONFIG", help="The configuration, a TOML file.")
+]
+MachineName = Annotated[str, typer.Argument(help="The key of the machine, as in the configuration.")]
+PLANT = Path("plant.toml")
+
+
+def _configuration(file: Path) -> "Configuration":
+    from app.bridge.configuration import ConfigurationError, read_configuration
+
+    try:
+        return read_configuration(file)
+    except ConfigurationError as error:
+        raise InbandError(
+            "The configuration cannot be used:\n" + "\n".join(f"- {problem}" for problem in error.problems),
+            f"Correct {file}, and look with “inband bridge check --config {file}”.",
+        ) from error
+
+
+def _with_store(file: Path, work: "Callable[[Configuration, Store], Coroutine[Any, Any, None]]") -> None:
+    """Do something with the configuration and its store."""
+    from app.bridge.program import store_of
+    from app.bridge.store import StoreError
+
+    configuration = _configuration(file)
+    try:
+        store = store_of(configuration)
+        try:
+            asyncio.run(work(configuration, store))
+        finally:
+            store.close()
+    except StoreError as error:
+        raise InbandError(str(error)) from error
+
+
+@bridge.callback()
+def run_bridge(context: typer.Context, config: ConfigFile = PLANT) -> None:
+    """Run the bridge: fetch readings from the machines, send them to the server, bring corrections back."""
+    if context.invoked_subcommand is not None:
+        return
+    from app.bridge import program
+
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s")
+    logging.getLogger("httpx").setLevel(logging.WARNING)
+
+    async def work(configuration: "Configuration", store: "Store") -> None:
+        running = asyncio.create_task(program.run(configuration, store))
+        loop = asyncio.get_running_loop()
+        for end in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(end, running.cancel)
+        with contextlib.suppress(asyncio.CancelledError):
+            await running
+
+    _with_store(config, work)
+
+
+@bridge.command("check")
+def check_bridge(config: ConfigFile = PLANT) -> None:
+    """Say what is wrong with the configuration, and what the server and each machine answer. Nothing is changed."""
+    from app.bridge.checking import check
+
+    findings = asyncio.run(check(_configuration(config)))
+    for finding in findings:
+        say(str(finding), style=None if finding.good else "bold red")
+    if not all(finding.good for finding in findings):
+        raise typer.Exit(1)
+
+
+@bridge.command("simulate")
+def simulate(
+    kind: Annotated[str, typer.Argument(help="Kind of control, such as haas.")],
+    port: Annotated[int, typer.Option(envvar="INBAND_PORT", min=0, max=65535, help="Port; 0 for a free one.")] = 0,
+    cycle: Annotated[float, typer.Option(envvar="INBAND_CYCLE", min=0.01, help="Seconds between two parts.")] = 5.0,
+    inch: Annotated[bool, typer.Option("--inch", envvar="INBAND_INCH", help="The control works in inches.")] = False,
+) -> None:
+    """Start a simulated control that makes and measures parts; its table for the configuration goes to standard output."""
+    from app.bridge.simulators import simulator_named
+    from app.bridge.simulators.model import Model, live
+    from app.core.ring import Unit
+
+    try:
+        module = simulator_named(kind)
+    except LookupError as error:
+        raise InbandError(str(error)) from error
+
+    async def work() -> None:
+        model = Model(unit=Unit.INCH if inch else Unit.MM)
+        simulator = await module.serve(model, port)
+        typer.echo(_toml(model.serial.lower(), simulator.table()))
+        say(f"A simulated control of kind {kind} listens on port {simulator.port}. End it with Ctrl-C.")
+        try:
+            await live(model, cycle)
+        finally:
+            await simulator.stop()
+
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(work())
+
+
+def _toml(key: str, table: dict[str, object]) -> str:
+    """A machine's table in TOML: plain values first, then tables in it."""
+    lines: list[str] = []
+
+    def write(place: str, content: dict[str, object], *, head: str) -> None:
+        lines.append(head)
+        inner = {}
+        for name, value in content.items():
+            if isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict)):
+                inner[name] = value
+            else:
+                lines.append(f"{name} = {_toml_value(value)}")
+        for name, value in inner.items():
+            if isinstance(value, dict):
+                write(f"{place}.{name}", value, head=f"\n[{place}.{name}]")
+            else:
+                for each in value:
+                    write(f"{place}.{name}", each, head=f"\n[[{place}.{name}]]")
+
+    write(f"machine.{key}", table, head=f"[machine.{key}]")
+    return "\n".join(lines)
+
+
+def _toml_value(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return repr(value)
+    return '"' + str(value).replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+@bridge.command("hold")
+def hold(
+    machine: Annotated[str | None, typer.Argument(help="Only this machine; all if left out.")] = None,
+    config: ConfigFile = PLANT,
+) -> None:
+    """Hold all corrections back, within seconds; readings go on. A bridge that runs takes notice by itself."""
+
+    async def work(configuration: "Configuration", store: "Store") -> None:
+        await store.note(
+            _known(configuration, machine), "hold_all" if machine is None else "hold", "by the command line"
+        )
+
+    _with_store(config, work)
+    say(f"Corrections of {machine or 'all machines'} are on hold. Release them with “inband bridge resume”.")
+
+
+@bridge.command("resume")
+def resume(
+    machine: Annotated[str | None, typer.Argument(help="Only this machine; all if left out.")] = None,
+    config: ConfigFile = PLANT,
+) -> None:
+    """Let corrections go on that were held back."""
+
+    async def work(configuration: "Configuration", store: "Store") -> None:
+        await store.note(_known(configuration, machine), "hold_all" if machine is None else "hold", None)
+
+    _with_store(config, work)
+    say(f"Corrections of {machine or 'all machines'} go on.")
+
+
+@bridge.command("accept-counters")
+def accept_counters(machine: MachineName, config: ConfigFile = PLANT) -> None:
+    """Begin anew with the counters that the control has now, after a person has looked why they went back.
+
+    Readings that the bridge has stored stay stored; those that come get keys of their own.
+    """
+
+    async def work(configuration: "Configuration", store: "Store") -> None:
+        await store.accept_counters(_known(configuration, machine))
+
+    _with_store(config, work)
+    say(f"The bridge takes the counters of {machine} as they are. A bridge that runs connects again within seconds.")
+
+
+@bridge.command("quarantine")
+def quarantine(
+    machine: MachineName,
+    send: Annotated[bool, typer.Option("--send", help="Send them again: the cause is mended.")] = False,
+    drop: Annotated[bool, typer.Option("--drop", help="Delete them for ever.")] = False,
+    key: Annotated[str | None, typer.Option(help="Only the reading with this key.")] = None,
+    config: ConfigFile = PLANT,
+) -> None:
+    """List the readings that the server has refused, with the reason; send them again, or drop them."""
+    if send and drop:
+        raise typer.BadParameter("Choose one of --send and --drop.")
+
+    async def work(configuration: "Configuration", store: "Store") -> None:
+        named = _known(configuration, machine)
+        if send or drop:
+            number = await store.release(named, key, drop=drop)
+            say(f"{number} readings {'dropped' if drop else 'wait to be sent again'}.")
+            return
+        for each in await store.quarantine(named, 1000):
+            at = datetime.fromtimestamp(each.at).astimezone().isoformat(timespec="seconds")
+            typer.echo(
+                f"{each.key}\t{at}\t{each.body.get('characteristic')}\t{each.body.get('measured')}\t{each.reason}"
+            )
+
+    _with_store(config, work)
+
+
+@bridge.command("touch-test")
+def touch_test(
+    machine: MachineName,
+    tool_memory: Annotated[int, typer.Argument(help="Tool memory R10 of Inband.")],
+    amount: Annotated[
+        float, typer.Option(envvar="INBAND_AMOUNT", min=0.001, max=0.05, help="Change of the offset, mm.")
+    ] = 0.010,
+    config: ConfigFile = PLANT,
+) -> None:
+    """Prove the mapping of one tool location: change the offset a little, look at the control, take it back.
+
+    Corrections reach a location only after this. Stop the bridge, and let nothing run on the machine.
+    """
+    from app.bridge.touch_test import run as run_test
+
+    async def work(configuration: "Configuration", store: "Store") -> None:
+        chosen = next(each for each in configuration.machines if each.key == _known(configuration, machine))
+        if not await run_test(chosen, tool_memory, amount, store, say, typer.confirm):
+            raise typer.Exit(1)
+
+    _with_store(config, work)
+
+
+def _known(configuration: "Configuration", machine: str | None) -> str:
+    """The key of a machine that the configuration has; empty for all of them."""
+    if machine is None:
+        return ""
+    keys = [each.key for each in configuration.machines]
+    if machine not in keys:
+        raise InbandError(f"The configuration has no machine {machine!r}; it has {', '.join(keys)}.")
+    return machine
