@@ -1,0 +1,198 @@
+"""The store: durable when a call returns, nothing twice, one that fails takes no other along."""
+
+import asyncio
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from app.bridge.links import Order, Outcome, Position, Received
+from app.bridge.store import Store, StoreError
+from tests.loops import run
+
+M = "lathe-1"
+
+
+def received(sequence: int, fault: str | None = None) -> Received:
+    body = {"characteristic": "c", "measured": 40.0 + sequence / 1000}
+    return Received(f"{M}:7:{sequence}", body, Position(7, sequence), fault)
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    return Store(tmp_path / "deeper" / "store.sqlite3")
+
+
+def test_readings_wait_in_their_order_until_they_are_sent(store: Store) -> None:
+    async def story() -> None:
+        assert await store.add(M, [received(1), received(2), received(3, "no size")]) == 3
+        assert await store.add(M, [received(2), received(4)]) == 1, "a known key is not stored again"
+        assert await store.position(M) == Position(7, 4)
+        rows = await store.waiting(M)
+        assert [row.key for row in rows] == [f"{M}:7:1", f"{M}:7:2", f"{M}:7:4"]
+        assert await store.waiting("another") == []
+        await store.sent(M, [rows[0].id])
+        await store.refuse(M, rows[1].id, "409")
+        counts = await store.counts(M)
+        assert (counts.waiting, counts.quarantined) == (1, 2)
+        assert counts.oldest == pytest.approx(time.time(), abs=60)
+        assert [each.reason for each in await store.quarantine(M)] == ["no size", "409"]
+
+    run(story())
+
+
+def test_what_the_server_had_is_kept_sent_again_and_deleted_in_time(store: Store) -> None:
+    async def story() -> None:
+        await store.add(M, [received(1), received(2)])
+        await store.sent(M, [row.id for row in await store.waiting(M)])
+        assert await store.tidy(keep=3600) == 0
+        assert await store.send_again(M) == 2
+        assert len(await store.waiting(M)) == 2
+        await store.sent(M, [row.id for row in await store.waiting(M)])
+        assert await store.tidy(keep=-1) == 2
+        assert await store.position(M) == Position(7, 2), "how far the ring is stored is known without the readings"
+
+    run(story())
+
+
+def test_the_quarantine_is_sent_again_or_dropped(store: Store) -> None:
+    async def story() -> None:
+        await store.add(M, [received(1, "a"), received(2, "b"), received(3, "c")])
+        assert await store.release(M, f"{M}:7:2", drop=False) == 1
+        assert [row.key for row in await store.waiting(M)] == [f"{M}:7:2"]
+        assert await store.release(M, None, drop=True) == 2
+        assert await store.quarantine(M) == []
+
+    run(story())
+
+
+def test_counters_that_were_accepted_name_new_readings(store: Store) -> None:
+    async def story() -> None:
+        await store.add(M, [received(5)])
+        await store.accept_counters(M)
+        assert await store.position(M) == Position(None, 0, 1)
+
+    run(story())
+
+
+def test_an_answer_counts_once_and_makes_the_offset_known(store: Store) -> None:
+    async def story() -> None:
+        order = Order(18, 3, 0.02, 0.014)
+        await store.intend(M, order, "abc")
+        assert await store.answered(M, Outcome(18, True, 0.014))
+        assert not await store.answered(M, Outcome(18, True, 0.014))
+        assert not await store.answered(M, Outcome(99, True, 0.5)), "a number that was never offered is no answer"
+        [intent] = await store.intents(M, "answered")
+        assert (intent.order, intent.mapping) == (order, "abc")
+        assert intent.outcome is not None
+        assert intent.outcome.applied
+        assert (await store.known(M))[3].offset == 0.014
+        await store.set_intent(M, 18, "told")
+        await store.intend(M, order, "abc")
+        assert await store.intents(M, "open") == [], "what was answered is not offered again"
+
+    run(story())
+
+
+def test_an_offset_is_told_once_and_not_while_a_correction_is_open(store: Store) -> None:
+    async def story() -> None:
+        await store.held(M, {3: 0.02})
+        assert await store.untold(M, 0.0005) == {3: 0.02}
+        await store.told(M, 3, 0.02)
+        await store.held(M, {3: 0.0203})
+        assert await store.untold(M, 0.0005) == {}
+        await store.intend(M, Order(1, 3, 0.02, 0.03), "abc")
+        await store.held(M, {3: 0.03})
+        assert await store.untold(M, 0.0005) == {}
+        await store.answered(M, Outcome(1, True, 0.03))
+        await store.set_intent(M, 1, "told")
+        assert await store.untold(M, 0.0005) == {}
+        await store.held(M, {3: 0.05})
+        assert await store.untold(M, 0.0005) == {3: 0.05}
+
+    run(story())
+
+
+def test_one_call_that_fails_takes_no_other_along(store: Store) -> None:
+    async def story() -> None:
+        together = await asyncio.gather(
+            store.add(M, [received(1)]),
+            store.note(M, "name", b"\xff"),  # type: ignore[arg-type]
+            store._run(lambda database: database.execute("SELECT * FROM nowhere")),
+            store.add("another", [received(1)]),
+            return_exceptions=True,
+        )
+        assert together[0] == 1
+        assert isinstance(together[2], StoreError)
+        assert together[3] == 1
+
+    run(story())
+
+
+def test_a_store_that_cannot_be_written_says_so(tmp_path: Path) -> None:
+    file = tmp_path / "store.sqlite3"
+    file.write_bytes(b"no database at all, but long enough to be looked at" * 100)
+    with pytest.raises(StoreError, match="cannot be opened"):
+        Store(file)
+    locked = Store(tmp_path / "locked.sqlite3")
+    locked._database.execute("PRAGMA busy_timeout = 50")
+    other = sqlite3.connect(locked.file, isolation_level=None)
+    other.execute("BEGIN EXCLUSIVE")
+    with pytest.raises(StoreError, match="cannot be written"):
+        run(locked.add(M, [received(1)]))
+    other.execute("ROLLBACK")
+    assert run(locked.add(M, [received(1)])) == 1, "it goes on once it can"
+
+
+def test_a_full_store_is_seen_and_room_that_was_freed_counts(tmp_path: Path) -> None:
+    store = Store(tmp_path / "store.sqlite3", largest=0.2)
+
+    async def story() -> None:
+        assert not store.is_full
+        await store.add(M, [received(sequence) for sequence in range(1, 3000)])
+        assert store.is_full
+        rows = await store.waiting(M, 5000)
+        await store.sent(M, [row.id for row in rows])
+        await store.tidy(keep=-1)
+        assert not store.is_full
+
+    run(story())
+
+
+WRITER = """
+import asyncio, sys
+from pathlib import Path
+from app.bridge.links import Position, Received
+from app.bridge.store import Store
+
+async def main():
+    store = Store(Path(sys.argv[1]))
+    for sequence in range(1, 100_000):
+        await store.add("lathe-1", [Received(f"k{sequence}", {}, Position(7, sequence))])
+        print(sequence, flush=True)
+
+asyncio.run(main())
+"""
+
+
+def test_what_was_said_to_be_stored_is_there_after_a_kill(tmp_path: Path) -> None:
+    file = tmp_path / "store.sqlite3"
+    with subprocess.Popen([sys.executable, "-c", WRITER, str(file)], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        said = 0
+        while said < 50:
+            said = int(process.stdout.readline())
+        os.kill(process.pid, signal.SIGKILL)
+        said = max([said, *map(int, process.stdout.read().split())])
+
+    async def story() -> None:
+        store = Store(file)
+        assert (await store.position(M)).sequence >= said
+        assert len(await store.waiting(M, 100_000)) == (await store.position(M)).sequence
+
+    run(story())
