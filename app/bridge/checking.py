@@ -4,11 +4,10 @@ import asyncio
 from collections.abc import AsyncIterator
 from typing import NamedTuple
 
-from inband_client import AsyncClient, Forbidden, NotFound, ProblemError, Unauthorized
-
 from app.bridge.configuration import Configuration, Machine
 from app.bridge.links import LinkError, Position
 from app.bridge.program import link_of
+from inband_client import AsyncClient, Forbidden, NotFound, ProblemError, Unauthorized
 
 
 class Finding(NamedTuple):
@@ -24,7 +23,7 @@ class Finding(NamedTuple):
 
 
 async def check(configuration: Configuration) -> list[Finding]:
-    """What the server says to each key, and what each control answers; machines are asked at the same time."""
+    """The server's answer to each key, and each control's; machines are asked at the same time."""
     found = await asyncio.gather(*(_of_machine(configuration, machine) for machine in configuration.machines))
     return [finding for findings in found for finding in findings]
 

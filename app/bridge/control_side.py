@@ -57,7 +57,7 @@ async def _connected(unit: Unit) -> None:
     full = False
     while True:
         if time.monotonic() >= full_at:
-            full, full_at = store.is_full, time.monotonic() + FULL_EVERY
+            full, full_at = store.is_full(), time.monotonic() + FULL_EVERY
         if full:
             raise StoreError(
                 f"The store holds {store.largest / 1e6:g} MB, its largest size: nothing is fetched until the server has"

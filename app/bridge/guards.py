@@ -16,7 +16,7 @@ class Verdict(NamedTuple):
 
 
 class Known(NamedTuple):
-    """What the bridge knows of a location: the offset it has read or brought last (mm), and the hash that a touch test proved."""
+    """A location as the bridge knows it: the offset it has read or brought last (mm), and the hash that a touch test proved."""
 
     offset: float | None = None
     proved: str | None = None

@@ -38,7 +38,7 @@ class Misconfigured(LinkError):
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """How far the ring of a control has been stored.
+    """The part of a control's ring that is stored.
 
     epoch: None before the first contact. generation: counts how often a person has accepted counters that went back.
     """
@@ -76,7 +76,7 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of an order. offset: the one that the control holds now, mm, None where it does not say.
+    """The outcome of an order. offset: the one that the control holds now, mm, None where it does not say.
 
     differs: the offset was neither the one before the correction nor the one after it.
     """
@@ -116,7 +116,7 @@ class Link(Protocol):
         """Make these known to the control, oldest first, and no others. Offering the same again changes nothing."""
 
     async def outcomes(self) -> Sequence[Outcome]:
-        """What the control has answered last. May repeat itself."""
+        """The answers that the control has given last. They may repeat themselves."""
 
     async def offsets(self) -> dict[int, float]:
         """The offsets that the control holds, by tool memory, mm; empty where they cannot be read."""

@@ -5,14 +5,13 @@ import contextlib
 import logging
 from pathlib import Path
 
-from inband_client import AsyncClient
-
 from app.bridge import control_side, server_side
 from app.bridge.configuration import Configuration, Machine
 from app.bridge.kinds import kind_named
 from app.bridge.links import Link
 from app.bridge.store import Store, StoreError
 from app.bridge.unit import Unit
+from inband_client import AsyncClient
 
 log = logging.getLogger(__name__)
 TIDY_EVERY = 600.0  # s

@@ -182,7 +182,7 @@ class RegisterLink:
         return Received(f"{self.machine.key}:{stored.epoch}{again}:{slot.sequence}", body, position, fault)
 
     def _measured_at(self, slot: Slot, now: datetime, *, fresh: bool) -> datetime | None:
-        """When it was measured: now if it was not there at the last poll; else by the control's clock, if that is known."""
+        """Time of the measurement: now if it was not there at the last poll; else by the control's clock, if that is known."""
         if slot.time is not None and fresh:
             midnight = now.replace(hour=0, minute=0, second=0, microsecond=0)
             ahead = slot.time - (now - midnight).total_seconds()

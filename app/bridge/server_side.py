@@ -8,6 +8,12 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any
 
+from app import __version__
+from app.bridge.configuration import Server
+from app.bridge.guards import against
+from app.bridge.links import Order
+from app.bridge.store import Intent, StoreError, Waiting
+from app.bridge.unit import Unit
 from inband_client import (
     AsyncClient,
     Conflict,
@@ -20,13 +26,6 @@ from inband_client import (
     Unauthorized,
     Unavailable,
 )
-
-from app import __version__
-from app.bridge.configuration import Server
-from app.bridge.guards import against
-from app.bridge.links import Order
-from app.bridge.store import Intent, StoreError, Waiting
-from app.bridge.unit import Unit
 
 log = logging.getLogger(__name__)
 REFUSED = (Conflict, Invalid, NotFound, TooLarge)

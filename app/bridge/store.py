@@ -208,7 +208,7 @@ class Store:
         return await self._run(lambda database: database.execute(statement, values).rowcount)
 
     async def counts(self, machine: str) -> Counts:
-        """How many wait, since when, and how many are in the quarantine."""
+        """Numbers of waiting and quarantined readings, and since when the oldest waits."""
         rows = await self._run(
             lambda database: database.execute(
                 "SELECT state, count(*), min(at) FROM reading WHERE machine = ? AND state <> 'sent' GROUP BY state",
@@ -220,7 +220,7 @@ class Store:
         return Counts(waiting, oldest, found.get("quarantined", (0, None))[0])
 
     async def position(self, machine: str) -> Position:
-        """How far the ring of the machine is stored."""
+        """The part of the machine's ring that is stored."""
         row = await self._run(
             lambda database: database.execute(
                 "SELECT epoch, sequence, generation FROM ring WHERE machine = ?", (machine,)
@@ -245,9 +245,8 @@ class Store:
             )
         )
 
-    @property
     def is_full(self) -> bool:
-        """Whether what is stored has reached its largest size. Space that was freed counts as free."""
+        """True if the store has reached its largest size. Space that was freed counts as free."""
         with suppress(sqlite3.Error):
             [pages], [free], [size] = (
                 self._database.execute(f"PRAGMA {name}").fetchone()

@@ -1,4 +1,4 @@
-"""What the tasks of one machine share: its link, what is offered to the control, and how it is doing."""
+"""State that the tasks of one machine share: its link, what is offered to the control, and how it is doing."""
 
 import asyncio
 import logging

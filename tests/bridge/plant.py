@@ -6,8 +6,6 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
-from inband_client import AsyncClient
-
 from app.bridge import control_side, server_side
 from app.bridge.configuration import Location, Machine, Server
 from app.bridge.links import ControlAway
@@ -16,6 +14,7 @@ from app.bridge.simulators.model import Feature, Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit
 from app.core.ring import Register
+from inband_client import AsyncClient
 
 PATIENCE = 30.0  # s: of a machine under load
 

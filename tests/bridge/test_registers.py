@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from app.bridge.configuration import Location
 from app.bridge.links import ControlAway, CountersLost, Misconfigured, Order, Outcome, Position
 from app.bridge.registers import RegisterLink
 from app.bridge.simulators.model import Feature, Model
@@ -188,7 +189,7 @@ def test_the_mailbox_brings_a_correction_and_its_answer() -> None:
         made(model)
         await link.fetch(Position())
         assert model.offsets[PLACE] == pytest.approx(-0.005), "half of it, in the other sense"
-        assert await link.outcomes() == [Outcome(18, True, pytest.approx(0.010))]
+        assert await link.outcomes() == [Outcome(18, applied=True, offset=0.010)]
         made(model)
         assert len(model.applied) == 1
 
@@ -207,7 +208,9 @@ def test_an_offset_that_was_edited_is_not_overwritten() -> None:
         made(model)
         await link.fetch(Position())
         [outcome] = await link.outcomes()
-        assert (outcome.applied, outcome.differs, outcome.offset) == (False, True, pytest.approx(0.05))
+        assert outcome.differs
+        assert not outcome.applied
+        assert outcome.offset == pytest.approx(0.05)
         assert model.offsets[PLACE] == 0.05
 
     run(story())
@@ -267,7 +270,7 @@ def test_a_power_loss_while_a_correction_is_taken_applies_it_once(after_step: in
         model.power_loss()
         made(model)
         await link.fetch(Position())
-        assert await link.outcomes() == [Outcome(18, True, pytest.approx(0.010))]
+        assert await link.outcomes() == [Outcome(18, applied=True, offset=0.010)]
         assert model.offsets[PLACE] == pytest.approx(0.010)
 
     run(story())
@@ -307,10 +310,10 @@ def test_a_direct_write_is_a_comparison_first(held: float, writes: int, *, appli
         link, registers = link_of(model, corrections="direct")
         write = registers.write_offset
 
-        async def counted(where: object, value: float) -> None:
+        async def counted(location: Location, value: float) -> None:
             nonlocal count
             count += 1
-            await write(where, value)  # type: ignore[arg-type]
+            await write(location, value)
 
         registers.write_offset = counted  # type: ignore[method-assign]
         await link.fetch(Position())

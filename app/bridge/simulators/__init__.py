@@ -17,7 +17,7 @@ class Simulator(Protocol):
     port: int
 
     def table(self) -> dict[str, object]:
-        """What a machine's table in the configuration needs to reach it: ``kind``, the kind's own table, and more."""
+        """A machine's table of the configuration to reach it: ``kind``, the kind's own table, and more."""
 
     async def stop(self) -> None:
         """End it."""
