@@ -41,6 +41,7 @@ from app.loop.calibration import jobs
 from app.loop.calibration import pages as calibration_pages
 from app.loop.characteristics import api as characteristics
 from app.loop.connections import api as connections_api
+from app.loop.connections import jobs as connection_jobs
 from app.loop.faults import api as faults
 from app.loop.machines import api as machines
 from app.loop.machines import keys_api as machine_keys
@@ -223,6 +224,11 @@ JOBS: tuple[PeriodicJob, ...] = (
 )
 
 
+def jobs_of(settings: Settings) -> tuple[PeriodicJob, ...]:
+    """All of them, as the settings have it."""
+    return *JOBS, connection_jobs.job(settings.bridge_silent_after)
+
+
 NOT_COMPRESSED = (
     "text/event-stream",  # each event leaves at once
     "application/pdf",
@@ -296,7 +302,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     letting_in = Database(settings.database_url, pool_size=4, overflow=-1, connections=connections)
     replica = _replica(settings, database)
     keys, directory = KeyRing(letting_in, caller_of_key), Directory(letting_in)
-    writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(database, JOBS)
+    writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(database, jobs_of(settings))
     report_worker = ReportWorker(database)
 
     @asynccontextmanager

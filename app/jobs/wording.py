@@ -17,6 +17,7 @@ def job_word(name: str) -> str:
         "run_rules": _("Run rules of control charts"),
         "capability_verdicts": _("Capability for the overview"),
         "results_become_readings": _("Results become readings"),
+        "connections": _("Bridges that are silent or back up"),
         "making_reports": _("Making reports"),
     }.get(name, name)
 
@@ -28,6 +29,8 @@ def link_of(subject: str) -> str | None:
         return f"/characteristics/{rest}"
     if kind in {"tool", "correction", "calibration-plan"}:
         return f"/plant/{rest.partition('/')[0]}"
+    if kind == "connection":
+        return f"/machines/{rest.partition('/')[0]}/connection"
     return "/reports" if kind == "reports" else None
 
 

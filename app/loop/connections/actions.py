@@ -6,16 +6,19 @@ A heartbeat takes no lock of the machine and waits for no disk: what a crash los
 from datetime import datetime, timedelta
 from typing import Any, NamedTuple
 
-from sqlalchemy import case, func, select, text
+from sqlalchemy import case, delete, func, select, text
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.orm import Session
 
+from app.access.audit.actions import record
 from app.access.callers import Caller
 from app.db.events import publish
-from app.loop.connections import queries
+from app.language.i18n import _
+from app.loop.connections import jobs, queries
+from app.loop.connections.alarm_kinds import GONE
 from app.loop.connections.queries import ServerMark
 from app.loop.connections.schemas import HeartbeatIn
-from app.loop.machines.queries import machine_for
+from app.loop.machines.queries import lock_machines, machine_for, machine_named
 from app.loop.tables.connections import Connection
 
 GOOD = ("starting", "online")
@@ -69,6 +72,21 @@ def take_heartbeat(
     ):
         publish(session, {"kind": "connection", "machine": owner.key, "state": beat.state})
     return Beat(now, queries.server_mark(session))
+
+
+def remove_connection(session: Session, machine: str, caller: Caller) -> None:
+    """Forget the connection of a machine that has no bridge any more, and end its alarms.
+
+    Harmless if there is none. A bridge that still speaks makes it anew. Raises `NotFound`.
+    """
+    owner = machine_named(session, machine)
+    lock_machines(session, [owner.id])
+    gone = session.scalar(delete(Connection).where(Connection.machine_id == owner.id).returning(Connection.received_at))
+    for name in GONE:
+        jobs.end(session, owner, name, caller.name, _("The machine has no bridge any more"), "connection_removed")
+    if gone is not None:
+        record(session, caller.name, "connection removed", f"machine/{owner.key}", {"heard": gone.isoformat()}, None)
+        publish(session, {"kind": "connection", "machine": owner.key, "state": None})
 
 
 def _values(beat: HeartbeatIn, now: datetime, backlog_after: float) -> dict[str, Any]:

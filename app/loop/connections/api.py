@@ -2,9 +2,9 @@
 
 from datetime import timedelta
 
-from fastapi import Request
+from fastapi import Request, Response
 
-from app.access.deps import AnyCaller
+from app.access.deps import Admin, AnyCaller
 from app.loop.connections import actions, queries
 from app.loop.connections.queries import ConnectionRow
 from app.loop.connections.schemas import ConnectionOut, HeartbeatIn, HeartbeatOut, ServerOut
@@ -51,6 +51,15 @@ def list_connections(
 def get_connection(request: Request, session: SessionDep, caller: AnyCaller, machine: MachineKey) -> ConnectionOut:
     """The connection of one machine."""
     return _out(request, queries.connection_of(session, machine_for(session, caller, machine, "viewer")))
+
+
+@router.delete("/machines/{machine}/connection", status_code=204, responses=problems(404))
+def remove_connection(session: SessionDep, caller: Admin, machine: MachineKey) -> Response:
+    """Forget the connection of a machine that has no bridge any more, and end its alarms. Doing it twice is harmless; a
+    bridge that still speaks makes it anew.
+    """
+    actions.remove_connection(session, machine, caller)
+    return Response(status_code=204)
 
 
 def _out(request: Request, row: ConnectionRow) -> ConnectionOut:

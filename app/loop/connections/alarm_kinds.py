@@ -1,0 +1,68 @@
+"""Alarm kinds of bridges: one is silent, or readings back up in it. Both end by themselves."""
+
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from typing import Any
+
+from app.language.i18n import _
+from app.language.times import MINUTES, written
+from app.loop.alarms.kinds import AlarmKind, register
+from app.loop.tables.alarms import Alarm
+
+
+def _since(alarm: Alarm, name: str) -> str:
+    moment = alarm.data.get(name)
+    return written(datetime.fromisoformat(str(moment)), MINUTES) if moment else "–"
+
+
+def _silent(alarm: Alarm) -> str:
+    return _(
+        "The bridge of this machine was heard last at {since}. Readings stay in the bridge or the control, and no correction "
+        "reaches the machine."
+    ).format(since=_since(alarm, "received_at"))
+
+
+def _backing_up(alarm: Alarm) -> str:
+    waiting = alarm.data.get("waiting", 0)
+    if alarm.data.get("state") == "full":
+        return _("The store of the bridge is full with {n} readings: it fetches no more from the control.").format(
+            n=waiting
+        )
+    return _("{n} readings wait in the bridge, the oldest since {since}. Corrections come too late.").format(
+        n=waiting, since=_since(alarm, "oldest_waiting_at")
+    )
+
+
+_REMOVED: dict[str, Callable[[Mapping[str, Any]], str]] = {
+    "connection_removed": lambda _item: _("The connection was removed: the machine has no bridge any more.")
+}
+BRIDGE_SILENT = register(
+    AlarmKind(
+        "bridge_silent",
+        word=lambda: _("Bridge is silent"),
+        sentence=_silent,
+        what_to_do=lambda: _(
+            "Look whether the bridge's computer runs and reaches this server. The alarm ends when the bridge speaks again. If "
+            "the machine has no bridge any more, an administrator removes the connection: Machines, Connections."
+        ),
+        icon="no_data",
+        comments={"noted": lambda: [_("Bridge started again"), _("Network repaired"), _("Machine is switched off")]},
+        outcomes={"bridge_heard": lambda _item: _("The bridge has spoken again.")} | _REMOVED,
+    )
+)
+BRIDGE_BACKING_UP = register(
+    AlarmKind(
+        "bridge_backing_up",
+        word=lambda: _("Bridge is backing up"),
+        sentence=_backing_up,
+        what_to_do=lambda: _(
+            "Look under Machines, Connections, what the bridge says: a reading may be refused again and again, or the network "
+            "is slow. The alarm ends when the backlog is gone."
+        ),
+        icon="waiting",
+        comments={"noted": lambda: [_("Network repaired"), _("Disk made larger")]},
+        outcomes={"backlog_gone": lambda _item: _("The backlog is gone.")} | _REMOVED,
+    )
+)
+GONE = {BRIDGE_SILENT.name: "bridge_heard", BRIDGE_BACKING_UP.name: "backlog_gone"}
+"""The outcome of each when it ends by itself."""

@@ -1,0 +1,124 @@
+"""Alarms of bridges: silent, backing up; they end by themselves, and with the connection."""
+
+from datetime import timedelta
+from typing import Any
+
+import psycopg
+from sqlalchemy import text
+
+from app.jobs.actions import run_jobs
+from app.loop.connections.jobs import due, job
+from tests.conftest import Server
+from tests.loop.connections.test_heartbeat import ago, beat
+from tests.shop import Person, Shop
+
+MINUTE = 60.0
+
+
+def change(shop: Shop, what: str) -> None:
+    """Change the stored connection of this machine."""
+    with psycopg.connect(shop.server.database.dsn) as connection:
+        connection.execute(
+            f"UPDATE connection SET {what} WHERE machine_id = (SELECT id FROM machine WHERE key = %s)",  # noqa: S608
+            [shop.machine],
+        )
+
+
+def silent_for(shop: Shop, minutes: int) -> None:
+    change(shop, f"received_at = now() - interval '{minutes} minutes'")
+
+
+def run(shop: Shop, silent_after: float = MINUTE) -> None:
+    """Twice: the first run of a server that has just started says nothing of silence."""
+    for _ in range(2):
+        run_jobs(shop.server.database, [job(silent_after)])
+
+
+def kinds(shop: Shop) -> list[str]:
+    return [alarm["kind"] for alarm in shop.alarms()]
+
+
+def test_a_silent_bridge_raises_an_alarm_that_ends_when_it_speaks(shop: Shop, server: Server) -> None:
+    beat(shop)
+    silent_for(shop, 3)
+    run(shop)
+    (alarm,) = shop.alarms()
+    assert alarm["kind"] == "bridge_silent"
+    assert "heard last at" in alarm["text"]
+    assert shop.call("GET", f"/machines/{shop.machine}/connection")["silent"] is True
+    run(shop)
+    assert shop.call("GET", f"/alarms/{alarm['id']}")["count"] == 1
+    assert "Bridge is silent" in Person(server, "operator").open(f"/todo?machine={shop.machine}")
+    beat(shop)
+    run(shop)
+    ended = shop.call("GET", f"/alarms/{alarm['id']}")
+    assert (ended["state"], ended["outcome"][0]["code"]) == ("acknowledged", "bridge_heard")
+    assert shop.alarms() == []
+
+
+def test_an_acknowledged_silence_is_not_told_again_but_the_next_one_is(shop: Shop) -> None:
+    beat(shop)
+    run(shop, 0)
+    shop.acknowledge(shop.alarms()[0]["id"], "noted", comment="Machine is switched off")
+    run(shop, 0)
+    assert shop.alarms() == []
+    beat(shop)
+    run(shop, 0)
+    assert kinds(shop) == ["bridge_silent"]
+
+
+def test_no_silence_is_told_when_the_server_itself_was_away(shop: Shop) -> None:
+    beat(shop)
+    silent_for(shop, 30)
+    with shop.server.database.begin() as session:
+        for away in ("DELETE FROM job_run", "UPDATE job_run SET finished_at = now() - interval '20 minutes'"):
+            session.execute(text(away))
+            subjects = {unit.subject for unit in due(timedelta(seconds=60), session)}
+            assert f"connection/{shop.machine}/bridge_silent" not in subjects
+        session.rollback()
+
+
+def test_a_machine_that_never_had_a_heartbeat_is_not_silent(shop: Shop) -> None:
+    run(shop)
+    assert shop.alarms() == []
+
+
+def test_a_backlog_raises_an_alarm_that_ends_with_it(shop: Shop) -> None:
+    beat(shop, waiting=7, oldest_waiting_at=ago(minutes=9))
+    run(shop)
+    (alarm,) = shop.alarms()
+    assert alarm["kind"] == "bridge_backing_up"
+    assert alarm["text"].startswith("7 readings wait in the bridge, the oldest since")
+    shop.acknowledge(alarm["id"], "noted")
+    beat(shop, waiting=8, oldest_waiting_at=ago(minutes=10))
+    run(shop)
+    assert shop.alarms() == []
+    beat(shop)
+    beat(shop, state="full", waiting=100)
+    run(shop)
+    (alarm,) = shop.alarms()
+    assert "full with 100 readings" in alarm["text"]
+    beat(shop, waiting=2, oldest_waiting_at=ago(seconds=5))
+    run(shop)
+    assert shop.alarms() == []
+
+
+def test_removing_a_connection_ends_its_alarms(shop: Shop, server: Server) -> None:
+    beat(shop, state="full", waiting=100)
+    silent_for(shop, 3)
+    run(shop)
+    assert sorted(kinds(shop)) == ["bridge_backing_up", "bridge_silent"]
+    ids = [alarm["id"] for alarm in shop.alarms()]
+    path = f"/machines/{shop.machine}/connection"
+    shop.call("DELETE", path, 403, client=server.client(server.key("engineer")))
+    shop.call("DELETE", path, 204)
+    assert shop.alarms() == []
+    assert {shop.call("GET", f"/alarms/{number}")["outcome"][0]["code"] for number in ids} == {"connection_removed"}
+    shop.call("GET", path, 404)
+    shop.call("DELETE", path, 204)
+    actions: list[Any] = shop.call("GET", f"/audit?subject=machine/{shop.machine}")["items"]
+    assert [each["action"] for each in actions].count("connection removed") == 1
+    run(shop)
+    assert shop.alarms() == []
+    beat(shop)
+    shop.call("GET", path)
