@@ -11,12 +11,14 @@ from zoneinfo import ZoneInfo
 
 import typer
 
+from app.cli import aqdef
 from app.cli.base import DatabaseUrl, DataDir, cli, existing, people, say, settings_from
 from app.errors import NotFound
 from app.language.i18n import _, ngettext
 from app.language.times import MINUTES, in_zone, plant_zone, written
 
 if TYPE_CHECKING:
+    from app.loop.readings.importing.aqdef.content import Wishes as AqdefWishes
     from app.loop.readings.importing.history import Flawed, Summary
     from app.loop.readings.importing.layout import Layout, Wishes
     from app.loop.readings.importing.lines import Flaw
@@ -39,13 +41,19 @@ class Format(StrEnum):
     NDJSON = "ndjson"
 
 
-File = Annotated[Path, typer.Argument(help="CSV, NDJSON, JSON or XLSX.", exists=True, dir_okay=False, readable=True)]
+File = Annotated[
+    Path,
+    typer.Argument(
+        help="CSV, NDJSON, JSON, XLSX or AQDEF (.dfq, .dfd with .dfx).", exists=True, dir_okay=False, readable=True
+    ),
+]
 Mapping = Annotated[
     str,
     typer.Option(
         "--map",
         envvar="INBAND_MAP",
-        help="Which column is what: measured=Wert,measured_at=Datum+Uhrzeit. A column is named, or numbered from 1.",
+        help="Which column is what: measured=Wert,measured_at=Datum+Uhrzeit. A column is named, or numbered from 1. "
+        "Of AQDEF, which characteristic is which: D40=shaft-d40; D41=+ sets it up.",
         show_default="by their names, in five languages",
     ),
 ]
@@ -95,6 +103,16 @@ def import_file(
     timezone: Zone = None,
     time_format: TimeFormat = None,
     encoding: Encoding = None,
+    create_missing: Annotated[
+        bool,
+        typer.Option("--create-missing", envvar="INBAND_CREATE_MISSING", help="Of AQDEF: set up what is not here yet."),
+    ] = False,
+    machine: Annotated[
+        str | None, typer.Option(envvar="INBAND_MACHINE", help="Of AQDEF: on which machine it is set up.")
+    ] = None,
+    day_first: Annotated[
+        bool, typer.Option("--day-first", envvar="INBAND_DAY_FIRST", help="Of AQDEF: dates with / begin with the day.")
+    ] = False,
     live: Annotated[
         bool, typer.Option("--live", envvar="INBAND_LIVE", help="Decide as if they came in now: corrections, alarms.")
     ] = False,
@@ -110,6 +128,13 @@ def import_file(
     from app.loop.readings.importing.layout import look
     from app.loop.readings.importing.wide import Column, ColumnResult, columns_said, import_wide
 
+    if aqdef.is_aqdef(file):
+        if live:
+            raise typer.BadParameter(_("AQDEF is imported as history only."), param_hint="--live")
+        chosen = aqdef.wishes_for(_zone(timezone), unit.value if unit else None, encoding, day_first=day_first)
+        given = {"mapping": mapping, "characteristic": characteristic, "create_missing": create_missing}
+        _import_aqdef(file, chosen, data_dir, database_url, machine=machine, dry_run=dry_run, **given)
+        return
     if bool(characteristic) == bool(columns):
         raise typer.BadParameter(
             _("Name one characteristic, or the columns of several."), param_hint="--characteristic"
@@ -144,6 +169,25 @@ def import_file(
             elif trouble is not None:
                 say(f"{column.characteristic}: {trouble.detail} {trouble.what_to_do or ''}", style="bold red")
     if any(trouble is not None for _column, _result, trouble in results):
+        raise typer.Exit(1)
+
+
+def _import_aqdef(
+    file: Path, wishes: "AqdefWishes", data_dir: Path | None, database_url: str | None, **given: Any
+) -> None:
+    from app.loop.readings.importing.history import Flawed
+
+    with (
+        existing(settings_from(data_dir=data_dir, database_url=database_url)) as database,
+        _bar(file) as bar,
+        in_zone(wishes.zone),
+    ):
+        try:
+            outcome = aqdef.import_file(database, file, wishes, progress=bar, **given)
+        except Flawed as refusal:
+            report(refusal)
+            raise typer.Exit(1) from None
+    if any(each.trouble is not None for each in outcome.results):
         raise typer.Exit(1)
 
 

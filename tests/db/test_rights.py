@@ -33,6 +33,7 @@ PASSING = {
     "connection",
     "event",
     "fixture",
+    "import_mapping",
     "invitation",
     "job_failure",
     "job_run",

@@ -209,6 +209,23 @@ class Exclusion(Base):
     reason: Mapped[str]
 
 
+class ImportMapping(Base):
+    """A characteristic of measuring machines' files (AQDEF: part, number, name) that somebody took for this one."""
+
+    __tablename__ = "import_mapping"
+    __table_args__ = (
+        ForeignKeyConstraint(["machine_id", "characteristic_id"], ["characteristic.machine_id", "characteristic.id"]),
+    )
+
+    machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    characteristic_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    part: Mapped[str] = mapped_column(primary_key=True)
+    number: Mapped[str] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(primary_key=True)
+    actor: Mapped[str]
+    at: Mapped[datetime]
+
+
 class ReadingSummary(Base):
     """Summary of a full block of 2^level readings, so that a chart of millions reads a few thousand rows.
 

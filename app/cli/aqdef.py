@@ -1,0 +1,149 @@
+"""AQDEF files on the command line: `inband import FILE.dfq` and `inband export --format dfq`."""
+
+import getpass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from zoneinfo import ZoneInfo
+
+import typer
+
+from app.cli.base import say
+from app.language.i18n import _
+from app.language.times import MINUTES, written
+
+if TYPE_CHECKING:
+    from app.db.engine import Database
+    from app.loop.readings.importing.aqdef.actions import Outcome, Result
+    from app.loop.readings.importing.aqdef.content import Wishes
+    from app.loop.readings.importing.aqdef.matching import Content
+
+
+def is_aqdef(file: Path) -> bool:
+    """Tell by its name."""
+    from app.files.formats.aqdef import ENDINGS
+
+    return file.suffix.lower() in ENDINGS
+
+
+def wishes_for(zone: ZoneInfo, unit: str | None, encoding: str | None, *, day_first: bool) -> "Wishes":
+    """The choices that options say."""
+    from app.loop.readings.importing.aqdef.content import Wishes
+
+    return Wishes(zone, "day_first" if day_first else None, unit, encoding)
+
+
+def import_file(
+    database: "Database",
+    file: Path,
+    wishes: "Wishes",
+    *,
+    mapping: str,
+    characteristic: str,
+    create_missing: bool,
+    machine: str | None,
+    dry_run: bool,
+    progress: Any,
+) -> "Outcome":
+    """Import a file and say what it came to. Raises `Flawed`, and `typer.BadParameter` for what cannot be chosen."""
+    from app.files.formats.aqdef import Source
+    from app.files.formats.delimited import Unusable
+    from app.loop.readings.importing.aqdef import actions, matching
+
+    try:
+        source = Source.at(file, wishes.encoding)
+    except Unusable as error:
+        raise typer.BadParameter(str(error), param_hint="FILE") from None
+    description = actions.describe(source)
+    found = matching.contents(description, wishes.unit)
+    with database.begin() as session:
+        chosen = actions.guess(session, found)
+        on = actions.machine_for(session, found, machine)
+    chosen |= _said(mapping, characteristic, found)
+    if create_missing:
+        chosen |= {
+            each.index: matching.NEW
+            for each in found
+            if each.index not in chosen and not each.obstacle and not each.not_new
+        }
+    _tell(found, chosen, description.encoding)
+    outcome = actions.import_aqdef(
+        database,
+        source,
+        description,
+        chosen,
+        wishes,
+        machine=on,
+        actor=f"command line ({getpass.getuser()})",
+        name=file.name,
+        dry_run=dry_run,
+        progress=progress,
+    )
+    _sum_up(outcome, dry_run=dry_run)
+    return outcome
+
+
+def _said(mapping: str, characteristic: str, found: "list[Content]") -> dict[int, str]:
+    from app.loop.readings.importing.aqdef import matching
+
+    if characteristic:
+        lengths = [each for each in found if not each.obstacle]
+        if len(lengths) != 1:
+            reason = _("The file has {count} characteristics of lengths: say which is which with --map.")
+            raise typer.BadParameter(reason.format(count=len(lengths)), param_hint="--characteristic")
+        return {lengths[0].index: characteristic}
+    try:
+        return matching.said(mapping, found)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--map") from None
+
+
+def _tell(found: "list[Content]", chosen: dict[int, str], encoding: str) -> None:
+    """Print how the file is understood."""
+    from app.loop.readings.importing.aqdef.matching import NEW
+
+    say(_("{count} characteristics, {encoding} text.").format(count=len(found), encoding=encoding.removesuffix("-sig")))
+    for each in found:
+        key = chosen.get(each.index)
+        if each.obstacle:
+            say(_("{title}: left out: {reason}.").format(title=each.title, reason=each.obstacle), style="yellow")
+            continue
+        if key is None:
+            reason = each.not_new or _("nothing here has its number or name; --map or --create-missing")
+            say(_("{title}: left out: {reason}.").format(title=each.title, reason=reason), style="yellow")
+            continue
+        say(f"{each.title} → {_('to be set up') if key == NEW else key}")
+        for remark in each.remarks:
+            say(f"  {remark}")
+
+
+def _sum_up(outcome: "Outcome", *, dry_run: bool) -> None:
+    for remark in outcome.remarks:
+        say(remark, style="yellow")
+    for each in outcome.results:
+        _result(each, dry_run=dry_run)
+    if not any(each.trouble for each in outcome.results):
+        say(_("They are history: no correction, no alarm, and the running average stays as it was."))
+
+
+def _result(result: "Result", *, dry_run: bool) -> None:
+    for doubt in result.doubts:
+        say(f"{result.key}: {doubt}", style="yellow")
+    if result.trouble is not None:
+        say(f"{result.key}: {result.trouble.detail} {result.trouble.what_to_do or ''}", style="bold red")
+        return
+    if result.created:
+        text = _("{key} is set up with the drawing's limits; it measures only. Check its zones before it corrects.")
+        say(text.format(key=result.key))
+    summary = result.summary
+    assert summary is not None
+    begin = _("Nothing was stored; this would be: ") if dry_run else ""
+    text = _("{stored} readings of {characteristic}").format(stored=summary.stored, characteristic=result.key)
+    if summary.first_at is not None and summary.last_at is not None:
+        text += _(", measured {span}").format(
+            span=f"{written(summary.first_at, MINUTES)} – {written(summary.last_at, MINUTES)}"
+        )
+    say(f"{begin}{text}.", style="bold")
+    if summary.repeated:
+        say(_("{count} were stored before and are not stored again.").format(count=summary.repeated))
+    if result.excluded:
+        say(_("{count} are excluded, as the file marks them (K0002).").format(count=result.excluded))

@@ -1,0 +1,250 @@
+"""Import of an AQDEF file: all of it or nothing, as history of each characteristic (decision 15)."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+
+from sqlalchemy import func, select
+from sqlalchemy.dialects.postgresql import insert
+from sqlalchemy.orm import Session
+
+from app.db.engine import Database
+from app.errors import InbandError, Invalid
+from app.files.formats import aqdef
+from app.files.formats.aqdef import Description, Source
+from app.files.formats.cell_values import folded
+from app.files.formats.delimited import Unusable
+from app.language.i18n import _
+from app.loop.characteristics import actions as characteristics
+from app.loop.characteristics import queries as characteristic_queries
+from app.loop.machines import queries as machines
+from app.loop.readings import queries
+from app.loop.readings.actions import exclude_all
+from app.loop.readings.importing.aqdef import matching
+from app.loop.readings.importing.aqdef.content import Readings, Wishes, put_down
+from app.loop.readings.importing.aqdef.matching import NEW, Content
+from app.loop.readings.importing.aqdef.queries import remembered
+from app.loop.readings.importing.history import Flawed, Summary, store_history
+from app.loop.readings.records import Entry
+from app.loop.tables.readings import ImportMapping, Reading
+
+MEANINGS = {129: "invalid", 290: "implausible"}
+
+
+@dataclass(frozen=True)
+class Result:
+    """The result of one characteristic. excluded: readings that the file marks. trouble: why it cannot be stored."""
+
+    content: Content
+    key: str
+    created: bool
+    summary: Summary | None = None
+    excluded: int = 0
+    doubts: tuple[str, ...] = ()
+    trouble: InbandError | None = None
+
+
+@dataclass
+class Outcome:
+    """The result of a file."""
+
+    results: list[Result] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def stored(self) -> int:
+        """Readings that are new."""
+        return sum(each.summary.stored for each in self.results if each.summary)
+
+    @property
+    def repeated(self) -> int:
+        """Readings that were there."""
+        return sum(each.summary.repeated for each in self.results if each.summary)
+
+
+def describe(source: Source) -> Description:
+    """The description of a file. Raises `Invalid`."""
+    try:
+        return aqdef.describe(source)
+    except Unusable as error:
+        raise _unusable(error) from None
+
+
+def _unusable(error: Unusable) -> Invalid:
+    where = _("line {line}").format(line=error.line) if error.line else "file"
+    return Invalid.at(where, str(error))
+
+
+def guess(session: Session, found: Sequence[Content]) -> dict[int, str]:
+    """The characteristics here that those of the file are, as far as it is known."""
+    known = characteristic_queries.characteristics(session, limit=100_000)
+    return matching.guessed(found, known, remembered(session))
+
+
+def machine_for(session: Session, found: Sequence[Content], named: str | None) -> str | None:
+    """The machine on which missing ones are set up: the one named, the one the file names, or the only one."""
+    if named:
+        return machines.machine_named(session, named).key
+    there = machines.machines(session)
+    words = {folded(each.machine) for each in found if each.machine}
+    fitting = [each for each in there if words & {folded(each.key), folded(each.name)}]
+    every = fitting or list(there)
+    return every[0].key if len(every) == 1 else None
+
+
+def import_aqdef(
+    database: Database,
+    source: Source,
+    description: Description,
+    chosen: Mapping[int, str],
+    wishes: Wishes,
+    *,
+    machine: str | None,
+    actor: str,
+    name: str,
+    dry_run: bool = False,
+    most: int | None = None,
+    progress: Callable[[], None] = lambda: None,
+) -> Outcome:
+    """Import the characteristics that are chosen, in one transaction.
+
+    chosen: the key of the characteristic here for each index of the file, or `NEW` to set it up on the machine. dry_run: say
+    what would happen, for each also what stands against it. Raises `Invalid`, `Flawed`, `NotFound` and `Conflict`.
+    """
+    found = {each.index: each for each in matching.contents(description, wishes.unit)}
+    _refuse(chosen, found)
+    wanted = {index: found[index] for index in chosen}
+    outcome = Outcome()
+    try:
+        with (
+            put_down(source, description, wanted, wishes, progress, most) as readings,
+            database.sessions() as session,
+        ):
+            if readings.flaws:
+                raise Flawed(readings.flaws, readings.flaw_count)
+            outcome.remarks = [str(each) for each in description.remarks] + readings.sentences()
+            outcome.results = _store_all(session, readings, wanted, chosen, machine, actor, name)
+            if dry_run:
+                session.rollback()
+                return outcome
+            for each in outcome.results:
+                if each.trouble is not None:
+                    each.trouble.detail = f"{each.key}: {each.trouble.detail}"
+                    raise each.trouble
+            _remember(session, outcome.results, actor)
+            session.commit()
+    except Unusable as error:
+        raise _unusable(error) from None
+    return outcome
+
+
+def _refuse(chosen: Mapping[int, str], found: Mapping[int, Content]) -> None:
+    if not chosen:
+        raise Invalid.at("characteristics", _("None of the file's characteristics is chosen; say which is which"))
+    keys = [key for key in chosen.values() if key != NEW]
+    for index, key in chosen.items():
+        content = found.get(index)
+        if content is None:
+            raise Invalid.at("characteristics", _("the file has no characteristic {index}").format(index=index))
+        reason = content.obstacle or (content.not_new if key == NEW else "")
+        if reason:
+            raise Invalid.at(content.title, reason)
+        if keys.count(key) > 1:
+            raise Invalid.at("characteristics", _("{key} is named for two characteristics of the file").format(key=key))
+
+
+def _store_all(
+    session: Session,
+    readings: Readings,
+    wanted: Mapping[int, Content],
+    chosen: Mapping[int, str],
+    machine: str | None,
+    actor: str,
+    name: str,
+) -> list[Result]:
+    entries: list[tuple[Entry, Content, bool]] = []
+    for index, content in wanted.items():
+        created = chosen[index] == NEW
+        key = _set_up(session, content, machine, actor) if created else chosen[index]
+        key = characteristic_queries.characteristic_named(session, key).characteristic.key
+        entry = queries.entry_of(session, key)
+        assert entry is not None
+        entries.append((entry, content, created))
+    results = {}
+    # In the order of the machines, as everybody takes their locks.
+    for entry, content, created in sorted(entries, key=lambda each: each[0].machine_id):
+        results[content.index] = _store(session, readings, entry, content, created=created, actor=actor, name=name)
+    return [results[index] for index in wanted]
+
+
+def _store(
+    session: Session, readings: Readings, entry: Entry, content: Content, *, created: bool, actor: str, name: str
+) -> Result:
+    current = characteristic_queries.characteristic_named(session, entry.characteristic)
+    doubts = tuple(matching.doubts(content, current.parameters))
+    if not readings.counted[content.index]:
+        return Result(content, entry.characteristic, created, Summary(), doubts=doubts)
+    with session.begin_nested() as part:
+        try:
+            lines = readings.lines(content.index, entry.characteristic)
+            summary = store_history(session, entry, lines, actor=actor, source=name, progress=lambda: None)
+            excluded = _exclude(session, entry, readings.excluded.get(content.index, {}), summary, actor, name)
+        except InbandError as trouble:
+            part.rollback()
+            return Result(content, entry.characteristic, created, doubts=doubts, trouble=trouble)
+    return Result(content, entry.characteristic, created, summary, excluded, doubts)
+
+
+def _set_up(session: Session, content: Content, machine: str | None, actor: str) -> str:
+    if machine is None:
+        raise Invalid.at("machine", _("say on which machine new characteristics are set up"))
+    known = characteristic_queries.characteristics(session, limit=100_000)
+    given = characteristics.CharacteristicIn(
+        key=matching.key_for(content, (each.characteristic.key for each in known)),
+        name=(content.name or content.title)[:200],
+        machine=machine,
+        part=(content.part or content.part_name)[:200] or None,
+        parameters=matching.parameters_of(content),
+    )
+    return characteristics.add_characteristic(session, given, actor).characteristic.key
+
+
+def _exclude(
+    session: Session, entry: Entry, marked: Mapping[int, Sequence[str]], summary: Summary, actor: str, name: str
+) -> int:
+    """Exclude the new readings that the file marks as not to be evaluated."""
+    if not summary.stored or not marked:
+        return 0
+    count = 0
+    for attribute, keys in marked.items():
+        sequences = session.scalars(
+            select(Reading.sequence).where(
+                Reading.machine_id == entry.machine_id,
+                Reading.characteristic_id == entry.characteristic_id,
+                Reading.sequence >= summary.first_sequence,
+                Reading.key == func.any(list(keys)),
+            )
+        ).all()
+        meaning = MEANINGS.get(attribute, "not to be evaluated")
+        reason = _("K0002 = {attribute} ({meaning}) in {file}").format(attribute=attribute, meaning=meaning, file=name)
+        for begin in range(0, len(sequences), 5_000):
+            count += len(exclude_all(session, entry, sequences[begin : begin + 5_000], actor, reason))
+    return count
+
+
+def _remember(session: Session, results: Sequence[Result], actor: str) -> None:
+    """Keep what belongs together, for the next file of the same part."""
+    for each in results:
+        entry = queries.entry_of(session, each.key)
+        assert entry is not None
+        part, number, name = each.content.identity
+        values = {"part": part, "number": number, "name": name, "actor": actor, "at": datetime.now(UTC)}
+        where = {"machine_id": entry.machine_id, "characteristic_id": entry.characteristic_id}
+        session.execute(
+            insert(ImportMapping)
+            .values(**where, **values)
+            .on_conflict_do_update(
+                index_elements=["machine_id", "characteristic_id", "part", "number", "name"],
+                set_={"actor": actor, "at": values["at"]},
+            )
+        )

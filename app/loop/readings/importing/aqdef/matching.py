@@ -1,0 +1,289 @@
+"""Characteristics of an AQDEF file: their unit and limits, the parameters they are set up with, and which ones are known here."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from app.core.parameters import Parameters, default_averaging_limit
+from app.core.plausibility import INCH, inch_warnings, looks_like_inches
+from app.files.formats.aqdef import Characteristic, Description
+from app.files.formats.aqdef_values import number_of
+from app.files.formats.cell_values import UNITS, Unreadable, folded
+from app.language.i18n import _
+from app.loop.characteristics.queries import CurrentCharacteristic
+from app.loop.warnings.wording import sentence
+
+WORDS = {
+    "mm": "mm", "millimeter": "mm", "millimetre": "mm", "µm": "um", "μm": "um", "um": "um", "mikrometer": "um",
+    "micrometer": "um", "micrometre": "um", "in": "inch", "inch": "inch", "inches": "inch", "zoll": "inch", '"': "inch",
+}  # fmt: skip
+NEW = "+"
+"""Chosen for a characteristic that is to be set up."""
+SLACK = 5e-7  # mm; limits that differ by less are the same
+NATURAL = "2"
+
+
+@dataclass(frozen=True)
+class Content:
+    """One characteristic of a file. Lengths in mm.
+
+    unit: of the file's numbers. obstacle: why it is not imported at all. not_new: why it cannot be set up out of the file.
+    """
+
+    index: int
+    part: str
+    part_name: str
+    number: str
+    name: str
+    unit: str
+    nominal: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    obstacle: str = ""
+    not_new: str = ""
+    remarks: tuple[str, ...] = ()
+    machine: str = ""
+
+    @property
+    def title(self) -> str:
+        """As people know it: number and name."""
+        words = dict.fromkeys(word for word in (self.number, self.name) if word)
+        return " ".join(words) or _("Characteristic {index}").format(index=self.index)
+
+    @property
+    def scale(self) -> float:
+        """Millimetres in its unit."""
+        return UNITS[self.unit]
+
+    @property
+    def identity(self) -> tuple[str, str, str]:
+        """By which it is remembered: part, number, name."""
+        return (self.part or self.part_name, self.number, self.name)
+
+    @property
+    def target(self) -> float | None:
+        """The size expected, mm: nominal, else between the limits."""
+        if self.nominal is not None:
+            return self.nominal
+        return None if self.lower is None or self.upper is None else (self.lower + self.upper) / 2
+
+
+@dataclass
+class _Said:
+    remarks: list[str] = field(default_factory=list)
+
+
+def contents(description: Description, unit: str | None = None) -> list[Content]:
+    """Every characteristic of the file. unit: of lengths for which it names none."""
+    return [_content(description, each, unit) for each in description.characteristics.values()]
+
+
+def _content(description: Description, each: Characteristic, unit: str | None) -> Content:
+    part, said = description.part_of(each), _Said()
+    word = each.fields.get("K2142", "")
+    own_unit, obstacle = _unit(word, unit, said)
+    if each.counts:
+        obstacle = _("counts parts (K2004 = {kind}); Inband keeps measured sizes").format(kind=each.fields["K2004"])
+    nominal, lower, upper = (None, None, None) if obstacle else _limits(each.fields, UNITS[own_unit], said)
+    machine = part.get("K1081", "") or part.get("K1082", "") or _only(description.catalogues.get("K4062", {}))
+    return Content(
+        each.index,
+        part.get("K1001", ""),
+        part.get("K1002", ""),
+        each.number,
+        each.name,
+        own_unit,
+        nominal,
+        lower,
+        upper,
+        obstacle,
+        "" if obstacle else _not_new(nominal, lower, upper),
+        tuple(said.remarks),
+        machine,
+    )
+
+
+def _only(entries: Mapping[int, str]) -> str:
+    return next(iter(entries.values())) if len(entries) == 1 else ""
+
+
+def _unit(word: str, said_unit: str | None, said: _Said) -> tuple[str, str]:
+    """Return the unit and why it cannot be used. Only what the file does not say is taken from elsewhere."""
+    if word.strip():
+        known = WORDS.get(word.strip().casefold())
+        if known is None:
+            return "mm", _("is not a length: its unit is {unit} (K2142)").format(unit=repr(word))
+        if known == "inch":
+            said.remarks.append(_("its unit is inch (K2142): values and limits are converted to mm"))
+        return known, ""
+    if said_unit is None:
+        said.remarks.append(_("the file names no unit (K2142): taken for mm"))
+    return said_unit or "mm", ""
+
+
+def _limits(fields: Mapping[str, str], scale: float, said: _Said) -> tuple[float | None, float | None, float | None]:
+    """Nominal size, lower and upper limit, mm."""
+
+    def length(key: str) -> float | None:
+        text = fields.get(key, "")
+        if not text:
+            return None
+        try:
+            return round(number_of(text) * scale, 9)
+        except Unreadable as error:
+            said.remarks.append(f"{key}: {text!r} {error}")
+            return None
+
+    nominal = length("K2101")
+    found: list[float | None] = []
+    for limit, deviation, kind in (("K2110", "K2112", "K2120"), ("K2111", "K2113", "K2121")):
+        value, off = length(limit), length(deviation)
+        if value is None and off is not None and nominal is not None:
+            value = round(nominal + off, 9)
+        elif value is not None and off is not None and nominal is not None and abs(nominal + off - value) > SLACK:
+            said.remarks.append(
+                _("{limit} and {deviation} do not agree; {limit} counts").format(limit=limit, deviation=deviation)
+            )
+        if value is not None and fields.get(kind) == "0":
+            said.remarks.append(
+                _("{kind} = 0 says that there is no limit, {limit} names one; it counts").format(kind=kind, limit=limit)
+            )
+        found.append(value)
+    lower, upper = found
+    if lower is None and upper is not None and (fields.get("K2120") == NATURAL or not nominal):
+        lower = 0.0
+        said.remarks.append(_("no lower limit: a form error, which is never below 0"))
+    return nominal, lower, upper
+
+
+def _not_new(nominal: float | None, lower: float | None, upper: float | None) -> str:
+    if lower is None or upper is None:
+        missing = "K2110" if upper is not None else "K2111"
+        return _("it has no tolerance: {field} is missing").format(field=missing)
+    if upper - lower < 1e-6:
+        return _("its upper limit is not above its lower one")
+    if nominal is not None and not lower - 1000 <= nominal <= upper + 1000:
+        return _("its nominal size lies far from its limits")
+    return ""
+
+
+def parameters_of(content: Content) -> dict[str, Any]:
+    """The parameters it is set up with: the drawing's, and for what no file knows cautious values. It corrects nothing.
+
+    Raises nothing where `not_new` is empty.
+    """
+    lower, upper = content.lower or 0.0, content.upper or 0.0
+    nominal = content.target or 0.0
+    width = round(upper - lower, 9)
+    wear = max(0.3, width)
+    return {
+        "nominal": round(nominal, 9),
+        "upper_deviation": round(upper - nominal, 9),
+        "lower_deviation": round(lower - nominal, 9),
+        "zero_range": round(default_averaging_limit(width) / 4, 9),
+        "wear_limit": wear,
+        "confidence_limit": max(1.0, 2 * wear),
+        "mode": "measure_only",
+    }
+
+
+def key_for(content: Content, taken: Iterable[str]) -> str:
+    """A key that is not taken, made of part, number and name."""
+    words = [content.part or content.part_name, content.number]
+    if len(content.number) < 3:
+        words.append(content.name)
+    plain = "-".join(
+        re.sub(r"[^a-z0-9._]+", "-", folded(word).replace(" ", "-")).strip("-._") for word in words if word
+    )
+    stem = re.sub(r"^[^a-z0-9]+", "", plain)[:58].strip("-") or f"aqdef-{content.index}"
+    others, number, key = set(taken), 1, stem
+    while key in others:
+        number += 1
+        key = f"{stem}-{number}"
+    return key
+
+
+def guessed(
+    found: Sequence[Content],
+    known: Sequence[CurrentCharacteristic],
+    remembered: Mapping[tuple[str, str, str], str],
+) -> dict[int, str]:
+    """The key of the characteristic that each is here: as remembered, else the one with its number or name."""
+    names: dict[str, list[CurrentCharacteristic]] = {}
+    for current in known:
+        for name in {current.characteristic.key, current.characteristic.name}:
+            names.setdefault(folded(name), []).append(current)
+    chosen: dict[int, str] = {}
+    for content in found:
+        if content.obstacle:
+            continue
+        key = remembered.get(content.identity) or _by_name(content, names)
+        if key and key not in chosen.values():
+            chosen[content.index] = key
+    return chosen
+
+
+def _by_name(content: Content, names: Mapping[str, Sequence[CurrentCharacteristic]]) -> str | None:
+    for word in filter(None, (content.number, content.name)):
+        fitting = names.get(folded(word), [])
+        if len(fitting) > 1:
+            parts = {folded(each) for each in (content.part, content.part_name) if each}
+            fitting = [each for each in fitting if folded(each.characteristic.part or "") in parts]
+        if len(fitting) == 1:
+            return fitting[0].characteristic.key
+    return None
+
+
+def doubts(content: Content, parameters: Parameters) -> list[str]:
+    """Sentences on what does not fit between the file and the characteristic that it is said to be."""
+    target = content.target
+    if target is None:
+        return []
+    texts = [sentence(each) for each in inch_warnings([("K2101", target, parameters.target)])]
+    if content.unit == "inch" and looks_like_inches(parameters.target, target):
+        texts.append(
+            _("{size} inch is {there} mm here: do the numbers of the file stand in mm already?").format(
+                size=f"{target / INCH:g}", there=f"{parameters.target:g}"
+            )
+        )
+    if texts or content.lower is None or content.upper is None:
+        return texts
+    half = parameters.tolerance_width / 2
+    here = (parameters.target - half, parameters.target + half)
+    if max(abs(content.lower - here[0]), abs(content.upper - here[1])) > SLACK:
+        texts.append(
+            _(
+                "The limits in the file, {lower:g} to {upper:g} mm, are not those of the characteristic, {low:g} to {high:g} mm."
+            ).format(lower=content.lower, upper=content.upper, low=round(here[0], 6), high=round(here[1], 6))
+        )
+    return texts
+
+
+def said(text: str, found: Sequence[Content]) -> dict[int, str]:
+    """Choices out of a text: `D40=shaft-d40,Part:L12=+`: number, name or index of a characteristic, before it the part if need be.
+
+    Raises `ValueError` with a sentence.
+    """
+    chosen: dict[int, str] = {}
+    for pair in filter(None, (each.strip() for each in text.split(","))):
+        name, sign, key = (each.strip() for each in pair.rpartition("="))
+        if not sign or not name or not key:
+            raise ValueError(_("Write it as D40=shaft-d40, or D40=+ to set it up."))
+        part, _colon, own = name.rpartition(":")
+        fitting = [
+            each
+            for each in found
+            if (own in {each.number, each.name} and (not part or part in {each.part, each.part_name}))
+            or name in {each.number, each.name}
+        ] or [each for each in found if own == str(each.index) and not part]
+        if len(fitting) != 1:
+            there = ", ".join(each.title for each in found[:20])
+            reason = (
+                _("{name} is no characteristic of the file; it has: {there}.")
+                if not fitting
+                else _("{name} is {count} characteristics of the file: write the part before it, as PART:{name}.")
+            )
+            raise ValueError(reason.format(name=name, there=there, count=len(fitting)))
+        chosen[fitting[0].index] = key
+    return chosen

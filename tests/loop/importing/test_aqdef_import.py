@@ -1,0 +1,211 @@
+"""AQDEF files into a real database: through the actions and the command."""
+
+from pathlib import Path
+from typing import Any
+from zoneinfo import ZoneInfo
+
+import pytest
+from sqlalchemy import text
+
+from app.db.engine import Database
+from app.errors import Invalid
+from app.files.formats.aqdef import Source
+from app.files.formats.aqdef_values import OF_CHARACTERISTIC as C
+from app.files.formats.aqdef_values import OF_FIELD as F
+from app.loop.characteristics import queries as characteristic_queries
+from app.loop.machines import actions as machines
+from app.loop.machines.schemas import MachineIn
+from app.loop.readings.importing.aqdef import actions, matching
+from app.loop.readings.importing.aqdef.actions import Outcome
+from app.loop.readings.importing.aqdef.content import Wishes
+from app.loop.readings.importing.aqdef.matching import NEW
+from app.loop.readings.importing.history import Flawed
+from tests.loop.importing.test_commands import inband
+from tests.loop.importing.test_history import scalar, set_up, stored
+
+BERLIN = Wishes(ZoneInfo("Europe/Berlin"))
+HEAD = [
+    "K0100 4", "K1001 shaft-0815", "K1002 Shaft",
+    "K2001/1 shaft-d40", "K2002/1 Seat", "K2101/1 40", "K2112/1 -0,016", "K2113/1 0", "K2142/1 mm",
+    "K2001/2 17", "K2002/2 Roundness Ø40", "K2111/2 0,005", "K2120/2 2", "K2142/2 mm",
+    "K2001/3 L1", "K2002/3 Length", "K2110/3 1.0000", "K2111/3 1.0020", "K2142/3 inch",
+    "K2001/4 W1", "K2002/4 Angle", "K2110/4 1", "K2111/4 2", "K2142/4 °",
+]  # fmt: skip
+
+
+def row(minute: int, *values: str) -> str:
+    """A line of values, each with its attribute behind a colon where it is not 0."""
+    time = f"02.03.2026/06:{minute:02}:00"
+    pairs = [value.partition(":") for value in values]
+    return C.join(f"{value}{F}{attribute or 0}{F}{time}" for value, _sign, attribute in pairs)
+
+
+ROWS = [
+    row(0, "39.991", "0.002", "1.0010", "1.5"),
+    "K0014/0 SN-1",
+    row(1, "39.992:129", "0.003", "1.0012", "1.5"),
+    row(1, "39.992", ":255"),
+]
+
+
+@pytest.fixture
+def plant(database: Database) -> Database:
+    set_up(database)
+    return database
+
+
+def written(path: Path, lines: list[str]) -> Path:
+    path.write_bytes("\r\n".join([*lines, ""]).encode("cp1252"))
+    return path
+
+
+def run(database: Database, path: Path, chosen: dict[int, str] | None = None, **options: Any) -> Outcome:
+    source = Source.at(path)
+    description = actions.describe(source)
+    with database.begin() as session:
+        guessed = actions.guess(session, matching.contents(description))
+    wishes = options.pop("wishes", BERLIN)
+    how = {"machine": "lathe-1", "actor": "tests", "name": path.name} | options
+    return actions.import_aqdef(database, source, description, guessed | (chosen or {}), wishes, **how)
+
+
+def test_what_is_known_is_found_and_what_is_missing_is_set_up(plant: Database, tmp_path: Path) -> None:
+    outcome = run(plant, written(tmp_path / "a.dfq", HEAD + ROWS), {2: NEW, 3: NEW})
+    seat, roundness, length = outcome.results
+    assert [each.key for each in outcome.results] == [
+        "shaft-d40",
+        "shaft-0815-17-roundness-40",
+        "shaft-0815-l1-length",
+    ]
+    assert [each.created for each in outcome.results] == [False, True, True]
+    assert [each.summary.stored for each in outcome.results if each.summary] == [3, 2, 2]
+    assert "marked as missing or deleted" in " ".join(outcome.remarks)
+    found = stored(plant)
+    assert [each["measured"] for each in found] == [39.991, 39.992, 39.992]
+    assert [each["part"] for each in found] == ["SN-1", None, None]
+    assert found[0]["measured_at"].isoformat() == "2026-03-02T05:00:00+00:00"
+    assert seat.excluded == 1
+    assert scalar(plant, "SELECT reason FROM exclusion") == "K0002 = 129 (invalid) in a.dfq"
+    assert scalar(plant, "SELECT sequence FROM exclusion") == 2
+    assert [each["measured"] for each in stored(plant, length.key)] == [25.4254, 25.43048]
+    with plant.begin() as session:
+        parameters = characteristic_queries.characteristic_named(session, roundness.key).version.parameters
+    assert (parameters["target"], parameters["tolerance_width"], parameters["mode"]) == (0.0025, 0.005, "measure_only")
+    assert scalar(plant, "SELECT (SELECT count(*) FROM correction) + (SELECT count(*) FROM alarm)") == 0
+
+
+def test_the_same_file_again_and_a_longer_one_store_nothing_twice(plant: Database, tmp_path: Path) -> None:
+    assert run(plant, written(tmp_path / "a.dfq", HEAD + ROWS)).stored == 3
+    again = run(plant, written(tmp_path / "b.dfq", HEAD + ROWS))
+    assert (again.stored, again.repeated) == (0, 3)
+    longer = run(plant, written(tmp_path / "c.dfq", [*HEAD, *ROWS, row(2, "39.993")]))
+    assert (longer.stored, longer.repeated, scalar(plant, "SELECT count(*) FROM exclusion")) == (1, 3, 1)
+
+
+def test_what_was_chosen_once_is_remembered(plant: Database, tmp_path: Path) -> None:
+    run(plant, written(tmp_path / "a.dfq", HEAD + ROWS), {1: "shaft-d41"})
+    again = run(plant, written(tmp_path / "b.dfq", [*HEAD, *ROWS, row(2, "39.993")]))
+    assert [(each.key, each.summary.stored) for each in again.results if each.summary] == [("shaft-d41", 1)]
+
+
+def test_nothing_is_stored_where_a_line_is_wrong(plant: Database, tmp_path: Path) -> None:
+    path = written(tmp_path / "a.dfq", [*HEAD, *ROWS, row(2, "x"), row(3, "39.9", "1", "1", "1", "5")])
+    with pytest.raises(Flawed) as refusal:
+        run(plant, path, {2: NEW})
+    assert [str(flaw) for flaw in refusal.value.flaws] == [
+        "line 29, K0001/1: 'x' is not a number",
+        "line 30, K0001: '5' belongs to characteristic 5, but the file describes 4",
+    ]
+    assert scalar(plant, "SELECT (SELECT count(*) FROM reading) + (SELECT count(*) FROM import_mapping)") == 0
+    assert scalar(plant, "SELECT count(*) FROM characteristic") == 2
+
+
+def test_a_trial_stores_nothing(plant: Database, tmp_path: Path) -> None:
+    outcome = run(plant, written(tmp_path / "a.dfq", HEAD + ROWS), {2: NEW}, dry_run=True)
+    assert outcome.stored == 5
+    assert scalar(plant, "SELECT (SELECT count(*) FROM reading) + (SELECT count(*) FROM import_mapping)") == 0
+
+
+@pytest.mark.parametrize(
+    ("chosen", "machine", "said"),
+    [
+        ({4: NEW}, "lathe-1", "is not a length: its unit is '°'"),
+        ({2: "shaft-d40"}, "lathe-1", "shaft-d40 is named for two characteristics"),
+        ({2: NEW}, None, "say on which machine"),
+    ],
+)
+def test_what_cannot_be_chosen_is_refused(
+    plant: Database, tmp_path: Path, chosen: dict[int, str], machine: str | None, said: str
+) -> None:
+    with pytest.raises(Invalid, match=said):
+        run(plant, written(tmp_path / "a.dfq", HEAD + ROWS), chosen, machine=machine)
+
+
+def test_without_a_tolerance_nothing_is_set_up() -> None:
+    def reason(**fields: str) -> str:
+        from app.files.formats.aqdef import Characteristic, Description
+
+        description = Description(characteristics={1: Characteristic(1, 1, {"K2142": "mm"} | fields)})
+        return matching.contents(description)[0].not_new
+
+    assert reason(K2101="40") == "it has no tolerance: K2111 is missing"
+    assert reason(K2101="40", K2111="40.1") == "it has no tolerance: K2110 is missing"
+    assert reason(K2110="40", K2111="40") == "its upper limit is not above its lower one"
+    assert reason(K2111="0.005") == ""
+
+
+def test_inches_that_nobody_named_are_questioned(plant: Database, tmp_path: Path) -> None:
+    lines = ["K0100 1", "K2001/1 shaft-d40", "K2101/1 1.5748", "K2142/1 mm", "K0001/1 39.99", "K0004/1 2.3.2026/6:00"]
+    outcome = run(plant, written(tmp_path / "a.dfq", lines), dry_run=True)
+    assert "looks like 39.992" in outcome.results[0].doubts[0]
+    lines[3], lines[2] = "K2142/1 inch", "K2101/1 39.992"
+    outcome = run(plant, written(tmp_path / "b.dfq", lines), dry_run=True)
+    assert "do the numbers of the file stand in mm already?" in outcome.results[0].doubts[0]
+
+
+def test_limits_that_are_others_here_are_said(plant: Database, tmp_path: Path) -> None:
+    lines = ["K0100 1", "K2001/1 shaft-d40", "K2110/1 39.9", "K2111/1 40.1", "K0001/1 39.99", "K0004/1 2.3.2026/6:00"]
+    outcome = run(plant, written(tmp_path / "a.dfq", lines), dry_run=True)
+    assert outcome.results[0].doubts[0].startswith("The limits in the file, 39.9 to 40.1 mm, are not those")
+
+
+def test_the_command_says_what_becomes_of_each(plant: Database, tmp_path: Path) -> None:
+    path = written(tmp_path / "shift.dfq", HEAD + ROWS)
+    done = inband("import", path, "--timezone", "Europe/Berlin", database=plant, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "shaft-d40 Seat → shaft-d40" in done.stderr
+    assert "17 Roundness Ø40: left out: nothing here has its number or name; --map or --create-missing." in done.stderr
+    assert "W1 Angle: left out: is not a length: its unit is '°' (K2142)." in done.stderr
+    assert "3 readings of shaft-d40, measured 2026-03-02 06:00 – 2026-03-02 06:01." in done.stderr
+    assert "1 are excluded" in done.stderr
+    with plant.begin() as session:
+        machines.add_machine(session, MachineIn(key="mill-1", name="Mill 1", control="fanuc"), "tests")
+    done = inband("import", path, "--timezone", "Europe/Berlin", "--create-missing", database=plant, folder=tmp_path)
+    assert (done.returncode, "say on which machine" in done.stderr) == (1, True), done.stderr
+    options = ["--timezone", "Europe/Berlin", "--map", "L1=+,shaft-0815:17=shaft-d41", "--machine", "mill-1"]
+    done = inband("import", path, *options, database=plant, folder=tmp_path)
+    assert done.returncode == 1
+    assert "shaft-d41: Every value lies more than" in done.stderr
+    done = inband("import", path, *options[:2], "--map", "L1=+", "--machine", "mill-1", database=plant, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "shaft-0815-l1-length is set up" in done.stderr
+    with plant.begin() as session:
+        keys = session.execute(
+            text("SELECT m.key FROM characteristic c JOIN machine m ON m.id = machine_id WHERE c.key LIKE '%l1%'")
+        )
+        assert keys.scalars().all() == ["mill-1"]
+
+
+def test_the_command_teaches(plant: Database, tmp_path: Path) -> None:
+    path = written(tmp_path / "shift.dfq", HEAD + ROWS)
+    for options, said in (
+        (["--map", "X9=shaft-d40"], "X9 is no characteristic of the file; it has: shaft-d40 Seat,"),
+        (["--map", "nonsense"], "Write it as D40=shaft-d40"),
+        (["--live"], "as history only"),
+        (["--characteristic", "shaft-d40"], "say which is which with --map"),
+    ):
+        done = inband("import", path, *options, database=plant, folder=tmp_path)
+        assert done.returncode == 2, done.stderr
+        assert said in " ".join(done.stderr.split()), done.stderr
+    lonely = written(tmp_path / "b.dfx", ["1"])
+    assert "b.dfd" in inband("import", lonely, database=plant, folder=tmp_path).stderr
