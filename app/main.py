@@ -303,7 +303,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     replica = _replica(settings, database)
     keys, directory = KeyRing(letting_in, caller_of_key), Directory(letting_in)
     writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(database, jobs_of(settings))
-    report_worker = ReportWorker(database)
+    report_worker = ReportWorker(database, replica)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:

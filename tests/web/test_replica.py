@@ -191,6 +191,36 @@ def test_a_query_that_it_ends_is_answered_by_the_other(shop: Shop, servers: Clus
     assert len(answered.json()["items"]) == 4
 
 
+class TestReportsInTheBackground:
+    def make(self, shop: Shop) -> Any:
+        job = shop.call("POST", "/reports", 201, characteristics=[shop.characteristic], format="csv")
+        until(lambda: shop.call("GET", f"/reports/{job['id']}")["state"] not in {"queued", "running"}, 60)
+        return shop.call("GET", f"/reports/{job['id']}")
+
+    def test_lack_nothing_that_was_stored_when_they_were_asked_for(self, shop: Shop, servers: Cluster) -> None:
+        with paused(servers):
+            shop.add(f"{shop.characteristic}-late")
+            shop.read(1.0, f"{shop.characteristic}-late")
+            shop.characteristic = f"{shop.characteristic}-late"
+            made = self.make(shop)
+        assert (made["state"], made["problems"]) == ("done", 0)
+
+    def test_are_read_there_and_by_the_other_where_the_standby_ends_the_query(
+        self, shop: Shop, servers: Cluster
+    ) -> None:
+        waiting = "FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND application_name = 'inband'"
+        with ThreadPoolExecutor(1) as pool, psycopg.connect(servers.nodes[0].url) as locking:
+            locking.execute("LOCK TABLE reading IN ACCESS EXCLUSIVE MODE")
+            locked = "SELECT 1 FROM pg_locks WHERE mode = 'AccessExclusiveLock' AND relation = 'reading'::regclass"
+            until(lambda: rows(servers.nodes[1].url, locked), 30)
+            making = pool.submit(self.make, shop)
+            until(lambda: rows(servers.nodes[1].url, f"SELECT 1 {waiting}"), 30)
+            rows(servers.nodes[1].url, f"SELECT pg_terminate_backend(pid) {waiting}")
+            locking.rollback()
+            made = making.result()
+        assert (made["state"], made["problems"]) == ("done", 0)
+
+
 def test_the_check_tells_how_far_it_is_behind(shop: Shop, servers: Cluster) -> None:
     def check(replica: str) -> str:
         command = [sys.executable, "-m", "app", "check", "--database-url", servers.nodes[0].url]

@@ -2,7 +2,8 @@
 
 Whoever works on a job holds an advisory lock with its number, on a connection of its own: when the process ends, however it
 ends, the lock is free, and another process – or the same one, started anew – goes on behind the last characteristic that is ready.
-After each characteristic the thread rests as long as it worked: readings come first.
+After each characteristic the thread rests as long as it worked: readings come first. What a report shows is read from the
+standby, where one is named and has everything that was stored when the job was taken up.
 """
 
 import asyncio
@@ -15,10 +16,13 @@ from uuid import uuid4
 
 import psycopg
 from sqlalchemy.exc import DBAPIError, OperationalError
+from sqlalchemy.orm import Session
 
 from app.db.engine import Database
 from app.db.outage import Outage
+from app.db.replica import MustSee, Replica
 from app.errors import InbandError
+from app.files.documents.content import Report
 from app.jobs.actions import DatabaseGone, Unit, end_failure, note_failure, paused_units
 from app.language.i18n import _, speaking
 from app.loop.characteristics import queries as characteristics
@@ -38,8 +42,9 @@ LOCK = "'report_job'::regclass::oid::int4, %s"
 class ReportWorker:
     """Makes reports in one process."""
 
-    def __init__(self, database: Database, every: float = EVERY) -> None:
+    def __init__(self, database: Database, replica: Replica | None = None, every: float = EVERY) -> None:
         self._database = database
+        self._replica = replica
         self._every = every
         self._closing = threading.Event()
         self._wake = threading.Event()
@@ -105,28 +110,26 @@ class ReportWorker:
         if stored is None:
             return
         bundle = Bundle.of(stored)
+        must_see = MustSee(written=self._replica.written() if self._replica else 0)
         proof.proof()  # what is handed over says it if an example fails; a page does not wait for that, this does
         with speaking(bundle.language):
             for place, key in enumerate(bundle.keys):
                 if place in ready:
                     continue
                 began = time.monotonic()
-                if self._closing.is_set() or not self._one(number, token, bundle, place, key):
+                if self._closing.is_set() or not self._one(number, token, bundle, place, key, must_see):
                     return
                 self._closing.wait(min(LONGEST_REST, time.monotonic() - began))
             self._pack(number, token, bundle)
 
-    def _one(self, number: int, token: str, bundle: Bundle, place: int, key: str) -> bool:
+    def _one(self, number: int, token: str, bundle: Bundle, place: int, key: str, must_see: MustSee) -> bool:
         """One characteristic; what is wrong with it is written down and spoils no other. False if nobody wants it any more."""
         with self._database.begin() as session:
             if not actions.begin(session, number, token, key):
                 return False
         content, trouble = None, None
         try:
-            with self._database.begin() as session:
-                current = characteristics.characteristic_named(session, key)
-                report = queries.report_of(session, current, bundle.request, datetime.now(UTC))
-            content = bundle.part(report)
+            content = bundle.part(self._report(bundle, key, must_see))
         except InbandError as error:
             trouble = f"{error.detail} {error.what_to_do or ''}".strip()
         except Exception as error:
@@ -136,6 +139,18 @@ class ReportWorker:
             trouble = _("The report could not be created; the server's log says why.")
         with self._database.begin() as session:
             return actions.keep(session, number, token, place, key, content, trouble)
+
+    def _report(self, bundle: Bundle, key: str, must_see: MustSee) -> Report:
+        """The report of one characteristic, read from the standby if it will do."""
+        reading = self._replica.begin(must_see) if self._replica else None
+        if self._replica is not None and reading is not None:
+            try:
+                with reading:
+                    return _report_of(reading, bundle, key)
+            except DBAPIError as error:  # it has ended the query, or is gone
+                self._replica.failed(error)
+        with self._database.begin() as session:
+            return _report_of(session, bundle, key)
 
     def _pack(self, number: int, token: str, bundle: Bundle) -> None:
         with self._database.begin() as session:
@@ -156,6 +171,11 @@ class ReportWorker:
             return
         with self._database.begin() as session:
             actions.finish(session, number, token, file_name(number, bundle.form), whole)
+
+
+def _report_of(session: Session, bundle: Bundle, key: str) -> Report:
+    current = characteristics.characteristic_named(session, key)
+    return queries.report_of(session, current, bundle.request, datetime.now(UTC))
 
 
 def _taken(ours: "psycopg.Connection[tuple[object, ...]]", number: int) -> bool:
