@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from random import Random
 from typing import Any
 
-from app.cli.demo.client import Client
+from inband_client import Client
 
 LIMITS = {
     "zero_range": 0.001,

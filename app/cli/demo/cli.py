@@ -80,14 +80,14 @@ def start(settings: "Settings", key: str, seed: int, speed: float, past: float |
 
 
 def _run(line: "Line", speed: float, past: float | None) -> None:
-    from app.cli.demo.client import Ending, Refused
     from app.cli.demo.installing import run_line
+    from inband_client import ProblemError, Stopped
 
     try:
         run_line(line, speed, past)
-    except Ending:
+    except Stopped:
         pass
-    except Refused as refusal:
+    except ProblemError as refusal:
         say(_("The simulated machine {key} has ended: {why}").format(key=line.key, why=refusal), style="bold red")
     except Exception:
         log.exception("the simulated machine %s has ended", line.key)

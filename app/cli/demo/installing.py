@@ -6,9 +6,9 @@ from datetime import UTC, datetime
 from random import Random
 
 from app.cli.demo import calibrating, plant, touching, turning
-from app.cli.demo.client import Client, Refused
 from app.cli.demo.running import Line, Pace
 from app.cli.demo.simulation import Machine
+from inband_client import Client, NotFound
 
 KEY_NAME = "demonstration plant"
 PAST = 300  # parts of each machine, if no number of days is asked for
@@ -37,9 +37,7 @@ def set_up(admin: Client, machine: plant.Machine) -> None:
 def _unless_there(admin: Client, path: str, body: dict[str, object], key: str) -> None:
     try:
         admin.get(f"{path}/{key}")
-    except Refused as refusal:
-        if refusal.status != 404:
-            raise
+    except NotFound:
         admin.post(path, body)
 
 
@@ -56,8 +54,12 @@ def lines(
     url: str, admin_key: str, seed: int, ending: threading.Event, machines: Sequence[plant.Machine] = plant.MACHINES
 ) -> list[Line]:
     """The machines of the plant, set up and with keys of their own."""
-    admin = Client(url, admin_key, ending)
-    operator = Client(url, new_key(admin, "/keys", {"name": f"{KEY_NAME}: operator", "role": "operator"}), ending)
+
+    def client(key: str) -> Client:
+        return Client(url, key, patience=None, stop=ending)
+
+    admin = client(admin_key)
+    operator = client(new_key(admin, "/keys", {"name": f"{KEY_NAME}: operator", "role": "operator"}))
     run = datetime.now(UTC).strftime("%y%m%d%H%M%S")
     simulated: list[Line] = []
     for spec in machines:
@@ -65,7 +67,7 @@ def lines(
         calibrating.behind(admin, spec.key, seed)
         turning.behind(admin, spec.key, seed)
         touching.behind(admin, spec.key, seed)
-        gateway = Client(url, new_key(admin, f"/machines/{spec.key}/keys", {"name": KEY_NAME}), ending)
+        gateway = client(new_key(admin, f"/machines/{spec.key}/keys", {"name": KEY_NAME}))
         rng = Random(f"{seed}:{spec.key}:operator")
         simulated.append(Line(Machine(spec, seed), gateway, operator, run, rng, ending))
     admin.close()

@@ -14,8 +14,8 @@ from datetime import UTC, datetime, timedelta
 from random import Random
 from typing import Any
 
-from app.cli.demo.client import Client, Ending, Refused
 from app.cli.demo.simulation import Machine, Probe
+from inband_client import Client, Conflict, Correction, ProblemError, Reading, Stopped
 
 log = logging.getLogger(__name__)
 DAY = 24 * 3600.0  # s
@@ -126,30 +126,25 @@ class Line:
         for number in worn:
             machine.fresh_edge(number, 0.0)
 
-    def _push_batch(self, probes: list[Probe]) -> list[dict[str, Any]]:
-        if not probes:
-            return []
-        answer = self._gateway.post(
-            "/readings/batch?decisions=true", [self._reading(probe, past=True) for probe in probes]
-        )
-        return [item["correction"] for item in answer["items"] if item["correction"]]
+    def _push_batch(self, probes: list[Probe]) -> list[Correction]:
+        batch = self._gateway.push_many(self._reading(probe, past=True) for probe in probes)
+        return [decision.correction for decision in batch.decisions if decision.correction]
 
-    def _apply(self, corrections: list[dict[str, Any]]) -> None:
+    def _apply(self, corrections: list[Correction]) -> None:
         """Put them into the offsets; the next reading confirms them by its `correction_in_effect`.
 
         What a person approves is approved now, whatever time the past has, so it is confirmed now too.
         """
         for correction in corrections:
-            path, edge = (
-                f"/corrections/{self.key}/{correction['number']}",
-                self.machine.edges[correction["tool_memory"]],
-            )
-            if correction["status"] == "pending":
-                edge.correct(correction["number"], correction["amount"])
-            elif correction["status"] == "awaiting_approval":
-                self._operator.post(f"{path}/approve", {"reason": "Plausible, small."})
-                offset = edge.correct(correction["number"], correction["amount"])
-                self._gateway.post(f"{path}/applied", {"offset_after": offset})
+            edge = self.machine.edges[correction.tool_memory]
+            if correction.status == "pending":
+                edge.correct(correction.number, correction.amount)
+            elif correction.status == "awaiting_approval":
+                self._approve(correction.number)
+                self._gateway.confirm(self.key, correction.number, edge.correct(correction.number, correction.amount))
+
+    def _approve(self, number: int) -> None:
+        self._operator.post(f"/corrections/{self.key}/{number}/approve", {"reason": "Plausible, small."})
 
     # --- the present
 
@@ -171,9 +166,9 @@ class Line:
         while not self._ending.is_set():
             try:
                 self._cycle()
-            except Ending:
+            except Stopped:
                 return
-            except Refused as refusal:
+            except ProblemError as refusal:
                 log.warning("%s: %s", self.key, refusal)
                 self._ending.wait(1.0)
 
@@ -203,36 +198,34 @@ class Line:
     def _push(self, probes: list[Probe]) -> None:
         """One reading after the other; a machine that is told to stop does not go on probing."""
         for probe in probes:
-            answer = self._gateway.post("/readings", self._reading(probe))
-            if answer["action"] == "stop":
+            if self._gateway.push(self._reading(probe)).action == "stop":
                 self._fault_told = True
                 return
 
-    def _reading(self, probe: Probe, *, past: bool = False) -> dict[str, Any]:
-        value: dict[str, Any] = {"touches": probe.touches} if probe.touches else {"measured": probe.size}
-        if (
-            not past
-        ):  # in which the tools are changed now, whatever time it has: only the corrections say what was cut when
-            value["machined_at"] = self.pace.moment(probe.part.cut_at).isoformat()
-        return value | {
-            "characteristic": probe.feature.key,
-            "measured_at": self.pace.moment(probe.measured_at).isoformat(),
-            "part": f"{self._run}-{probe.part.serial:04d}",
-            "key": f"{self._run}:{self.key}:{probe.part.serial}:{probe.feature.key}",
-            "correction_in_effect": probe.part.in_effect[probe.feature.key],
-        }
+    def _reading(self, probe: Probe, *, past: bool = False) -> Reading:
+        # In the past the tools are changed now, whatever time it has: only the corrections say what was cut when.
+        return Reading(
+            characteristic=probe.feature.key,
+            measured=None if probe.touches else probe.size,
+            touches=probe.touches or None,
+            measured_at=self.pace.moment(probe.measured_at),
+            machined_at=None if past else self.pace.moment(probe.part.cut_at),
+            part=f"{self._run}-{probe.part.serial:04d}",
+            key=f"{self._run}:{self.key}:{probe.part.serial}:{probe.feature.key}",
+            correction_in_effect=probe.part.in_effect[probe.feature.key],
+        )
 
     def _fetch_corrections(self) -> None:
-        for correction in self._gateway.items(f"/machines/{self.key}/corrections", status="pending"):
-            edge = self.machine.edges.get(correction["tool_memory"])
+        for correction in self._gateway.pending(self.key):
+            edge = self.machine.edges.get(correction.tool_memory)
             if edge is None:  # a location that somebody else uses
                 continue
-            confirmation = {}
-            if correction["number"] not in edge.applied:  # else it is in the offset already, with those after it
-                confirmation["offset_after"] = edge.correct(correction["number"], correction["amount"])
+            offset = None
+            if correction.number not in edge.applied:  # else it is in the offset already, with those after it
+                offset = edge.correct(correction.number, correction.amount)
             try:
-                self._gateway.post(f"/corrections/{self.key}/{correction['number']}/applied", confirmation)
-            except Refused as refusal:  # superseded in this moment: the tool memory says what holds
+                self._gateway.confirm(self.key, correction.number, offset)
+            except ProblemError as refusal:  # superseded in this moment: the tool memory says what holds
                 log.info("%s: %s", self.key, refusal)
 
     def _follow_tool_memory(self) -> bool:
@@ -261,8 +254,8 @@ class Line:
                 alarm, *REMEDIES.get(alarm["kind"], NOTED)
             )  # type: ignore[misc]
         for correction in self._operator.items(f"/machines/{self.key}/corrections", status="awaiting_approval"):
-            path = f"/corrections/{self.key}/{correction['number']}/approve"
-            waiting[path] = lambda path=path: self._operator.post(path, {"reason": "Plausible, small."})  # type: ignore[misc]
+            number = correction["number"]
+            waiting[f"correction {number}"] = lambda number=number: self._approve(number)  # type: ignore[misc]
         now = time.monotonic()
         self._patience = {what: self._patience.get(what) or now + self._rng.uniform(*PATIENCE) for what in waiting}
         for what, step_in in waiting.items():
@@ -278,10 +271,9 @@ class Line:
     def _acknowledge(self, alarm: dict[str, Any], action: str, comment: str) -> None:
         body = {"action": action, "comment": f"{comment} (simulated operator)"}
         try:
-            self._operator.post(f"/alarms/{alarm['id']}/acknowledge", body | self._measured_by_hand(alarm))
-        except Refused as refusal:
-            if refusal.status != 409:  # somebody was first
-                raise
+            self._operator.post(f"/alarms/{alarm['id']}/acknowledge", body | self._measured_by_hand(alarm), repeat=True)
+        except Conflict as first:
+            log.info("%s: %s", self.key, first)
 
     def _set_by_hand(self, alarm: dict[str, Any]) -> None:
         """Correct the offset by the bore gauge's deviation of the last part."""
@@ -311,6 +303,7 @@ class Line:
                 self._operator.post(
                     f"/machines/{self.key}/tools/{number}/change",
                     {"offset": 0.0, "reason": f"{edge.tool.name}: changed after {edge.parts} parts"},
+                    repeat=True,
                 )
 
     def _wait_until(self, at: float) -> None:

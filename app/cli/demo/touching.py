@@ -4,7 +4,7 @@ from datetime import UTC, datetime, timedelta
 from random import Random
 from typing import Any
 
-from app.cli.demo.client import Client
+from inband_client import Client
 
 MACHINE = "mill-1"
 FIXTURE = "vice-left"

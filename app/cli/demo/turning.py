@@ -5,7 +5,7 @@ from math import cos, radians, sin
 from random import Random
 from typing import Any, NamedTuple
 
-from app.cli.demo.client import Client
+from inband_client import Client
 
 MACHINE = "mill-1"
 PLAN = {

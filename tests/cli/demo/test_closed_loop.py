@@ -15,14 +15,14 @@ from typing import Any
 import pytest
 
 from app.cli.demo import people, plant, running
-from app.cli.demo.client import Client, Refused
 from app.cli.demo.installing import lines, set_up
 from app.cli.demo.running import Line, Pace
 from app.cli.demo.simulation import Machine
 from app.db.engine import Database
 from app.errors import InbandError
 from app.settings import Settings
-from tests.conftest import RunServer, Server
+from inband_client import Client
+from tests.conftest import Server
 
 PARTS = 250
 
@@ -50,7 +50,7 @@ def filled(server: Server) -> Iterator[list[Line]]:
 
 
 def readings(server: Server, characteristic: str) -> list[dict[str, Any]]:
-    with_key = Client(server.url, server.key("viewer"), threading.Event())
+    with_key = Client(server.url, server.key("viewer"))
     found = list(with_key.items("/readings", characteristic=characteristic, limit=1000))
     with_key.close()
     return found
@@ -159,7 +159,7 @@ def test_a_second_run_is_judged_by_what_was_in_effect_before_it(server: Server, 
 
 
 def test_setting_up_twice_finds_what_is_there(server: Server) -> None:
-    admin = Client(server.url, server.key("admin"), threading.Event())
+    admin = Client(server.url, server.key("admin"))
     spec = plant.MILL_1
     set_up(admin, spec)
     set_up(admin, spec)
@@ -175,19 +175,6 @@ def test_a_second_run_goes_on_where_the_offsets_stand() -> None:
     for feature in plant.LATHE_1.features:
         part = machine.pipeline[0]
         assert part.sizes[feature.key] == pytest.approx(feature.target, abs=0.006)
-
-
-def test_the_gateway_waits_for_a_server_that_is_away_and_tells_a_refusal(run_server: RunServer) -> None:
-    with run_server() as server:
-        client = Client(server.url, server.key("admin"), threading.Event())
-        server.kill()
-        later = threading.Timer(1.0, server.restart)
-        later.start()
-        assert client.get("/machines")["items"] == []
-        later.join()
-        with pytest.raises(Refused, match=r"404 .*no machine"):
-            client.get("/machines/lathe-9")
-        client.close()
 
 
 def test_times_run_at_their_own_pace_until_now_and_faster_from_now_on() -> None:

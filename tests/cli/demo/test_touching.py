@@ -1,17 +1,15 @@
 """The vice of the demonstration: it creeps until it warns, and a casting is aligned."""
 
-import threading
-
 import pytest
 
 from app.cli.demo import plant, touching
-from app.cli.demo.client import Client
 from app.cli.demo.installing import set_up
+from inband_client import Client
 from tests.conftest import Server
 
 
 def test_a_creeping_vice_and_an_aligned_casting_are_there_once(server: Server) -> None:
-    admin = Client(server.url, server.key("admin"), threading.Event())
+    admin = Client(server.url, server.key("admin"))
     set_up(admin, plant.MILL_1)
     for _again in range(2):
         touching.behind(admin, plant.MILL_1.key, 1)

@@ -1,17 +1,15 @@
 """The rotary table of the demonstration: last month's run is entered, today's says what to enter."""
 
-import threading
-
 import pytest
 
 from app.cli.demo import plant, turning
-from app.cli.demo.client import Client
 from app.cli.demo.installing import set_up
+from inband_client import Client
 from tests.conftest import Server
 
 
 def test_a_month_of_runs_is_there_once(server: Server) -> None:
-    admin = Client(server.url, server.key("admin"), threading.Event())
+    admin = Client(server.url, server.key("admin"))
     set_up(admin, plant.MILL_1)
     for _again in range(2):
         turning.behind(admin, plant.MILL_1.key, 1)
