@@ -181,3 +181,23 @@ class TestAway:
             away.pending("lathe-1")
         with pytest.raises(Stopped):
             away.pending("lathe-1")
+
+
+class TestFollowing:
+    def test_what_happens_to_the_machine_is_told_and_taken_up_after_a_restart(
+        self, connect: Connect, run_server: RunServer
+    ) -> None:
+        with run_server() as server:
+            shop = Shop(server)
+            machine = connect(server.url, server.key(machine=shop.machine), patience=None)
+            events = machine.follow()
+            assert next(events).kind == "hello"
+            shop.read(6)
+            kinds = {event.kind: event for event, _at in zip(events, range(2), strict=False)}
+            assert kinds["reading"].sequence == 1
+            assert (kinds["correction"].number, kinds["correction"].status) == (1, "pending")
+            server.kill()
+            server.restart()
+            shop.read(0.2)
+            told = next(event for event in events if event.sequence == 2)
+            assert (told.machine, told.characteristic) == (shop.machine, shop.characteristic)
