@@ -3,7 +3,7 @@
 # make lint    style, types, lengths, templates, and the walls between the rooms
 # make bench   the benchmarks; each prints ratios
 # make messages  collect what can be translated into frontend/locale/inband.pot
-# make wheel   what others install: dist/inband-*.whl, and the source beside it
+# make wheel   what others install: dist/inband-*.whl, dist/inband_client-*.whl, and the sources beside them
 # make clean   remove what make has made; no data
 
 SHELL := /bin/sh
@@ -41,6 +41,7 @@ messages: $(VENV)/installed
 wheel: $(VENV)/installed
 	@rm -rf dist
 	@$(BIN)/hatchling build
+	@cd app/client && $(CURDIR)/$(BIN)/hatchling build -d $(CURDIR)/dist
 
 clean:
 	rm -rf $(VENV) dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis

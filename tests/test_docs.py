@@ -19,6 +19,7 @@ from app.db.engine import Database
 from app.settings import Settings, variable_of
 from docs import generate
 from tests.conftest import Server, begun, free_port, wait_ready
+from tests.shop import Shop
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]*)?\)")
@@ -212,6 +213,41 @@ class TestReference:
 
 
 class TestHowTo:
+    def test_the_python_client_closes_a_loop_as_it_is_written(self, server: Server) -> None:
+        path = HOUSE / "docs" / "how-to" / "python-client.md"
+        loop, live = (
+            text.replace("http://127.0.0.1:8000", server.url) for kind, text in blocks(path) if kind == "python"
+        )
+        shop = Shop(server)
+        shop.call("POST", "/machines", 201, key="my-lathe", name="My lathe", control="sinumerik")
+        parameters = {"R10": 3, "R11": 5, "R42": 40, "R40": 0, "R41": -0.016, "R29": 2, "factor": -1}
+        limits = {"R33": 0.001, "R34": 0.0053, "R37": 0.3, "R36": 1}
+        seat: dict[str, Any] = {
+            "key": "seat-d40",
+            "name": "Bearing seat",
+            "machine": "my-lathe",
+            "parameters": parameters | limits,
+        }
+        shop.call("POST", "/characteristics", 201, **seat)
+        environment = os.environ | {"PYTHONPATH": str(HOUSE / "app" / "client"), "PYTHONIOENCODING": "utf-8"}
+        environment["MACHINE_KEY"] = server.key(machine="my-lathe")
+        watching = subprocess.Popen([sys.executable, "-c", live], env=environment, stdout=subprocess.PIPE, text=True)
+        try:
+            assert watching.stdout is not None
+            assert watching.stdout.readline() == "[]\n"
+            for _again in range(2):
+                done = subprocess.run(
+                    [sys.executable, "-c", loop], env=environment, capture_output=True, encoding="utf-8"
+                )
+                assert done.returncode == 0, done.stderr
+                assert f"It prints `{done.stdout.strip()}`" in path.read_text()
+            applied = shop.call("GET", "/machines/my-lathe/corrections?status=applied")["items"]
+            assert [(each["number"], each["offset_after"]) for each in applied] == [(1, -0.0061)]
+            assert watching.stdout.readline() in {"[1]\n", "[]\n"}, "it may look when it is applied already"
+        finally:
+            watching.terminate()
+            watching.communicate()
+
     def test_backing_up_works_as_it_is_written(self, server: Server, tmp_path: Path) -> None:
         text = (HOUSE / "docs" / "how-to" / "back-up.md").read_text()
         assert "inband backup inband-monday.dump" in text
