@@ -36,6 +36,7 @@ def test_an_empty_database_is_brought_to_the_head(empty: str) -> None:
 STATIONS = "0103 Stations: devices bound to machines, PINs and badges of people"
 BLOCK_RANGES = "0104 Block ranges of readings by time of arrival and by part, in place of trees"
 CONNECTIONS = "0105 Connections: the last heartbeat of each bridge, the last use of keys, the mapping of corrections"
+IMPORT_MAPPINGS = "0107 Import mappings: which characteristics of measuring machines' files belong to which here"
 Rows = dict[str, list[dict[str, Any]]]
 ADDED: dict[str, dict[str, Any]] = {
     "machine": {
@@ -64,6 +65,7 @@ ADDED_TABLES = {
     "station_device",
     "badge",
     "connection",
+    "import_mapping",
 }
 
 
@@ -105,6 +107,7 @@ def test_a_database_of_the_first_program_is_brought_to_the_head_with_its_rows(fi
         STATIONS,
         BLOCK_RANGES,
         CONNECTIONS,
+        IMPORT_MAPPINGS,
     ]
     assert migrate.current(first_program) == migrate.head()
     assert migrate.differences(first_program) == []
