@@ -296,20 +296,20 @@ def to_fetch(block: Block, stored: int) -> tuple[Slot, ...]:
 def went_back(block: Block, stored: int, epoch: int | None) -> str | None:
     """The reason for which a person has to look before anything else is fetched; None where block and store agree.
 
-    stored: the highest sequence stored in this epoch. epoch: the one that is known, None at the first contact.
+    stored: the highest sequence stored in this epoch. epoch: the one that is known, None at the first contact. A complete slot
+    counts as written: the power may go before the NC program sets ``written``, which its next run does.
     """
+    written = max((block.written, *(slot.sequence for slot in block.slots)))
     if epoch is not None and block.epoch != epoch:
         return (
             f"The control counts in epoch {block.epoch}, the bridge knows epoch {epoch}: its counters were lost or"
             " restored."
         )
-    if block.written < stored:
+    if written < stored:
+        return f"The control has written {written} readings, the bridge has stored {stored}: its counters went back."
+    if written - stored > SLOTS:
         return (
-            f"The control has written {block.written} readings, the bridge has stored {stored}: its counters went back."
-        )
-    if block.written - stored > SLOTS:
-        return (
-            f"The control has written reading {block.written}, the bridge has stored {stored}: more than the ring of"
+            f"The control has written reading {written}, the bridge has stored {stored}: more than the ring of"
             f" {SLOTS} holds lie between, and are lost. Did the program go on without waiting?"
         )
     return None

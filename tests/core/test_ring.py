@@ -114,6 +114,12 @@ def test_counters_that_went_back_are_seen(
     assert found is None if words is None else words in (found or "")
 
 
+def test_a_complete_slot_counts_as_written_before_the_counter_says_so() -> None:
+    """The power went between the two: the NC program sets the counter when it runs the next time."""
+    registers = block_of(*(reading(sequence) for sequence in range(1, 4)), written=2)
+    assert went_back(read_block(registers), 3, 4711) is None
+
+
 @pytest.mark.parametrize(
     ("registers", "words"),
     [
