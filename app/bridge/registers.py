@@ -1,8 +1,10 @@
 """Ring, mailbox and direct writes, for every control whose registers and tool offsets can be read and written."""
 
 import asyncio
+import time
 from collections.abc import Sequence
 from datetime import datetime, timedelta
+from math import isfinite
 from typing import Protocol
 
 from app.bridge.configuration import Location, Machine
@@ -39,6 +41,10 @@ from app.core.ring import (
 )
 
 HEADS = tuple(range(FIRST_SLOT))
+WATCHED = (Register.WRITTEN, Register.ANSWERED, Register.ANSWER, Register.EPOCH)
+"""What a poll looks at where registers are read one by one; the other heads change only with these, or by the bridge."""
+HEADS_EVERY = 10.0  # s: all heads are read again at the latest
+SLOTS_AT_ONCE = 4  # where registers are read one by one, so that a call does not take too long
 FRESH = 2.0  # polls: a reading that was not there so long ago was measured just now
 DAY = 86_400.0  # s
 FAULTS = {
@@ -90,11 +96,14 @@ class RegisterLink:
         self._block: Block | None = None
         self._polled: tuple[datetime, int] | None = None
         self._direct: list[Outcome] = []
+        self._heads: list[float] = []
+        self._heads_at = 0.0
 
     async def connect(self) -> str:
         """Connect, and answer the control's identity."""
         self._block = self._polled = None
         self._direct = []
+        self._heads = []
         return await self.registers.connect()
 
     async def close(self) -> None:
@@ -106,8 +115,8 @@ class RegisterLink:
     async def fetch(self, stored: Position) -> Sequence[Received]:
         """The readings in the ring that follow the last stored one."""
         now = datetime.now().astimezone()
-        block = self._block = await self._read(stored.sequence)
         known = stored.epoch is not None
+        block = self._block = await self._read(stored.sequence if known else None)
         if not known:  # the first contact: what is acknowledged was fetched by somebody before
             first = max(min(block.ack, block.written), block.written - SLOTS)
             stored = Position(block.epoch, first, stored.generation)
@@ -132,17 +141,15 @@ class RegisterLink:
         if received and (last := received[-1].position):
             await self._write(Register.ACK, last.sequence)
 
-    async def _read(self, stored: int) -> Block:
-        """The block; from a control that is read number by number only the heads and the slots that matter."""
+    async def _read(self, stored: int | None) -> Block:
+        """The block; from a control that is read number by number only the heads and the slots that matter.
+
+        stored: the highest stored sequence, None at the first contact.
+        """
         if self.registers.whole:
             registers = await self.registers.read(range(SIZE))
         else:
-            registers = [0.0] * SIZE
-            registers[:FIRST_SLOT] = await self.registers.read(HEADS)
-            written = round(registers[Register.WRITTEN])
-            for sequence in range(max(stored + 1, written - SLOTS + 1), written + 1):
-                first = FIRST_SLOT + SLOT_SIZE * slot_of(sequence)
-                registers[first : first + SLOT_SIZE] = await self.registers.read(range(first, first + SLOT_SIZE))
+            registers = await self._one_by_one(stored)
         try:
             block = read_block(registers)
         except BlockError as error:
@@ -154,6 +161,30 @@ class RegisterLink:
                 f" {self.machine.unit!r}. Nothing is fetched or corrected until they agree."
             )
         return block
+
+    async def _one_by_one(self, stored: int | None) -> list[float]:
+        """The block from a control that is read number by number."""
+        await self._look()
+        registers = self._heads + [0.0] * (SIZE - FIRST_SLOT)
+        written, ack = self._heads[Register.WRITTEN], self._heads[Register.ACK]
+        if not (isfinite(written) and isfinite(ack)):
+            return registers
+        last = round(written)
+        oldest = max((round(ack) if stored is None else stored) + 1, last - SLOTS + 1)
+        for sequence in range(oldest, min(last, oldest + SLOTS_AT_ONCE - 1) + 1):
+            first = FIRST_SLOT + SLOT_SIZE * slot_of(sequence)
+            registers[first : first + SLOT_SIZE] = await self.registers.read(range(first, first + SLOT_SIZE))
+        return registers
+
+    async def _look(self) -> None:
+        """The heads as they are now: all of them only if one has changed, the bridge has written, or it was long ago."""
+        if self._heads and time.monotonic() < self._heads_at + HEADS_EVERY:
+            now = await self.registers.read(WATCHED)
+            if all(value == self._heads[place] for place, value in zip(WATCHED[1:], now[1:], strict=True)):
+                self._heads[Register.WRITTEN] = now[0]
+                return
+        self._heads = await self.registers.read(HEADS)
+        self._heads_at = time.monotonic()
 
     def _received(self, slot: Slot, stored: Position, now: datetime, *, fresh: bool) -> Received:
         characteristic = self.machine.characteristics.get(str(slot.characteristic))
@@ -224,8 +255,9 @@ class RegisterLink:
         ):  # a newer one waits for the next poll: first the old one is taken back, and its answer looked for
             await self._write(Register.MAIL_NUMBER, block.answered)
             return
-        for place, value in mail_registers(self._mail(wanted)):
-            await self._write(place, value)
+        content = mail_registers(self._mail(wanted))
+        await self._write_all(content[:-1])
+        await self._write_all(content[-1:])  # the number last, when all else is read back
 
     def _mail(self, order: Order) -> Mail:
         location = location_of(self.machine, order.tool_memory)
@@ -335,10 +367,25 @@ class RegisterLink:
 
     async def _write(self, place: Register, value: float) -> None:
         """Write a register of the block and read it back."""
-        await self.registers.write(place, float(value))
-        [found] = await self.registers.read([place])
-        if abs(found - value) > max(2e-6, 2e-7 * abs(value)):  # eight digits, six decimals
-            raise ControlAway(
-                f"Register +{int(place)} ({place.name.lower()}) holds {found:g} after {value:g} was written: may the"
-                " bridge write it, and does another program?"
-            )
+        await self._write_all([(place, value)])
+
+    async def _write_all(self, content: Sequence[tuple[Register, float]]) -> None:
+        """Write registers of the block in this order, and read them back.
+
+        Twice where they are read one by one: such a control may hand us an answer that was meant for somebody else.
+        """
+        for place, value in content:
+            await self.registers.write(place, float(value))
+            if self._heads:
+                self._heads[place] = float(value)
+        for _ in range(1 if self.registers.whole else 2):
+            held = await self.registers.read([place for place, _ in content])
+            for (place, value), found in zip(content, held, strict=True):
+                if not abs(found - value) <= max(
+                    2e-6, 2e-7 * abs(value)
+                ):  # eight digits, six decimals; or not a number
+                    self._heads = []
+                    raise ControlAway(
+                        f"Register +{int(place)} ({place.name.lower()}) holds {found:g} after {value:g} was written: may"
+                        " the bridge write it, and does another program?"
+                    )

@@ -98,7 +98,7 @@ def simulate(
 ) -> None:
     """Start a simulated control that makes and measures parts; its table for the configuration goes to standard output."""
     from app.bridge.simulators import simulator_named
-    from app.bridge.simulators.model import Model, live
+    from app.bridge.simulators.model import Feature, Model, live
     from app.core.ring import Unit
 
     try:
@@ -107,7 +107,8 @@ def simulate(
         raise InbandError(str(error)) from error
 
     async def work() -> None:
-        model = Model(unit=Unit.INCH if inch else Unit.MM)
+        features = getattr(module, "FEATURES", (Feature(),))
+        model = Model(features, unit=Unit.INCH if inch else Unit.MM)
         simulator = await module.serve(model, port)
         typer.echo(_toml(model.serial.lower(), simulator.table()))
         say(f"A simulated control of kind {kind} listens on port {simulator.port}. End it with Ctrl-C.")

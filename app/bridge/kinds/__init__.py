@@ -8,7 +8,9 @@ from importlib import import_module
 from types import ModuleType
 from typing import Final
 
-KINDS: Final[dict[str, str]] = {}
+KINDS: Final[dict[str, str]] = {
+    "haas": "app.bridge.kinds.haas",
+}
 """Names and modules."""
 EXTRAS: Final = {"opcua": "opcua", "mqtt": "mqtt", "heidenhain": "heidenhain"}
 """Kinds that need an extra of the package."""

@@ -1,13 +1,16 @@
 """Simulated controls: one model of a machine, behind each protocol. For trying, for the demonstration plant, and for tests.
 
-Each module has ``serve(model, port)``, which answers a `Simulator`.
+Each module has ``serve(model, port)``, which answers a `Simulator`, and may have ``FEATURES``: characteristics of a model in the
+words of that control.
 """
 
 from importlib import import_module
 from types import ModuleType
 from typing import Final, Protocol
 
-SIMULATORS: Final[dict[str, str]] = {}
+SIMULATORS: Final[dict[str, str]] = {
+    "haas": "app.bridge.simulators.haas",
+}
 """Kinds that can be simulated, and the module of each."""
 
 
