@@ -153,9 +153,11 @@ class RegisterLink:
         try:
             block = read_block(registers)
         except BlockError as error:
+            self._heads = []
             raise Misconfigured(str(error)) from error
         says = {Unit.MM: "mm", Unit.INCH: "inch"}.get(Unit(block.unit)) if block.unit in {1, 2} else None
         if says != self.machine.unit:
+            self._heads = []
             raise Misconfigured(
                 f"The control says that it works in {says or f'unit {block.unit}'}, the configuration says unit ="
                 f" {self.machine.unit!r}. Nothing is fetched or corrected until they agree."

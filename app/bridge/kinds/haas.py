@@ -40,12 +40,12 @@ LONGEST_LINE: Final = 4096
 
 
 class Settings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """host: address of the control. port: setting 143. first_register: the variable in which the block begins.
+    """address: name or number of the control in the network. port: setting 143. first_register: the variable in which the block begins.
 
     pause: seconds between an answer and the next query. answer: seconds in which an answer comes.
     """
 
-    host: str
+    address: str
     port: Annotated[int, Meta(ge=1, le=65535)] = 5051
     first_register: Annotated[int, Meta(ge=1)] = 10800
     pause: Annotated[float, Meta(ge=0, le=1)] = 0.02
@@ -102,7 +102,7 @@ class HaasRegisters:
 
     @property
     def _place(self) -> str:
-        return f"{self.settings.host}:{self.settings.port}"
+        return f"{self.settings.address}:{self.settings.port}"
 
     async def connect(self) -> str:
         """Connect, and answer the serial number. The first query of a connection may stay without an answer."""
@@ -111,7 +111,7 @@ class HaasRegisters:
         self._lines, self._marker, self._asked, self._fenced = Lines(), NO_NUMBER, False, False
         try:
             self._transport, _ = await asyncio.get_running_loop().create_connection(
-                lambda: self._lines, self.settings.host, self.settings.port
+                lambda: self._lines, self.settings.address, self.settings.port
             )
         except OSError as error:
             raise ControlAway(

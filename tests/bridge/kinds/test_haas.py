@@ -283,7 +283,7 @@ def test_each_mistake_is_said() -> None:
             async with collector(simulator.port, "?Q100"), collector(simulator.port, "?Q100"):
                 await until(lambda: len(simulator._clients) == 2, "two collectors")
                 assert "It serves two programs at most" in str(await _fails(one))
-            simulator.answer = lambda text: ">STATUS, BUSY"  # type: ignore[method-assign]
+            simulator.answer = lambda _: ">STATUS, BUSY"  # type: ignore[method-assign]
             assert "does not answer ?Q100 with a serial number" in str(await _fails(one))
         error = await _fails(one)
         assert isinstance(error, ControlAway)
@@ -317,7 +317,7 @@ def test_the_table_of_the_simulator_is_a_configuration(tmp_path: Path) -> None:
         try:
             list(simulator.model.part())
             (tmp_path / "machine.key").write_text("secret\n")
-            table = simulator.table() | {"haas": {"host": "127.0.0.1", "port": simulator.port, "pause": 0}}
+            table = simulator.table() | {"haas": {"address": "127.0.0.1", "port": simulator.port, "pause": 0}}
             read = configuration_from({"server": {"url": "http://127.0.0.1:9"}, "machine": {"mill-1": table}}, tmp_path)
             findings = await check(Configuration(Server(url="http://127.0.0.1:9"), StoreSettings(), read.machines))
             words = [str(finding) for finding in findings if finding.good]
