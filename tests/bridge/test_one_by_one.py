@@ -92,7 +92,8 @@ def test_a_full_ring_comes_in_several_calls_in_order(acknowledged: int) -> None:
         model.registers[Register.ACK] = float(acknowledged)
         make(model, 8)
         await link.connect()
-        position, found = Position(), []
+        position = Position()
+        found: list[Received] = []
         while True:
             received, position = await stored(link, position)
             if not received:
