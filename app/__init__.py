@@ -42,6 +42,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         tools            tool memory (R10), average memory (R11), corrections and their life
         programs         program text of the controls: read, written
         timeline         events along time or readings on every chart: alarms, tool changes, calibrations, versions
+        notes            what a person writes down at a machine or a characteristic, at a moment
         alarms           kinds of alarms, raised once
         readings         the door: probe readings come in, are decided, stored and answered together
         characteristics  nominal, limits, and the versions of the R parameters

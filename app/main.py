@@ -46,6 +46,8 @@ from app.loop.faults import api as faults
 from app.loop.machines import api as machines
 from app.loop.machines import keys_api as machine_keys
 from app.loop.machines.keys import caller_of_key
+from app.loop.notes import api as notes
+from app.loop.notes import pages as note_pages
 from app.loop.programs import api as programs
 from app.loop.readings import api as readings
 from app.loop.readings import results
@@ -151,6 +153,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     programs.router,
     text_api.router,
     alarms.router,
+    notes.router,
     events_api.router,
     people.router,
     machine_keys.router,
@@ -172,6 +175,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     signals_pages.router,
     capability_pages.router,
     alarm_pages.router,
+    note_pages.router,
     queue_pages.router,
     text_pages.router,
     edge_pages.router,

@@ -46,6 +46,7 @@ WITH_A_LIFE = frozenset(
         "correction",
         "machine",
         "machine_state",
+        "note",
         "paired_reading",
         "parameter_proposal",
         "person",

@@ -13,7 +13,7 @@ _BEHIND: dict[Door, re.Pattern[str]] = {
     "todo": re.compile(r"/(todo|alarms|corrections|proposals)(/.*)?"),
     "quality": re.compile(r"/(overview|compare|characteristics|signals|gauges|reports|parts)(/.*)?"),
     "machines": re.compile(
-        r"/(machines|plant|tools|calibration|work-zeros|alignments|forms|kinematics)(/.*)?|/setup/machines/(?!new$)[^/]+(/.*)?"
+        r"/(machines|plant|tools|calibration|work-zeros|alignments|forms|kinematics|notes)(/.*)?|/setup/machines/(?!new$)[^/]+(/.*)?"
     ),
     "setup": re.compile(r"/(setup|import)(/.*)?"),
 }
@@ -37,5 +37,6 @@ def search_words() -> dict[str, str]:
         "alarm": _("Alarm"),
         "report": _("Report"),
         "part": _("Part"),
+        "note": _("Note"),
         "page": _("Page"),
     }

@@ -50,6 +50,7 @@ TAGS = {
     "programs": "Program text of the controls: read, written, and fetched where a machine has no network.",
     "alarms": "What needs a person, and what that person did about it.",
     "connections": "Bridges beside the machines: their heartbeats, how each machine is connected, and what waits there.",
+    "notes": "What people wrote down at a machine or a characteristic, at a moment; shown on every chart there.",
     "machines": "The machines that push readings.",
     "characteristics": "What is measured, by which R parameters it is judged, and its charts.",
     "statistics": "What a run of readings amounts to.",

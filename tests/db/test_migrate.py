@@ -37,6 +37,7 @@ STATIONS = "0103 Stations: devices bound to machines, PINs and badges of people"
 BLOCK_RANGES = "0104 Block ranges of readings by time of arrival and by part, in place of trees"
 CONNECTIONS = "0105 Connections: the last heartbeat of each bridge, the last use of keys, the mapping of corrections"
 IMPORT_MAPPINGS = "0107 Import mappings: which characteristics of measuring machines' files belong to which here"
+NOTES = "0108 Notes that people write at a machine or at a characteristic"
 Rows = dict[str, list[dict[str, Any]]]
 ADDED: dict[str, dict[str, Any]] = {
     "machine": {
@@ -63,6 +64,7 @@ ADDED_TABLES = {
     "job_failure",
     "capability_verdict",
     "station_device",
+    "note",
     "badge",
     "connection",
     "import_mapping",
@@ -108,6 +110,7 @@ def test_a_database_of_the_first_program_is_brought_to_the_head_with_its_rows(fi
         BLOCK_RANGES,
         CONNECTIONS,
         IMPORT_MAPPINGS,
+        NOTES,
     ]
     assert migrate.current(first_program) == migrate.head()
     assert migrate.differences(first_program) == []

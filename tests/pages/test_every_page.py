@@ -31,6 +31,10 @@ PAGES = {
     "/station/{machine}": ["/station/{machine}", "/station/{machine}?tool=3"],
     "/station/{machine}/alarms/{number}": ["/station/{machine}/alarms/{alarm}?action=noted"],
     "/station/{machine}/corrections/{number}": ["/station/{machine}/corrections/{waiting}?do=approve"],
+    "/station/{machine}/note": ["/station/{machine}/note"],
+    "/notes": ["/notes", "/notes?machine={machine}", "/notes?characteristic={characteristic}"],
+    "/notes/new": ["/notes/new?machine={machine}", "/notes/new?characteristic={characteristic}&sequence=3"],
+    "/notes/{number}": ["/notes/{note}"],
     "/station/{machine}/tools/{number}/change": ["/station/{machine}/tools/3/change"],
     "/characteristics/{characteristic}": [
         "/characteristics/{characteristic}",
@@ -293,6 +297,10 @@ def furnished(server: Server) -> Shop:
         parameters={"zero_range": 0.0015},
         reason="A reason that somebody took the time to write down in full, with everything that matters.",
     )
+    made.call(
+        "POST", "/notes", 201, machine=made.machine, text="Coolant changed\n" + "Kühlschmierstoffkonzentration" * 4
+    )
+    made.call("POST", "/notes", 201, characteristic=made.characteristic, sequence=3, text="New batch of bars")
     return made
 
 
@@ -326,6 +334,7 @@ def addresses(shop: Shop) -> list[str]:
         ],
         "proposal": shop.call("GET", f"/characteristics/{shop.characteristic}/proposals")["items"][0]["id"],
         "signal": signal,
+        "note": shop.call("GET", f"/notes?machine={shop.machine}")["items"][-1]["id"],
         **dict(zip(("repeated", "crossed"), (each["id"] for each in studies), strict=True)),
         "zero": shop.call("GET", f"/work-zeros?machine={shop.machine}")["items"][0]["id"],
         "alignment": shop.call("GET", f"/alignments?machine={shop.machine}")["items"][0]["id"],

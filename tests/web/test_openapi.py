@@ -328,6 +328,8 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/machines/{machine}/corrections/{number}": ("approve_correction", "release_correction", "reject_correction"),
     "/machines/{machine}/tools/{number}": ("describe",),
     "/machines/{machine}/tools/{number}/{what}": ("edit_tool", "change_tool", "switch_tool"),
+    "/notes/new": ("write_note",),
+    "/notes/{number}/withdraw": ("withdraw_note",),
     "/proposals/{number}": ("approve_proposal", "reject_proposal", "withdraw_proposal"),
     "/reports": ("ask_for_reports",),
     "/reports/{number}/cancel": ("cancel_reports",),
@@ -354,6 +356,7 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/station": None,
     "/station/{machine}/alarms/{number}": None,  # on a device it is asked who acts: tests/views/station
     "/station/{machine}/corrections/{number}": None,
+    "/station/{machine}/note": None,
     "/station/{machine}/tools/{number}/change": None,
     "/sign-out": None,
     "/signals/{number}": ("comment_signal",),

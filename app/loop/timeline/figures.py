@@ -1,4 +1,4 @@
-"""The lane of events above a chart: tool changes, calibrations, versions of the parameters, alarms. Pure.
+"""The lane of events above a chart: tool changes, calibrations, versions of the parameters, alarms, notes. Pure.
 
 Events that would cover each other are one mark with their number; pointed at, it names them.
 """
@@ -19,6 +19,7 @@ TOOL_CHANGE = "tool_change"
 MANUAL_EDIT = "manual_edit"
 CALIBRATION = "calibration"
 PARAMETERS = "parameters"
+NOTE = "note"
 
 LETTER = (
     6.5  # pixels that a letter of an event takes, about: words that would run into each other are left to the shapes
@@ -34,6 +35,7 @@ SHAPES = {
     MANUAL_EDIT: "square-open",
     CALIBRATION: "circle-open",
     PARAMETERS: "diamond-open",
+    NOTE: "square",
     "tool_worn": ZONE_SYMBOLS["wear"],
 }
 TONES: dict[str, Role] = {
@@ -41,21 +43,26 @@ TONES: dict[str, Role] = {
     MANUAL_EDIT: "correction",
     CALIBRATION: "ink",
     PARAMETERS: "ink",
+    NOTE: "ink",
     "probe_fault": "stop",
     "tool_worn": "wear",
 }
-SET_UP = (PARAMETERS, CALIBRATION, MANUAL_EDIT, TOOL_CHANGE)  # from what matters least, below the alarms
+SET_UP = (NOTE, PARAMETERS, CALIBRATION, MANUAL_EDIT, TOOL_CHANGE)  # from what matters least, below the alarms
 
 
 @dataclass(frozen=True)
 class Event:
-    """One event. at: the number of a reading, or a moment. kind: as above, or that of an alarm; text: its word."""
+    """One event. at: the number of a reading, or a moment. kind: as above, or that of an alarm; text: its word.
+
+    more: what it says when it is pointed at. Both are markup, as labels of charts are.
+    """
 
     at: float | datetime
     kind: str
     text: str
     link: str | None = None
     active: bool = False
+    more: str = ""
 
     @property
     def is_alarm(self) -> bool:
@@ -95,9 +102,13 @@ class _Mark:
 
     @property
     def hover(self) -> str:
-        named = [f"<b>{event.text}</b><br>{_place_words(event.at)}" for event in self.events[-MOST_NAMED:]]
+        named = [_pointed_at(event) for event in self.events[-MOST_NAMED:]]
         more = len(self.events) - len(named)
         return "<br>".join([*([_("{n} more before").format(n=more)] if more else []), *named])
+
+
+def _pointed_at(event: Event) -> str:
+    return "<br>".join([f"<b>{event.text}</b>", *([event.more] if event.more else []), _place_words(event.at)])
 
 
 def _place_words(at: float | datetime) -> str:
@@ -155,7 +166,7 @@ def event_lane(
         return []
     main = [mark.main for mark, _row, _written in places]
     colours = [event.tone for event in main]
-    changed = [event for event in main if not event.is_alarm]
+    changed = [event for event in main if not event.is_alarm and event.kind != NOTE]
     return [
         *(
             Rule(Pen("correction", 1.25, "dot"), x=event.at, upto=0.94)
@@ -192,6 +203,7 @@ def _legend(events: Sequence[Event]) -> list[Series]:
         MANUAL_EDIT: _("Offset edited"),
         CALIBRATION: _("Calibration"),
         PARAMETERS: _("Parameter version"),
+        NOTE: _("Note"),
     }
     kinds = {event.kind if not event.is_alarm else "alarm": event for event in events}
     return [

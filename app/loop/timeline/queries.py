@@ -4,6 +4,7 @@ from bisect import bisect_right
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
+from html import escape
 from math import ceil, floor
 from typing import NamedTuple
 
@@ -14,13 +15,16 @@ from app.charts import Chart
 from app.language.i18n import _
 from app.loop.alarms.kinds import kind_named
 from app.loop.characteristics.queries import CurrentCharacteristic
+from app.loop.notes.queries import on_charts_of
+from app.loop.notes.wording import beginning, in_lines
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.calibration import CalibrationRecord
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
 from app.loop.tables.machines import Machine
+from app.loop.tables.notes import Note
 from app.loop.tables.readings import Reading, Stream
 from app.loop.tables.tools import ToolEvent
-from app.loop.timeline.figures import CALIBRATION, MANUAL_EDIT, PARAMETERS, TOOL_CHANGE, Event, span_of, with_lane
+from app.loop.timeline.figures import CALIBRATION, MANUAL_EDIT, NOTE, PARAMETERS, TOOL_CHANGE, Event, span_of, with_lane
 
 MOST = 1_000  # events of each kind, the newest
 MOST_MOMENTS = 600  # readings whose moments say between which of them an event lies: more than marks have room
@@ -65,7 +69,7 @@ def with_events_of_machine(
     tool: int | None = None,
     without: Collection[str] = (),
 ) -> Chart:
-    """A chart over time with the events of the machine above it: alarms, calibrations, tool changes.
+    """A chart over time with the events of the machine above it: alarms, calibrations, tool changes, notes.
 
     width: in pixels, about. tool: only of this one. without: kinds that the chart draws itself.
     """
@@ -77,6 +81,7 @@ def with_events_of_machine(
         *_alarms(session, machine, true() if tool is None else Alarm.tool_memory == tool, period),
         *(_calibrations(session, machine, true(), period) if tool is None else ()),
         *_tool_events(session, machine, true() if tool is None else ToolEvent.number == tool, period),
+        *_notes(session, machine, true() if tool is None else Note.characteristic_id.is_(None), period.holds(Note.at)),
     ]
     events = [each.event for each in happened if each.event.kind not in without]
     return with_lane(chart, events, width, lines=False)
@@ -111,7 +116,7 @@ def events_by_reading(session: Session, current: CurrentCharacteristic, first: i
     arrivals = [at for _sequence, at in moments]
     numbers = [sequence for sequence, _at in moments] + ([] if after else [last + 1])
     events = []
-    for event, sequence, arrived in _of_characteristic(session, current, period):
+    for event, sequence, arrived in _of_characteristic(session, current, period, (first, last)):
         place = bisect_right(arrivals, arrived)
         at = sequence or (numbers[place] if place < len(numbers) else None)
         if at is not None and first <= at <= last + 1:
@@ -142,7 +147,13 @@ class _Happened(NamedTuple):
     arrived: datetime
 
 
-def _of_characteristic(session: Session, current: CurrentCharacteristic, period: Period) -> list[_Happened]:
+def _of_characteristic(
+    session: Session, current: CurrentCharacteristic, period: Period, numbers: tuple[int, int] | None = None
+) -> list[_Happened]:
+    """Everything of the period. numbers: of the first and last reading; notes about one of them are found by its number."""
+    noted = period.holds(Note.at)
+    if numbers is not None:
+        noted = or_(Note.sequence.is_(None) & noted, Note.sequence.between(*numbers))
     machine, parameters = current.machine, current.parameters
     concerned = or_(
         Alarm.characteristic_id == current.characteristic.id,
@@ -155,6 +166,7 @@ def _of_characteristic(session: Session, current: CurrentCharacteristic, period:
         *(_calibrations(session, machine, place, period) if parameters.average_memory else ()),
         *(_tool_events(session, machine, ToolEvent.number == parameters.tool_memory, period)),
         *_versions(session, current, period),
+        *_notes(session, machine, on_charts_of(current.characteristic.id), noted),
     ]
 
 
@@ -232,3 +244,17 @@ def _versions(session: Session, current: CurrentCharacteristic, period: Period) 
         yield _Happened(
             Event(at, PARAMETERS, text, f"/characteristics/{current.characteristic.key}#versions"), None, at
         )
+
+
+def _notes(
+    session: Session, machine: Machine, concerned: ColumnElement[bool], noted: ColumnElement[bool]
+) -> Iterator[_Happened]:
+    rows = session.execute(
+        select(Note.id, Note.text, Note.written_by, Note.at, Note.sequence)
+        .where(Note.machine_id == machine.id, Note.withdrawn_at.is_(None), concerned, noted)
+        .order_by(Note.id.desc())
+        .limit(MOST)
+    )
+    for number, words, author, at, sequence in rows:
+        more = f"{in_lines(words)}<br>{escape(author)}"
+        yield _Happened(Event(at, NOTE, escape(beginning(words)), f"/notes/{number}", more=more), sequence, at)

@@ -28,6 +28,8 @@ from app.loop.calibration import queries as calibrations
 from app.loop.characteristics import queries
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.wording import history, in_order, label, result_label, worded
+from app.loop.notes import queries as notes
+from app.loop.notes.queries import NEWEST, NoteRow
 from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
 from app.loop.summaries import queries as statistics
@@ -115,6 +117,10 @@ class CharacteristicView:
     @cached_property
     def decisions(self) -> list[Decision]:
         return decisions(self._session, self.current, before=self._before, limit=DECISIONS_ON_PAGE + 1)
+
+    @property
+    def notes(self) -> list[NoteRow]:
+        return notes.notes(self._session, characteristic=self.current.characteristic, limit=NEWEST)
 
     @cached_property
     def history(self) -> list[Any]:

@@ -31,6 +31,7 @@ class SectionName(StrEnum):
     WEAR = "wear"
     CORRECTIONS = "corrections"
     ALARMS = "alarms"
+    NOTES = "notes"
     TOOLS = "tools"
     PARAMETERS = "parameters"
     EXCLUDED = "excluded"

@@ -41,7 +41,7 @@ def search(
         ),
     ],
 ) -> SearchOut:
-    """Machines, characteristics, tools, alarms, parts and pages by their names.
+    """Machines, characteristics, tools, alarms, parts and pages by their names, notes by their words.
 
     Parts are found by their whole name, or by its first three letters or more among the newest half a million readings;
     *report* before a name finds the report of a characteristic.

@@ -34,6 +34,7 @@ def doors() -> list[Door]:
         Door(_("Reports"), "/reports", _("PDF, spreadsheet, XLSX, CSV, hand over")),
         Door(_("Find a part"), "/parts", _("serial number, part")),
         Door(_("Machines"), "/machines", _("tool memory, R10, average memory, R11, connections")),
+        Door(_("Notes"), "/notes", _("what people wrote down, comment, remark, log")),
         Door(
             _("Calibration"), "/calibration", _("probe calibration, ring, empirical value, gauge, measuring error, due")
         ),

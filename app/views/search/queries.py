@@ -1,4 +1,4 @@
-"""One search for all that has a name: machines, characteristics, tools, alarms, parts, pages. Never writes."""
+"""One search for all that has a name: machines, characteristics, tools, alarms, parts, notes, pages. Never writes."""
 
 from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
@@ -8,6 +8,8 @@ from sqlalchemy.orm import Session
 
 from app.access.callers import Caller
 from app.language.i18n import _
+from app.loop.notes import queries as notes
+from app.loop.notes.wording import beginning
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
@@ -19,8 +21,9 @@ from app.views.search.parts import part_path
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL
 from app.web.states import word_of
 
-Kind = Literal["machine", "characteristic", "tool", "alarm", "report", "part", "page"]
+Kind = Literal["machine", "characteristic", "tool", "alarm", "report", "part", "note", "page"]
 MOST_OF_A_KIND = 6
+MOST_OF_A_NOTE = 60  # characters
 ACTIVE_ALARMS = 500  # that are looked through by their kind
 LOOKED_THROUGH = 500_000  # readings, about: the newest, for parts whose name begins as typed
 
@@ -39,7 +42,7 @@ def hits(session: Session, term: str, caller: Caller) -> list[Hit]:
     term = term.strip()
     if not term:
         return []
-    searched = (_machines, _characteristics, _tools, _alarms, _parts)
+    searched = (_machines, _characteristics, _tools, _alarms, _parts, _notes)
     return [hit for search in searched for hit in search(session, term)] + list(_pages(term, caller))
 
 
@@ -151,6 +154,12 @@ def _beginning(session: Session, typed: Sequence[str]) -> list[str]:
         if len(names) >= MOST_OF_A_KIND:
             break
     return list(names)
+
+
+def _notes(session: Session, term: str) -> Iterator[Hit]:
+    for row in notes.notes(session, named=term, limit=MOST_OF_A_KIND):
+        title = f"{beginning(row.note.text, MOST_OF_A_NOTE)}, {row.about}"
+        yield Hit("note", str(row.note.id), title, f"/notes/{row.note.id}")
 
 
 def _pages(term: str, caller: Caller) -> Iterator[Hit]:

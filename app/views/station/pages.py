@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
+from secrets import token_hex
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
@@ -24,6 +25,9 @@ from app.loop.alarm_response.form_reader import acknowledge_as_typed
 from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.machines.queries import machine_named
+from app.loop.notes import queries as notes
+from app.loop.notes.form_reader import write_as_typed
+from app.loop.notes.wording import beginning
 from app.loop.tools import actions as tools
 from app.loop.tools import confirmation
 from app.loop.tools import queries as tool_queries
@@ -104,10 +108,11 @@ def station_page(
     decided: Word = None,
     too_late: Word = None,
     n: Number = None,
+    note: Number = None,
 ) -> Response:
     """The machine as it stands.
 
-    done, late: the alarm of the last action; tool: the tool that was changed. decided, too_late: the verb of what was done
+    done, late: the alarm of the last action; tool: the tool that was changed; note: the one that was written. decided, too_late: the verb of what was done
     about correction ``n``, or had been decided before.
     """
     station = queries.station(session, machine)
@@ -125,6 +130,7 @@ def station_page(
         refused=list(tool_wording.refused(tool_queries.correction(session, station.machine, n), machine, too_late))
         if too_late and n
         else None,
+        written=_beginning_of(session, station.machine.key, note) if note else None,
         offered=confirmation.offered,
         now=datetime.now(UTC),
         state_word=state_word,
@@ -301,6 +307,42 @@ def decide(request: Request, session: SessionDep, at: Station, machine: str, num
     return RedirectResponse(address(f"/station/{machine}", n=number, **said), 303)
 
 
+@router.get("/{machine}/note")
+def ask_note(request: Request, session: SessionDep, at: Station, machine: str) -> Response:
+    """The form of a note at the machine."""
+    at.must_act()
+    return _ask_note(request, session, at, machine)
+
+
+def _ask_note(
+    request: Request,
+    session: Session,
+    at: AtStation,
+    key: str,
+    form: Mapping[str, str] = NO_FORM,
+    error: InbandError | None = None,
+) -> Response:
+    return page(
+        request,
+        "station/ask_note.html",
+        status=error.status if error else 200,
+        machine=machine_named(session, key),
+        key=token_hex(8),
+        **_asked(session, at, form, error),
+    )
+
+
+@router.post("/{machine}/note")
+def write_note(request: Request, session: SessionDep, at: Station, machine: str, form: FormDep) -> Response:
+    """Write a note at the machine; sent twice, it is one."""
+    written = {"machine": machine, "text": form.get("text", ""), "key": form.get("key", "")}
+    try:
+        row = write_as_typed(session, written, _who(request, at, form))
+    except (*REFUSED, Conflict) as error:
+        return _ask_note(request, session, at, machine, form, error)
+    return RedirectResponse(address(f"/station/{machine}", note=row.note.id), 303)
+
+
 def _who(request: Request, at: AtStation, form: Mapping[str, str]) -> Caller:
     """The person who acts: signed in, or identified on the device for this one action.
 
@@ -356,3 +398,9 @@ def _of_machine(session: Session, machine: str, number: int) -> AlarmRow:
             _("Go back to the station of the machine."),
         )
     return row
+
+
+def _beginning_of(session: Session, machine: str, number: int) -> str | None:
+    """The first words of a note of this machine."""
+    row = notes.note(session, number)
+    return beginning(row.note.text, 60) if row.machine.key == machine else None

@@ -1,4 +1,4 @@
-"""Sections on the record of the period: alarms, parameters, excluded readings, decisions."""
+"""Sections on the record of the period: alarms, notes, parameters, excluded readings, decisions."""
 
 from sqlalchemy import func, or_, select
 
@@ -7,8 +7,10 @@ from app.files.documents.content import Column, Fact, Section, Table, count, dev
 from app.language.i18n import _
 from app.loop.alarm_response import wording as alarm_wording
 from app.loop.characteristics import wording
+from app.loop.notes.queries import on_charts_of
 from app.loop.readings import queries as readings
 from app.loop.tables.alarms import Alarm
+from app.loop.tables.notes import Note
 from app.loop.tables.readings import Exclusion, Reading
 from app.loop.tools.wording import status_word
 from app.views.reports.queries.frame import Frame
@@ -68,6 +70,34 @@ def alarms(frame: Frame) -> Section:
         Fact("active", _("Not acknowledged yet"), count(waiting)),
     )
     return Section("alarms", _("Alarms"), facts=facts, table=table if rows else None)
+
+
+def notes(frame: Frame) -> Section | None:
+    """Notes on the charts of the period, the last moment first; nothing where nobody has written one."""
+    here = [Note.sequence.is_not(None) & frame.holds(Note.sequence)]
+    if frame.span is not None:
+        here.append(Note.sequence.is_(None) & Note.at.between(*frame.span))
+    chosen = (
+        Note.machine_id == frame.current.machine.id,
+        on_charts_of(frame.current.characteristic.id),
+        Note.withdrawn_at.is_(None),
+        or_(*here),
+    )
+    rows = frame.session.scalars(select(Note).where(*chosen).order_by(Note.at.desc(), Note.id).limit(MOST_ROWS)).all()
+    if not rows:
+        return None
+    total = frame.session.scalar(select(func.count()).select_from(Note).where(*chosen)) or 0
+    table = Table(
+        (
+            Column("at", _("At"), 1.4),
+            Column("reading", _("Reading"), 0.8, "right"),
+            Column("note", _("Note"), 5.0),
+            Column("by", _("By whom"), 1.2),
+        ),
+        tuple((moment(row.at), count(row.sequence), words(row.text), words(row.written_by)) for row in rows),
+        more=total - len(rows),
+    )
+    return Section("notes", _("Notes"), table=table)
 
 
 def parameters(frame: Frame) -> Section:
