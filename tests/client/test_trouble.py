@@ -266,6 +266,11 @@ class TestStrangeAnswers:
             client.push(characteristic="c", measured=1.0)
         assert len(script.asked) == 1
 
+    def test_each_sentence_of_a_refusal_ends(self) -> None:
+        document = {"title": "Cannot be used", "detail": "state: must be one of these", "what_to_do": "Correct it."}
+        error = problem_of("POST /x", httpx.Response(422, json=document))
+        assert str(error) == "POST /x: 422 Cannot be used. state: must be one of these. Correct it."
+
     @pytest.mark.parametrize("document", [b"", b"[]", b'"no"', b'{"errors": [3, {}], "detail": 4, "title": null}'])
     def test_a_refusal_without_a_problem_document_is_read_all_the_same(self, document: bytes) -> None:
         error = problem_of("GET /x", httpx.Response(404, content=document))

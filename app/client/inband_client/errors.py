@@ -62,8 +62,8 @@ class ProblemError(Exception):
         """Say what was called, what is wrong, where, and what to do."""
         head = " ".join(str(part) for part in (self.status, self.title) if part)
         fields = "; ".join(f"{field}: {message}" for field, message in self.errors[:5] if message not in self.detail)
-        said = [f"{head}." if head else "", self.detail, f"{fields}." if fields else "", self.what_to_do or ""]
-        return f"{self.call}: {' '.join(filter(None, said))}".replace("..", ".")
+        said = [part if part.endswith((".", "!", "?")) else f"{part}." for part in (head, self.detail, fields) if part]
+        return f"{self.call}: {' '.join([*said, self.what_to_do or '']).strip()}"
 
     @property
     def kind(self) -> str:
