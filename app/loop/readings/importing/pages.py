@@ -18,6 +18,7 @@ from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
 from app.loop.readings.importing import uploads, wide
 from app.loop.readings.importing.actions import import_readings
+from app.loop.readings.importing.aqdef import form as aqdef_form
 from app.loop.readings.importing.history import Flawed
 from app.loop.readings.importing.layout import NAMES, Layout, Wishes, look
 from app.loop.readings.importing.preview import TRIED_WHOLE, Preview, PreviewLine, first_lines, preview
@@ -88,15 +89,18 @@ def _start(
 async def send(request: Request, session: SessionDep, caller: Engineer, settings: SettingsDep) -> Response:
     """Keep the file and go on to the preview."""
     form = await request.form()
-    file, characteristic = form.get("file"), str(form.get("characteristic") or "")
-    if not isinstance(file, UploadFile) or not file.filename:
+    characteristic = str(form.get("characteristic") or "")
+    files = [
+        (each.filename, each.file) for each in form.getlist("file") if isinstance(each, UploadFile) and each.filename
+    ]
+    if not files:
         return await run_in_threadpool(
             _start, request, session, characteristic, error=_("Choose the file to import."), status=422
         )
     if characteristic:
         await run_in_threadpool(characteristics.characteristic_named, session, characteristic)
     try:
-        kept = await run_in_threadpool(uploads.keep, settings, caller.name, file.filename, file.file)
+        kept = await run_in_threadpool(uploads.keep_pair, settings, caller.name, files)
     except Invalid as error:
         return await run_in_threadpool(_start, request, session, characteristic, error=error.detail, status=422)
     return RedirectResponse(address(f"/import/{kept.token}", characteristic=characteristic or None), 303)
@@ -127,6 +131,8 @@ def _preview(
     status: int = 200,
 ) -> Response:
     upload = uploads.find(settings, caller.name, token, said.get("sheet", ""))
+    if upload.is_aqdef:
+        return _aqdef_preview(request, upload, said, characteristic, status=status)
     if not characteristic:
         return _wide_preview(request, upload, said, status=status)
     with _database(request).sessions() as session:
@@ -148,6 +154,13 @@ def _preview(
         and trouble is None
     )
     return _page(request, upload, said, layout, trouble, status=status, to=current, found=preview_result, ready=ready)
+
+
+def _aqdef_preview(
+    request: Request, upload: Upload, said: Mapping[str, str], characteristic: str, *, status: int
+) -> Response:
+    form = aqdef_form.look(_database(request), upload, said, characteristic)
+    return page(request, "imports/aqdef.html", status=status, upload=upload, form=form, back="/import")
 
 
 def _wide_preview(request: Request, upload: Upload, said: Mapping[str, str], *, status: int) -> Response:
@@ -261,6 +274,8 @@ def import_it(
     characteristic = form.get("characteristic", "")
     upload = uploads.find(settings, caller.name, token, form.get("sheet", ""))
     session.commit()  # the import has a transaction of its own, and takes a while
+    if upload.is_aqdef:
+        return _import_aqdef(request, caller, upload, form, characteristic)
     try:
         layout = look(upload.path, _wishes(form), upload.name, complete=bool(characteristic))
         if not characteristic:
@@ -277,6 +292,17 @@ def import_it(
     if summary.first_sequence is not None:
         outcome["first"] = summary.first_sequence
     return RedirectResponse(address("/import", **outcome), 303)
+
+
+def _import_aqdef(
+    request: Request, caller: Caller, upload: Upload, form: Mapping[str, str], characteristic: str
+) -> Response:
+    try:
+        outcome = aqdef_form.store(_database(request), upload, form, caller.name)
+    except InbandError as error:
+        return _aqdef_preview(request, upload, form, characteristic, status=error.status)
+    uploads.forget(upload)
+    return RedirectResponse(address("/import", stored=outcome.stored, repeated=outcome.repeated), 303)
 
 
 def _import_wide(

@@ -6,11 +6,12 @@ import re
 import secrets
 import shutil
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from app.errors import Invalid, NotFound
-from app.files.formats import delimited, spreadsheet
+from app.files.formats import aqdef, delimited, spreadsheet
 from app.language.i18n import _
 from app.settings import Settings
 
@@ -21,7 +22,7 @@ _TOKEN = re.compile(r"[A-Za-z0-9_-]{22}")
 class Upload(NamedTuple):
     """A file that waits to be imported; `name` is what its owner calls it.
 
-    path: its text. sheets: the sheets of a workbook, of which `sheet` is the one at `path`.
+    path: its text. values: those of an AQDEF description, where they came in a file of their own. sheets: the sheets of a workbook, of which `sheet` is the one at `path`.
     """
 
     token: str
@@ -29,6 +30,28 @@ class Upload(NamedTuple):
     path: Path
     sheets: tuple[str, ...] = ()
     sheet: str = ""
+    values: Path | None = None
+
+    @property
+    def is_aqdef(self) -> bool:
+        """Tell by its name."""
+        return Path(self.name).suffix.lower() in aqdef.ENDINGS
+
+
+def keep_pair(settings: Settings, owner: str, files: Sequence[tuple[str, BinaryIO]]) -> Upload:
+    """Keep a file, or the description and the values of AQDEF that were sent together. Raises `Invalid`."""
+    endings = [Path(name).suffix.lower() for name, _content in files]
+    if endings == [".dfx"]:
+        raise Invalid.at("file", _("These are values alone: choose the .dfd that describes them too, both at once."))
+    if len(files) > 1 and sorted(endings) != [".dfd", ".dfx"]:
+        raise Invalid.at("file", _("Choose one file, or a .dfd and its .dfx."))
+    (name, content), *rest = sorted(files, key=lambda file: Path(file[0]).suffix.lower())
+    kept = keep(settings, owner, name, content)
+    for _name, values in rest:
+        path = kept.path.with_name(f"{kept.token}.values")
+        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+            shutil.copyfileobj(values, file)
+    return kept
 
 
 def keep(settings: Settings, owner: str, name: str, content: BinaryIO) -> Upload:
@@ -69,7 +92,8 @@ def find(settings: Settings, owner: str, token: str, sheet: str = "") -> Upload:
         sheet = sheet if sheet in sheets else next(iter(sheets), "")
         path = folder / sheets.get(sheet, f"{token}.data")
         if about.get("owner") == owner and path.exists():
-            return Upload(token, about["name"], path, tuple(sheets), sheet)
+            values = folder / f"{token}.values"
+            return Upload(token, about["name"], path, tuple(sheets), sheet, values if values.exists() else None)
     raise NotFound(
         _("This file is not here any more: it was imported, or you sent it more than a day ago."),
         _("Send it again under Set-up, Import."),

@@ -2,5 +2,6 @@
 
 matching.py   what the file's characteristics are: lengths in mm, limits, and which of them are known here
 content.py    the values of each, as readings with keys of their own, or what is wrong with them
+form.py       what is chosen on the page
 actions.py    set up what is missing, store as history, exclude what the file marks, remember what belongs together
 """
