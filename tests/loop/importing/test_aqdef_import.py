@@ -1,10 +1,14 @@
 """AQDEF files into a real database: through the actions and the command."""
 
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from zoneinfo import ZoneInfo
 
+import httpx
 import pytest
+from playwright.sync_api import Page, expect
 from sqlalchemy import text
 
 from app.db.engine import Database
@@ -20,8 +24,10 @@ from app.loop.readings.importing.aqdef.actions import Outcome
 from app.loop.readings.importing.aqdef.content import Wishes
 from app.loop.readings.importing.aqdef.matching import NEW
 from app.loop.readings.importing.history import Flawed
+from tests.conftest import RunServer, Server
 from tests.loop.importing.test_commands import inband
 from tests.loop.importing.test_history import scalar, set_up, stored
+from tests.shop import Shop
 
 BERLIN = Wishes(ZoneInfo("Europe/Berlin"))
 HEAD = [
@@ -209,3 +215,77 @@ def test_the_command_teaches(plant: Database, tmp_path: Path) -> None:
         assert said in " ".join(done.stderr.split()), done.stderr
     lonely = written(tmp_path / "b.dfx", ["1"])
     assert "b.dfd" in inband("import", lonely, database=plant, folder=tmp_path).stderr
+
+
+@pytest.fixture(scope="module")
+def server(run_server: RunServer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """It keeps what is sent in a folder of this test."""
+    with run_server(data_dir=tmp_path_factory.mktemp("plant") / "data") as running:
+        running.person("Eva", "engineer", "correct horse battery")
+        yield running
+
+
+def signed_in(server: Server) -> httpx.Client:
+    client = server.client()
+    assert client.post("/sign-in", data={"name": "Eva", "password": "correct horse battery"}).status_code == 303
+    return client
+
+
+def send(client: httpx.Client, *files: tuple[str, str]) -> httpx.Response:
+    csrf = re.search(r'name="csrf" value="([^"]+)"', client.get("/account").text)
+    assert csrf
+    parts = [("file", (name, content.encode())) for name, content in files]
+    return client.post("/import", data={"csrf": csrf[1], "characteristic": ""}, files=parts)
+
+
+@pytest.mark.browser
+def test_a_file_on_the_page(server: Server, page: Page, tmp_path: Path) -> None:
+    shop = Shop(server)
+    lines = [line.replace("shaft-d40", shop.characteristic).replace("shaft-0815", shop.machine) for line in HEAD + ROWS]
+    page.goto("/sign-in?next=/import")
+    page.fill("[name=name]", "Eva")
+    page.fill("[name=password]", "correct horse battery")
+    page.keyboard.press("Enter")
+    page.wait_for_url(re.compile(r"/import$"))
+    page.set_input_files("[name=file]", written(tmp_path / "shift.dfq", lines))
+    page.get_by_role("button", name="Preview").click()
+    rows = page.locator("tbody tr")
+    expect(rows).to_have_count(4)
+    expect(rows.nth(0).locator("select")).to_have_value(shop.characteristic)
+    expect(rows.nth(0)).to_contain_text("1 is excluded, as the file marks it.")
+    expect(rows.nth(3)).to_contain_text("is not a length: its unit is '°'")
+    page.select_option("[name=machine]", shop.machine)
+    page.get_by_role("button", name="Set up all 2").click()
+    expect(rows.nth(1)).to_contain_text("Set up with the drawing's limits")
+    expect(rows.nth(2)).to_contain_text("converted to mm")
+    page.get_by_role("button", name="Import all").click()
+    expect(page.get_by_role("heading", name="7 readings imported")).to_be_visible()
+    found = shop.call("GET", f"/readings?characteristic={shop.characteristic}")["items"]
+    assert [each["measured"] for each in found] == [39.991, 39.992, 39.992]
+
+
+def test_a_pair_is_sent_together_and_what_is_wrong_is_shown(server: Server) -> None:
+    shop, client = Shop(server), signed_in(server)
+    head = f"K0100 1\nK2001/1 {shop.characteristic}\nK2142/1 mm\n"
+    alone = send(client, ("a.dfx", "1"))
+    assert (alone.status_code, "choose the .dfd that describes them too" in alone.text) == (422, True)
+    assert "Choose one file, or a .dfd and its .dfx" in send(client, ("a.dfq", head), ("b.csv", "x")).text
+    good = send(client, ("a.dfx", f"39.99{F}0{F}2.3.2026/6:00\n"), ("a.dfd", head))
+    preview = client.get(good.headers["location"]).text
+    assert re.search(r'<td class="num">1</td>', preview)
+    bad = client.get(send(client, ("a.dfx", f"39.99{F}0{F}32.3.2026/6:00\nx\n"), ("a.dfd", head)).headers["location"])
+    assert "32.3.2026/6:00" in bad.text
+    assert "day is out of range for month" in bad.text
+    nothing = client.get(send(client, ("a.dfq", "measured\n1\n")).headers["location"])
+    assert (nothing.status_code, "no line begins with a K field" in nothing.text) == (200, True)
+    address = good.headers["location"]
+    for said in (
+        "timezone=Mars",
+        "unit=%00",
+        "to_1=nobody",
+        "to_99=%2B",
+        "to_x=1",
+        "encoding=x",
+        "machine=nobody&to_1=%2B",
+    ):
+        assert client.get(f"{address}?{said}").status_code == 200, said

@@ -34,6 +34,11 @@ class ColumnResult(NamedTuple):
     summary: Summary | None
     trouble: InbandError | None = None
 
+    @property
+    def flaws(self) -> list[Flaw]:
+        """Lines that are wrong."""
+        return self.trouble.flaws if isinstance(self.trouble, Flawed) else []
+
 
 def columns_by_name(layout: Layout, known: Sequence[CurrentCharacteristic]) -> dict[int, str]:
     """The columns whose name is the key or the name of a characteristic: its key by place in the header."""

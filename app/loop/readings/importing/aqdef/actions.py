@@ -25,6 +25,7 @@ from app.loop.readings.importing.aqdef.content import Readings, Wishes, put_down
 from app.loop.readings.importing.aqdef.matching import NEW, Content
 from app.loop.readings.importing.aqdef.queries import remembered
 from app.loop.readings.importing.history import Flawed, Summary, store_history
+from app.loop.readings.importing.lines import Flaw
 from app.loop.readings.records import Entry
 from app.loop.tables.readings import ImportMapping, Reading
 
@@ -42,6 +43,11 @@ class Result:
     excluded: int = 0
     doubts: tuple[str, ...] = ()
     trouble: InbandError | None = None
+
+    @property
+    def flaws(self) -> list[Flaw]:
+        """Lines that are wrong."""
+        return self.trouble.flaws if isinstance(self.trouble, Flawed) else []
 
 
 @dataclass

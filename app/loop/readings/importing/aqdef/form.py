@@ -17,7 +17,9 @@ from app.loop.readings.importing.aqdef import actions, matching
 from app.loop.readings.importing.aqdef.actions import Outcome, Result
 from app.loop.readings.importing.aqdef.content import Wishes
 from app.loop.readings.importing.aqdef.matching import NEW, Content
+from app.loop.readings.importing.history import Flawed
 from app.loop.readings.importing.layout import wrong
+from app.loop.readings.importing.lines import Flaw
 from app.loop.readings.importing.preview import CHECKED_LINES, TRIED_WHOLE
 from app.loop.readings.importing.uploads import Upload
 
@@ -42,6 +44,11 @@ class Form:
         """The result of one characteristic."""
         results = self.outcome.results if self.outcome else []
         return next((each for each in results if each.content.index == index), None)
+
+    @property
+    def flaws(self) -> list[Flaw]:
+        """Lines that are wrong."""
+        return self.trouble.flaws if isinstance(self.trouble, Flawed) else []
 
     @property
     def ready(self) -> bool:
