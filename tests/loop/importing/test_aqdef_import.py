@@ -254,7 +254,7 @@ def test_a_file_on_the_page(server: Server, page: Page, tmp_path: Path) -> None:
     expect(rows.nth(0).locator("select")).to_have_value(shop.characteristic)
     expect(rows.nth(0)).to_contain_text("1 is excluded, as the file marks it.")
     expect(rows.nth(3)).to_contain_text("is not a length: its unit is '°'")
-    page.select_option("[name=machine]", shop.machine)
+    page.select_option("select[name=machine]", shop.machine)
     page.get_by_role("button", name="Set up all 2").click()
     expect(rows.nth(1)).to_contain_text("Set up with the drawing's limits")
     expect(rows.nth(2)).to_contain_text("converted to mm")
