@@ -8,10 +8,14 @@ from zoneinfo import ZoneInfo
 import typer
 
 from app.cli.base import say
-from app.language.i18n import _
+from app.language.i18n import _, ngettext
 from app.language.times import MINUTES, written
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
+    from sqlalchemy.orm import Session
+
     from app.db.engine import Database
     from app.loop.readings.importing.aqdef.actions import Outcome, Result
     from app.loop.readings.importing.aqdef.content import Wishes
@@ -147,3 +151,33 @@ def _result(result: "Result", *, dry_run: bool) -> None:
         say(_("{count} were stored before and are not stored again.").format(count=summary.repeated))
     if result.excluded:
         say(_("{count} are excluded, as the file marks them (K0002).").format(count=result.excluded))
+
+
+def export_file(
+    session: "Session",
+    keys: list[str],
+    output: Path,
+    *,
+    since: "datetime | None",
+    until: "datetime | None",
+    last: int | None,
+) -> None:
+    """Write readings of these characteristics, and say what was made to fit."""
+    from app.access.audit import actions as audit
+    from app.loop.readings.aqdef_export import write_aqdef
+
+    done = write_aqdef(session, keys, output, since=since, until=until, last=last)
+    for key in dict.fromkeys(keys):
+        audit.record(
+            session,
+            f"command line ({getpass.getuser()})",
+            "readings exported",
+            f"characteristic/{key}",
+            after={"file": output.name, "format": "dfq"},
+        )
+    for remark in done.remarks:
+        say(remark, style="yellow")
+    say(
+        ngettext("%(num)d reading written to AQDEF.", "%(num)d readings written to AQDEF.", done.values)
+        % {"num": done.values}
+    )

@@ -39,6 +39,7 @@ class Format(StrEnum):
 
     CSV = "csv"
     NDJSON = "ndjson"
+    DFQ = "dfq"
 
 
 File = Annotated[
@@ -209,7 +210,12 @@ def readable(file: Path, sheet: str | None = None) -> "Iterator[Path]":
 
 @cli.command("export")
 def export_file(
-    characteristic: Characteristic,
+    characteristic: Annotated[
+        str,
+        typer.Option(
+            envvar="INBAND_CHARACTERISTIC", help="The key of the characteristic; of AQDEF several, parted by commas."
+        ),
+    ],
     since: Annotated[str | None, typer.Option("--from", envvar="INBAND_FROM", help="Measured at or after.")] = None,
     until: Annotated[str | None, typer.Option("--to", envvar="INBAND_TO", help="Measured before.")] = None,
     last: Annotated[int | None, typer.Option(envvar="INBAND_LAST", min=1, help="Only so many, the last ones.")] = None,
@@ -222,12 +228,23 @@ def export_file(
     data_dir: DataDir = None,
     database_url: DatabaseUrl = None,
 ) -> None:
-    """Write the readings of a characteristic, oldest first, as CSV or NDJSON."""
+    """Write the readings of a characteristic, oldest first, as CSV or NDJSON, or those of several as AQDEF."""
     from app.access.audit import actions as audit
     from app.loop.readings import exporting, queries
 
     zone = _zone(timezone)
     first, end = _moment(since, zone, "--from", 0), _moment(until, zone, "--to", 0)
+    if format_ is Format.DFQ or (format_ is None and output is not None and output.suffix.lower() == ".dfq"):
+        if output is None:
+            raise typer.BadParameter(_("name the file: AQDEF is not written to standard output"), param_hint="--output")
+        keys = [key.strip() for key in characteristic.split(",") if key.strip()]
+        with (
+            existing(settings_from(data_dir=data_dir, database_url=database_url)) as database,
+            database.begin() as session,
+            in_zone(zone),
+        ):
+            aqdef.export_file(session, keys, output, since=first, until=end, last=last)
+        return
     lines_wanted = format_ is Format.NDJSON or (format_ is None and output is not None and output.suffix == ".ndjson")
     with (
         existing(settings_from(data_dir=data_dir, database_url=database_url)) as database,

@@ -1,0 +1,177 @@
+"""Readings of any choice of characteristics as an AQDEF file: what a CAQ system evaluates them from.
+
+The value is the corrected size, which the drawing is compared with; limits are those in force now. Excluded readings are there,
+marked (K0002). Events are corrections that a reading caused, alarms that it raised, and tool changes before it.
+"""
+
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from heapq import merge
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from app.core.decision.limits import Zone
+from app.core.parameters import Parameters
+from app.errors import Invalid, NotFound
+from app.files.formats.aqdef_writer import Catalogues, Described, Outcome, Part, Validity, Written, write
+from app.language.i18n import _
+from app.language.times import plant_zone
+from app.loop.characteristics import queries as characteristics
+from app.loop.characteristics.queries import CurrentCharacteristic
+from app.loop.readings import exporting, queries
+from app.loop.tables.tools import Correction, ToolEvent
+
+MOST = 1000
+CORRECTION, CHANGED, EXCLUDED = "correction sent", "tool changed", "excluded"
+ZONES = {
+    Zone.OVERSIZE: "oversize",
+    Zone.UNDERSIZE: "undersize",
+    Zone.WEAR: "tool worn",
+    Zone.PROBE_FAULT: "probe fault",
+}
+EVENTS = (CORRECTION, CHANGED, EXCLUDED, *ZONES.values())
+IN_EFFECT, EMPIRICAL, NUMBER = "offset in effect, mm", "empirical value, mm", "correction in effect"
+PROCESS = (IN_EFFECT, NUMBER, EMPIRICAL)
+"""K0011: the location's offset where it is known, the last correction in effect, and what was taken off the measured size."""
+
+
+class _Of(NamedTuple):
+    """A characteristic and its place in the file."""
+
+    place: int
+    current: CurrentCharacteristic
+
+
+def write_aqdef(
+    session: Session,
+    keys: Sequence[str],
+    path: Path,
+    *,
+    since: datetime | None = None,
+    until: datetime | None = None,
+    last: int | None = None,
+) -> Outcome:
+    """Write the readings of these characteristics. since, until, last: as `exporting.rows` takes them, for each of them.
+
+    Raises `NotFound` and `Invalid`.
+    """
+    if not keys:
+        raise Invalid.at("characteristic", _("name at least one"))
+    if len(keys) > MOST:
+        raise Invalid.at("characteristic", _("at most {most} go into one file").format(most=MOST))
+    chosen = [characteristics.characteristic_named(session, key) for key in dict.fromkeys(keys)]
+    # Characteristics of one part stand together, as the file has them.
+    chosen.sort(key=lambda each: (each.characteristic.part or "", each.machine.id, each.characteristic.id))
+    parts = list(dict.fromkeys(_part(each) for each in chosen))
+    described = [_described(each, parts.index(_part(each))) for each in chosen]
+    places = list(dict.fromkeys(each.machine.id for each in chosen))
+    names = {each.machine.id: (each.machine.key, each.machine.name) for each in chosen}
+    catalogues = Catalogues(
+        events=EVENTS,
+        machines=[names[place] for place in places],
+        gauges=[(names[place][0], f"probe of {names[place][1]}") for place in places],
+        process=PROCESS,
+    )
+    values = merge(
+        *(_values(session, _Of(place, each), since=since, until=until, last=last) for place, each in enumerate(chosen)),
+        key=lambda value: value.at,
+    )
+    return write(path, parts, described, values, catalogues)
+
+
+def _part(current: CurrentCharacteristic) -> Part:
+    part = current.characteristic.part or current.machine.name
+    return Part(part, part, current.machine.key, current.machine.name)
+
+
+def _described(current: CurrentCharacteristic, part: int) -> Described:
+    parameters, characteristic = current.parameters, current.characteristic
+    half = parameters.tolerance_width / 2
+    return Described(
+        part,
+        characteristic.key,
+        characteristic.name,
+        parameters.target if parameters.nominal is None else parameters.nominal,
+        round(parameters.target - half, 9),
+        round(parameters.target + half, 9),
+        unit=characteristic.unit,
+        decimals=_decimals(parameters),
+        gauge=f"probe of {current.machine.name}",
+    )
+
+
+def _decimals(parameters: Parameters) -> int:
+    """Places that show a fiftieth of the tolerance, from 3 to 6."""
+    return next((places for places in range(3, 6) if parameters.tolerance_width / 50 >= 10.0**-places), 6)
+
+
+def _values(
+    session: Session, of: _Of, *, since: datetime | None, until: datetime | None, last: int | None
+) -> Iterator[Written]:
+    entry = queries.entry_of(session, of.current.characteristic.key)
+    if entry is None:
+        raise NotFound(_("There is no characteristic {key}.").format(key=repr(of.current.characteristic.key)))
+    zone, machine = plant_zone(), of.current.machine
+    parameters = of.current.parameters
+    changes = _changes(session, machine.id, parameters.tool_memory)
+    offsets = _offsets(session, machine.id, parameters.tool_memory)
+    before: datetime | None = None
+    for row in exporting.rows(session, entry, since=since, until=until, last=last):
+        at: datetime = row["measured_at"]
+        changed = before is not None and any(before < each <= at for each in changes)
+        before = at
+        yield Written(
+            of.place,
+            row["corrected_size"],
+            at.astimezone(zone).replace(tzinfo=None, microsecond=0),
+            _validity(row),
+            row["part"] or "",
+            _events(row, changed=changed),
+            machine=machine.key,
+            gauge=machine.key,
+            process=_process(row, offsets),
+        )
+
+
+def _validity(row: dict[str, Any]) -> Validity:
+    if row["excluded"] is None:
+        return Validity.GOOD
+    return Validity.IMPLAUSIBLE if row["zone"] == Zone.PROBE_FAULT else Validity.INVALID
+
+
+def _events(row: dict[str, Any], *, changed: bool) -> list[str]:
+    events = [CHANGED] if changed else []
+    if row["correction"] is not None:
+        events.append(CORRECTION)
+    if row["zone"] in ZONES:
+        events.append(ZONES[Zone(row["zone"])])
+    return [*events, EXCLUDED] if row["excluded"] is not None else events
+
+
+def _process(row: dict[str, Any], offsets: dict[int, float]) -> dict[str, float]:
+    process: dict[str, float] = {}
+    number = row["correction_in_effect"]
+    if number is not None:
+        process[NUMBER] = float(number)
+        if number in offsets:
+            process[IN_EFFECT] = offsets[number]
+    empirical = round(row["measured"] - row["corrected_size"], 9)
+    return process | {EMPIRICAL: empirical} if empirical else process
+
+
+def _changes(session: Session, machine_id: int, tool: int) -> list[datetime]:
+    here = (ToolEvent.machine_id == machine_id, ToolEvent.number == tool, ToolEvent.kind == "change")
+    return list(session.scalars(select(ToolEvent.at).where(*here).order_by(ToolEvent.at)))
+
+
+def _offsets(session: Session, machine_id: int, tool: int) -> dict[int, float]:
+    """The offset after each correction that was applied, by its number."""
+    rows = session.execute(
+        select(Correction.number, Correction.offset_after).where(
+            Correction.machine_id == machine_id, Correction.tool_memory == tool, Correction.offset_after.is_not(None)
+        )
+    )
+    return {number: offset for number, offset in rows if offset is not None}
