@@ -6,6 +6,7 @@ the public API through ``inband_client`` and imports nothing of the server.
     configuration    one TOML file: the server, the machines, what each number of a control means
     links            what a kind of control has to do for the bridge, and how it says what failed
     registers        ring, mailbox and direct writes, for every control whose registers can be read and written
+    moments          when something was measured, by a control's clock
     kinds            the protocols, one module each
     store            readings kept until the server has them, corrections on their way, the quarantine: SQLite
     guards           the bridge's own limits for a correction, whatever the server says

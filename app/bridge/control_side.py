@@ -83,5 +83,6 @@ async def _connected(unit: Unit) -> None:
                     await store.held(machine.key, offsets)
             offsets_at = time.monotonic() + OFFSETS_EVERY
         unit.polls += 1
-        unit.say("held" if unit.hold_all else "online", " ".join(unit.held_back))
+        remark = getattr(link, "remark", "")  # of kinds that see gaps in what a control prints
+        unit.say("held" if unit.hold_all else "online", " ".join(filter(None, (*unit.held_back, remark))))
         await asyncio.sleep(machine.interval)

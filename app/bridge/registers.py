@@ -3,7 +3,7 @@
 import asyncio
 import time
 from collections.abc import Sequence
-from datetime import datetime, timedelta
+from datetime import datetime
 from math import isfinite
 from typing import Protocol
 
@@ -19,6 +19,7 @@ from app.bridge.links import (
     Position,
     Received,
 )
+from app.bridge.moments import learn, measured_at
 from app.core.ring import (
     FIRST_SLOT,
     INCH,
@@ -46,7 +47,6 @@ WATCHED = (Register.WRITTEN, Register.ANSWERED, Register.ANSWER, Register.EPOCH)
 HEADS_EVERY = 10.0  # s: all heads are read again at the latest
 SLOTS_AT_ONCE = 4  # where registers are read one by one, so that a call does not take too long
 FRESH = 2.0  # polls: a reading that was not there so long ago was measured just now
-DAY = 86_400.0  # s
 FAULTS = {
     Status.NO_TRIGGER: "The probe did not trigger (status 1): there is no size.",
     Status.MARKED: "The NC program has marked the reading as not valid (status 3).",
@@ -84,6 +84,32 @@ class Registers(Protocol):
 
     async def against_writing(self, location: Location) -> str | None:
         """A reason why the offset must not be written now (program running, tool in use); None if it may be."""
+
+
+def body_of(machine: Machine, slot: Slot) -> dict[str, object]:
+    """A reading as ``POST /readings`` takes it, without key and time."""
+    body: dict[str, object] = {
+        "characteristic": machine.characteristics.get(str(slot.characteristic)),
+        "measured": round(slot.measured * (INCH if machine.unit == "inch" else 1.0), 9),
+        "correction_in_effect": slot.in_effect,
+    }
+    if slot.part:
+        body["part"] = str(slot.part)
+    if slot.status == Status.FIRST_MOVE:
+        body["first_move_triggered"] = True
+    return body
+
+
+def fault_of(machine: Machine, slot: Slot) -> str | None:
+    """A sentence why this is no reading for the server; None if it is one."""
+    if str(slot.characteristic) not in machine.characteristics:
+        return (
+            f"The control sends characteristic {slot.characteristic}, which machine.{machine.key}.characteristics does not"
+            " name."
+        )
+    if slot.status not in list(Status):
+        return f"Status {slot.status} is not known."
+    return FAULTS.get(Status(slot.status))
 
 
 class RegisterLink:
@@ -189,45 +215,15 @@ class RegisterLink:
         self._heads_at = time.monotonic()
 
     def _received(self, slot: Slot, stored: Position, now: datetime, *, fresh: bool) -> Received:
-        characteristic = self.machine.characteristics.get(str(slot.characteristic))
-        measured = slot.measured * (INCH if self.machine.unit == "inch" else 1.0)
-        body: dict[str, object] = {
-            "characteristic": characteristic,
-            "measured": round(measured, 9),
-            "correction_in_effect": slot.in_effect,
-        }
-        if slot.part:
-            body["part"] = str(slot.part)
-        if slot.status == Status.FIRST_MOVE:
-            body["first_move_triggered"] = True
-        if at := self._measured_at(slot, now, fresh=fresh):
+        body = body_of(self.machine, slot)
+        if slot.time is not None and fresh:
+            learn(self.clock, slot.time, now)
+        if at := measured_at(self.clock, slot.time, now, fresh=fresh):
             body["measured_at"] = at.isoformat()
-        fault = (
-            FAULTS.get(Status(slot.status)) if slot.status in list(Status) else f"Status {slot.status} is not known."
-        )
-        if characteristic is None:
-            fault = (
-                f"The control sends characteristic {slot.characteristic}, which machine.{self.machine.key}.characteristics"
-                " does not name."
-            )
         position = Position(stored.epoch, slot.sequence, stored.generation)
         again = f".{stored.generation}" if stored.generation else ""  # counters that went back name new readings
-        return Received(f"{self.machine.key}:{stored.epoch}{again}:{slot.sequence}", body, position, fault)
-
-    def _measured_at(self, slot: Slot, now: datetime, *, fresh: bool) -> datetime | None:
-        """Time of the measurement: now if it was not there at the last poll; else by the control's clock, if that is known."""
-        if slot.time is not None and fresh:
-            midnight = now.replace(hour=0, minute=0, second=0, microsecond=0)
-            ahead = slot.time - (now - midnight).total_seconds()
-            self.clock.offset = (ahead + DAY / 2) % DAY - DAY / 2
-        if fresh:
-            return now
-        if slot.time is None or self.clock.offset is None:
-            return None
-        there = now + timedelta(seconds=self.clock.offset)
-        at = there.replace(hour=0, minute=0, second=0, microsecond=0) + timedelta(seconds=slot.time)
-        at -= timedelta(seconds=self.clock.offset)
-        return min(at, now) if at <= now + timedelta(seconds=5) else at - timedelta(days=1)
+        key = f"{self.machine.key}:{stored.epoch}{again}:{slot.sequence}"
+        return Received(key, body, position, fault_of(self.machine, slot))
 
     # --- corrections
 

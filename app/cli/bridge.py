@@ -152,6 +152,24 @@ def _toml_value(value: object) -> str:
     return '"' + str(value).replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
+@bridge.command("print-macros")
+def print_macros(
+    first_register: Annotated[
+        int, typer.Option(envvar="INBAND_FIRST_REGISTER", help="First of the variables that they keep.")
+    ] = 700,
+    first_program: Annotated[
+        int, typer.Option(envvar="INBAND_FIRST_PROGRAM", help="Number of the first of the three.")
+    ] = 9825,
+) -> None:
+    """Write the user macros with which a Fanuc prints readings for kind dprnt, to standard output."""
+    from app.core.programs.dprnt import dprnt_programs
+
+    try:
+        typer.echo(dprnt_programs(first_register, first_program), nl=False)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
 @bridge.command("hold")
 def hold(
     machine: Annotated[str | None, typer.Argument(help="Only this machine; all if left out.")] = None,

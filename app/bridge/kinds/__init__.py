@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Final
 
 KINDS: Final[dict[str, str]] = {
+    "dprnt": "app.bridge.kinds.dprnt",
     "haas": "app.bridge.kinds.haas",
 }
 """Names and modules."""

@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Final, Protocol
 
 SIMULATORS: Final[dict[str, str]] = {
+    "dprnt": "app.bridge.simulators.dprnt",
     "haas": "app.bridge.simulators.haas",
 }
 """Kinds that can be simulated, and the module of each."""

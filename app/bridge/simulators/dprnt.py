@@ -1,0 +1,150 @@
+"""A simulated control that prints: on a TCP port like a serial server, and on a pseudo terminal like a serial port.
+
+It pads numbers with blanks, prints ``-`` in front of the padding, asks nothing back, and prints the last eight again after each
+part. Whoever is not connected misses what is printed.
+"""
+
+import asyncio
+import contextlib
+import os
+import tty
+
+from app.bridge.simulators.model import Feature, Model
+from app.core.printed_line import END, START, Printed, check_of
+from app.core.ring import SLOTS, Register, Slot, Unit
+
+FEATURES = (Feature(),)
+TICK = 0.01  # s
+
+
+class PrintingSimulator:
+    """One control that is running. device: its pseudo terminal. parity: seven bits and even parity, as 7E1 sends them."""
+
+    def __init__(self, model: Model, *, parity: bool = False) -> None:
+        self.model = model
+        self.parity = parity
+        self.port = 0
+        self.device = ""
+        self._server: asyncio.Server | None = None
+        self._writers: set[asyncio.StreamWriter] = set()
+        self._terminal: tuple[int, int] | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._printed = 0
+
+    async def start(self, port: int) -> None:
+        """Listen; 0 takes a free port."""
+        self._server = await asyncio.start_server(self._serve, "127.0.0.1", port)
+        self.port = self._server.sockets[0].getsockname()[1]
+        ours, theirs = os.openpty()
+        tty.setraw(theirs)
+        os.set_blocking(ours, False)
+        self._terminal, self.device = (ours, theirs), os.ttyname(theirs)
+        self._task = asyncio.create_task(self._print_new())
+
+    async def stop(self) -> None:
+        """End it."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+        if self._server is not None:
+            self._server.close()
+        self.cut()
+        for end in self._terminal or ():
+            os.close(end)
+        self._terminal = None
+
+    def cut(self) -> None:
+        """The network fails: every connection ends."""
+        for writer in self._writers:
+            writer.transport.abort()
+
+    @property
+    def connections(self) -> int:
+        """Number of connections by TCP."""
+        return len(self._writers)
+
+    def table(self) -> dict[str, object]:
+        """The table of a machine in the configuration."""
+        return {
+            "kind": "dprnt",
+            "unit": "inch" if self.model.unit == Unit.INCH else "mm",
+            "secret_file": "machine.key",
+            "corrections": "none",
+            "dprnt": {"connect": f"127.0.0.1:{self.port}"},
+            "characteristics": {str(each.number): f"characteristic-{each.number}" for each in self.model.features},
+        }
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._writers.add(writer)
+        try:
+            while await reader.read(1024):
+                pass
+        except OSError:
+            pass
+        finally:
+            self._writers.discard(writer)
+            writer.close()
+
+    async def _print_new(self) -> None:
+        parts = self.model.parts
+        while True:
+            for epoch, slot in self.model.written[self._printed :]:
+                self.send(self.text(epoch, slot))
+                self._printed += 1
+            self.model.registers[Register.ACK] = self.model.registers[Register.WRITTEN]  # a print waits for nobody
+            if not self.model.running and self.model.parts != parts:
+                parts = self.model.parts
+                self.print_again()
+            await asyncio.sleep(TICK)
+
+    def print_again(self) -> None:
+        """Print the last eight again."""
+        for epoch, slot in self.model.written[: self._printed][-SLOTS:]:
+            self.send(self.text(epoch, slot))
+
+    def text(self, epoch: int, slot: Slot) -> bytes:
+        """A reading as the control prints it."""
+        unit = Unit(self.model.unit)
+        decimals = 4 if unit is Unit.MM else 5
+        size = round(slot.measured, decimals)
+        printed = Printed(epoch, unit, Slot(slot.sequence, slot.characteristic, size, *_rest(slot)))
+        numbers = {
+            "E": (epoch, 6),
+            "N": (slot.sequence, 7),
+            "C": (slot.characteristic, 4),
+            "V": (size, 9),
+            "I": (slot.in_effect, 7),
+            "P": (slot.part, 7),
+            "T": (slot.tool, 4),
+            "S": (slot.status, 1),
+            "H": (-1 if slot.time is None else round(slot.time), 5),
+            "U": (int(unit), 1),
+            "K": (check_of(printed), 2),
+        }
+        words = []
+        for letter, (number, digits) in numbers.items():
+            shown = f"{abs(number):.{decimals}f}" if letter == "V" else str(abs(int(number)))
+            words.append(f"{letter}{'-' if number < 0 else ''}{shown:>{digits}}")
+        return f"{START} {' '.join(words)} {END}\n".encode()
+
+    def send(self, data: bytes) -> None:
+        """Send bytes to everybody who listens."""
+        if self.parity:
+            data = bytes(byte | (0x80 if byte.bit_count() % 2 else 0) for byte in data)
+        for writer in self._writers:
+            if not writer.is_closing():
+                writer.write(data)
+        if self._terminal is not None:
+            with contextlib.suppress(BlockingIOError):  # nobody reads it
+                os.write(self._terminal[0], data)
+
+
+def _rest(slot: Slot) -> tuple[int, int, int, int, float | None]:
+    return slot.in_effect, slot.part, slot.tool, slot.status, slot.time
+
+
+async def serve(model: Model, port: int = 0) -> PrintingSimulator:
+    """Start a simulated control."""
+    simulator = PrintingSimulator(model)
+    await simulator.start(port)
+    return simulator

@@ -1,0 +1,339 @@
+"""Readings that a control prints: by TCP, by a serial port (a pseudo terminal), into a file; with gaps, cuts and rubbish."""
+
+import asyncio
+import random
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.bridge import control_side
+from app.bridge.configuration import Machine, configuration_from
+from app.bridge.kinds.dprnt import PrintedLink, Settings
+from app.bridge.links import ControlAway, LinkError, Misconfigured, Position, Received
+from app.bridge.simulators.dprnt import PrintingSimulator, serve
+from app.bridge.simulators.model import Model
+from app.bridge.store import Store
+from app.bridge.unit import Unit as Tasks
+from app.core.printed_line import LineReader, Printed, line_of
+from app.core.ring import Slot, Unit
+from tests.bridge.plant import bridge, machine, parts, store_in, until
+from tests.loops import run
+from tests.shop import Shop
+
+SLOT = Slot(1, 1, 40.001, 0, 1, 3, 0, 43_200.0)
+
+
+@asynccontextmanager
+async def printing(model: Model | None = None, *, parity: bool = False) -> AsyncIterator[PrintingSimulator]:
+    simulator = PrintingSimulator(model or Model(), parity=parity)
+    await simulator.start(0)
+    try:
+        yield simulator
+    finally:
+        await simulator.stop()
+
+
+def printed_machine(settings: Settings, **other: Any) -> Machine:
+    return machine(Model(), **{"kind": "dprnt", "settings": settings, "corrections": "none", "location": ()} | other)
+
+
+@asynccontextmanager
+async def controlled(one: Machine, store: Store) -> AsyncIterator[Tasks]:
+    tasks = Tasks(one, PrintedLink(one), store)
+    task = asyncio.create_task(control_side.run(tasks))
+    try:
+        yield tasks
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+async def sizes(store: Store) -> dict[str, float]:
+    return {row.key.removeprefix("lathe-1:"): row.body["measured"] for row in await store.waiting("lathe-1", 10_000)}
+
+
+async def all_stored(store: Store, model: Model) -> None:
+    async def met() -> bool:
+        return len(await sizes(store)) == len(model.truth())
+
+    await until(met, "every reading in the store")
+    found, truth = await sizes(store), model.truth()
+    assert found == pytest.approx({key: truth[key] for key in truth}, abs=6e-5)
+
+
+def lines(*sequences: int, epoch: int = 7, **other: Any) -> bytes:
+    printed = [Printed(epoch, Unit.MM, replace(SLOT, sequence=number, **other)) for number in sequences]
+    return "".join(f"{line_of(each)}\r\n" for each in printed).encode()
+
+
+def test_readings_come_by_tcp_and_what_a_cut_has_swallowed_comes_with_the_second_print(tmp_path: Path) -> None:
+    async def work() -> None:
+        async with printing() as simulator:
+            store = store_in(tmp_path)
+            one = printed_machine(Settings(connect=f"127.0.0.1:{simulator.port}"))
+            async with controlled(one, store) as tasks:
+                await until(lambda: simulator.connections, "the connection")
+                await parts(simulator.model, 3)
+                await all_stored(store, simulator.model)
+                simulator.cut()
+                await until(lambda: not simulator.connections, "the cut")
+                await parts(simulator.model, 2)
+                await until(lambda: simulator._printed == 5, "the print")
+                await until(lambda: simulator.connections, "the connection")
+                await parts(simulator.model, 1)
+                await all_stored(store, simulator.model)
+                await until(lambda: not tasks.detail, "no gap any more")
+                assert tasks.state == "online"
+            store.close()
+
+    run(work())
+
+
+@pytest.mark.parametrize(("framing", "parity"), [("8N1", False), ("8N1", True), ("7E1", False)])
+def test_a_serial_port(tmp_path: Path, framing: Any, *, parity: bool) -> None:
+    """8N1 at the port while the control sends 7E1 is read as well: the eighth bit is only parity."""
+
+    async def work() -> None:
+        async with printing(parity=parity) as simulator:
+            store = store_in(tmp_path)
+            one = printed_machine(Settings(serial=simulator.device, framing=framing))
+            async with controlled(one, store) as tasks:
+                await until(lambda: tasks.state == "online", "the port")
+                simulator.send(b"\x12%\r\nINBLINE E12 N4\r\n")
+                await parts(simulator.model, 4)
+                await all_stored(store, simulator.model)
+                await until(lambda: "Damaged lines since the start: 1." in tasks.detail, "the damage said")
+            store.close()
+
+    run(work())
+
+
+def test_a_port_that_listens_keeps_connections_apart(tmp_path: Path) -> None:
+    async def work() -> None:
+        store = store_in(tmp_path)
+        server = await asyncio.start_server(lambda *_: None, "127.0.0.1", 0)
+        port = server.sockets[0].getsockname()[1]
+        server.close()
+        await server.wait_closed()
+        one = printed_machine(Settings(listen=port, listen_on="127.0.0.1"))
+        async with controlled(one, store) as tasks:
+            await until(lambda: "Nobody is connected" in tasks.detail, "the port")
+            writers = [(await asyncio.open_connection("127.0.0.1", port))[1] for _ in range(2)]
+            text = lines(1), lines(2)
+            for at in range(0, 80, 5):  # both at once, cut into pieces
+                for writer, data in zip(writers, text, strict=True):
+                    writer.write(data[at : at + 5])
+                    await writer.drain()
+
+            async def both() -> bool:
+                return set(await sizes(store)) == {"7:1", "7:2"}
+
+            await until(both, "both lines")
+            for writer in writers:
+                writer.close()
+        store.close()
+
+    run(work())
+
+
+def test_a_file_that_grows_shrinks_and_is_read_again_after_a_restart(tmp_path: Path) -> None:
+    async def work() -> None:
+        store = store_in(tmp_path)
+        file = tmp_path / "print.txt"
+        one = printed_machine(Settings(file=str(file)))
+
+        async def stored(*keys: str) -> None:
+            async def met() -> bool:
+                return list(await sizes(store)) == list(keys)
+
+            await until(met, str(keys))
+
+        async with controlled(one, store) as tasks:
+            await until(lambda: "cannot be read" in tasks.detail, "no file yet")
+            half = len(lines(1)) + 20
+            file.write_bytes(lines(1, 2)[:half])
+            await stored("7:1")
+            with file.open("ab") as end:
+                end.write(lines(1, 2)[half:])
+            await stored("7:1", "7:2")
+            file.write_bytes(lines(3))  # a new file under the old name
+            await stored("7:1", "7:2", "7:3")
+        async with controlled(one, store):
+            with file.open("ab") as end:
+                end.write(lines(4))
+            await stored("7:1", "7:2", "7:3", "7:4")
+        store.close()
+
+    run(work())
+
+
+class Canned:
+    """A source of lines that are given. remark: nothing to say."""
+
+    remark = ""
+
+    def __init__(self, *batches: bytes) -> None:
+        self.batches = list(batches)
+        self.reader = LineReader()
+
+    async def take(self) -> list[Printed]:
+        return self.reader.feed(self.batches.pop(0)) if self.batches else []
+
+    async def close(self) -> None:
+        pass
+
+    def damaged(self) -> int:
+        return 0
+
+
+def canned(*batches: bytes, **other: Any) -> PrintedLink:
+    link = PrintedLink(printed_machine(Settings(connect="127.0.0.1:1"), **other))
+    link._source = Canned(*batches)  # type: ignore[assignment]
+    return link
+
+
+async def taken(link: PrintedLink, stored: Position = Position()) -> Sequence[Received]:  # noqa: B008 - frozen
+    received = await link.fetch(stored)
+    await link.acknowledge(received)
+    return received
+
+
+def test_missing_sequences_are_told_until_they_come() -> None:
+    async def work() -> None:
+        link = canned(lines(1, 2, 5), lines(3), lines(1, 2, 3, 4, 5), lines(6), lines(40))
+        first = await taken(link)
+        assert [each.key for each in first] == ["lathe-1:7:1", "lathe-1:7:2", "lathe-1:7:5"]
+        assert "Missing readings: 3, 4." in link.remark
+        [healed] = await taken(link)
+        assert healed.key == "lathe-1:7:3"
+        assert healed.position == Position(7, 5)  # how far it has counted never goes back
+        assert "Missing readings: 4." in link.remark
+        [healed] = await taken(link)
+        assert healed.key == "lathe-1:7:4"
+        assert link.remark == ""
+        await taken(link)
+        await taken(link)
+        assert "Readings are missing: 33, the newest are 28, 29" in link.remark
+
+    run(work())
+
+
+def test_a_gap_over_a_restart_is_told() -> None:
+    async def work() -> None:
+        link = canned(lines(12))
+        await taken(link, Position(7, 9))
+        assert "Missing readings: 10, 11." in link.remark
+
+    run(work())
+
+
+def test_what_was_not_stored_comes_again() -> None:
+    async def work() -> None:
+        link = canned(lines(1, 2), lines(3))
+        assert len(await link.fetch(Position())) == 2
+        again = await link.fetch(Position())  # the disk was full
+        assert [each.key for each in again] == ["lathe-1:7:1", "lathe-1:7:2", "lathe-1:7:3"]
+        await link.acknowledge(again)
+        assert await link.fetch(Position()) == []
+
+    run(work())
+
+
+def test_contradictions_and_wrong_units_go_to_the_quarantine() -> None:
+    async def work() -> None:
+        link = canned(lines(1), lines(1, measured=41.0), lines(2, characteristic=9), lines(3, status=1))
+        await taken(link)
+        for words in (
+            "was printed as 40.001 before, and as 41 now",
+            "characteristic 9, which machine.lathe-1.characteristics does not name",
+            "did not trigger",
+        ):
+            [received] = await taken(link)
+            assert received.fault is not None
+            assert words in received.fault
+        inch = canned(lines(1), unit="inch")
+        [received] = await taken(inch)
+        assert received.fault == "The line is in mm, the configuration says unit = 'inch'."
+
+    run(work())
+
+
+def test_a_new_epoch_is_told() -> None:
+    async def work() -> None:
+        link = canned(lines(8), lines(1, epoch=9))
+        await taken(link)
+        [received] = await taken(link)
+        assert received.key == "lathe-1:9:1"
+        assert "The control began to count anew: epoch 7 became 9." in link.remark
+
+    run(work())
+
+
+def test_each_mistake_is_said(tmp_path: Path) -> None:
+    async def fails(settings: Settings, **other: Any) -> LinkError:
+        link = PrintedLink(printed_machine(settings, **other))
+        with pytest.raises(LinkError) as error:
+            await link.connect()
+        await link.close()
+        return error.value
+
+    async def work() -> None:
+        assert "It has none of them" in str(await fails(Settings())).replace("it has", "It has")
+        both = await fails(Settings(serial="/dev/ttyS9", file="x"))
+        assert isinstance(both, Misconfigured)
+        assert "it has serial and file" in str(both)
+        assert "is not an address with a port" in str(await fails(Settings(connect="192.0.2.17")))
+        away = await fails(Settings(connect="127.0.0.1:9"))
+        assert isinstance(away, ControlAway)
+        assert "Is the serial server on" in str(away)
+        assert "cannot be opened" in str(await fails(Settings(serial=str(tmp_path / "ttyUSB7"))))
+        assert 'Set corrections = "none"' in str(await fails(Settings(listen=4001), corrections="control"))
+
+    run(work())
+
+
+def test_the_table_of_the_simulator_is_a_configuration(tmp_path: Path) -> None:
+    async def work() -> None:
+        simulator = await serve(Model(), 0)
+        (tmp_path / "machine.key").write_text("secret")
+        content = {"server": {"url": "http://127.0.0.1:9"}, "machine": {"mill-1": simulator.table()}}
+        [read] = configuration_from(content, tmp_path).machines
+        assert read.settings == Settings(connect=f"127.0.0.1:{simulator.port}")
+        await simulator.stop()
+
+    run(work())
+
+
+def test_the_server_gets_each_reading_once(shop: Shop, tmp_path: Path) -> None:
+    chance = random.Random(1)
+
+    async def work() -> None:
+        async with printing() as simulator:
+            store = store_in(tmp_path)
+            one = printed_machine(
+                Settings(connect=f"127.0.0.1:{simulator.port}"),
+                key=shop.machine,
+                characteristics={"1": shop.characteristic},
+            )
+            secret = shop.machine_client.headers["Authorization"].split()[1]
+            async with bridge(shop.server.url, secret, Tasks(one, PrintedLink(one), store)):
+                await until(lambda: simulator.connections, "the connection")
+                for _ in range(5):
+                    simulator.send(chance.randbytes(12))
+                    await parts(simulator.model, 1)
+
+                async def all_sent() -> bool:
+                    position = await store.position(shop.machine)
+                    return position.sequence == 5 and not (await store.counts(shop.machine)).waiting
+
+                await until(all_sent, "everything at the server")
+            store.close()
+            readings = shop.call("GET", f"/readings?characteristic={shop.characteristic}")["items"]
+            truth = list(simulator.model.truth().values())
+            assert [reading["measured"] for reading in readings] == pytest.approx(truth, abs=6e-5)
+
+    run(work())
