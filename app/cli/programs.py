@@ -11,6 +11,7 @@ import typer
 
 from app.cli.base import DatabaseUrl, DataDir, cli, existing, say, settings_from
 from app.core.programs.correction_forms import Form
+from app.core.programs.ring_settings import Offsets
 
 program = typer.Typer(help="Program text of the controls.", no_args_is_help=True)
 cli.add_typer(program, name="program")
@@ -21,6 +22,7 @@ class Control(StrEnum):
 
     SINUMERIK = "sinumerik"
     FANUC = "fanuc"
+    HAAS = "haas"
 
 
 class ReadableControl(StrEnum):
@@ -91,16 +93,71 @@ def write_program(
     gauge: Annotated[
         float | None, typer.Option(envvar="INBAND_GAUGE", min=0, help="Calibration: size of the gauge, mm.")
     ] = None,
+    ring: Annotated[
+        bool, typer.Option("--ring", envvar="INBAND_RING", help="The NC programs for the bridge, in place of these.")
+    ] = False,
+    number: Annotated[
+        int, typer.Option(envvar="INBAND_NUMBER", min=1, max=9999, help="Ring: number of the characteristic.")
+    ] = 1,
+    first_register: Annotated[
+        int,
+        typer.Option(
+            envvar="INBAND_FIRST_REGISTER", min=0, help="Ring: its first register.", show_default="the control's usual"
+        ),
+    ] = 0,
+    time_out: Annotated[
+        float, typer.Option(envvar="INBAND_TIME_OUT", min=1, max=3600, help="Ring: seconds to wait for the bridge.")
+    ] = 30.0,
+    go_on: Annotated[
+        bool, typer.Option("--go-on", envvar="INBAND_GO_ON", help="Ring: write on then; the oldest reading is lost.")
+    ] = False,
+    largest_step: Annotated[
+        float,
+        typer.Option(envvar="INBAND_LARGEST_STEP", min=0.001, max=10, help="Ring: largest step of an offset, mm."),
+    ] = 0.1,
+    measured: Annotated[
+        str | None, typer.Option(envvar="INBAND_MEASURED", help="Ring: where the measuring cycle leaves the size.")
+    ] = None,
+    offsets: Annotated[
+        Offsets | None,
+        typer.Option(envvar="INBAND_OFFSETS", help="Ring: place of the wear.", show_default="as such a machine has it"),
+    ] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option(envvar="INBAND_FOLDER", file_okay=False, help="Ring: write each program into a file here."),
+    ] = None,
     data_dir: DataDir = None,
     database_url: DatabaseUrl = None,
 ) -> None:
-    """Write the measuring or the calibration subprogram of a characteristic to standard output."""
+    """Write the measuring or the calibration subprogram of a characteristic, or the programs for the bridge."""
     from app.loop.characteristics import queries
     from app.loop.programs import queries as programs
+    from app.loop.programs import ring_queries
 
     settings = settings_from(data_dir=data_dir, database_url=database_url)
     with existing(settings) as database, database.begin() as session:
         current = queries.characteristic_named(session, characteristic)
+        if ring:
+            chosen_control = ring_queries.ring_control(current, control.value if control else None)
+            ring_of = ring_queries.ring_settings(
+                current,
+                chosen_control,
+                number=number,
+                first_register=first_register,
+                time_out=time_out,
+                go_on=go_on,
+                largest_step=largest_step,
+                measured=measured,
+                offsets=offsets,
+            )
+            if folder is None:
+                sys.stdout.write(ring_queries.ring_text(current, ring_of, "all").text)
+                return
+            folder.mkdir(parents=True, exist_ok=True)
+            for text in ring_queries.ring_texts(current, ring_of):
+                (folder / text.file).write_text(text.text, encoding="ascii", newline="\r\n")
+                say(f"{folder / text.file}: {ring_queries.ring_word(text.key)}")
+            return
         chosen = programs.control_of(current, control.value if control else None)
         sys.stdout.write(programs.program_of(current, chosen, kind.value, gauge=gauge))
 

@@ -55,6 +55,23 @@ def test_what_is_written_is_what_is_read(shop: Shop, server: Server, tmp_path: P
     assert "There is no characteristic" in inband("program", "write", "nothing", *database, expect=1).stderr
 
 
+def test_programs_for_the_bridge_are_written_at_once_or_each_into_its_file(
+    shop: Shop, server: Server, tmp_path: Path
+) -> None:
+    database = ("--database-url", server.database.dsn)
+    ring = ("program", "write", shop.characteristic, "--ring", "--control", "fanuc", "--number", 7, *database)
+    text = inband(*ring, "--first-register", 600, "--time-out", 5).stdout
+    assert text.count("=600 (FIRST OF 96 REGISTERS)") == 4
+    assert text.startswith("%")
+    assert text.endswith("%\n")
+    inband(*ring, "--folder", tmp_path / "ring")
+    assert {file.name for file in (tmp_path / "ring").iterdir()} == {
+        "O9820.NC", "O9821.NC", "O9822.NC", "O9823.NC", "CALLS.NC",
+    }  # fmt: skip
+    assert "C7." in (tmp_path / "ring" / "CALLS.NC").read_text()
+    assert "must leave" in inband(*ring, "--first-register", 450, expect=1).stderr
+
+
 def test_corrections_are_written_and_marked(shop: Shop, server: Server) -> None:
     database = ("--database-url", server.database.dsn)
     shop.read(6.1)

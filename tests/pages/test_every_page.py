@@ -169,6 +169,7 @@ PAGES = {
     "/setup/characteristics/{characteristic}/program": [
         "/setup/characteristics/{characteristic}/program",
         "/setup/characteristics/{characteristic}/program?kind=calibration&gauge=199.852&control=fanuc",
+        "/setup/characteristics/{characteristic}/program?kind=ring&control=haas&number=7",
     ],
     "/setup/machines": ["/setup/machines"],
     "/setup/machines/new": ["/setup/machines/new"],

@@ -84,6 +84,7 @@ NOT_FREE: Final = {
 """Variables that the measuring cycles, the probes and the correction texts use, or that a reset clears."""
 HIGHEST: Final = {RingControl.SINUMERIK: 32_535, RingControl.FANUC: 999, RingControl.HAAS: 10_999}
 """The last variable that a program can keep over power off."""
+HIGHEST_OF_ALL: Final = max(HIGHEST.values())
 
 
 class RingError(ValueError):

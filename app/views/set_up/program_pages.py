@@ -1,5 +1,6 @@
 """Set-up pages: a program text becomes a characteristic, and a characteristic becomes program text."""
 
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any, get_args
 from urllib.parse import urlencode
@@ -14,13 +15,15 @@ from app.core.parameters import BY_NAME, LARGEST_LENGTH
 from app.core.programs import fanuc
 from app.core.programs.heidenhain import OF_SAVING, PARAMETERS
 from app.core.programs.lines import MOST_CHARACTERS, WARNINGS, LineVerdict, Program, ProgramKind
+from app.core.programs.ring_settings import HIGHEST_OF_ALL, MOST_CHARACTERISTICS, WEARS
 from app.errors import Invalid
 from app.language.i18n import _
 from app.loop.characteristics import actions, queries
+from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.wording import in_order, label, worded
 from app.loop.machines.queries import find_machine, machines
 from app.loop.programs import queries as programs
-from app.loop.programs import wording
+from app.loop.programs import ring_queries, wording
 from app.loop.programs.queries import READABLE, CheckedProgram
 from app.views.set_up import characteristic_pages, parameter_form
 from app.views.set_up.frame import setup_page
@@ -200,8 +203,10 @@ def program_page(
     surface: Annotated[str, Query(max_length=40)] = "free",
     probe: Annotated[str, Query(max_length=40)] = "axial",
 ) -> Response:
-    """The measuring or calibration program of a characteristic, to copy and download."""
+    """The measuring or calibration program of a characteristic, or those for the bridge, to copy and download."""
     current = queries.characteristic_named(session, characteristic)
+    if kind == "ring":
+        return _ring_page(request, current, caller, control)
     chosen = control if control in programs.WRITTEN else current.machine.control
     if chosen not in programs.WRITTEN:
         chosen = programs.WRITTEN[0]
@@ -229,6 +234,69 @@ def program_page(
         file=programs.file_name(current, chosen, kind),  # type: ignore[arg-type]
         address=lambda **query: f"/setup/characteristics/{current.characteristic.key}/program?{urlencode(query)}",
     )
+
+
+def _ring_page(request: Request, current: CurrentCharacteristic, caller: Caller, control: str | None) -> Response:
+    """The programs that send readings to the bridge and take corrections from it."""
+    query = request.query_params
+    usual = current.machine.control if current.machine.control in ring_queries.RING_CONTROLS else "sinumerik"
+    chosen = ring_queries.ring_control(current, control if control in ring_queries.RING_CONTROLS else usual)
+    typed = {name: query.get(name, "")[:40] for name in RING_FIELDS}
+    errors: dict[str, str] = {}
+    given: dict[str, float] = {}
+    for name, (lowest, highest, whole) in RING_FIELDS.items():
+        value = parameter_form.number(typed[name])
+        if value is None:
+            continue
+        if isinstance(value, str) or not lowest <= value <= highest or (whole and value != int(value)):
+            errors[name] = _("Must be a number from {lowest} to {highest}").format(lowest=lowest, highest=highest)
+        else:
+            given[name] = int(value) if whole else float(value)
+    measured, go_on = query.get("measured", "")[:40].strip(), query.get("go_on") == "true"
+    if measured and not re.fullmatch(ring_queries.SIZE_WORD, measured):
+        errors["measured"] = _("Must be a variable of the control, such as #510 or R43")
+        measured = ""
+    places = [offsets for control_of, offsets in WEARS if control_of is chosen]
+    offsets = next((place for place in places if place == query.get("offsets")), None)
+    try:
+        settings = ring_queries.ring_settings(current, chosen, offsets=offsets, measured=measured, go_on=go_on, **given)  # type: ignore[arg-type]
+    except Invalid as error:
+        errors |= by_field(error)
+        settings = ring_queries.ring_settings(current, chosen)
+        given, measured = {}, ""
+    said: dict[str, object] = {**given, "offsets": settings.offsets.value}
+    if measured:
+        said["measured"] = measured
+    if go_on:
+        said["go_on"] = "true"
+    address = f"/api/v1/characteristics/{current.characteristic.key}/program"
+    return setup_page(
+        request,
+        "ring_programs.html",
+        caller,
+        "characteristics",
+        current=current,
+        control=chosen.value,
+        controls=[("sinumerik", "Sinumerik"), ("fanuc", "Fanuc"), ("haas", "Haas")],
+        typed=typed | {"measured": query.get("measured", "")[:40]},
+        go_on=go_on,
+        places=[(place.value, ring_queries.offsets_word(place)) for place in places],
+        errors=errors,
+        settings=settings,
+        texts=ring_queries.ring_texts(current, settings),
+        word=ring_queries.ring_word,
+        download=lambda part: f"{address}?{urlencode({'ring': part, 'control': chosen.value} | said)}",
+        address=lambda **query: f"/setup/characteristics/{current.characteristic.key}/program?{urlencode(query)}",
+    )
+
+
+RING_FIELDS: dict[str, tuple[float, float, bool]] = {
+    "number": (1, MOST_CHARACTERISTICS, True),
+    "first_register": (0, HIGHEST_OF_ALL, True),
+    "time_out": (1, 3600, False),
+    "largest_step": (0.001, 10, False),
+}
+"""Fields of the form: lowest and highest value, and whether it is whole."""
 
 
 def _gauge(text: str) -> tuple[float | None, str | None]:

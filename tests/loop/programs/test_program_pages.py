@@ -129,6 +129,26 @@ class TestWriting:
         page.get_by_role("link", name="Fanuc").click()
         expect(page.locator("#program-text")).to_have_value(re.compile("G65 P9010"))
 
+    def test_programs_for_the_bridge(self, shop: Shop, engineer: Person, page: Page) -> None:
+        engineer.sign_in(page)
+        page.goto(f"/setup/characteristics/{shop.characteristic}/program")
+        page.get_by_role("link", name="For the bridge").click()
+        page.get_by_role("link", name="Haas").click()
+        page.get_by_label("Number in the ring").fill("7")
+        page.get_by_label("Variable with the size").fill("#10188")
+        page.get_by_role("button", name="Write it").click()
+        expect(page.locator("#program-call")).to_have_value(re.compile(r"C7\. V#10188"))
+        with page.expect_download() as arriving:
+            page.get_by_role("link", name="Download").last.click()
+        assert "V#10188" in Path(arriving.value.path()).read_text()
+
+    def test_what_is_no_number_for_the_ring_is_said(self, shop: Shop, engineer: Person) -> None:
+        address = f"/setup/characteristics/{shop.characteristic}/program?kind=ring&control=haas"
+        assert "Must be a number from 1 to 9999" in engineer.open(f"{address}&number=0.5")
+        assert "must leave 550 to 599 free" in engineer.open(f"{address}&first_register=500")
+        assert "Must be a variable of the control" in engineer.open(f"{address}&measured=1;M30")
+        engineer.open(f"{address}&number=NaN&time_out=1e99&largest_step=x&go_on=q&control=heidenhain")
+
     def test_what_is_no_size_is_said(self, shop: Shop, engineer: Person) -> None:
         for gauge in ("large", "-1", "1e9", "NaN"):
             text = engineer.open(f"/setup/characteristics/{shop.characteristic}/program?kind=calibration&gauge={gauge}")

@@ -176,3 +176,23 @@ def test_inches_are_answered_as_mm_line_by_line(shop: Shop) -> None:
     assert notes[0] == ["unit_inch"]
     assert notes[2] == ["blank_in_number"]
     assert answer["lines"][1]["notes"][0]["text"] == "#505 = 1.5748 inch = 39.99992 mm nominal"
+
+
+class TestRing:
+    """The programs for the bridge, over REST."""
+
+    def test_each_control_has_its_own(self, shop: Shop) -> None:
+        for control, words in (("sinumerik", "PROC INBAND_READING("), ("fanuc", "O9821 ("), ("haas", "O09821 (")):
+            text = written(shop, shop.characteristic, ring="reading", control=control, time_out=4)
+            assert words in text
+            assert words in written(shop, shop.characteristic, ring="all", control=control)
+        call = written(shop, shop.characteristic, ring="call", control="haas", number=7, measured="#10188")
+        assert "C7. V#10188" in call
+        assert shop.characteristic.upper() in call
+
+    def test_what_cannot_be_is_refused_in_words(self, shop: Shop) -> None:
+        refused = written(shop, shop.characteristic, 422, ring="all", control="haas", first_register=500)
+        assert "must leave 550 to 599 free" in refused
+        assert "must be one of" in written(shop, shop.characteristic, 422, ring="definition", control="fanuc")
+        assert "haas" in written(shop, shop.characteristic, 422, control="haas")
+        written(shop, shop.characteristic, 422, ring="call", control="fanuc", measured="#1) M30")
