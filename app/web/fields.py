@@ -116,6 +116,12 @@ RecordKey = Annotated[
 ]
 """The key of what is sent, for sending it again."""
 
+MappingHash = Annotated[
+    Text200,
+    Field(max_length=64, description="Hash of the mapping by which the bridge converts; any text up to 64 characters."),
+]
+"""Which mapping a bridge has used between the tool memory and the control."""
+
 
 class Body(BaseModel):
     """Body of a JSON request: unknown fields are refused by name, not ignored."""

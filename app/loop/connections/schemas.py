@@ -1,14 +1,14 @@
 """Heartbeats and connections as JSON."""
 
 from datetime import UTC, datetime
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
 from app.core.parameters import MOST_LOCATIONS
 from app.language.i18n import _
-from app.web.fields import LARGEST_SERIAL, Body, Length, Moment, Text200, one_line
+from app.web.fields import LARGEST_SERIAL, Body, Length, MappingHash, Moment, Text200, one_line
 
 ConnectionState = Literal[
     "starting", "online", "control_away", "wrong_machine", "counters_lost", "full", "held", "configuration"
@@ -33,12 +33,15 @@ def _storable(moment: datetime) -> datetime:
 
 AnyMoment = Annotated[Moment, AfterValidator(_storable)]
 """A time by a clock that may be wrong: a bridge is heard all the same."""
-Sentence = Annotated[str, StringConstraints(strip_whitespace=True, max_length=1000), AfterValidator(one_line)]
+
+
+def _in_one_line(text: Any) -> Any:
+    return " ".join(text.split()) if isinstance(text, str) else text
+
+
+Sentence = Annotated[str, BeforeValidator(_in_one_line), StringConstraints(max_length=1000), AfterValidator(one_line)]
+"""What a bridge says; line breaks become blanks."""
 Count = Annotated[int, Field(strict=True, ge=0, le=LARGEST_SERIAL)]
-MappingHash = Annotated[
-    Text200,
-    Field(max_length=64, description="Hash of the mapping by which the bridge converts; any text up to 64 characters."),
-]
 
 
 class LocationIn(BaseModel):

@@ -7,6 +7,13 @@ from app.loop.tables.alarms import Alarm
 
 
 def _differs(alarm: Alarm) -> str:
+    if alarm.data.get("correction") is None:
+        return _(
+            "The machine holds {reported} in tool {tool}; {expected} was expected. Who changed it at the control, and why? "
+            "Nothing is corrected through this tool until that is said."
+        ).format(
+            reported=mm(alarm.data.get("reported")), expected=mm(alarm.data.get("expected")), tool=alarm.tool_memory
+        )
     return _(
         "After correction {correction} the machine holds {reported} in tool {tool}; {expected} was expected. Who "
         "changed it at the control, and why? Nothing is corrected through this tool until that is said."

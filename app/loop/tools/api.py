@@ -20,6 +20,8 @@ from app.loop.tools.schemas import (
     CorrectionOut,
     DecisionsIn,
     EmpiricalValueIn,
+    OffsetReportIn,
+    OffsetReportOut,
     RejectionIn,
     Status,
     ToolChange,
@@ -92,6 +94,30 @@ def change_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, too
     machine_row = machine_for(session, caller, machine, "operator")
     done = actions.change_tool(session, machine_row, tool, change.offset, change.reason, caller)
     return tool_set(queries.tools(session, machine_row, only=tool)[0], machine_row.key, done.superseded)
+
+
+@router.post("/machines/{machine}/tools/{tool}/reported", responses=problems(404))
+def report_offset(
+    session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, report: OffsetReportIn
+) -> OffsetReportOut:
+    """Say what offset the control holds, without confirming a correction.
+
+    Within 0.0005 mm of the known one, or of what pending corrections lead to, nothing happens. Any other raises the alarm
+    *offset differs*: open corrections are superseded, and nothing is corrected through this tool until somebody has said
+    which offset is true.
+    """
+    machine_row = machine_for(session, caller, machine, "operator")
+    done = applying.report_offset(session, machine_row, tool, report.offset, caller)
+    return OffsetReportOut(
+        machine=machine_row.key,
+        tool_memory=tool,
+        offset=done.tool.offset,
+        differs=done.differs,
+        explained_by=list(done.explained_by),
+        superseded=list(done.superseded),
+        paused_by=done.tool.paused_by,
+        note=done.note,
+    )
 
 
 @router.get("/machines/{machine}/tools/{tool}/figure", responses=problems(404) | FIGURE)
@@ -191,7 +217,13 @@ def mark_applied(
     machine_row = machine_for(session, caller, machine, "operator")
     confirmation = applied or AppliedIn()
     done = applying.mark_applied(
-        session, machine_row, number, caller, offset_after=confirmation.offset_after, applied_at=confirmation.applied_at
+        session,
+        machine_row,
+        number,
+        caller,
+        offset_after=confirmation.offset_after,
+        applied_at=confirmation.applied_at,
+        mapping=confirmation.mapping,
     )
     return correction_out(queries.row_of(session, machine_row, done.correction), done.note)
 

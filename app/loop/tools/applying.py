@@ -7,6 +7,7 @@ person has confirmed the true offset. Lengths are mm.
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from typing import NamedTuple
 
 from sqlalchemy.orm import Session
 
@@ -17,6 +18,8 @@ from app.db.events import publish
 from app.errors import Conflict
 from app.language.i18n import _
 from app.loop.alarms import actions as alarms
+from app.loop.machines.queries import lock_machines
+from app.loop.tables.alarms import Alarm
 from app.loop.tables.machines import Machine
 from app.loop.tables.tools import Correction, Tool, ToolEvent
 from app.loop.tools import queries, wording
@@ -37,15 +40,18 @@ def mark_applied(
     *,
     offset_after: float | None = None,
     applied_at: datetime | None = None,
+    mapping: str | None = None,
 ) -> Decided:
     """A pending correction is in the offset now. Saying so twice is harmless.
 
     A machine that applies everything it has fetched and then confirms one after the other reports the last offset each
     time: if that is what later pending corrections of the tool lead to, they are in effect, too. Any other offset than
-    the expected one raises *offset differs*, becomes the known offset and pauses the tool.
+    the expected one raises *offset differs*, becomes the known offset and pauses the tool. mapping: hash of the mapping by
+    which a bridge converted it for the control.
     Raises `NotFound`; `Conflict` for a correction that is not pending, or when another offset is reported the second time.
     """
     correction = locked(session, machine, number)
+    correction.mapping = correction.mapping or mapping
     if correction.status == "applied":
         if offset_after is None or not _differs(offset_after, correction.offset_after):
             return Decided(correction)
@@ -72,6 +78,7 @@ def mark_applied(
             caller.name,
             tool.offset,
         )
+        pending.mapping = mapping
         if pending is not together[-1]:
             _step(session, machine, tool, pending.number, before, tool.offset, at, caller)
         if caller.kind != "machine":  # what a machine does all day stands in the history of its tools
@@ -87,13 +94,20 @@ def _later_ones(
     running = round(tool.offset + correction.amount, DECIMALS)
     if offset_after is None or not _differs(offset_after, running):
         return []
-    later: list[Correction] = []
+    return _leading_to(session, machine, tool, offset_after, running, correction.number)
+
+
+def _leading_to(
+    session: Session, machine: Machine, tool: Tool, offset: float, running: float, after: int = 0
+) -> list[Correction]:
+    """The pending corrections beyond number `after` that lead from `running` to this offset; none if they do not."""
+    led: list[Correction] = []
     for waiting in queries.open_corrections(session, machine, tool.number):
-        if waiting.status == "pending" and waiting.number > correction.number:
-            later.append(waiting)
+        if waiting.status == "pending" and waiting.number > after:
+            led.append(waiting)
             running = round(running + waiting.amount, DECIMALS)
-            if not _differs(offset_after, running):
-                return later
+            if not _differs(offset, running):
+                return led
     return []
 
 
@@ -124,20 +138,7 @@ def _reported(
     if not _differs(tool.offset, expected):
         publish(session, *changes)
         return Decided(first)
-    alarm = alarms.raise_for_tool(
-        session,
-        machine.id,
-        tool.number,
-        OFFSET_DIFFERS,
-        {
-            "correction": first.number,
-            "expected": expected,
-            "reported": tool.offset,
-            "limit": OFFSET_TOLERANCE / 1e6,
-        },
-    )
-    tool.paused_by = alarm.id
-    fallen = supersede(session, machine, tool.number, datetime.now(UTC), None, f"{wording.PAUSED} {alarm.id}")
+    alarm, fallen = _pause(session, machine, tool, expected, first.number)
     changes += [correction_changed(session, machine, superseded) for superseded in fallen]
     publish(session, *changes, alarm_raised(machine, alarm))
     return Decided(
@@ -145,22 +146,83 @@ def _reported(
     )
 
 
+def _pause(
+    session: Session, machine: Machine, tool: Tool, expected: float, correction: int | None
+) -> tuple[Alarm, Sequence[Correction]]:
+    """Nothing is corrected through this tool until a person has said which offset is true: the alarm, and what fell."""
+    alarm = alarms.raise_for_tool(
+        session,
+        machine.id,
+        tool.number,
+        OFFSET_DIFFERS,
+        {
+            "correction": correction,
+            "expected": expected,
+            "reported": tool.offset,
+            "limit": OFFSET_TOLERANCE / 1e6,
+        },
+    )
+    tool.paused_by = alarm.id
+    return alarm, supersede(session, machine, tool.number, datetime.now(UTC), None, f"{wording.PAUSED} {alarm.id}")
+
+
+class Report(NamedTuple):
+    """A reported offset: the tool, the pending corrections that explain it, and those that fell because nothing does."""
+
+    tool: Tool
+    differs: bool
+    explained_by: Sequence[int] = ()
+    superseded: Sequence[int] = ()
+    note: str | None = None
+
+
+def report_offset(session: Session, machine: Machine, number: int, offset: float, caller: Caller) -> Report:
+    """The control holds this offset; no correction is confirmed by that.
+
+    Nothing happens if it is the known one, or the one that pending corrections of the tool lead to: the control has applied
+    them, and their confirmations are on the way. Any other becomes the known offset, raises *offset differs* and pauses the
+    tool. Raises `NotFound`.
+    """
+    lock_machines(session, [machine.id])
+    tool = queries.tool(session, machine, number)
+    if not _differs(offset, tool.offset):
+        return Report(tool, differs=False)
+    explained = _leading_to(session, machine, tool, offset, tool.offset)
+    if explained:
+        return Report(tool, differs=False, explained_by=[correction.number for correction in explained])
+    asked = session.get(Alarm, (machine.id, tool.paused_by)) if tool.paused_by else None
+    expected = tool.offset if asked is None else asked.data["expected"]  # a second report: still of the first question
+    before, tool.offset = tool.offset, rounded(offset)
+    _step(session, machine, tool, None, before, tool.offset, datetime.now(UTC), caller)
+    alarm, fallen = _pause(session, machine, tool, expected, None)
+    publish(
+        session,
+        tool_changed(machine, tool.number),
+        *(correction_changed(session, machine, superseded) for superseded in fallen),
+        alarm_raised(machine, alarm),
+    )
+    numbers = [superseded.number for superseded in fallen]
+    note = wording.offset_differs(alarm.id, expected, tool.offset, numbers)
+    return Report(tool, differs=True, superseded=numbers, note=note)
+
+
 def _step(
     session: Session,
     machine: Machine,
     tool: Tool,
-    number: int,
+    number: int | None,
     before: float,
     after: float,
     at: datetime,
     caller: Caller,
 ) -> None:
+    """Keep a step of the offset: by a correction, or as the machine has reported it without one."""
     session.add(
         ToolEvent(
             machine_id=machine.id,
             number=tool.number,
             at=at,
-            kind="correction",
+            kind="edit" if number is None else "correction",
             offset_before=before,
             offset_after=after,
             correction=number,

@@ -295,7 +295,7 @@ def _expected(session: Session, machine: Machine) -> dict[int, float]:
 
 class OffsetChange(NamedTuple):
     """A step in the history of an offset. kind: `change`, `edit`, `correction`, or `reported` when the machine said that
-    its offset is another than the correction makes it. amount: of the correction, mm.
+    its offset is another than the correction makes it, or than is known. amount: of the correction, mm.
     """
 
     event: ToolEvent
@@ -322,7 +322,7 @@ def offset_history(
 
 
 def _kind(event: ToolEvent, amount: float | None) -> str:
-    if amount is None:
-        return event.kind
+    if amount is None:  # who edits says why; a machine that reports an offset does not
+        return "reported" if event.kind == "edit" and event.reason is None else event.kind
     differs = abs(nanometres(event.offset_after - event.offset_before - amount)) > OFFSET_TOLERANCE
     return "reported" if differs else event.kind

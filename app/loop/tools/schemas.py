@@ -12,7 +12,7 @@ from app.loop.tables.tools import Correction
 from app.loop.tools import wording
 from app.loop.tools.queries import AverageRow, CorrectionRow, ToolRow
 from app.loop.warnings.wording import sentence
-from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Length, Reason, answer_from
+from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Length, MappingHash, Reason, answer_from
 from app.web.warnings import Warnings, warnings_out
 
 DESCRIBED = ("edge", "name", "kind", "planned_parts", "planned_total", "sister")
@@ -26,6 +26,28 @@ class AppliedIn(Body):
         Length | None, Field(description="The offset that the control holds now; it is compared with the expected one.")
     ] = None
     applied_at: Annotated[LatelyOrNow | None, Field(description="When; if left out, now.")] = None
+    mapping: MappingHash | None = None
+
+
+class OffsetReportIn(Body):
+    """The offset that the control holds, as it was read there."""
+
+    offset: Length
+
+
+class OffsetReportOut(BaseModel):
+    """Answer to a reported offset."""
+
+    machine: str
+    tool_memory: Annotated[int, Field(description="R10")]
+    offset: Annotated[float, Field(description="The offset that the control is known to hold now, mm.")]
+    differs: Annotated[bool, Field(description="It was another one than expected: the tool is paused.")]
+    explained_by: Annotated[
+        list[int], Field(description="Pending corrections that lead to this offset: confirm them. Nothing was changed.")
+    ]
+    superseded: Annotated[list[int], Field(description="Corrections that must not be applied any more.")]
+    paused_by: Annotated[int | None, Field(description="Number of the alarm that asks which offset is true.")]
+    note: str | None = None
 
 
 class CorrectionDecisionIn(Body):
@@ -106,6 +128,7 @@ class CorrectionOut(BaseModel):
     applied_at: datetime | None
     applied_by: str | None
     offset_after: float | None
+    mapping: Annotated[str | None, Field(description="Hash of the mapping by which a bridge converted it.")]
     decided_at: Annotated[datetime | None, Field(description="When it was released, approved, rejected or superseded.")]
     decided_by: str | None
     status_reason: Annotated[str | None, Field(description="What was said when that was decided.")]

@@ -210,4 +210,4 @@ def step(change: OffsetChange) -> str:
         return _("correction {number}: {amount}, {actor}").format(
             number=event.correction, amount=um(change.amount), actor=event.actor
         )
-    return f"{event.reason or '–'}, {event.actor}"
+    return ", ".join(filter(None, (event.reason, event.actor)))
