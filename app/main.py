@@ -42,6 +42,7 @@ from app.loop.calibration import pages as calibration_pages
 from app.loop.characteristics import api as characteristics
 from app.loop.connections import api as connections_api
 from app.loop.connections import jobs as connection_jobs
+from app.loop.connections import pages as connection_pages
 from app.loop.faults import api as faults
 from app.loop.machines import api as machines
 from app.loop.machines import keys_api as machine_keys
@@ -162,6 +163,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     health.router,
     api_docs.router,
     machine_pages.router,
+    connection_pages.router,
     plant_pages.router,
     station_pages.router,
     search_pages.router,

@@ -1,12 +1,14 @@
 """API keys: adding one, ending one, and the ring that knows their callers without asking each time."""
 
 import asyncio
+import logging
 import time
 import weakref
 from collections.abc import Callable
 from typing import NamedTuple
 
-from sqlalchemy import event, func, select
+from sqlalchemy import event, func, select, text
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
@@ -20,8 +22,18 @@ from app.language.i18n import _
 CallerOfKey = Callable[[Session, bytes], Caller | None]
 KEPT = 1.0
 """Seconds an answer of the database is believed: so long may a key revoked in another process still work."""
+NOTED = 60.0
+"""Seconds between two notes that a key was used; by each process."""
 AHEAD = 0.5
 """Age in seconds from which an answer is renewed in the background, so that a busy key never waits."""
+
+_NO_DISK = text("SELECT set_config('synchronous_commit', 'off', true)")
+_USED = text("""
+UPDATE api_key SET last_used_at = now()
+WHERE id = :id AND revoked_at IS NULL AND (last_used_at IS NULL OR last_used_at < now() - interval '50 seconds')
+""")
+
+log = logging.getLogger(__name__)
 
 
 class MachineOfKey(NamedTuple):
@@ -71,6 +83,8 @@ class KeyRing:
         self._known: dict[bytes, _Known] = {}
         self._renewing: dict[bytes, asyncio.Task[Caller | None]] = {}
         self._generation = 0
+        self._noted: dict[int, float] = {}
+        self._noting: set[asyncio.Task[None]] = set()
         _rings.add(self)
 
     async def lookup(self, secret: str) -> Caller | None:
@@ -113,12 +127,30 @@ class KeyRing:
         since = time.monotonic()
         # Not among the threads of requests: when all of these are busy, readings are still let in.
         caller = await asyncio.to_thread(self._read, secret_hash)
+        if caller is not None and caller.key_id is not None and since - self._noted.get(caller.key_id, -NOTED) >= NOTED:
+            self._note(caller.key_id, since)
         if generation == self._generation:
             if caller is None:
                 self._known.pop(secret_hash, None)
             else:
                 self._known[secret_hash] = _Known(caller, since)
         return caller
+
+    def _note(self, key_id: int, since: float) -> None:
+        """Keep that a key was used, beside the request, which does not wait for it."""
+        self._noted[key_id] = since
+        task = asyncio.get_running_loop().create_task(asyncio.to_thread(self._write_use, key_id))
+        self._noting.add(task)
+        task.add_done_callback(self._noting.discard)
+
+    def _write_use(self, key_id: int) -> None:
+        try:
+            with self._database.begin() as session:
+                session.execute(_NO_DISK)
+                session.execute(_USED, {"id": key_id})
+        except SQLAlchemyError as error:
+            log.debug("the last use of key %d was not noted: %s", key_id, error)
+            self._noted.pop(key_id, None)
 
     def _read(self, secret_hash: bytes) -> Caller | None:
         with self._database.begin() as session:

@@ -64,6 +64,7 @@ class KeyOut(BaseModel):
     name: str
     role: Role | None = Field(description="null for the key of a machine.")
     created_at: datetime
+    last_used_at: datetime | None = Field(description="When it last called, to about a minute; null: never.")
     revoked_at: datetime | None
 
 

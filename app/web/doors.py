@@ -13,7 +13,8 @@ _BEHIND: dict[Door, re.Pattern[str]] = {
     "todo": re.compile(r"/(todo|alarms|corrections|proposals)(/.*)?"),
     "quality": re.compile(r"/(overview|compare|characteristics|signals|gauges|reports|parts)(/.*)?"),
     "machines": re.compile(
-        r"/(machines|plant|tools|calibration|work-zeros|alignments|forms|kinematics|notes)(/.*)?|/setup/machines/(?!new$)[^/]+(/.*)?"
+        r"/(machines|connections|plant|tools|calibration|work-zeros|alignments|forms|kinematics|notes)(/.*)?"
+        r"|/setup/machines/(?!new$)[^/]+(/.*)?"
     ),
     "setup": re.compile(r"/(setup|import)(/.*)?"),
 }

@@ -8,6 +8,7 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
+from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
 from app.access import actions
@@ -104,3 +105,24 @@ def test_of_many_keys_none_waits_for_another_while_the_database_hangs() -> None:
         assert {type(answer) for answer in run(look())} == {OperationalError}
         assert time.monotonic() - begun < 10
         silent.shutdown(socket.SHUT_RDWR)
+
+
+def test_the_last_use_is_noted_beside_the_request_once_a_minute(database: Database, secret: str) -> None:
+    async def use() -> None:
+        ring = KeyRing(database, caller_of_key)
+        await ring.lookup(secret)
+        await asyncio.gather(*ring._noting)
+        ring.forget()
+        await ring.lookup(secret)
+        assert not ring._noting, "noted a moment ago"
+
+    with database.begin() as session:
+        assert session.scalar(text("SELECT last_used_at FROM api_key")) is None
+    run(use())
+    with database.begin() as session:
+        assert session.scalar(text("SELECT now() - last_used_at < interval '1 minute' FROM api_key")) is True
+        session.execute(text("UPDATE api_key SET last_used_at = now() - interval '1 hour', revoked_at = now()"))
+    ring = KeyRing(database, caller_of_key)
+    ring._write_use(1)
+    with database.begin() as session:
+        assert session.scalar(text("SELECT now() - last_used_at > interval '59 minutes' FROM api_key")) is True

@@ -81,6 +81,8 @@ OPERATOR_PAGES = [
     "/alarms/{alarm}?action=keep_cutting",
     "/alarms/history",
     "/todo",
+    "/connections",
+    "/machines/{machine}/connection",
     "/corrections",
     "/corrections/{machine}/tools/5",
     "/machines/{machine}/tools/3/change",

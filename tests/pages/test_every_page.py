@@ -28,6 +28,8 @@ PAGES = {
     "/": ["/", "/?show=attention"],
     "/overview": ["/overview", "/overview?by=ppk&machine={machine}"],
     "/plant/{machine}": ["/plant/{machine}"],
+    "/connections": ["/connections"],
+    "/machines/{machine}/connection": ["/machines/{machine}/connection"],
     "/station/{machine}": ["/station/{machine}", "/station/{machine}?tool=3"],
     "/station/{machine}/alarms/{number}": ["/station/{machine}/alarms/{alarm}?action=noted"],
     "/station/{machine}/corrections/{number}": ["/station/{machine}/corrections/{waiting}?do=approve"],
@@ -198,6 +200,33 @@ PARTS = {  # only ever fetched into a page
     "/characteristics/{characteristic}/readings/{sequence}/panel",
 }
 
+HEARTBEAT: dict[str, Any] = {
+    "version": "0.2.0.dev17+g1cbe8a9",
+    "state": "control_away",
+    "detail": "ConnectionRefusedError: opc.tcp://192.168.214.1:4840 does not answer; the next attempt is made in 30 s",
+    "waiting": 1204,
+    "oldest_waiting_at": "2026-11-01T08:00:00Z",
+    "quarantined": 27,
+    "quarantine": [
+        {
+            "key": f"a-machine-with-a-long-key:123456:{number}",
+            "characteristic": "shaft-with-a-long-key",
+            "reason": "There is no characteristic shaft-with-a-long-key. GET /api/v1/characteristics lists them.",
+            "at": "2026-11-01T08:00:00Z",
+        }
+        for number in range(3)
+    ],
+    "clock_offset": -3605.2,
+    "kind": "opcua",
+    "mapping": "5b8c1f0e5b8c1f0e",
+    "hold_all": True,
+    "identity": "ZA6-1207 840D sl",
+    "locations": [
+        {"tool_memory": 3, "mapping": "77d09a12", "proved_at": "2026-11-01T08:00:00Z", "offset": -0.0123},
+        {"tool_memory": 13, "mapping": "1c2d3e4f", "proved_at": None, "offset": None},
+    ],
+}
+
 
 def routes_of(router: Any) -> Iterator[APIRoute]:
     """All routes of a router, those of the routers it includes too."""
@@ -235,6 +264,7 @@ def furnished(server: Server) -> Shop:
         planned_parts=400,
         sister=13,
     )
+    made.call("POST", f"/machines/{made.machine}/heartbeat", **HEARTBEAT)
     calibrations = f"/machines/{made.machine}/calibrations"
     limits: dict[str, Any] = {"zero_range": 0.001, "averaging_limit": 0.01, "confidence_limit": 1.0}
     for touches in ([199.8553], [201.9]):

@@ -324,6 +324,7 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/kinematics/runs/{run}/recompute": ("recompute_kinematics_run",),
     "/kinematics/runs/{run}/{what}": ("confirm_kinematics_run", "enter_kinematics_run", "undo_kinematics_run"),
     "/machines/{machine}/averages/{location}/edit": ("set_empirical_value",),
+    "/machines/{machine}/connection/remove": ("remove_connection",),
     "/machines/{machine}/corrections/program": ("mark_fetched", "confirm_corrections"),
     "/machines/{machine}/corrections/{number}": ("approve_correction", "release_correction", "reject_correction"),
     "/machines/{machine}/tools/{number}": ("describe",),

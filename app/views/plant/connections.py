@@ -7,6 +7,8 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.language.i18n import _
+from app.loop.connections import queries as bridges
+from app.loop.connections import wording
 from app.loop.machines import keys
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
@@ -14,11 +16,12 @@ from app.loop.tables.tools import Correction
 
 
 class Connection(NamedTuple):
-    """One way of the machine to the server: what it is, since when nothing came, more in words."""
+    """One way of the machine to the server: its name, since when nothing came, more in words, and the page about it."""
 
     what: str
     at: datetime | None
     more: str
+    path: str = ""
 
 
 def connections_of(session: Session, machine: Machine) -> list[Connection]:
@@ -30,7 +33,10 @@ def connections_of(session: Session, machine: Machine) -> list[Connection]:
         )
     ).one()
     in_use = [key for key in keys.machine_keys(session, machine.id) if key.revoked_at is None]
+    bridge = bridges.find_connection(session, machine.id)
+    heard = [] if bridge is None else [_bridge(machine, bridge)]
     return [
+        *heard,
         Connection(_("Last reading received"), received, ""),
         Connection(_("Last correction confirmed"), applied, ""),
         Connection(_("Last corrections fetched as program text"), fetched, ""),
@@ -40,3 +46,8 @@ def connections_of(session: Session, machine: Machine) -> list[Connection]:
             ", ".join(key.name for key in in_use[:5]) or _("Without a key the machine cannot push readings."),
         ),
     ]
+
+
+def _bridge(machine: Machine, row: bridges.ConnectionRow) -> Connection:
+    told = row.connection.detail or wording.explained(f"connection_{row.connection.state}")
+    return Connection(_("Bridge heard"), row.connection.received_at, told, f"/machines/{machine.key}/connection")

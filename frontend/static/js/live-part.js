@@ -5,6 +5,7 @@
 //         that element's content is taken (so a whole page will do), else all of its body.
 //   on    see live.js
 //   now   fetch at once, too
+//   every seconds between two looks where no event tells of a change
 //
 // What the reader is doing is kept: focus, selection, opened <details> (those with an id or data-key), scrolling.
 // While he types in it or has a dialog of it open, it waits. If fetching fails it says so and how old the content is.
@@ -24,10 +25,13 @@ class LivePart extends HTMLElement {
     this.refresh = coalesced(() => this.load());
     this.stop = subscribe(this.getAttribute("on"), () => this.refresh());
     if (this.hasAttribute("now")) this.refresh();
+    const every = Number(this.getAttribute("every"));
+    if (every) this.timer = setInterval(() => document.hidden || this.refresh(), every * 1_000);
   }
 
   disconnectedCallback() {
     this.stop?.();
+    clearInterval(this.timer);
   }
 
   get busy() {
