@@ -191,6 +191,8 @@ def _machine(key: str, table: dict[str, Any], folder: Path, problems: list[str])
             problems.append(f"{place}: {error}")
         else:
             settings = _converted(table.pop(kind, {}), module.Settings, f"{place}.{kind}", problems)
+            if hasattr(settings, "beside"):  # a kind with files of its own, which stand beside the configuration
+                settings = settings.beside(folder, f"{place}.{kind}", problems)
     secret = _secret(table, place, folder, problems)
     machine = _converted(table | {"key": key, "secret": secret or "", "settings": settings}, Machine, place, problems)
     if machine is not None:

@@ -241,6 +241,41 @@ def quarantine(
     _with_store(config, work)
 
 
+@bridge.command("certificate")
+def certificate(
+    folder: Annotated[
+        Path, typer.Option(envvar="INBAND_FOLDER", help="Where the files go: beside the configuration.")
+    ] = Path(),
+    host: Annotated[
+        str | None, typer.Option(envvar="INBAND_HOST", help="Name of the machine with the bridge; its own if left out.")
+    ] = None,
+) -> None:
+    """Make the certificate and the key with which the bridge shows itself to OPC UA controls."""
+    from socket import gethostname
+
+    try:
+        from app.bridge.certificates import write_pair
+    except ModuleNotFoundError as error:
+        raise InbandError(f"{error.name} is not installed.", "Install inband[opcua].") from error
+    try:
+        public, key, uri = write_pair(folder, host or gethostname())
+    except FileExistsError as error:
+        raise InbandError(
+            f"{error} is there already.", "Move it away first; controls have to trust a new certificate anew."
+        ) from error
+    except OSError as error:
+        raise InbandError(f"{folder} cannot be written: {error.strerror}.") from error
+    say(f"Made {public} (for the controls) and {key} (keep it secret), URI {uri}.")
+    say(f'Into each [machine.KEY.opcua]: certificate = "{public.name}" and key = "{key.name}".')
+    say(
+        "Then run “inband bridge check” once: the control refuses the certificate, and keeps it among the rejected ones."
+    )
+    say(
+        "At the panel: Start-up, Network, OPC UA, certificates: choose “Inband bridge”, trust it, and run the check again."
+    )
+    say(f"Or carry {public.name} to the control on a USB stick and import it there as a trusted client.")
+
+
 @bridge.command("touch-test")
 def touch_test(
     machine: MachineName,

@@ -11,6 +11,7 @@ from typing import Final
 KINDS: Final[dict[str, str]] = {
     "dprnt": "app.bridge.kinds.dprnt",
     "haas": "app.bridge.kinds.haas",
+    "opcua": "app.bridge.kinds.opcua",
 }
 """Names and modules."""
 EXTRAS: Final = {"opcua": "opcua", "mqtt": "mqtt", "heidenhain": "heidenhain"}

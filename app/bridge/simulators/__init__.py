@@ -11,6 +11,7 @@ from typing import Final, Protocol
 SIMULATORS: Final[dict[str, str]] = {
     "dprnt": "app.bridge.simulators.dprnt",
     "haas": "app.bridge.simulators.haas",
+    "opcua": "app.bridge.simulators.opcua",
 }
 """Kinds that can be simulated, and the module of each."""
 
