@@ -355,7 +355,7 @@ class SimulatedSinumerik:
         return {
             "kind": "opcua",
             "unit": "inch" if model.unit == Unit.INCH else "mm",
-            "secret": "the key of the machine at the server",
+            "secret": "key-of-the-machine-at-the-server",
             "identity": model.serial,
             "characteristics": {str(each.number): f"shaft-{each.number}" for each in model.features},
             "opcua": settings,
