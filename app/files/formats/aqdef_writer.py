@@ -181,9 +181,10 @@ class _Header(_Texts):
     ) -> Iterator[str]:
         yield f"K0100 {len(characteristics)}"
         for number, part in enumerate(parts, 1):
+            where = f"/{number}" if len(parts) > 1 else ""  # without one some take it for that of a characteristic
             for key, text in zip(("K1001", "K1002", "K1081", "K1082", "K1085", "K1086"), part, strict=True):
                 if text or key in {"K1001", "K1002"}:
-                    yield f"{key}/{number} {self.fit(key, text)}"
+                    yield f"{key}{where} {self.fit(key, text)}"
             taken: set[str] = set()
             for index, described in enumerate(characteristics, 1):
                 if described.part == number - 1:

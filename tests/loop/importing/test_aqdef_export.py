@@ -10,8 +10,10 @@ from app.files.formats.aqdef import Source
 from app.files.formats.aqdef_values import Measured, Value
 from app.loop.readings import queries
 from app.loop.readings.actions import exclude
+from tests.conftest import Server
 from tests.loop.importing.test_commands import inband
 from tests.loop.importing.test_history import run, scalar, set_up, table
+from tests.shop import Shop
 
 
 @pytest.fixture
@@ -80,3 +82,22 @@ def test_the_command_teaches(plant: Database, tmp_path: Path) -> None:
     done = inband("export", "--characteristic", "nobody", "-o", path, database=plant, folder=tmp_path)
     assert (done.returncode, "There is no characteristic 'nobody'" in done.stderr) == (1, True), done.stderr
     assert not path.exists()
+
+
+def test_readings_by_the_api(server: Server, tmp_path: Path) -> None:
+    shop = Shop(server)
+    other = f"{shop.characteristic}-b"
+    shop.add(other)
+    for key, measured in ((shop.characteristic, 39.992), (other, 39.993)):
+        shop.call("POST", "/readings", 201, characteristic=key, measured=measured, part="SN-1")
+    client = shop.admin
+    answer = client.get(f"/api/v1/readings.dfq?characteristic={shop.characteristic},{other}")
+    assert answer.status_code == 200, answer.text
+    assert 'filename="readings.dfq"' in answer.headers["content-disposition"]
+    path = tmp_path / "got.dfq"
+    path.write_bytes(answer.content)
+    assert [(at, each.measured, each.part) for at, each in read(path)[1]] == [(1, 39.992, "SN-1"), (2, 39.993, "SN-1")]
+    assert client.get("/api/v1/readings.dfq?characteristic=nobody").status_code == 404
+    assert client.get("/api/v1/readings.dfq?characteristic=,").status_code == 422
+    several = client.get(f"/api/v1/readings.dfq?characteristic={shop.characteristic},{other}&last=200000")
+    assert (several.status_code, "ask for fewer" in several.text) == (422, True)
