@@ -95,6 +95,10 @@ def simulate(
     port: Annotated[int, typer.Option(envvar="INBAND_PORT", min=0, max=65535, help="Port; 0 for a free one.")] = 0,
     cycle: Annotated[float, typer.Option(envvar="INBAND_CYCLE", min=0.01, help="Seconds between two parts.")] = 5.0,
     inch: Annotated[bool, typer.Option("--inch", envvar="INBAND_INCH", help="The control works in inches.")] = False,
+    at: Annotated[
+        str | None,
+        typer.Option("--at", envvar="INBAND_AT", help="Folder, or broker as host:port: kinds folder and mqtt."),
+    ] = None,
 ) -> None:
     """Start a simulated control that makes and measures parts; its table for the configuration goes to standard output."""
     from app.bridge.simulators import simulator_named
@@ -105,13 +109,16 @@ def simulate(
         module = simulator_named(kind)
     except LookupError as error:
         raise InbandError(str(error)) from error
+    if at is not None and not hasattr(module, "AT"):
+        raise typer.BadParameter(f"A simulated control of kind {kind} needs no place.", param_hint="--at")
 
     async def work() -> None:
         features = getattr(module, "FEATURES", (Feature(),))
         model = Model(features, unit=Unit.INCH if inch else Unit.MM)
-        simulator = await module.serve(model, port)
+        simulator = await (module.serve(model, port) if at is None else module.serve(model, port, at))
         typer.echo(_toml(model.serial.lower(), simulator.table()))
-        say(f"A simulated control of kind {kind} listens on port {simulator.port}. End it with Ctrl-C.")
+        where = f" listens on port {simulator.port}" if simulator.port else " runs"
+        say(f"A simulated control of kind {kind}{where}. End it with Ctrl-C.")
         try:
             await live(model, cycle)
         finally:
@@ -168,6 +175,41 @@ def print_macros(
         typer.echo(dprnt_programs(first_register, first_program), nl=False)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
+
+
+@bridge.command("preview")
+def preview(
+    machine: MachineName,
+    file: Annotated[
+        Path, typer.Argument(help="A file as the measuring machine writes it.", exists=True, dir_okay=False)
+    ],
+    config: ConfigFile = PLANT,
+) -> None:
+    """Say what each line of a file would become. Nothing is sent, moved or stored. For machines of kind folder."""
+    from app.bridge.file_content import files_of, read_content
+    from app.files.formats.delimited import Unusable
+
+    configuration = _configuration(config)
+    chosen = next(each for each in configuration.machines if each.key == _known(configuration, machine))
+    if chosen.kind != "folder":
+        raise InbandError(f"{machine} is of kind {chosen.kind}; a preview is there for kind folder.")
+    try:
+        content = read_content(chosen, files_of(file))
+    except (OSError, Unusable) as error:
+        raise InbandError(f"{file} cannot be read: {error}.") from error
+    for entry in content.entries:
+        words = "\t".join(f"{name}={value}" for name, value in entry.body.items())
+        typer.echo(f"line {entry.line}\t{entry.name}\t{words}")
+    for remark in content.remarks:
+        say(remark)
+    if content.skipped:
+        say(f"{content.skipped} readings are passed over.")
+    for fault in content.faults:
+        say(f"✗ {fault}", style="bold red")
+    if content.faults:
+        say("The file would go to the folder of failed files; nothing of it would be stored.")
+        raise typer.Exit(1)
+    say(f"{len(content.entries)} readings.")
 
 
 @bridge.command("hold")

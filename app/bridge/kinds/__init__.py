@@ -10,6 +10,7 @@ from typing import Final
 
 KINDS: Final[dict[str, str]] = {
     "dprnt": "app.bridge.kinds.dprnt",
+    "folder": "app.bridge.kinds.folder",
     "haas": "app.bridge.kinds.haas",
     "opcua": "app.bridge.kinds.opcua",
 }

@@ -1,7 +1,7 @@
 """Simulated controls: one model of a machine, behind each protocol. For trying, for the demonstration plant, and for tests.
 
 Each module has ``serve(model, port)``, which answers a `Simulator`, and may have ``FEATURES``: characteristics of a model in the
-words of that control.
+words of that control. Where it has ``AT``, a sentence, ``serve`` takes a third word: a place that the simulator needs.
 """
 
 from importlib import import_module
@@ -10,6 +10,7 @@ from typing import Final, Protocol
 
 SIMULATORS: Final[dict[str, str]] = {
     "dprnt": "app.bridge.simulators.dprnt",
+    "folder": "app.bridge.simulators.folder",
     "haas": "app.bridge.simulators.haas",
     "opcua": "app.bridge.simulators.opcua",
 }

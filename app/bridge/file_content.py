@@ -1,0 +1,426 @@
+"""The readings in a file of a measuring machine: CSV, NDJSON, a text protocol, or AQDEF. Nothing is moved or sent here.
+
+A file is taken whole or not at all: one line that cannot be read is a `Fault`, and a person puts the file right. Each reading has
+a key for ever. It is a hash of the file up to its line and of its own fields: the same file delivered again, or one that
+has grown since, brings nothing twice. Readings without time, part and key of their own are told apart by the file's name and
+its time of modification too.
+"""
+
+import hashlib
+import io
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+from typing import Any, Final, Literal, NamedTuple
+
+from msgspec import Struct
+
+from app.bridge.configuration import Machine, Positive
+from app.bridge.links import Received
+from app.core.ring import INCH
+from app.files.formats import aqdef, aqdef_values, delimited
+from app.files.formats.aqdef_times import WallClock
+from app.files.formats.cell_values import UNITS, Unreadable, moment, number, unit_in, zone_named
+
+FIELDS: Final = ("characteristic", "measured", "measured_at", "machined_at", "part", "correction_in_effect", "key")
+"""What a column, or a named group of a regular expression, may be."""
+NAMES: Final = {"csv": "*.csv", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
+EVERY: Final = "*"
+"""The name in ``characteristics`` that stands for readings whose line names none."""
+LONGEST_LINE: Final = 10_000
+HIGHEST_NUMBER: Final = 2_147_483_647
+NOT_ALONE: Final = 2  # files of a pair
+
+
+class Settings(Struct, forbid_unknown_fields=True, frozen=True):
+    """A folder into which a measuring machine writes files.
+
+    path: absolute. names: a pattern such as ``part_*.csv``; else by the format. done, failed: folders that files are moved to,
+    from ``path``, on the same disk or share. every: s between two looks; a file is read when two looks find it the same.
+    settle: s that a file whose last line has no end, or that cannot be read, has to stay the same. empty_after: s after
+    which an empty file, or one without its pair, has failed. largest: MB.
+
+    columns: column (or name in NDJSON) by field of `FIELDS`; if empty, each is named as its field. Without ``measured`` the
+    names in ``characteristics`` are columns of sizes. lines: regular expressions with fields as named groups; one without
+    ``measured`` holds for the lines below. decimal, delimiter, encoding: of the text; the last two are found out if they are
+    left out. times: the form of times, as strptime has it. zone: of times without an offset. day_first: in dates
+    with strokes, AQDEF only. others: readings of a characteristic that has no name in ``characteristics`` make the file fail,
+    or are passed over.
+    """
+
+    path: str
+    format: Literal["csv", "ndjson", "text", "aqdef"]
+    names: str | None = None
+    done: str = "done"
+    failed: str = "failed"
+    every: Positive = 2.0
+    settle: Positive = 30.0
+    empty_after: Positive = 600.0
+    largest: Positive = 20.0
+    columns: dict[str, str] = {}
+    lines: tuple[str, ...] = ()
+    decimal: Literal[".", ","] = "."
+    delimiter: str | None = None
+    encoding: str | None = None
+    times: str | None = None
+    zone: str | None = None
+    day_first: bool | None = None
+    others: Literal["fail", "skip"] = "fail"
+
+    def __post_init__(self) -> None:
+        """Refuse what contradicts itself."""
+        if not Path(self.path).is_absolute():
+            raise ValueError(f"path = {self.path!r} is not absolute: name it from the root or the drive on")
+        if {Path(self.path, self.done), Path(self.path, self.failed)} & {Path(self.path)} or self.done == self.failed:
+            raise ValueError("done and failed are two other folders than path")
+        for name in self.columns.keys() - set(FIELDS):
+            raise ValueError(f"columns.{name} is no field; fields are {', '.join(FIELDS)}")
+        if self.zone is not None:
+            zone_named(self.zone)
+        if self.encoding is not None:
+            try:
+                "".encode(self.encoding)
+            except LookupError:
+                raise ValueError(
+                    f"encoding = {self.encoding!r} is not known; known are utf-8, cp1252, cp1250 …"
+                ) from None
+        if self.delimiter is not None and len(self.delimiter) != 1:
+            raise ValueError("delimiter is one character")
+        if self.format == "text":
+            _check_expressions(self.lines)
+
+
+def _check_expressions(lines: tuple[str, ...]) -> None:
+    groups: set[str] = set()
+    for text in lines:
+        try:
+            groups |= set(re.compile(text).groupindex)
+        except re.error as error:
+            raise ValueError(f"lines: {text!r} is no regular expression: {error}") from None
+    for name in groups - set(FIELDS):
+        raise ValueError(f"lines: the group {name!r} is no field; fields are {', '.join(FIELDS)}")
+    if "measured" not in groups:
+        raise ValueError("lines: one expression needs the group (?P<measured>…), the size")
+
+
+class Fault(NamedTuple):
+    """Something for which a file cannot be taken: line where it is known, field or column, and the reason with what to do."""
+
+    line: int | None
+    field: str
+    reason: str
+
+    def __str__(self) -> str:
+        """Line, field, reason."""
+        where = ", ".join(([f"line {self.line}"] if self.line else []) + ([self.field] if self.field else []))
+        return f"{where}: {self.reason}" if where else self.reason
+
+
+class Entry(NamedTuple):
+    """One reading: its line, the characteristic as the file names it, and what `POST /readings` takes, without the key."""
+
+    line: int
+    name: str
+    body: dict[str, Any]
+    key: str
+
+
+@dataclass(slots=True)
+class Content:
+    """The content of a file. skipped: readings that were passed over. complete: its last line has an end."""
+
+    entries: list[Entry] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+    skipped: int = 0
+    complete: bool = True
+    digest: str = ""
+
+    def received(self, machine: str, named: str) -> list[Received]:
+        """The readings for the store; of a file that cannot be taken one entry for the quarantine says why."""
+        if not self.faults:
+            return [Received(entry.key, entry.body, mark=named) for entry in self.entries]
+        more = f" (and {len(self.faults) - 1} more)" if len(self.faults) > 1 else ""
+        words = f"File {named} is in the folder of failed ones, nothing of it was taken: {self.faults[0]}{more}"
+        return [Received(f"{machine}:file:{self.digest[:32]}", {"file": named}, fault=words, mark=named)]
+
+
+def read_content(machine: Machine, paths: tuple[Path, ...], stamp: str = "") -> Content:
+    """Read a file, or a pair of AQDEF. stamp: name and time of modification. Raises `OSError` only."""
+    settings: Settings = machine.settings
+    content = Content()
+    try:
+        _Reader(machine, settings, paths, stamp, content).read()
+    except delimited.Unusable as error:
+        content.faults.append(Fault(error.line, "", str(error)))
+    if not content.faults and not content.entries and not content.skipped:
+        content.faults.append(Fault(None, "", _nothing_found(settings)))
+    return content
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """The file, or the pair of AQDEF that it belongs to. Raises `Unusable` for values without their description."""
+    if path.suffix.lower() not in {".dfd", ".dfx"}:
+        return (path,)
+    source = aqdef.Source.at(path)
+    return (source.description,) if source.values is None else (source.description, source.values)
+
+
+def _nothing_found(settings: Settings) -> str:
+    if settings.format == "text":
+        return "No line holds a reading as an expression of lines describes it. Try with “inband bridge preview”."
+    return "The file holds no readings."
+
+
+class _Reader:
+    def __init__(
+        self, machine: Machine, settings: Settings, paths: tuple[Path, ...], stamp: str, content: Content
+    ) -> None:
+        self.machine, self.settings, self.content = machine, settings, content
+        self.path = next((path for path in paths if path.suffix.lower() != ".dfd"), paths[0])
+        self.stamp = stamp
+        self.scale = INCH if machine.unit == "inch" else 1.0
+        self.zone = None if settings.zone is None else zone_named(settings.zone)
+        self.encoding = settings.encoding or (
+            aqdef.encoding_of(self.path) if settings.format == "aqdef" else delimited.encoding_of(self.path)
+        )
+        seed = hashlib.sha256()
+        for path in paths:
+            if path != self.path:
+                seed.update(path.read_bytes())
+        self._prefixes(seed)
+
+    def _prefixes(self, seed: Any) -> None:
+        """A hash of the file up to each line, whatever its line ends are."""
+        text = self.path.read_bytes().decode(self.encoding, "replace")
+        self.content.complete = text.endswith(("\n", "\r", "\x1a"))
+        self.lines = list(io.StringIO(text, newline=None))
+        self.prefix = [seed.hexdigest()]
+        for line in self.lines:
+            seed.update(line.rstrip("\n").encode("utf-8", "replace") + b"\n")
+            self.prefix.append(seed.hexdigest())
+        self.content.digest = self.prefix[-1]
+
+    def read(self) -> None:
+        match self.settings.format:
+            case "csv":
+                self._table(self._csv())
+            case "ndjson":
+                self._table(self._ndjson())
+            case "text":
+                self._text()
+            case "aqdef":
+                self._aqdef()
+
+    # --- tables
+
+    def _csv(self) -> Iterator[tuple[int, Mapping[str, Any]]]:
+        try:
+            delimiter = self.settings.delimiter or delimited.delimiter_of(self.path, self.encoding)
+            rows = delimited.rows(self.path, self.encoding, delimiter)
+            header = next(rows, None)
+            if header is None:
+                return
+            names = [name.strip().lstrip("\ufeff") for name in header.cells]
+            for name in sorted({name for name in names if name and names.count(name) > 1}):
+                self._fault(header.line, name, "is the name of several columns; give each its own.")
+            wanted = set(self.settings.columns.values()) - set(names)
+            for name in sorted(wanted):
+                self._fault(header.line, name, f"is no column of this file; it has {', '.join(names)}.")
+            if wanted:
+                return
+            for row in rows:
+                if len(row.cells) > len(names) and any(cell.strip() for cell in row.cells[len(names) :]):
+                    self._fault(row.line, "", f"has {len(row.cells)} cells under {len(names)} columns.")
+                elif len(row.cells) < len(names):
+                    self._fault(row.line, "", f"has only {len(row.cells)} cells under {len(names)} columns: cut off?")
+                else:
+                    yield row.line, dict(zip(names, row.cells, strict=False))
+        except UnicodeError:
+            self._fault(None, "", f"This is not {self.encoding} text: name the encoding of the file.")
+
+    def _ndjson(self) -> Iterator[tuple[int, Mapping[str, Any]]]:
+        for number_, line in enumerate(self.lines, 1):
+            if not line.strip().lstrip("\ufeff"):
+                continue
+            try:
+                content = json.loads(line.lstrip("\ufeff"))
+            except ValueError as error:
+                self._fault(number_, "", f"is no JSON ({error}): one object stands in each line.")
+                continue
+            if isinstance(content, dict):
+                yield number_, content
+            else:
+                self._fault(number_, "", "is JSON but no object: each line is one {…}.")
+
+    def _table(self, rows: Iterator[tuple[int, Mapping[str, Any]]]) -> None:
+        columns = self.settings.columns or {name: name for name in FIELDS}
+        for line, row in rows:
+            fields = {name: row[column] for name, column in columns.items() if column in row}
+            if "measured" in fields:
+                self._take(line, str(fields.get("characteristic", EVERY)).strip(), fields, row)
+                continue
+            named = [name for name in self.machine.characteristics if name in row]
+            if not named:
+                reason = "has neither a column measured nor one that characteristics names."
+                self._fault(line, "", f"{reason} It has {', '.join(map(str, row))}.")
+                return
+            for name in named:
+                if row[name] not in {None, ""} and str(row[name]).strip():
+                    self._take(line, name, fields | {"measured": row[name]}, row)
+
+    # --- text protocols
+
+    def _text(self) -> None:
+        expressions = [re.compile(text) for text in self.settings.lines]
+        held: dict[str, str] = {}
+        for line, text in enumerate(self.lines, 1):
+            if len(text) > LONGEST_LINE:
+                self._fault(line, "", f"is longer than {LONGEST_LINE} characters: is this the right file?")
+                continue
+            for expression in expressions:
+                if match := expression.search(text.rstrip("\n")):
+                    groups = {name: value for name, value in match.groupdict().items() if value is not None}
+                    if "measured" in groups:
+                        fields = held | groups
+                        self._take(line, fields.get("characteristic", EVERY).strip(), fields, fields)
+                    else:
+                        held |= groups
+
+    # --- AQDEF
+
+    def _aqdef(self) -> None:
+        source = aqdef.Source.at(self.path, self.settings.encoding)
+        description = aqdef.describe(source)
+        clock = None if self.zone is None else WallClock(self.zone)
+        order: Literal["month_first", "day_first"] | None = {True: "day_first", False: "month_first", None: None}[
+            self.settings.day_first
+        ]
+        for item in aqdef_values.values(source, description):
+            if isinstance(item, aqdef.Remark):
+                self._remark(item)
+                continue
+            characteristic = description.characteristics[item.characteristic]
+            key, name = self._key_of(description.part_of(characteristic).get("K1001", ""), characteristic)
+            if key is None:
+                self._nobody(item.line, name)
+                continue
+            if characteristic.counts:
+                self.content.skipped += 1
+                self.content.remarks.append(f"line {item.line}: {name} counts parts, it measures nothing; passed over")
+                continue
+            if order is None and aqdef_values.has_doubtful_date(item):
+                self._fault(item.line, "K0004", "could be day/month or month/day: set day_first to true or false.")
+                continue
+            value = aqdef_values.read_value(item, order)
+            if isinstance(value, aqdef.Remark):
+                self._remark(value)
+            elif value is None or value.attribute:
+                self.content.skipped += 1
+                self.content.remarks.append(f"line {item.line}: {name} is marked as not valid (K0002); passed over")
+            else:
+                self._measured(item, key, name, value, characteristic.fields.get("K2142", ""), clock)
+
+    def _measured(
+        self,
+        item: aqdef_values.Value,
+        key: str,
+        name: str,
+        value: aqdef_values.Measured,
+        unit: str,
+        clock: WallClock | None,
+    ) -> None:
+        said = unit_in(f"[{unit}]") if unit else None
+        if unit and said is None:
+            self._fault(item.line, "K2142", f"{unit!r} is no unit of length that is known; known are mm, µm and inch.")
+            return
+        scale = self.scale if said is None else UNITS[said]
+        body: dict[str, Any] = {"characteristic": key, "measured": round(value.measured * scale, 9)}
+        if value.part:
+            body["part"] = value.part[:128]
+        if value.at is not None:
+            if value.at.tzinfo is None and clock is None:
+                self._fault(item.line, "K0004", "does not say its time zone: set zone, such as Europe/Belgrade.")
+                return
+            body["measured_at"] = (clock.moment(value.at) if clock else value.at).isoformat()
+        self._add(item.line, f"{name}/{item.characteristic}", body, item.fields, None)
+
+    def _key_of(self, part: str, characteristic: aqdef.Characteristic) -> tuple[str | None, str]:
+        """The key of a characteristic by part and number or name, number, or name; and its name for sentences."""
+        names = [name for name in (characteristic.number, characteristic.name) if name]
+        for name in [f"{part}/{name}" for name in names] + names:
+            if name in self.machine.characteristics:
+                return self.machine.characteristics[name], name
+        return None, names[0] if names else str(characteristic.index)
+
+    def _remark(self, remark: aqdef.Remark) -> None:
+        if remark.wrong:
+            self._fault(remark.line, remark.field, f"{remark.value!r} {remark.reason}")
+        else:
+            self.content.remarks.append(str(remark))
+
+    # --- one reading
+
+    def _take(self, line: int, name: str, fields: Mapping[str, Any], raw: Mapping[str, Any]) -> None:
+        key = self.machine.characteristics.get(name)
+        if key is None:
+            self._nobody(line, name)
+            return
+        body: dict[str, Any] = {"characteristic": key}
+        own = None
+        for field_, value in fields.items():
+            if field_ == "characteristic" or value is None or (value == "" and field_ != "measured"):
+                continue
+            try:
+                if field_ == "key":
+                    own = str(value)
+                else:
+                    body[field_] = self._value(field_, value)
+            except Unreadable as error:
+                column = self.settings.columns.get(field_, field_ if name == EVERY or "measured" in fields else name)
+                self._fault(line, column, f"{str(value)[:40]!r} {error}.")
+                return
+        self._add(line, name, body, raw, own)
+
+    def _value(self, field_: str, value: Any) -> Any:
+        text = str(value).strip()
+        if field_ == "measured":
+            if isinstance(value, bool) or not isinstance(value, int | float | str):
+                raise Unreadable("is not a number")
+            size = value if isinstance(value, int | float) else number(text, self.settings.decimal)
+            if not isfinite(size):
+                raise Unreadable("is not a number")
+            return round(size * self.scale, 9)
+        if field_ in {"measured_at", "machined_at"}:
+            return moment(text, self.zone, self.settings.times).isoformat()
+        if field_ == "correction_in_effect":
+            if not text.isascii() or not text.isdigit() or int(text) > HIGHEST_NUMBER:
+                raise Unreadable("is not the number of a correction, such as 12")
+            return int(text)
+        if not 1 <= len(text) <= 128:
+            raise Unreadable("is longer than 128 characters" if text else "is empty")
+        return text
+
+    def _add(self, line: int, name: str, body: dict[str, Any], raw: Mapping[str, Any], own: str | None) -> None:
+        if own is not None:
+            told = [own, name]
+        else:
+            told = [self.prefix[line], name, json.dumps(dict(raw), sort_keys=True, default=str)]
+            if not body.keys() & {"measured_at", "machined_at", "part"}:
+                told.append(self.stamp)
+        digest = hashlib.sha256("\0".join(told).encode("utf-8", "replace")).hexdigest()[:32]
+        place = "own" if own is not None else str(line)
+        self.content.entries.append(Entry(line, name, body, f"{self.machine.key}:{place}:{digest}"))
+
+    def _nobody(self, line: int, name: str) -> None:
+        self.content.skipped += 1
+        if self.settings.others == "fail":
+            where = f"machine.{self.machine.key}.characteristics"
+            said = f"names no characteristic that {where} has" if name == EVERY else f"{name!r} is not named in {where}"
+            self._fault(line, "", f'{said}. Add it there, or set others = "skip".')
+
+    def _fault(self, line: int | None, field_: str, reason: str) -> None:
+        self.content.faults.append(Fault(line, field_, reason))

@@ -1,0 +1,295 @@
+"""Folders into which measuring machines write files; see `app.bridge.file_content` for what a file holds.
+
+The folder is looked at again and again: shares tell nobody of a new file. A file is read when two looks find it the same. It is
+moved when all its readings are stored durably, into the folder of done files or, with a text that says why, of failed
+ones. It is never deleted. Nothing goes back to the machine.
+"""
+
+import asyncio
+import hashlib
+import logging
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from datetime import datetime
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Final, NamedTuple, TypeVar
+
+from app.bridge.configuration import Machine
+from app.bridge.file_content import NAMES, NOT_ALONE, Content, Fault, Settings, read_content
+from app.bridge.links import Clock, ControlAway, Misconfigured, Order, Outcome, Position, Received
+
+__all__ = ["Folder", "Settings", "link"]
+log = logging.getLogger(__name__)
+T = TypeVar("T")
+IDENTITY: Final = "inband-identity.txt"
+"""A file in the folder that says whose it is; a share that is not mounted has none."""
+UNFINISHED: Final = (".tmp", ".part", ".partial", ".filepart", ".crdownload", ".why.txt")
+SAME_FOR: Final = 0.9  # of the time between two looks
+LOCKED_FOR: Final = 60.0  # s until it is said
+MOST_FAULTS: Final = 100
+
+
+class Seen(NamedTuple):
+    """One file, or a pair, as a look found it: sizes and times of modification."""
+
+    paths: tuple[Path, ...]
+    state: tuple[tuple[int, int], ...]
+
+    @property
+    def name(self) -> str:
+        """The name of the file, of a pair that of the values."""
+        return self.paths[-1].name
+
+    @property
+    def modified(self) -> int:
+        """Last modification, ns."""
+        return max(modified for _, modified in self.state)
+
+
+class _Known(NamedTuple):
+    seen: Seen
+    since: float
+
+
+class Folder:
+    """The link to one folder."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.settings: Settings = machine.settings
+        self.clock = Clock()
+        self.path = Path(self.settings.path)
+        self._known: dict[str, _Known] = {}
+        self._locked: dict[str, tuple[float, str]] = {}
+        self._taken: dict[str, tuple[Seen, Content]] = {}  # read; moved when it is stored
+        self._stored: dict[str, tuple[Seen, Content]] = {}  # stored; to be moved
+        self._unmoved = ""
+        self._looked = 0.0
+        self._pool: ThreadPoolExecutor | None = None
+        self._work: Future[object] | None = None
+
+    async def connect(self) -> str:
+        """Look if the folder is there; answer what `IDENTITY` in it says, or else its path."""
+        return await self._in_thread(self._connect)
+
+    def _connect(self) -> str:
+        if not self.path.is_dir():
+            raise ControlAway(f"The folder {self.path} is not there: is the share mounted, and the path right?")
+        try:
+            next(self.path.iterdir(), None)
+            identity = self.path / IDENTITY
+            return identity.read_text(encoding="utf-8").strip() if identity.exists() else str(self.path)
+        except (OSError, UnicodeDecodeError) as error:
+            raise Misconfigured(
+                f"The folder {self.path} cannot be read: {error}. The bridge needs the right."
+            ) from error
+
+    async def close(self) -> None:
+        """Let go of the folder."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=False, cancel_futures=True)
+            self._pool = None
+
+    async def fetch(self, stored: Position) -> Sequence[Received]:
+        """The readings of the oldest file that is complete."""
+        del stored
+        now = time.monotonic()
+        if self._looked and now < self._looked + self.settings.every:
+            return []
+        first = not self._looked
+        received = await self._in_thread(self._look)
+        if first and self._known and not received:
+            await asyncio.sleep(min(self.settings.every, self.machine.patience / 2))
+            received = await self._in_thread(self._look)
+        self._looked = 0.001 if received else time.monotonic()  # there may be more: look again at once
+        return received
+
+    async def acknowledge(self, received: Sequence[Received]) -> None:
+        """The file of these is stored: move it."""
+        for name in {each.mark for each in received}:
+            if name in self._taken:
+                self._stored[name] = self._taken.pop(name)
+        await self._in_thread(self._move_stored)
+
+    async def offer(self, orders: Sequence[Order]) -> None:
+        """Nothing goes back to a measuring machine."""
+
+    async def outcomes(self) -> Sequence[Outcome]:
+        """None."""
+        return []
+
+    async def offsets(self) -> dict[int, float]:
+        """None."""
+        return {}
+
+    async def _in_thread(self, work: Callable[[], T]) -> T:
+        """Do something that a share may hold up, one at a time."""
+        if self._work is not None and not self._work.done():
+            raise ControlAway(f"The folder {self.path} has not answered yet: look at the share and the network.")
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(1, "folder")
+        future = self._pool.submit(work)
+        self._work = future  # type: ignore[assignment]
+        try:
+            return await asyncio.wrap_future(future)
+        except OSError as error:
+            raise ControlAway(f"The folder {self.path} does not answer: {error}.") from error
+
+    # --- in the thread
+
+    def _look(self) -> list[Received]:
+        self._move_stored()
+        now = time.monotonic()
+        before = self._known
+        self._known = {}
+        ready: list[tuple[Seen, float]] = []
+        for seen in self._files():
+            known = before.get(seen.name)
+            same = known is not None and known.seen == seen
+            since = known.since if known is not None and same else now
+            self._known[seen.name] = _Known(seen, since)
+            if same and now - since >= SAME_FOR * self.settings.every and seen.name not in self._stored:
+                ready.append((seen, now - since))
+        for name in self._locked.keys() - self._known.keys():
+            del self._locked[name]
+        for seen, unchanged in sorted(ready, key=lambda each: (each[0].modified, each[0].name)):
+            content = self._read(seen, unchanged)
+            if content is None:
+                continue
+            if content.entries or content.faults:
+                self._taken[seen.name] = (seen, content)
+                return content.received(self.machine.key, seen.name)
+            self._stored[seen.name] = (seen, content)  # all of it is passed over
+        late = [(name, why) for name, (since, why) in self._locked.items() if now - since >= LOCKED_FOR]
+        if late:
+            name, why = late[0]
+            raise ControlAway(
+                f"The file {name} cannot be read: {why}. Does a program still hold it, has the bridge the right?"
+            )
+        if self._unmoved:
+            raise Misconfigured(self._unmoved)
+        return []
+
+    def _files(self) -> list[Seen]:
+        """Files, and pairs of AQDEF, that are there."""
+        pattern = (self.settings.names or NAMES[self.settings.format]).lower()
+        groups: dict[str, list[Path]] = {}
+        try:
+            for path in self.path.iterdir():
+                name = path.name.lower()
+                hidden = name.startswith((".", "~")) or name.endswith(UNFINISHED) or name == IDENTITY
+                if not hidden and fnmatch(name, pattern.lower()) and path.is_file():
+                    pair = self.settings.format == "aqdef" and path.suffix.lower() in {".dfd", ".dfx"}
+                    groups.setdefault(f"{path.stem.lower()}.df" if pair else path.name, []).append(path)
+        except FileNotFoundError:
+            raise ControlAway(f"The folder {self.path} is gone: is the share mounted?") from None
+        found = []
+        for paths in groups.values():
+            try:
+                ordered = tuple(sorted(paths, key=lambda path: path.suffix.lower()))
+                stats = [path.stat() for path in ordered]
+            except FileNotFoundError:
+                continue  # renamed or taken away meanwhile
+            found.append(Seen(ordered, tuple((stat.st_size, stat.st_mtime_ns) for stat in stats)))
+        return found
+
+    def _read(self, seen: Seen, unchanged: float) -> Content | None:
+        """Read a file that two looks found the same; None where it has to be waited for."""
+        size = sum(size for size, _ in seen.state)
+        content = Content(digest=hashlib.sha256(repr((seen.name, seen.state)).encode()).hexdigest())
+        pair = seen.paths[0].suffix.lower() in {".dfd", ".dfx"}
+        lacks = pair and len(seen.paths) < NOT_ALONE
+        if lacks or not all(size for size, _ in seen.state):
+            if unchanged < self.settings.empty_after:
+                return None
+            words = "Of the pair .dfd and .dfx one file is missing." if lacks else "The file is empty."
+            content.faults.append(Fault(None, "", f"{words} Let the measuring machine write it again."))
+            return content
+        if size > self.settings.largest * 1e6:
+            words = (
+                f"The file has {size / 1e6:.1f} MB, the most is {self.settings.largest:g}: part it, or raise largest."
+            )
+            content.faults.append(Fault(None, "", words))
+            return content
+        try:
+            with tempfile.TemporaryDirectory(prefix="inband-") as folder:
+                copies = tuple(Path(shutil.copyfile(path, Path(folder, path.name))) for path in seen.paths)
+                if not self._is_as_seen(seen):
+                    return None
+                content = read_content(self.machine, copies, f"{seen.name}\0{seen.state}")
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            since, _ = self._locked.get(seen.name, (time.monotonic(), ""))
+            self._locked[seen.name] = (since, error.strerror or str(error))
+            return None
+        self._locked.pop(seen.name, None)
+        if (content.faults or not content.complete) and unchanged < self.settings.settle:
+            return None
+        return content
+
+    def _is_as_seen(self, seen: Seen) -> bool:
+        stats = [path.stat() for path in seen.paths]
+        return tuple((stat.st_size, stat.st_mtime_ns) for stat in stats) == seen.state
+
+    def _move_stored(self) -> None:
+        self._unmoved = ""
+        for name, (seen, content) in list(self._stored.items()):
+            try:
+                if not self._is_as_seen(seen):  # it has grown: read again; what is stored does not come twice
+                    del self._stored[name]
+                    continue
+                self._move(seen, content)
+            except FileNotFoundError:
+                pass  # renamed: it comes again under its new name, and nothing of it twice
+            except OSError as error:
+                self._unmoved = (
+                    f"The file {name} is stored, but cannot be moved ({error.strerror or error}): the bridge needs the"
+                    f" right to write in {self.path}; done and failed lie on the same disk or share."
+                )
+                continue
+            del self._stored[name]
+            self._known.pop(name, None)
+
+    def _move(self, seen: Seen, content: Content) -> None:
+        folder = self.path / (self.settings.failed if content.faults else self.settings.done)
+        folder.mkdir(parents=True, exist_ok=True)
+        count = 1
+        while any((folder / _numbered(path, count)).exists() for path in seen.paths):
+            count += 1
+        if content.faults:
+            text = folder / f"{_numbered(seen.paths[-1], count)}.why.txt"
+            text.write_text(_why(seen, content, self.path), encoding="utf-8")
+            log.warning("%s: file %s has failed: %s", self.machine.key, seen.name, content.faults[0])
+        for path in seen.paths:
+            path.rename(folder / _numbered(path, count))
+
+
+def _numbered(path: Path, count: int) -> str:
+    return path.name if count == 1 else f"{path.stem}-{count}{path.suffix}"
+
+
+def _why(seen: Seen, content: Content, folder: Path) -> str:
+    lines = [
+        f"Inband could not take this file ({seen.name}). Nothing of it was stored.",
+        f"{datetime.now().astimezone().isoformat(timespec='seconds')}",
+        "",
+        *(f"- {fault}" for fault in content.faults[:MOST_FAULTS]),
+    ]
+    if len(content.faults) > MOST_FAULTS:
+        lines.append(f"- and {len(content.faults) - MOST_FAULTS} more")
+    lines += [
+        "",
+        f"What to do: correct the file, or the configuration of the bridge, and put the file back into {folder}.",
+        "“inband bridge preview MACHINE FILE” says what each line would become.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def link(machine: Machine) -> Folder:
+    """The link to a folder."""
+    return Folder(machine)

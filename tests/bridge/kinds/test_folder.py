@@ -1,0 +1,435 @@
+"""Folders of measuring machines: files that are half there, locked, empty, delivered twice; and what lines become."""
+
+import asyncio
+import os
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.bridge import control_side
+from app.bridge.configuration import ConfigurationError, Machine, configuration_from
+from app.bridge.file_content import Content, read_content
+from app.bridge.kinds.folder import Folder
+from app.bridge.links import ControlAway, Misconfigured, Position, Received
+from app.bridge.simulators.folder import FolderSimulator
+from app.bridge.simulators.model import Model
+from app.bridge.store import Store
+from app.bridge.unit import Unit
+from tests.bridge.plant import store_in, until
+from tests.loops import run
+
+HEAD = "time;part;feature;actual\n"
+LINE = "23.11.2026 06:05:00;P1;D40;40,0123\n"
+COLUMNS = {"measured_at": "time", "part": "part", "characteristic": "feature", "measured": "actual"}
+
+
+def machine(folder: Path, unit: str = "mm", names: dict[str, str] | None = None, **other: Any) -> Machine:
+    settings = {"path": str(folder), "format": "csv", "every": 0.05, "settle": 0.3, "zone": "Europe/Belgrade"}
+    if other.get("format", "csv") == "csv":
+        settings |= {"columns": COLUMNS, "decimal": ","}
+    table = {"kind": "folder", "unit": unit, "secret": "x", "corrections": "none", "interval": 0.02, "patience": 30.0}
+    content = {
+        "server": {"url": "http://127.0.0.1:1"},
+        "machine": {"cmm-1": table | {"folder": settings | other, "characteristics": names or {"D40": "shaft-1"}}},
+    }
+    return configuration_from(content, folder).machines[0]
+
+
+@asynccontextmanager
+async def fetching(chosen: Machine, store: Store) -> AsyncIterator[Unit]:
+    unit = Unit(chosen, Folder(chosen), store)
+    task = asyncio.create_task(control_side.run(unit))
+    try:
+        yield unit
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        await unit.link.close()
+
+
+def write(path: Path, text: str, encoding: str = "utf-8") -> Path:
+    path.write_text(text, encoding=encoding, newline="")
+    return path
+
+
+async def sizes(store: Store) -> list[float]:
+    return [row.body["measured"] for row in await store.waiting("cmm-1", 10_000)]
+
+
+def read(tmp_path: Path, text: str, name: str = "a.csv", stamp: str = "", **other: Any) -> Content:
+    return read_content(machine(tmp_path, **other), (write(tmp_path / name, text),), stamp)
+
+
+# --- what lines become
+
+
+def test_a_line_becomes_a_reading_with_its_time_in_the_zone(tmp_path: Path) -> None:
+    content = read(tmp_path, HEAD + LINE)
+    assert content.faults == []
+    [entry] = content.entries
+    assert entry.body == {
+        "characteristic": "shaft-1",
+        "measured": 40.0123,
+        "part": "P1",
+        "measured_at": "2026-11-23T06:05:00+01:00",
+    }
+
+
+def test_names_of_characteristics_may_be_columns(tmp_path: Path) -> None:
+    columns = {"part": "part", "measured_at": "time"}
+    names = {"D40 [mm]": "shaft-1", "D20 [mm]": "bore-1"}
+    text = "time;part;D40 [mm];D20 [mm]\n23.11.2026 06:05:00;P1;40,01;20,02\n23.11.2026 06:06:00;P2;;20,03\n"
+    content = read(tmp_path, text, columns=columns, names=names)
+    assert [(each.body["characteristic"], each.body["measured"]) for each in content.entries] == [
+        ("shaft-1", 40.01),
+        ("bore-1", 20.02),
+        ("bore-1", 20.03),
+    ]
+
+
+def test_ndjson_is_read_by_the_names_of_the_fields(tmp_path: Path) -> None:
+    text = '{"characteristic": "D40", "measured": 1.5, "part": 7, "measured_at": "2026-11-23T05:05:00Z"}\n'
+    content = read(tmp_path, text, "a.ndjson", format="ndjson", unit="inch")
+    assert content.faults == []
+    assert content.entries[0].body["measured"] == 38.1
+    assert content.entries[0].body["part"] == "7"
+
+
+def test_text_is_read_by_expressions_and_what_stands_above_holds(tmp_path: Path) -> None:
+    text = "PART P7\nDATE 23.11.2026 06:05:00\nFEATURE D40\nSIZE 40.0 ACTUAL 40.012 DEV 0.012\nFEATURE D20\nSIZE 20.0 ACTUAL 20.1\n"
+    lines = [
+        r"^PART (?P<part>\S+)",
+        r"^DATE (?P<measured_at>.+)$",
+        r"^FEATURE (?P<characteristic>\S+)",
+        r"ACTUAL (?P<measured>[-\d.]+)",
+    ]
+    names = {"D40": "shaft-1", "D20": "bore-1"}
+    content = read(tmp_path, text, "a.txt", format="text", lines=lines, names=names)
+    assert [(each.line, each.body["characteristic"], each.body["measured"]) for each in content.entries] == [
+        (4, "shaft-1", 40.012),
+        (6, "bore-1", 20.1),
+    ]
+    assert {each.body["part"] for each in content.entries} == {"P7"}
+
+
+DESCRIPTION = "K0100 2\nK1001 4711\nK2001/1 10\nK2002/1 D40\nK2142/1 mm\nK2001/2 20\nK2002/2 D20\nK2142/2 µm\n"
+VALUES = "40.0123\x140\x1423.11.2026/06:05:00\x0f20020\x140\x1423.11.2026/06:05:00\n40.0130\x14256\x1423.11.2026/06:06:00\x0f20021\x140\n"
+
+
+@pytest.mark.parametrize("names", [{"10": "shaft-1", "D20": "bore-1"}, {"4711/10": "shaft-1", "4711/D20": "bore-1"}])
+def test_aqdef_is_read_by_number_or_name_with_or_without_the_part(tmp_path: Path, names: dict[str, str]) -> None:
+    content = read(tmp_path, DESCRIPTION + VALUES, "a.dfq", format="aqdef", names=names)
+    assert content.faults == []
+    assert [(each.body["characteristic"], each.body["measured"]) for each in content.entries] == [
+        ("shaft-1", 40.0123),
+        ("bore-1", 20.02),
+        ("bore-1", 20.021),
+    ]
+    assert content.entries[0].body["measured_at"] == "2026-11-23T06:05:00+01:00"
+    assert content.skipped == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "settings", "words"),
+    [
+        (HEAD + LINE.replace("40,0123", "40.0123"), {}, "line 2, actual: '40.0123' has a point"),
+        (HEAD + LINE.replace("D40", "D50"), {}, "line 2: 'D50' is not named in machine.cmm-1.characteristics"),
+        (HEAD + LINE, {"zone": None}, "line 2, time: '23.11.2026 06:05:00' does not say in which time zone"),
+        (HEAD + "23.11.2026 06:05:00;P1\n", {}, "line 2: has only 2 cells under 4 columns: cut off?"),
+        (LINE + LINE, {}, "is no column of this file"),
+        (HEAD, {}, "The file holds no readings"),
+        (HEAD + LINE.replace("23.11.2026 06:05:00", "25.10.2026 02:30:00"), {}, "is there twice in Europe/Belgrade"),
+    ],
+)
+def test_what_is_wrong_is_said_with_line_and_field(tmp_path: Path, text: str, settings: Any, words: str) -> None:
+    content = read(tmp_path, text, **settings)
+    assert words in str(content.faults[0])
+    [entry] = content.received("cmm-1", "a.csv")
+    assert entry.fault is not None
+    assert words in entry.fault
+
+
+def test_doubtful_dates_of_aqdef_are_not_guessed(tmp_path: Path) -> None:
+    text = DESCRIPTION + "40.01\x140\x1403/04/2026/06:05:00\n"
+    names = {"D40": "shaft-1", "D20": "bore-1"}
+    assert "day_first" in str(read(tmp_path, text, "a.dfq", format="aqdef", names=names).faults[0])
+    content = read(tmp_path, text, "a.dfq", format="aqdef", names=names, day_first=True)
+    assert content.entries[0].body["measured_at"].startswith("2026-04-03T06:05:00")
+
+
+def test_others_are_passed_over_where_it_is_said(tmp_path: Path) -> None:
+    content = read(tmp_path, HEAD + LINE + LINE.replace("D40", "D50"), others="skip")
+    assert (len(content.entries), content.skipped, content.faults) == (1, 1, [])
+
+
+def test_keys_stay_when_a_file_grows_or_changes_its_line_ends(tmp_path: Path) -> None:
+    first = read(tmp_path, HEAD + LINE, stamp="a")
+    grown = read(tmp_path, (HEAD + LINE + LINE).replace("\n", "\r\n"), stamp="b")
+    keys = [each.key for each in grown.entries]
+    assert keys[0] == first.entries[0].key
+    assert len(set(keys)) == 2
+    assert all(len(key) <= 128 for key in keys)
+
+
+def test_readings_without_time_and_part_are_told_apart_by_the_file(tmp_path: Path) -> None:
+    columns = {"measured": "actual", "characteristic": "feature"}
+    text = "feature;actual\nD40;40,01\n"
+    keys = {read(tmp_path, text, stamp=stamp, columns=columns).entries[0].key for stamp in ("a", "b", "b")}
+    assert len(keys) == 2
+
+
+def test_an_own_key_names_the_reading_wherever_it_stands(tmp_path: Path) -> None:
+    columns = {"measured": "actual", "characteristic": "feature", "key": "id"}
+    one = read(tmp_path, "id;feature;actual\n7;D40;40,01\n", columns=columns)
+    two = read(tmp_path, "id;feature;actual\n6;D40;40,02\n7;D40;40,01\n", columns=columns)
+    assert one.entries[0].key == two.entries[1].key
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"path": "out"}, "is not absolute"),
+        ({"zone": "Belgrade"}, "There is no time zone 'Belgrade'"),
+        ({"columns": {"size": "actual"}}, "columns.size is no field"),
+        ({"format": "text", "lines": ["(?P<measured>"]}, "is no regular expression"),
+        ({"format": "text"}, "needs the group"),
+        ({"done": "."}, "two other folders"),
+    ],
+)
+def test_contradictions_are_told_with_their_place(tmp_path: Path, settings: dict[str, Any], words: str) -> None:
+    with pytest.raises(ConfigurationError, match=r"machine.cmm-1.folder") as caught:
+        machine(tmp_path, **settings)
+    assert words in str(caught.value)
+
+
+# --- the folder
+
+
+def test_a_file_is_stored_once_and_moved_then(tmp_path: Path) -> None:
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        inbox = tmp_path / "in"
+        inbox.mkdir()
+        async with fetching(machine(inbox), store):
+            write(inbox / "a.csv", HEAD + LINE)
+            await until((inbox / "done" / "a.csv").exists, "the first file is done")
+            write(inbox / "a.csv", HEAD + LINE)
+            await until((inbox / "done" / "a-2.csv").exists, "the same file again is done")
+            write(inbox / "b.csv", HEAD + LINE)
+            await until((inbox / "done" / "b.csv").exists, "the same under another name is done")
+        assert await sizes(store) == [40.0123]
+        store.close()
+
+    run(work())
+
+
+def test_nothing_is_moved_before_it_is_stored(tmp_path: Path) -> None:
+    async def work() -> None:
+        link = Folder(machine(tmp_path))
+        path = write(tmp_path / "a.csv", HEAD + LINE)
+        assert await link.connect() == str(tmp_path)
+        received = await link.fetch(Position())
+        assert [each.body["measured"] for each in received] == [40.0123]
+        assert path.exists()
+        assert not (tmp_path / "done").exists()
+        await link.acknowledge(received)
+        assert not path.exists()
+        await link.close()
+
+    run(work())
+
+
+def test_a_file_that_cannot_be_read_fails_as_a_whole_and_says_why(tmp_path: Path) -> None:
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        async with fetching(machine(tmp_path), store):
+            write(tmp_path / "a.csv", HEAD + LINE + LINE.replace("40,0123", "forty"))
+            await until((tmp_path / "failed" / "a.csv").exists, "the file has failed")
+            assert await store.waiting("cmm-1") == []
+            [refused] = await store.quarantine("cmm-1")
+            assert "line 3, actual: 'forty' is not a number" in refused.reason
+            why = (tmp_path / "failed" / "a.csv.why.txt").read_text(encoding="utf-8")
+            assert "line 3, actual: 'forty'" in why
+            assert str(tmp_path) in why
+            (tmp_path / "failed" / "a.csv").unlink()
+            write(tmp_path / "a.csv", HEAD + LINE + LINE)  # put right
+            await until((tmp_path / "done" / "a.csv").exists, "the file is done")
+        assert await sizes(store) == [40.0123, 40.0123]
+        store.close()
+
+    run(work())
+
+
+def test_a_file_that_is_being_written_is_waited_for(tmp_path: Path) -> None:
+    """Cut in the middle of a number, with its size unchanged over several looks: never 40.0 in place of 40.0123."""
+
+    async def work() -> None:
+        chosen = machine(tmp_path, settle=3600.0)
+        link = Folder(chosen)
+        whole = HEAD + LINE
+        path = write(tmp_path / "a.csv", whole[:-4])
+        await link.connect()
+        for _ in range(4):
+            assert await link.fetch(Position()) == []
+            await asyncio.sleep(0.06)
+        write(path, whole)
+        received = await fetched(link)
+        assert [each.body["measured"] for each in received] == [40.0123]
+        await link.close()
+
+    run(work())
+
+
+async def fetched(link: Folder) -> list[Received]:
+    found: list[Received] = []
+
+    async def some() -> bool:
+        found.extend(await link.fetch(Position()))
+        return bool(found)
+
+    await until(some, "readings")
+    return found
+
+
+def test_empty_files_and_single_halves_of_a_pair_fail_after_a_time(tmp_path: Path) -> None:
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        chosen = machine(tmp_path, format="aqdef", empty_after=0.5, names={"D40": "shaft-1", "D20": "bore-1"})
+        async with fetching(chosen, store):
+            write(tmp_path / "pair.dfx", VALUES)
+            write(tmp_path / "pair.DFD", DESCRIPTION)
+            await until((tmp_path / "done" / "pair.dfx").exists, "the pair is done")
+            assert (tmp_path / "done" / "pair.DFD").exists()
+            write(tmp_path / "empty.dfq", "")
+            write(tmp_path / "single.dfx", VALUES)
+            await until((tmp_path / "failed" / "empty.dfq").exists, "the empty file has failed")
+            await until((tmp_path / "failed" / "single.dfx").exists, "the single file has failed")
+        reasons = " ".join(each.reason for each in await store.quarantine("cmm-1"))
+        assert "The file is empty" in reasons
+        assert "one file is missing" in reasons
+        assert await sizes(store) == [40.0123, 20.02, 20.021]
+        store.close()
+
+    run(work())
+
+
+def test_a_file_that_has_grown_since_it_was_stored_is_not_moved_unread(tmp_path: Path) -> None:
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        link = Folder(machine(tmp_path))
+        path = write(tmp_path / "a.csv", HEAD + LINE)
+        await link.connect()
+        received = await link.fetch(Position())
+        await store.add("cmm-1", received)
+        write(path, HEAD + LINE + LINE.replace("P1", "P2"))
+        await link.acknowledge(received)
+        assert path.exists()
+        again = await fetched(link)
+        await store.add("cmm-1", again)
+        await link.acknowledge(again)
+        assert not path.exists()
+        assert [row.body["part"] for row in await store.waiting("cmm-1")] == ["P1", "P2"]
+        await link.close()
+        store.close()
+
+    run(work())
+
+
+def test_a_folder_that_is_away_is_told_and_comes_back(tmp_path: Path) -> None:
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        inbox = tmp_path / "in"
+        async with fetching(machine(inbox), store) as unit:
+            await until(lambda: "is the share mounted" in unit.detail, "the bridge says so")
+            assert unit.state == "control_away"
+            inbox.mkdir()
+            write(inbox / "a.csv", HEAD + LINE)
+            await until((inbox / "done" / "a.csv").exists, "the file is done")
+        store.close()
+
+    run(work())
+
+
+def test_a_file_in_the_folder_names_it(tmp_path: Path) -> None:
+    async def work() -> None:
+        write(tmp_path / "inband-identity.txt", "CMM-4711\n")
+        link = Folder(machine(tmp_path))
+        assert await link.connect() == "CMM-4711"
+        await link.close()
+
+    run(work())
+
+
+def test_files_that_cannot_be_moved_hold_up_no_others_and_are_told(tmp_path: Path) -> None:
+    async def work() -> None:
+        write(tmp_path / "done", "a file where the folder should be")
+        link = Folder(machine(tmp_path))
+        await link.connect()
+        for name in ("a.csv", "b.csv"):
+            write(tmp_path / name, HEAD + LINE.replace("P1", name))
+        parts = set()
+        for _ in range(2):
+            received = await fetched(link)
+            parts.add(received[0].body["part"])
+            await link.acknowledge(received)
+        assert parts == {"a.csv", "b.csv"}
+        with pytest.raises(Misconfigured, match=r"is stored, but cannot be moved"):
+            await fetched(link)
+        (tmp_path / "done").unlink()
+        await asyncio.sleep(0.06)
+        await link.fetch(Position())
+        assert {path.name for path in (tmp_path / "done").iterdir()} == parts
+        await link.close()
+
+    run(work())
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read every file")
+def test_a_locked_file_is_told_after_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.bridge.kinds.folder.LOCKED_FOR", 0.0)
+
+    async def work() -> None:
+        write(tmp_path / "a.csv", HEAD + LINE).chmod(0)
+        link = Folder(machine(tmp_path))
+        await link.connect()
+        with pytest.raises(ControlAway, match=r"a\.csv cannot be read"):
+            await fetched(link)
+        (tmp_path / "a.csv").chmod(0o600)
+        assert len(await fetched(link)) == 1
+        await link.close()
+
+    run(work())
+
+
+def test_every_part_of_the_simulated_machine_arrives_once(tmp_path: Path) -> None:
+    """With halves and repeats, and the bridge cut and begun anew in between."""
+
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        model = Model()
+        inbox = tmp_path / "in"
+        simulator = FolderSimulator(model, inbox, pause=0.2)
+        await simulator.start()
+        table = simulator.table()
+        settings: Any = table["folder"]
+        chosen = machine(inbox, names={"D1": "shaft-1"}, **settings | {"every": 0.05, "settle": 0.3})
+        parts = 15
+        for _ in range(3):
+            async with fetching(chosen, store):
+                for _ in range(parts // 3):
+                    for _ in model.part():
+                        await asyncio.sleep(0.01)
+                await asyncio.sleep(0.2)
+        async with fetching(chosen, store):
+            await until(lambda: simulator.files == parts and not list(inbox.glob("*.csv")), "every file is moved")
+        await simulator.stop()
+        rows = await store.waiting("cmm-1", 1000)
+        assert sorted(row.body["part"] for row in rows) == sorted(f"P{number}" for number in range(1, parts + 1))
+        assert sorted(row.body["measured"] for row in rows) == pytest.approx(sorted(model.truth().values()))
+        assert not (inbox / "failed").exists()
+        store.close()
+
+    run(work())
