@@ -64,7 +64,8 @@ class Machine(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
 
     identity: what the control must answer as its serial number. corrections: the control takes them from the mailbox
     (``control``), the bridge writes the offset itself (``direct``), or there are ``none``. proof_needed: corrections wait
-    until a touch test has proved the mapping of their location. patience: how long one call to the control may take.
+    until a touch test has proved the mapping of their location. offsets_every: how often offsets are read, which is how an edit
+    at the panel is noticed. patience: how long one call to the control may take.
     """
 
     key: str
@@ -77,6 +78,7 @@ class Machine(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
     characteristics: dict[str, str] = {}
     location: tuple[Location, ...] = ()
     interval: Positive = 0.25
+    offsets_every: Positive = 10.0
     patience: Positive = 10.0
     tolerance: Positive = 0.0005
     largest_step: Positive = 0.1

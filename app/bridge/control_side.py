@@ -10,7 +10,6 @@ from app.bridge.unit import Unit
 
 log = logging.getLogger(__name__)
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 15.0  # s between attempts to connect
-OFFSETS_EVERY = 10.0  # s: an operator's edit is noticed within this time
 FULL_EVERY = 5.0  # s
 
 
@@ -81,7 +80,7 @@ async def _connected(unit: Unit) -> None:
             async with asyncio.timeout(machine.patience):
                 if offsets := await link.offsets():
                     await store.held(machine.key, offsets)
-            offsets_at = time.monotonic() + OFFSETS_EVERY
+            offsets_at = time.monotonic() + machine.offsets_every
         unit.polls += 1
         remark = getattr(link, "remark", "")  # of kinds that see gaps in what a control prints
         unit.say("held" if unit.hold_all else "online", " ".join(filter(None, (*unit.held_back, remark))))
