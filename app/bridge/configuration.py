@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import re
+import ssl
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -171,6 +172,8 @@ def configuration_from(content: dict[str, Any], folder: Path) -> Configuration:
         raise ConfigurationError(problems)
     placed = msgspec.structs.replace(store, file=str(folder / store.file))
     certificate = None if server.ca is None else str(folder / server.ca)
+    if certificate is not None and (reason := _not_trusted(certificate)):
+        raise ConfigurationError([f"server.ca: {certificate} {reason}"])
     return Configuration(
         msgspec.structs.replace(server, ca=certificate), placed, tuple(machines), bool(content.get("hold_all", False))
     )
@@ -246,6 +249,15 @@ def _contradictions(machine: Machine, place: str) -> Iterator[str]:
         )
     if machine.largest_step > machine.largest_distance:
         yield f"{place}: largest_step {machine.largest_step:g} is more than largest_distance {machine.largest_distance:g}."
+
+
+def _not_trusted(certificate: str) -> str | None:
+    """The reason why a file holds no certificate of an authority."""
+    try:
+        ssl.create_default_context(cafile=certificate)
+    except OSError as error:
+        return f"cannot be read as a certificate (PEM): {error.strerror or error}."
+    return None
 
 
 def _shared_secrets(machines: list[Machine]) -> Iterator[str]:

@@ -116,7 +116,7 @@ def simulate(
         features = getattr(module, "FEATURES", (Feature(),))
         model = Model(features, unit=Unit.INCH if inch else Unit.MM)
         simulator = await (module.serve(model, port) if at is None else module.serve(model, port, at))
-        typer.echo(_toml(model.serial.lower(), simulator.table()))
+        typer.echo(toml_of(model.serial.lower(), simulator.table()))
         where = f" listens on port {simulator.port}" if simulator.port else " runs"
         say(f"A simulated control of kind {kind}{where}. End it with Ctrl-C.")
         try:
@@ -128,7 +128,7 @@ def simulate(
         asyncio.run(work())
 
 
-def _toml(key: str, table: dict[str, object]) -> str:
+def toml_of(key: str, table: dict[str, object]) -> str:
     """A machine's table in TOML: plain values first, then tables in it."""
     lines: list[str] = []
 

@@ -68,7 +68,7 @@ class Applied(NamedTuple):
 
 @dataclass(slots=True)
 class Model:
-    """A machine. battery: registers and offsets survive a power loss."""
+    """A machine. history: every change of an offset, before and after, by the NC program or by hand."""
 
     features: tuple[Feature, ...] = (Feature(),)
     unit: Unit = Unit.MM
@@ -85,7 +85,7 @@ class Model:
     written: list[tuple[int, Slot]] = field(default_factory=list)
     applied: list[Applied] = field(default_factory=list)
     refused: list[tuple[int, Answer]] = field(default_factory=list)
-    edits: list[tuple[tuple[int, int, str], float]] = field(default_factory=list)
+    history: list[tuple[float, float]] = field(default_factory=list)
     chance: random.Random = field(init=False)
 
     def __post_init__(self) -> None:
@@ -175,6 +175,7 @@ class Model:
         if abs(held - mail.value) > tolerance or not self._has_applied(mail.number):
             self.offsets[place] = mail.value
             self.applied.append(Applied(mail.number, held, mail.value))
+            self.history.append((held, mail.value))
             yield
         self.registers[Register.APPLIED] = float(mail.number)
         yield
@@ -215,8 +216,8 @@ class Model:
 
     def edit(self, place: tuple[int, int, str], offset: float) -> None:
         """Set an offset by hand at the panel."""
+        self.history.append((self.offsets[place], offset))
         self.offsets[place] = offset
-        self.edits.append((place, offset))
 
     def power_loss(self, *, battery: bool = True) -> None:
         """Stop the program wherever it stands; without a battery every register is 0 afterwards."""
