@@ -224,7 +224,7 @@ class Campaign:
                 self._until(lambda: len(self._readings()) >= 3, "the first readings", 60)
                 for number in range(count):
                     self._one_fault(chance, control, bridge)
-                    time.sleep(chance.uniform(0.05, 1.5))
+                    time.sleep(chance.uniform(0.05, 4.0))
                     if sys.stderr.isatty():
                         print(f"\r{number + 1}/{count} {self.faults}", end="", file=sys.stderr)
                 return self._compare(control)

@@ -111,7 +111,7 @@ async def _tell(unit: Unit, client: AsyncClient) -> None:
         await _tell_one(unit, client, intent)
         await unit.store.set_intent(key, intent.order.number, "told")
     for tool_memory, offset in (await unit.store.untold(key, NOTICED)).items():
-        await client.report_offset(key, tool_memory, round(offset, 6))
+        await client.report_offset(key, tool_memory, round(offset, 6), none_applied=True)
         await unit.store.told(key, tool_memory, offset)
 
 
@@ -130,7 +130,7 @@ async def _tell_one(unit: Unit, client: AsyncClient, intent: Intent) -> None:
             await client.reject(key, order.number, outcome.reason)
             return
     if held is not None:
-        await client.report_offset(key, order.tool_memory, held)
+        await client.report_offset(key, order.tool_memory, held, none_applied=True)
 
 
 async def _ask(unit: Unit, client: AsyncClient) -> None:

@@ -118,9 +118,11 @@ class AsyncClient:
         """As `Client.heartbeat`."""
         return await self._answer(calls.heartbeat(machine, state))
 
-    async def report_offset(self, machine: str, tool_memory: int, offset: float) -> dict[str, Any]:
+    async def report_offset(
+        self, machine: str, tool_memory: int, offset: float, *, none_applied: bool = False
+    ) -> dict[str, Any]:
         """As `Client.report_offset`."""
-        return await self._answer(calls.report_offset(machine, tool_memory, offset))
+        return await self._answer(calls.report_offset(machine, tool_memory, offset, none_applied=none_applied))
 
     async def report_fault(
         self, machine: str, kind: str, text: str | None = None, *, active: bool = True

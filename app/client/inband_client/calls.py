@@ -109,10 +109,10 @@ def heartbeat(machine: str, state: Mapping[str, Any]) -> Call[dict[str, Any]]:
     return Call("POST", f"/machines/{_part(machine)}/heartbeat", _object, json=_given(state))
 
 
-def report_offset(machine: str, tool_memory: int, offset: float) -> Call[dict[str, Any]]:
+def report_offset(machine: str, tool_memory: int, offset: float, *, none_applied: bool) -> Call[dict[str, Any]]:
     """The offset that the control holds."""
     path = f"/machines/{_part(machine)}/tools/{int(tool_memory)}/reported"
-    return Call("POST", path, _object, json={"offset": offset})
+    return Call("POST", path, _object, json={"offset": offset, "none_applied": none_applied})
 
 
 def report_fault(machine: str, kind: str, text: str | None, *, active: bool) -> Call[dict[str, Any]]:

@@ -148,9 +148,14 @@ class Client:
         """
         return self._answer(calls.heartbeat(machine, state))
 
-    def report_offset(self, machine: str, tool_memory: int, offset: float) -> dict[str, Any]:
-        """Report the offset that the control holds in this location R10, mm."""
-        return self._answer(calls.report_offset(machine, tool_memory, offset))
+    def report_offset(
+        self, machine: str, tool_memory: int, offset: float, *, none_applied: bool = False
+    ) -> dict[str, Any]:
+        """Report the offset that the control holds in this location R10, mm.
+
+        none_applied: no pending correction is in it, so that none of them can explain another offset than the known one.
+        """
+        return self._answer(calls.report_offset(machine, tool_memory, offset, none_applied=none_applied))
 
     def report_fault(self, machine: str, kind: str, text: str | None = None, *, active: bool = True) -> dict[str, Any]:
         """Report a fault (`battery_low`, `receiver`, `probe_not_ready`, `other`), or its end."""

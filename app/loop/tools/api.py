@@ -107,7 +107,7 @@ def report_offset(
     which offset is true.
     """
     machine_row = machine_for(session, caller, machine, "operator")
-    done = applying.report_offset(session, machine_row, tool, report.offset, caller)
+    done = applying.report_offset(session, machine_row, tool, report.offset, caller, none_applied=report.none_applied)
     return OffsetReportOut(
         machine=machine_row.key,
         tool_memory=tool,

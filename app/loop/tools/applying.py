@@ -176,18 +176,21 @@ class Report(NamedTuple):
     note: str | None = None
 
 
-def report_offset(session: Session, machine: Machine, number: int, offset: float, caller: Caller) -> Report:
+def report_offset(
+    session: Session, machine: Machine, number: int, offset: float, caller: Caller, *, none_applied: bool = False
+) -> Report:
     """The control holds this offset; no correction is confirmed by that.
 
     Nothing happens if it is the known one, or the one that pending corrections of the tool lead to: the control has applied
-    them, and their confirmations are on the way. Any other becomes the known offset, raises *offset differs* and pauses the
+    them, and their confirmations are on the way. none_applied: the reporter knows better: no pending correction is in it, so
+    an edit that happens to hit such an offset is seen. Any other becomes the known offset, raises *offset differs* and pauses the
     tool. Raises `NotFound`.
     """
     lock_machines(session, [machine.id])
     tool = queries.tool(session, machine, number)
     if not _differs(offset, tool.offset):
         return Report(tool, differs=False)
-    explained = _leading_to(session, machine, tool, offset, tool.offset)
+    explained = [] if none_applied else _leading_to(session, machine, tool, offset, tool.offset)
     if explained:
         return Report(tool, differs=False, explained_by=[correction.number for correction in explained])
     asked = session.get(Alarm, (machine.id, tool.paused_by)) if tool.paused_by else None

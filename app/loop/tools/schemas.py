@@ -33,6 +33,13 @@ class OffsetReportIn(Body):
     """The offset that the control holds, as it was read there."""
 
     offset: Length
+    none_applied: Annotated[
+        bool,
+        Field(
+            strict=True,
+            description="No pending correction is in it, as the caller knows: then none of them explains another offset.",
+        ),
+    ] = False
 
 
 class OffsetReportOut(BaseModel):

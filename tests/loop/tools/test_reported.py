@@ -44,6 +44,14 @@ def test_another_offset_pauses_the_tool_until_a_person_answers(shop: Shop) -> No
     assert (shop.tool()["offset"], shop.tool()["paused_by"]) == (0.06, None)
 
 
+def test_an_edit_that_hits_a_pending_offset_is_seen_by_who_knows_better(shop: Shop) -> None:
+    number = pending(shop, 20)
+    offset = shop.correction(number)["offset_expected"]
+    path = f"/machines/{shop.machine}/tools/3/reported"
+    answer = shop.call("POST", path, client=shop.machine_client, offset=offset, none_applied=True)
+    assert (answer["differs"], answer["superseded"]) == (True, [number])
+
+
 def test_pending_corrections_may_explain_it(shop: Shop) -> None:
     first, second = pending(shop, 20), pending(shop, 50)
     expected = shop.correction(second)["offset_expected"]
