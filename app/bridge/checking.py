@@ -74,7 +74,7 @@ async def _control(machine: Machine) -> AsyncIterator[Finding]:
         yield Finding(machine.key, f"the control answers as {identity!r}{named}", True)
         async with asyncio.timeout(machine.patience):
             received = await link.fetch(Position())
-            yield Finding(machine.key, f"{len(received)} readings wait at the control", True)
+            yield Finding(machine.key, f"{len(received)} readings can be fetched now", True)
             for memory, offset in (await link.offsets()).items():
                 yield Finding(machine.key, f"tool memory {memory} holds {offset:.4f} mm", True)
     except TimeoutError:

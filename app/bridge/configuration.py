@@ -93,6 +93,7 @@ class Machine(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
             "kind": self.kind,
             "unit": self.unit,
             "identity": self.identity,
+            "place": [str(getattr(self.settings, name)) for name in getattr(kind_named(self.kind), "MEANING", ())],
             "characteristics": {} if location else self.characteristics,
             "locations": [
                 {name: value for name, value in msgspec.structs.asdict(place).items() if name != "largest_step"}
@@ -217,16 +218,21 @@ def _secret(table: dict[str, Any], place: str, folder: Path, problems: list[str]
     [(name, value)] = given.items()
     value = str(value)
     if name == "secret_env":
-        if not os.environ.get(value):
+        found = os.environ.get(value)
+        if not found:
             problems.append(f"{place}.secret_env: the variable {value} is not set.")
-        return os.environ.get(value)
-    if name == "secret":
-        return value
-    try:
-        return (folder / value).read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        problems.append(f"{place}.secret_file: {folder / value} cannot be read: {error}.")
+            return None
+        value = found
+    if name == "secret_file":
+        try:
+            value = (folder / value).read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError) as error:
+            problems.append(f"{place}.secret_file: {folder / value} cannot be read: {error}.")
+            return None
+    if not value.isascii() or not value.isprintable() or " " in value or not value:
+        problems.append(f"{place}.{name} holds no key: one is a single word of plain letters, as Inband has shown it.")
         return None
+    return value
 
 
 def _contradictions(machine: Machine, place: str) -> Iterator[str]:

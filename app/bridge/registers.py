@@ -158,8 +158,9 @@ class RegisterLink:
         )
         received = [self._received(slot, stored, now, fresh=fresh) for slot in slots]
         self._polled = (now, slots[-1].sequence if slots else stored.sequence)
-        if known and not slots and block.ack != stored.sequence:
-            await self._write(Register.ACK, stored.sequence)  # the acknowledgement was lost
+        accepted = known or stored.generation > 0  # a first look changes nothing
+        if accepted and not slots and block.ack != stored.sequence:
+            await self._write(Register.ACK, stored.sequence)  # the acknowledgement was lost, or is of another epoch
         return received
 
     async def acknowledge(self, received: Sequence[Received]) -> None:

@@ -32,6 +32,7 @@ REFUSED = (Conflict, Invalid, NotFound, TooLarge)
 SHORTEST_PAUSE, LONGEST_PAUSE = 1.0, 30.0  # s
 AWAY = (Unauthorized, Forbidden, Unavailable)
 TOGETHER = 100  # readings of a backlog in one request
+MOST_DETAIL = 1000  # characters
 NOTICED = 0.0005  # mm: what an offset may differ by without being told
 
 
@@ -225,7 +226,8 @@ async def heartbeat(unit: Unit) -> dict[str, Any]:
         "version": __version__,
         "kind": machine.kind,
         "state": unit.state,
-        "detail": unit.detail or unit.trouble,
+        "detail": (unit.detail or unit.trouble or "")[:MOST_DETAIL],
+        "sent_at": datetime.now(UTC),
         "waiting": counts.waiting,
         "oldest_waiting_at": _moment(counts.oldest),
         "quarantined": counts.quarantined,

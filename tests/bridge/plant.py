@@ -80,7 +80,7 @@ def location(feature: Feature, tool_memory: int = 3, **other: Any) -> Location:
 def machine(model: Model, **other: Any) -> Machine:
     fields: dict[str, Any] = {
         "key": "lathe-1",
-        "kind": "memory",
+        "kind": "haas",
         "unit": "mm" if model.unit == 1 else "inch",
         "secret": "secret",
         "settings": None,

@@ -48,7 +48,7 @@ class Settings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 @pytest.fixture(autouse=True)
 def _kind(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(kinds.KINDS, "tried", "tests.bridge.tried")
-    module: Any = SimpleNamespace(Settings=Settings, NUMBERED=True)
+    module: Any = SimpleNamespace(Settings=Settings, NUMBERED=True, MEANING=("port",))
     monkeypatch.setattr(kinds, "import_module", lambda _name: module)
 
 
@@ -73,6 +73,7 @@ def test_a_good_one() -> None:
         ('unit = "mm"', "", "machine.lathe-1.unit is missing."),
         ('unit = "mm"', 'unit = "cm"', "machine.lathe-1.unit: Invalid enum value 'cm'."),
         ('secret = "one"', "", "needs one of secret, secret_file and secret_env"),
+        ('secret = "one"', 'secret = "two words"', "machine.lathe-1.secret holds no key"),
         ('secret = "one"', 'secret_env = "INBAND_NOT_SET"', "the variable INBAND_NOT_SET is not set"),
         ('secret = "one"', 'secret_file = "nowhere"', "/plant/nowhere cannot be read"),
         ('url = "https://inband.example"', "", "server.url is missing."),
@@ -147,7 +148,9 @@ def test_the_hash_changes_with_whatever_a_number_means() -> None:
     place = first.location[0]
     for name, value in {"sign": -1, "holds": "radius", "tool": 9, "edge": 2, "register": "x", "factor": 2.0}.items():
         hashes.add(machine(model, location=(msgspec.structs.replace(place, **{name: value}),)).mapping_hash())
-    assert len(hashes) == 10
+    hashes.add(machine(model, kind="tried", settings=Settings(1)).mapping_hash())
+    hashes.add(machine(model, kind="tried", settings=Settings(2)).mapping_hash())
+    assert len(hashes) == 12
     looser = msgspec.structs.replace(place, largest_step=0.01)
     assert machine(model, location=(looser,)).mapping_hash() == first.mapping_hash(), "a limit changes no meaning"
 

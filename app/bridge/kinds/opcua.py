@@ -73,6 +73,9 @@ NOT_TRUSTED = {
 }
 
 
+MEANING = ("channel", "tool_area")
+
+
 class Settings(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
     """Address and login of a SINUMERIK, and the place of its block.
 
