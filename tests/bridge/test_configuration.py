@@ -2,6 +2,7 @@
 
 import tomllib
 from datetime import UTC, datetime, timedelta
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -49,7 +50,9 @@ class Settings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 def _kind(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(kinds.KINDS, "tried", "tests.bridge.tried")
     module: Any = SimpleNamespace(Settings=Settings, NUMBERED=True, MEANING=("port",))
-    monkeypatch.setattr(kinds, "import_module", lambda _name: module)
+    monkeypatch.setattr(
+        kinds, "import_module", lambda name: module if name == "tests.bridge.tried" else import_module(name)
+    )
 
 
 def read(text: str) -> Configuration:

@@ -323,7 +323,7 @@ def test_the_table_of_the_simulator_is_a_configuration(tmp_path: Path) -> None:
             words = [str(finding) for finding in findings if finding.good]
             assert words == [
                 "✓ mill-1: the control answers as 'SIM-0001'",
-                "✓ mill-1: 1 readings wait at the control",
+                "✓ mill-1: 1 readings can be fetched now",
                 "✓ mill-1: tool memory 3 holds 0.0000 mm",
             ]
         finally:
