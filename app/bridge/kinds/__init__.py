@@ -13,6 +13,7 @@ KINDS: Final[dict[str, str]] = {
     "dprnt": "app.bridge.kinds.dprnt",
     "folder": "app.bridge.kinds.folder",
     "haas": "app.bridge.kinds.haas",
+    "heidenhain": "app.bridge.kinds.heidenhain",
     "opcua": "app.bridge.kinds.opcua",
 }
 """Names and modules."""

@@ -12,6 +12,7 @@ SIMULATORS: Final[dict[str, str]] = {
     "dprnt": "app.bridge.simulators.dprnt",
     "folder": "app.bridge.simulators.folder",
     "haas": "app.bridge.simulators.haas",
+    "heidenhain": "app.bridge.simulators.heidenhain",
     "opcua": "app.bridge.simulators.opcua",
 }
 """Kinds that can be simulated, and the module of each."""

@@ -1,0 +1,485 @@
+"""Heidenhain TNC: readings from a file that the NC program prints by FN 16; corrections as a small program that it calls.
+
+The files come and go by LSV2 file transfer (library pyLSV2), or lie in a folder. The TNC keeps the offset in a QR parameter, which the
+tool call adds (``DR+QR31``): no tool table is written. Tried against a simulator only.
+"""
+
+import asyncio
+import contextlib
+import logging
+import re
+import socket
+import tempfile
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from pathlib import Path, PureWindowsPath
+from typing import Annotated, Any, NamedTuple, Protocol, TypeVar
+
+import msgspec
+import pyLSV2
+from msgspec import Meta
+
+from app.bridge.configuration import Location, Machine
+from app.bridge.links import Clock, ControlAway, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.moments import learn, measured_at
+from app.bridge.registers import body_of, fault_of
+from app.core.printed_line import MODULUS, STEPS, LineReader, Printed
+from app.core.ring import Unit
+
+NUMBERED = True
+LARGE = 500_000  # bytes: a file that is fetched whole each time it grows should be emptied now and then
+TOLERANCE = 0.0006  # mm: of the comparison that the TNC makes
+REGISTER = re.compile(r"QR([1-9]\d{1,2})")
+FIRST_REGISTER, LAST_REGISTER = 10, 499  # QR0 to QR9 are for the counters
+ANSWER = re.compile(r"INBANS N(\d+) A(\d) R(\d+) V(-?\d+\.\d+) U([12]) K(\d+) FIN")
+REASONS = {1: "The control holds another offset than expected.", 4: "The NC program refused the step (answer 4)."}
+T = TypeVar("T")
+for _name in ("LSV2 Client", "LSV2 TCP"):
+    logging.getLogger(_name).setLevel(logging.CRITICAL)  # what it logs is said here in a sentence
+
+
+class Settings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Either address or folder.
+
+    address, port: of the TNC for LSV2. readings: the file that FN 16 appends to. corrections: the program that the part program
+    calls. folder: where both files lie under their names, on a share that the TNC writes to. answer: seconds for one answer.
+    """
+
+    address: str | None = None
+    port: Annotated[int, Meta(ge=1, le=65535)] = 19000
+    folder: str | None = None
+    readings: str = "TNC:\\inband\\readings.txt"
+    corrections: str = "TNC:\\inband\\corr.h"
+    answer: Annotated[float, Meta(gt=0)] = 3.0
+
+    def beside(self, folder: Path, place: str, problems: list[str]) -> "Settings":
+        """The same with a folder that is not relative; mistakes are added to ``problems``."""
+        if (self.address is None) == (self.folder is None):
+            problems.append(f"{place} needs one of address and folder.")
+        return self if self.folder is None else msgspec.structs.replace(self, folder=str(folder / self.folder))
+
+
+class Answered(NamedTuple):
+    """The NC program's answer to a correction. held: the offset then, in the control's unit."""
+
+    number: int
+    answer: int
+    register: int
+    held: float
+    unit: Unit
+
+
+def answer_check(answered: Answered) -> int:
+    """The check sum of an answer's line: 0 to 96."""
+    steps = round(abs(answered.held) * STEPS[answered.unit])
+    total = 3 * answered.number + 5 * answered.answer + 7 * answered.register + steps + 23 * answered.unit
+    return int(total + (answered.held < 0 and steps > 0)) % MODULUS
+
+
+def answers_in(text: str) -> list[Answered]:
+    """The answers in the text of a file, in their order; damaged ones are left out."""
+    found = []
+    for number, answer, register, held, unit, check in ANSWER.findall(text):
+        one = Answered(int(number), int(answer), int(register), float(held), Unit(int(unit)))
+        if answer_check(one) == int(check):
+            found.append(one)
+    return found
+
+
+def correction_program(order: Order | None, location: Location | None, unit: str, name: str) -> str:
+    """The program that sets an offset once, if the expected one is there, and answers; without an order it does nothing."""
+    lines = ["; Inband writes this program anew. Do not edit it."]
+    if order is not None and location is not None:
+        register = location.register
+        before, after = (round(location.to_control(each, unit), 6) + 0.0 for each in (order.before, order.after))
+        tolerance = TOLERANCE if unit == "mm" else TOLERANCE / 25.4
+        lines += [
+            f"; Correction {order.number}: tool {location.tool}",
+            f"FN 9: IF +QR4 EQU +{order.number} GOTO LBL 9 ; answered before",
+            f"Q1610 = ABS ( {register} - {_signed(before)} )",
+            f"FN 12: IF +Q1610 LT +{tolerance:.6f} GOTO LBL 1 ; as expected",
+            f"Q1610 = ABS ( {register} - {_signed(after)} )",
+            f"FN 12: IF +Q1610 LT +{tolerance:.6f} GOTO LBL 2 ; set before, power was lost",
+            "Q1611 = +1 ; another offset: it stays",
+            "FN 9: IF +0 EQU +0 GOTO LBL 3",
+            "LBL 1",
+            f"{register} = {_signed(after)}",
+            "LBL 2",
+            f"QR3 = +{order.number}",
+            "Q1611 = +0",
+            "LBL 3",
+            f"Q1612 = +{order.number}",
+            f"Q1613 = {register}",
+            f"Q1614 = +{register[2:]}",
+            "CALL PGM TNC:\\inband\\answer.h",
+            f"QR4 = +{order.number}",
+            "LBL 9",
+        ]
+    inside = PureWindowsPath(name).stem.upper()
+    measure = "MM" if unit == "mm" else "INCH"
+    lines = [f"BEGIN PGM {inside} {measure}", *lines, f"END PGM {inside} {measure}"]
+    return "".join(f"{number} {line}\r\n" for number, line in enumerate(lines))
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.6f}"
+
+
+class Files(Protocol):
+    """The two files; every call blocks, and is made in a thread."""
+
+    def open(self) -> str:
+        """Connect, and answer the identity. Raises `LinkError`, as all do."""
+
+    def read(self) -> bytes | None:
+        """The file of readings if it has changed since the last call; None if not."""
+
+    def put(self, text: str) -> None:
+        """Replace the program of corrections; never half of it."""
+
+    def end(self) -> None:
+        """Disconnect at once, also while another thread waits for an answer."""
+
+
+class FolderFiles:
+    """Files in a folder."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.folder = Path(settings.folder or "")
+        self.readings = self.folder / PureWindowsPath(settings.readings).name
+        self.corrections = self.folder / PureWindowsPath(settings.corrections).name
+        self._known: tuple[int, int] | None = None
+
+    def open(self) -> str:
+        """Look whether the folder is there; its name."""
+        if not self.folder.is_dir():
+            raise ControlAway(f"The folder {self.folder} is not there: is the share mounted?")
+        return str(self.folder)
+
+    def read(self) -> bytes | None:
+        """The file of readings if it has changed."""
+        try:
+            about = self.readings.stat()
+            if self._known == (about.st_size, about.st_mtime_ns):
+                return None
+            content = self.readings.read_bytes()
+        except FileNotFoundError:
+            self.open()
+            changed, self._known = self._known != (0, 0), (0, 0)
+            return b"" if changed else None
+        except OSError as error:
+            raise ControlAway(f"{self.readings} cannot be read: {error.strerror or error}.") from error
+        self._known = (about.st_size, about.st_mtime_ns)
+        return content
+
+    def put(self, text: str) -> None:
+        """Replace the program of corrections."""
+        new = self.corrections.with_suffix(".new")
+        try:
+            new.write_bytes(text.encode("cp1252"))
+            new.replace(self.corrections)
+        except OSError as error:
+            raise ControlAway(
+                f"{self.corrections} cannot be written: {error.strerror or error}. May this program write into the folder?"
+            ) from error
+
+    def end(self) -> None:
+        """Nothing is open."""
+
+
+class _Socket(socket.socket):
+    """A socket that reports an end as an error: pyLSV2 would wait for the rest of an answer for ever."""
+
+    def recv(self, size: int, flags: int = 0) -> bytes:
+        """Bytes, never none."""
+        data = super().recv(size, flags)
+        if not data:
+            raise ConnectionResetError("the control has closed the connection")
+        return data
+
+
+class Lsv2Files:
+    """Files of a TNC by LSV2. Logins INSPECT and FILE, nothing else: pyLSV2's safe mode stays on."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self._client: Any = None
+        self._socket: _Socket | None = None
+        self._known: tuple[int, Any] | None = None
+
+    def _said(self, words: str) -> str:
+        code = self._client.last_error
+        return f"{words} ({pyLSV2.get_error_text(code)})" if code.e_code > 0 else words
+
+    def _guarded(self, call: Callable[[], T], what: str) -> T:
+        place = f"{self.settings.address}:{self.settings.port}"
+        try:
+            return call()
+        except TimeoutError as error:
+            raise ControlAway(
+                f"{place} has not answered for {self.settings.answer:g} s while the bridge {what}: is the control on, and does"
+                " a firewall stand between?"
+            ) from error
+        except OSError as error:
+            raise ControlAway(
+                f"{place}: {error.strerror or error}, while the bridge {what}. Are address and port right, and is external"
+                " access switched on at the control?"
+            ) from error
+        except Exception as error:
+            # pyLSV2 raises bare exceptions, and ValueError and struct.error for what it cannot read
+            raise ControlAway(
+                f"{place} gives an answer that is not understood while the bridge {what}: {error}. Is it a TNC, and LSV2?"
+            ) from error
+
+    def open(self) -> str:
+        """Connect; type and number of the control."""
+        settings = self.settings
+
+        def connected() -> None:
+            self._client = pyLSV2.LSV2(settings.address or "", settings.port, settings.answer)
+            wire = self._client._llcom  # noqa: SLF001 - it offers no other way to notice a closed connection
+            wire._tcpsock.close()  # noqa: SLF001
+            self._socket = _Socket(socket.AF_INET, socket.SOCK_STREAM)
+            self._socket.settimeout(settings.answer)
+            wire._tcpsock = self._socket  # noqa: SLF001
+            self._client.connect()
+
+        self._guarded(connected, "connected")
+        if not self._guarded(lambda: self._client.login(pyLSV2.Login.FILETRANSFER), "logged in"):
+            raise Misconfigured(
+                self._said("The control refuses the login FILE")
+                + ": allow external access and file transfer at the control (MOD functions)."
+            )
+        about = self._client.versions
+        number = "" if about.id_number == "not supported" else f" {about.id_number}"
+        return f"{about.control}{number}".strip("\0 ")
+
+    def read(self) -> bytes | None:
+        """The file of readings if its size or time has changed."""
+        name = self.settings.readings
+        about = self._guarded(lambda: self._client.file_info(name), f"looked for {name}")
+        if about is None:
+            if self._client.last_error.e_code != pyLSV2.LSV2StatusCode.T_ER_NO_FILE:
+                raise Misconfigured(self._said(f"The control does not show {name}") + ". Is the path right?")
+            changed, self._known = self._known != (0, None), (0, None)
+            return b"" if changed else None
+        known = (about.size, about.timestamp)
+        if known == self._known:
+            return None
+        if about.size == 0:  # pyLSV2 cannot fetch an empty file
+            self._known = known
+            return b""
+        with tempfile.TemporaryDirectory() as folder:
+            local = Path(folder) / "readings.txt"
+            if not self._guarded(lambda: self._client.recive_file(name, local), f"fetched {name}"):
+                raise ControlAway(self._said(f"The control did not send {name}") + ". It is tried again.")
+            content = local.read_bytes()
+        self._known = known
+        return content
+
+    def put(self, text: str) -> None:
+        """Replace the program: sent under another name first, so that a half one is never called."""
+        name = self.settings.corrections
+        new = str(PureWindowsPath(name).with_name("corr_new.h"))
+        with tempfile.TemporaryDirectory() as folder:
+            local = Path(folder) / "corr_new.h"
+            local.write_bytes(text.encode("cp1252"))
+
+            def sent() -> bool:
+                client = self._client
+                return bool(
+                    client.send_file(local, new, override_file=True)
+                    and client.delete_file(name)
+                    and client.move_file(new, name)
+                )
+
+            try:
+                done = self._guarded(sent, f"wrote {name}")
+            except ControlAway as error:
+                if not isinstance(error.__cause__, pyLSV2.LSV2StateException):
+                    raise
+                raise Misconfigured(
+                    f"{name} cannot be written: {error.__cause__}. Make the directory {PureWindowsPath(name).parent} at the"
+                    " control."
+                ) from error
+        if not done:
+            raise ControlAway(
+                self._said(f"The control did not take {name}") + ". Is it open in the editor? It is tried again."
+            )
+
+    def end(self) -> None:
+        """Cut the connection: a thread that waits for an answer ends with an error."""
+        if self._socket is not None:
+            with contextlib.suppress(OSError):
+                self._socket.shutdown(socket.SHUT_RDWR)
+            self._socket.close()
+            self._socket = None
+
+
+class TncLink:
+    """A TNC: a `Link`. remark: gaps, damage and a large file, in words."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.clock = Clock()
+        self.remark = ""
+        self._files: Files | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        self._reader = LineReader()
+        self._content = b""
+        self._sizes: dict[tuple[int, int], float] = {}
+        self._unstored: list[Received] = []
+        self._highest: tuple[int, int] | None = None
+        self._answers: list[Answered] = []
+        self._lying: str | None = None
+        self._looked = False
+        self._missing = 0
+
+    async def connect(self) -> str:
+        """Connect; type and number of the control, or the folder."""
+        machine = self.machine
+        if machine.corrections == "direct":
+            raise Misconfigured(
+                f'machine.{machine.key}: a TNC takes corrections by its program only. Set corrections = "control" or "none".'
+            )
+        for place in machine.location:
+            found = REGISTER.fullmatch(place.register)
+            if found is None or not FIRST_REGISTER <= int(found[1]) <= LAST_REGISTER:
+                raise Misconfigured(
+                    f"machine.{machine.key}: register = {place.register!r} is not a QR parameter from QR{FIRST_REGISTER} to"
+                    f" QR{LAST_REGISTER}."
+                )
+        self._begin()
+        chosen = FolderFiles if machine.settings.folder is not None else Lsv2Files
+        self._files = chosen(machine.settings)
+        return await asyncio.to_thread(self._files.open)
+
+    async def close(self) -> None:
+        """Disconnect."""
+        if self._files is not None:
+            self._files.end()
+            self._files = None
+
+    def _open_files(self) -> Files:
+        if self._files is None:
+            raise ControlAway("It is not connected.")
+        return self._files
+
+    async def fetch(self, stored: Position) -> Sequence[Received]:
+        """The readings that the file has and the store has not, in the order of the file."""
+        content = await asyncio.to_thread(self._open_files().read)
+        if content is not None:
+            content = content.replace(b",", b".")  # decimal comma, by the language of the control
+            self._take(content, stored)
+        return list(self._unstored)
+
+    def _take(self, content: bytes, stored: Position) -> None:
+        fresh = self._looked
+        if not content.startswith(self._content):  # emptied, or another file: from its beginning
+            self._reader, self._sizes = LineReader(), {}
+            self._content = b""
+        lines = self._reader.feed(content[len(self._content) :])
+        self._content = content
+        self._answers = answers_in(content.decode("cp1252", "replace"))
+        if not self._looked:
+            self._looked = True
+            self._highest = None if stored.epoch is None else (stored.epoch, stored.sequence)
+            places = [(line.epoch, line.slot.sequence) for line in lines]
+            if self._highest in places:
+                first = places.index(self._highest) + 1
+                self._sizes = {place: line.slot.measured for place, line in zip(places[:first], lines, strict=False)}
+                lines = lines[first:]
+        now = datetime.now().astimezone()
+        for printed in lines:
+            if received := self._received(printed, stored.generation, now, fresh=fresh and len(lines) == 1):
+                self._unstored.append(received)
+        self.remark = self._remark()
+
+    def _received(self, printed: Printed, generation: int, now: datetime, *, fresh: bool) -> Received | None:
+        """One reading; None where the file has it before: M_APPEND writes whole blocks again."""
+        slot, place = printed.slot, (printed.epoch, printed.slot.sequence)
+        known = self._sizes.get(place)
+        if known == slot.measured:
+            return None
+        again = f".{generation}" if generation else ""
+        key = f"{self.machine.key}:{printed.epoch}{again}:{slot.sequence}"
+        body = body_of(self.machine, slot)
+        fault = fault_of(self.machine, slot)
+        if known is not None:
+            key = f"{key}:{slot.measured:g}"
+            fault = (
+                f"Reading {slot.sequence} of epoch {printed.epoch} stands in the file as {known:g} and as {slot.measured:g}:"
+                " one of the two is wrong."
+            )
+        self._sizes.setdefault(place, slot.measured)
+        unit = "mm" if printed.unit is Unit.MM else "inch"
+        if unit != self.machine.unit:
+            fault = f"The line is in {unit}, the configuration says unit = {self.machine.unit!r}."
+        if fresh and slot.time is not None:
+            learn(self.clock, slot.time, now)
+        if at := measured_at(self.clock, slot.time, now, fresh=fresh):
+            body["measured_at"] = at.isoformat()
+        before = self._highest
+        if before is None or before[0] != place[0] or place[1] > before[1]:
+            if before is not None and before[0] == place[0]:
+                self._missing += place[1] - before[1] - 1
+            self._highest = place
+        epoch, sequence = self._highest or place
+        return Received(key, body, Position(epoch, sequence, generation), fault)
+
+    def _remark(self) -> str:
+        words = []
+        if self._missing:
+            words.append(f"Missing readings since the connection: {self._missing}; they are not in the file.")
+        if self._reader.damaged:
+            words.append(f"Damaged lines in the file: {self._reader.damaged}.")
+        if len(self._content) > LARGE:
+            words.append("The file of readings is large: delete it at the control between two programs.")
+        return " ".join(words)
+
+    async def acknowledge(self, received: Sequence[Received]) -> None:
+        """They are stored. The file stays as it is."""
+        del self._unstored[: len(received)]
+
+    async def offer(self, orders: Sequence[Order]) -> None:
+        """Write the oldest order as a program, or one that does nothing; only if another lies there."""
+        if self.machine.corrections == "none":
+            return
+        last = self._answers[-1].number if self._answers else 0
+        order = orders[0] if orders else None
+        if order is not None and order.number == last:
+            return
+        location = None
+        if order is not None:
+            location = next((each for each in self.machine.location if each.tool_memory == order.tool_memory), None)
+        text = correction_program(order, location, self.machine.unit, self.machine.settings.corrections)
+        if text != self._lying:
+            self._lying = None
+            await asyncio.to_thread(self._open_files().put, text)
+            self._lying = text
+
+    async def outcomes(self) -> Sequence[Outcome]:
+        """The NC program's last answer."""
+        if not self._answers or self.machine.corrections == "none":
+            return []
+        last = self._answers[-1]
+        held = None
+        for location in self.machine.location:
+            unit = "mm" if last.unit is Unit.MM else "inch"
+            if location.register == f"QR{last.register}":
+                held = location.from_control(last.held, unit)
+        if last.answer == 0:
+            return [Outcome(last.number, applied=True, offset=held)]
+        reason = REASONS.get(last.answer, f"The NC program refused it (answer {last.answer}).")
+        return [Outcome(last.number, False, held, reason, last.answer == 1)]
+
+    async def offsets(self) -> dict[int, float]:
+        """Nothing can be read; an edit is noticed at the next correction."""
+        return {}
+
+
+def link(machine: Machine) -> TncLink:
+    """The link to a machine's control."""
+    return TncLink(machine)
