@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator
 from typing import NamedTuple
 
 from app.bridge.configuration import Configuration, Machine
+from app.bridge.kinds.mtconnect import AgentError, Context
 from app.bridge.links import LinkError, Position
 from app.bridge.program import link_of
 from inband_client import AsyncClient, Forbidden, NotFound, ProblemError, Unauthorized
@@ -29,9 +30,11 @@ async def check(configuration: Configuration) -> list[Finding]:
 
 
 async def _of_machine(configuration: Configuration, machine: Machine) -> list[Finding]:
-    return [finding async for finding in _server(configuration, machine)] + [
-        finding async for finding in _control(machine)
-    ]
+    return (
+        [finding async for finding in _server(configuration, machine)]
+        + [finding async for finding in _control(machine)]
+        + [finding async for finding in _context(machine)]
+    )
 
 
 async def _server(configuration: Configuration, machine: Machine) -> AsyncIterator[Finding]:
@@ -83,3 +86,15 @@ async def _control(machine: Machine) -> AsyncIterator[Finding]:
         yield Finding(machine.key, str(error), False)
     finally:
         await link.close()
+
+
+async def _context(machine: Machine) -> AsyncIterator[Finding]:
+    if machine.context is None:
+        return
+    context = Context(machine.key, machine.context)
+    try:
+        async with context.client() as http:
+            await context.poll(http)
+        yield Finding(machine.key, context.summary(), good=not context.unclear)
+    except AgentError as error:
+        yield Finding(machine.key, str(error), False)

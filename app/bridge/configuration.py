@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, TypeVar
 import msgspec
 from msgspec import Meta, Struct
 
-from app.bridge.kinds import KindError, kind_named
+from app.bridge.kinds import KindError, kind_named, mtconnect
 from app.core.ring import INCH
 
 KEY = re.compile(r"[a-z0-9][a-z0-9._-]{0,63}")
@@ -66,7 +66,8 @@ class Machine(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
     identity: what the control must answer as its serial number. corrections: the control takes them from the mailbox
     (``control``), the bridge writes the offset itself (``direct``), or there are ``none``. proof_needed: corrections wait
     until a touch test has proved the mapping of their location. offsets_every: how often offsets are read, which is how an edit
-    at the panel is noticed. patience: how long one call to the control may take.
+    at the panel is noticed. patience: how long one call to the control may take. context: an MTConnect agent that tells the part
+    of readings that have none.
     """
 
     key: str
@@ -86,6 +87,7 @@ class Machine(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
     largest_distance: Positive = 0.5
     largest_age: Positive = 8 * 3600.0
     proof_needed: bool = True
+    context: mtconnect.Settings | None = None
 
     def mapping_hash(self, location: Location | None = None) -> str:
         """The hash of the mapping of one location, or of all: it changes with everything that a number's meaning depends on."""
@@ -236,6 +238,8 @@ def _secret(table: dict[str, Any], place: str, folder: Path, problems: list[str]
 
 
 def _contradictions(machine: Machine, place: str) -> Iterator[str]:
+    if machine.context is not None and not re.match(r"https?://[^/]", machine.context.url):
+        yield f"{place}.context.url = {machine.context.url!r} is not an address such as http://192.168.1.20:5000."
     for number in machine.characteristics:
         if not number.isdecimal() and getattr(kind_named(machine.kind), "NUMBERED", False):
             yield f"{place}.characteristics: {number!r} is not a number as the NC program writes it."

@@ -65,6 +65,8 @@ async def _connected(unit: Unit) -> None:
         async with asyncio.timeout(machine.patience):
             received = await link.fetch(position)
         if received:
+            if unit.context is not None:
+                received = unit.context.with_parts(received)
             await store.add(machine.key, received)
             position = received[-1].position or position
             unit.news.set()

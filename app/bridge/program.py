@@ -9,6 +9,7 @@ from pathlib import Path
 from app.bridge import control_side, server_side
 from app.bridge.configuration import Configuration, Machine
 from app.bridge.kinds import kind_named
+from app.bridge.kinds.mtconnect import Context
 from app.bridge.links import Link
 from app.bridge.store import Store, StoreError
 from app.bridge.unit import Unit
@@ -39,6 +40,9 @@ async def run(configuration: Configuration, store: Store) -> None:
                 AsyncClient(configuration.server.url, machine.secret, verify=trusted, patience=0.0)
             )
             unit = Unit(machine, link_of(machine), store, configuration.hold_all)
+            if machine.context is not None:
+                unit.context = Context(machine.key, machine.context)
+                tasks.append(asyncio.create_task(unit.context.run(), name=f"{machine.key} context"))
             for name, work in (
                 ("control", control_side.run(unit)),
                 ("server", server_side.run(unit, client, configuration.server)),

@@ -226,7 +226,7 @@ async def heartbeat(unit: Unit) -> dict[str, Any]:
         "version": __version__,
         "kind": machine.kind,
         "state": unit.state,
-        "detail": (unit.detail or unit.trouble or "")[:MOST_DETAIL],
+        "detail": (unit.detail or unit.trouble or (unit.context.summary() if unit.context else ""))[:MOST_DETAIL],
         "sent_at": datetime.now(UTC),
         "waiting": counts.waiting,
         "oldest_waiting_at": _moment(counts.oldest),

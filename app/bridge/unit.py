@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
 from app.bridge.configuration import Machine
+from app.bridge.kinds.mtconnect import Context
 from app.bridge.links import Link, Order
 from app.bridge.store import Store
 
@@ -19,7 +20,7 @@ class Unit:
 
     orders: corrections that passed the guards; the control side offers them. news: something waits for the server. state and
     detail: the control's side, as the heartbeat tells it. held_back: sentences why corrections wait. trouble: the server's
-    side, None while it answers.
+    side, None while it answers. context: what an MTConnect agent tells of the machine.
     """
 
     machine: Machine
@@ -35,6 +36,7 @@ class Unit:
     trouble: str | None = None
     started_at: datetime = field(default_factory=lambda: datetime.now(UTC))
     polls: int = 0
+    context: Context | None = None
 
     def say(self, state: str, detail: str = "") -> None:
         """Note how the control's side is doing; a change is logged."""

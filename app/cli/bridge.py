@@ -133,13 +133,15 @@ def toml_of(key: str, table: dict[str, object]) -> str:
     lines: list[str] = []
 
     def write(place: str, content: dict[str, object], *, head: str) -> None:
-        lines.append(head)
         inner = {}
+        start = len(lines)
         for name, value in content.items():
             if isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict)):
                 inner[name] = value
             else:
                 lines.append(f"{name} = {_toml_value(value)}")
+        if len(lines) > start or not inner:
+            lines.insert(start, head)
         for name, value in inner.items():
             if isinstance(value, dict):
                 write(f"{place}.{name}", value, head=f"\n[{place}.{name}]")

@@ -30,6 +30,10 @@ def kind_named(name: str) -> ModuleType:
 
     Raises `KindError`.
     """
+    if name == "mtconnect":
+        raise KindError(
+            'kind = "mtconnect" brings no readings; it tells the part of readings as [machine.KEY.context] beside another kind.'
+        )
     if name not in KINDS:
         raise KindError(f"kind = {name!r} is not known; known are {', '.join(sorted(KINDS))}.")
     try:

@@ -13,6 +13,7 @@ SIMULATORS: Final[dict[str, str]] = {
     "folder": "app.bridge.simulators.folder",
     "haas": "app.bridge.simulators.haas",
     "heidenhain": "app.bridge.simulators.heidenhain",
+    "mtconnect": "app.bridge.simulators.mtconnect",
     "opcua": "app.bridge.simulators.opcua",
 }
 """Kinds that can be simulated, and the module of each."""
