@@ -101,7 +101,7 @@ def simulate(
     ] = None,
 ) -> None:
     """Start a simulated control that makes and measures parts; its table for the configuration goes to standard output."""
-    from app.bridge.simulators import simulator_named
+    from app.bridge.simulators import NoPlace, simulator_named
     from app.bridge.simulators.model import Feature, Model, live
     from app.core.ring import Unit
 
@@ -124,8 +124,11 @@ def simulate(
         finally:
             await simulator.stop()
 
-    with contextlib.suppress(KeyboardInterrupt):
-        asyncio.run(work())
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            asyncio.run(work())
+    except NoPlace as error:
+        raise InbandError(str(error)) from error
 
 
 def toml_of(key: str, table: dict[str, object]) -> str:

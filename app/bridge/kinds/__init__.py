@@ -14,6 +14,7 @@ KINDS: Final[dict[str, str]] = {
     "folder": "app.bridge.kinds.folder",
     "haas": "app.bridge.kinds.haas",
     "heidenhain": "app.bridge.kinds.heidenhain",
+    "mqtt": "app.bridge.kinds.mqtt",
     "opcua": "app.bridge.kinds.opcua",
 }
 """Names and modules."""

@@ -14,9 +14,14 @@ SIMULATORS: Final[dict[str, str]] = {
     "haas": "app.bridge.simulators.haas",
     "heidenhain": "app.bridge.simulators.heidenhain",
     "mtconnect": "app.bridge.simulators.mtconnect",
+    "mqtt": "app.bridge.simulators.mqtt",
     "opcua": "app.bridge.simulators.opcua",
 }
 """Kinds that can be simulated, and the module of each."""
+
+
+class NoPlace(Exception):
+    """A simulator cannot begin: the place that it needs is missing. The words say what to do."""
 
 
 class Simulator(Protocol):

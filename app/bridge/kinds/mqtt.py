@@ -1,0 +1,446 @@
+"""Machines and gateways that speak MQTT 5 over a broker, by five topics; library aiomqtt, an extra.
+
+Below ``inband/v1/{machine}/``: ``readings`` come in; ``stored`` answers each with its key, once it is stored durably;
+``corrections`` is the list that is pending now, retained; ``applied`` is the machine's answer to one of them; ``offsets`` is what
+the machine holds, if it says so. A message is acknowledged to the broker when it is stored, not before: what this bridge
+did not store, the broker of a persistent session delivers again. The broker itself may lose messages that it has
+acknowledged (it writes them to its disk now and then): a machine sends a reading until ``stored`` names its key.
+"""
+
+import asyncio
+import contextlib
+import hashlib
+import json
+import logging
+import math
+import os
+import ssl
+import time
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any, Final
+
+import aiomqtt
+from msgspec import Struct
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
+
+from app.bridge.configuration import Location, Machine, Number, Positive
+from app.bridge.links import Clock, ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
+from app.core.ring import INCH
+
+log = logging.getLogger(__name__)
+FIELDS: Final = {
+    "characteristic": str,
+    "measured": (int, float),
+    "touches": list,
+    "measured_at": str,
+    "machined_at": str,
+    "part": str,
+    "key": str,
+    "correction_in_effect": int,
+    "first_move_triggered": bool,
+}
+"""What the body of a reading may hold."""
+LONGEST_KEY: Final = 128
+LARGEST: Final = 65_536  # bytes of a message
+IN_FLIGHT: Final = 200  # messages that the broker may send before the first is acknowledged
+AT_LEAST_ONCE: Final = 1
+REFUSED: Final = 0x80  # from here on a reason of MQTT is a failure
+BAD_LOGIN, NOT_ALLOWED, TAKEN_OVER = 0x86, 0x87, 0x8E
+GOODBYE: Final = 3.0  # s
+OTHERS_TURN: Final = 15.0  # s that a client stays away after another one has taken its id
+
+
+class Settings(Struct, forbid_unknown_fields=True, frozen=True):
+    """A broker, and the topics of one machine there.
+
+    host, port: 1883, with tls 8883, if left out. name: of the machine in the topics; its key if left out. prefix: of the
+    topics. client_id: ``inband-bridge-`` and the machine's key if left out; no other client may have it. username; password in a
+    file or in a variable of the environment. tls, ca: a file with the authority of the broker's certificate, if it is one of
+    the plant's own. certificate, private_key: files of the client's own. session: s that the broker keeps messages for a
+    bridge that is away. valid: s after which a list of corrections that was not renewed counts no longer. keepalive: s.
+    """
+
+    host: str
+    port: int | None = None
+    name: str | None = None
+    prefix: str = "inband/v1"
+    client_id: str | None = None
+    username: str | None = None
+    password_file: str | None = None
+    password_env: str | None = None
+    tls: bool = False
+    ca: str | None = None
+    certificate: str | None = None
+    private_key: str | None = None
+    session: Number = 7 * 86_400
+    valid: Positive = 600.0
+    keepalive: Number = 20
+
+    def __post_init__(self) -> None:
+        """Refuse what contradicts itself."""
+        if not self.tls and (self.ca or self.certificate):
+            raise ValueError("ca and certificate need tls = true")
+        if (self.certificate is None) != (self.private_key is None):
+            raise ValueError("certificate and private_key belong together")
+        for word in (self.prefix, self.name or ""):
+            if set(word) & set("+#\0") or word.startswith("/"):
+                raise ValueError(f"{word!r} is no part of a topic: without + and #, not beginning with /")
+        if self.password_file and self.password_env:
+            raise ValueError("password_file or password_env, not both")
+        if self.username is None and (self.password_file or self.password_env):
+            raise ValueError("a password needs a username")
+
+
+class MqttLink:
+    """The link to one machine by a broker."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.settings: Settings = machine.settings
+        self.clock = Clock()
+        self.base = f"{self.settings.prefix}/{self.settings.name or machine.key}"
+        self.port = self.settings.port or (8883 if self.settings.tls else 1883)
+        self.where = f"{self.settings.host}:{self.port}"
+        self.scale = INCH if machine.unit == "inch" else 1.0
+        self._client: aiomqtt.Client | None = None
+        self._listening: asyncio.Task[None] | None = None
+        self._readings: list[aiomqtt.Message] = []
+        self._answers: list[aiomqtt.Message] = []
+        self._told: list[aiomqtt.Message] = []  # answers that were handed on
+        self._offsets: dict[int, float] = {}
+        self._offered: tuple[Sequence[Order], float] | None = None
+        self._taken_over = -OTHERS_TURN
+
+    # --- connection
+
+    async def connect(self) -> str:
+        """Connect to the broker, take up the session, listen."""
+        if self.machine.corrections == "direct":
+            raise Misconfigured('Over MQTT the machine sets its offsets itself: use corrections = "control" or "none".')
+        if time.monotonic() < self._taken_over + OTHERS_TURN:
+            raise Misconfigured(self._takeover())
+        await self.close()
+        client = aiomqtt.Client(
+            self.settings.host,
+            self.port,
+            identifier=self._client_id(),
+            username=self.settings.username,
+            password=self._password(),
+            tls_context=self._tls() if self.settings.tls else None,
+            protocol=aiomqtt.ProtocolVersion.V5,
+            clean_start=False,
+            properties=_connect_properties(self.settings.session),
+            keepalive=self.settings.keepalive,
+            timeout=math.inf,  # the caller has one; that of aiomqtt may swallow a cancellation in Python 3.11
+        )
+        client._client.manual_ack_set(True)  # noqa: SLF001 - aiomqtt has no word of its own for it
+        try:
+            await client.__aenter__()
+            self._client = client
+            self._listening = asyncio.create_task(self._listen(client))
+            for topic in ("readings", "applied", "offsets"):
+                [reason, *_] = await client.subscribe(f"{self.base}/{topic}", qos=AT_LEAST_ONCE)
+                if getattr(reason, "value", reason) >= REFUSED:
+                    raise Misconfigured(
+                        f"The broker {self.where} does not let the bridge read {self.base}/{topic}: {reason}. Look at its"
+                        " list of rights."
+                    )
+        except aiomqtt.MqttError as error:
+            raise self._wrong(error) from error
+        return f"{self.where}/{self.base}"
+
+    async def close(self) -> None:
+        """Leave the broker; the session stays."""
+        client, self._client = self._client, None
+        if self._listening is not None:
+            self._listening.cancel()
+            await asyncio.gather(self._listening, return_exceptions=True)
+            self._listening = None
+        if client is not None:
+            with contextlib.suppress(aiomqtt.MqttError, TimeoutError):
+                async with asyncio.timeout(GOODBYE):
+                    await client.__aexit__(None, None, None)
+        self._readings, self._answers, self._told = [], [], []  # not acknowledged: they come again
+        self._offered = None
+
+    async def _listen(self, client: aiomqtt.Client) -> None:
+        async for message in client.messages:
+            match str(message.topic).rpartition("/")[2]:
+                case "readings":
+                    self._readings.append(message)
+                case "applied":
+                    self._answers.append(message)
+                case _:
+                    self._take_offsets(message)
+                    self._done(message)
+
+    def _there(self) -> aiomqtt.Client:
+        """The client; raises where the connection has ended."""
+        if self._listening is not None and self._listening.done():
+            error = self._listening.exception()
+            if isinstance(error, aiomqtt.MqttError):
+                raise self._wrong(error)
+            raise ControlAway(f"The broker {self.where} has ended the connection.") from error
+        if self._client is None:
+            raise ControlAway(f"There is no connection to the broker {self.where}.")
+        return self._client
+
+    def _done(self, message: aiomqtt.Message) -> None:
+        """Acknowledge a message to the broker."""
+        if message.qos and self._client is not None:
+            self._client._client.ack(message.mid, message.qos)  # noqa: SLF001
+
+    async def _publish(
+        self, topic: str, content: object, *, retain: bool = False, expires: float | None = None
+    ) -> None:
+        properties = Properties(PacketTypes.PUBLISH)  # type: ignore[no-untyped-call]
+        if expires is not None:
+            properties.MessageExpiryInterval = round(expires)
+        try:
+            await self._there().publish(
+                f"{self.base}/{topic}", json.dumps(content), qos=AT_LEAST_ONCE, retain=retain, properties=properties
+            )
+        except aiomqtt.MqttError as error:
+            raise self._wrong(error) from error
+
+    def _wrong(self, error: aiomqtt.MqttError) -> LinkError:
+        """The error of ours that stands for one of the library."""
+        reason = getattr(error, "rc", None) or getattr(error.__cause__, "rc", None)
+        code = getattr(reason, "value", reason)
+        if code in {BAD_LOGIN, NOT_ALLOWED, 4, 5}:
+            return Misconfigured(
+                f"The broker {self.where} refuses the login of {self.settings.username or 'a client without a name'}: look"
+                " at username, password, certificate, and the broker's list of users."
+            )
+        if code == TAKEN_OVER:
+            self._taken_over = time.monotonic()
+            return Misconfigured(self._takeover())
+        if "CERTIFICATE_VERIFY_FAILED" in str(error):
+            return Misconfigured(
+                f"The certificate of the broker {self.where} is not to be trusted ({error}): look at ca, and that host is a"
+                " name in the certificate."
+            )
+        if "SSL" in str(error) or "TLS" in str(error):
+            return Misconfigured(f"No encrypted connection to the broker {self.where}: {error}. Look at tls, port, ca.")
+        if self._listening is not None and self._listening.done():
+            return ControlAway(
+                f"The broker {self.where} has ended the connection. Does it still run, and does another program use the client"
+                f" id {self._client_id()!r}, such as a second bridge? Each has its own, and one bridge alone serves a machine."
+            )
+        return ControlAway(
+            f"The broker {self.where} does not answer: {error}. Look at host, port and network; does it run?"
+        )
+
+    def _takeover(self) -> str:
+        return (
+            f"Another program has connected to the broker {self.where} with the client id {self._client_id()!r}: does a"
+            " second bridge run with this machine? Each has its own client_id, and one bridge alone serves a machine."
+        )
+
+    def _client_id(self) -> str:
+        return self.settings.client_id or f"inband-bridge-{self.machine.key}"
+
+    def _password(self) -> str | None:
+        if self.settings.password_env:
+            if (password := os.environ.get(self.settings.password_env)) is None:
+                raise Misconfigured(f"The variable {self.settings.password_env} (password_env) is not set.")
+            return password
+        if self.settings.password_file:
+            try:
+                return Path(self.settings.password_file).read_text(encoding="utf-8").strip()
+            except (OSError, UnicodeDecodeError) as error:
+                raise Misconfigured(f"password_file {self.settings.password_file} cannot be read: {error}.") from error
+        return None
+
+    def _tls(self) -> ssl.SSLContext:
+        try:
+            context = ssl.create_default_context(cafile=self.settings.ca)
+            if self.settings.certificate is not None:
+                context.load_cert_chain(self.settings.certificate, self.settings.private_key)
+        except (OSError, ssl.SSLError) as error:
+            raise Misconfigured(f"ca, certificate or private_key cannot be read: {error}.") from error
+        return context
+
+    # --- readings
+
+    async def fetch(self, stored: Position) -> Sequence[Received]:
+        """Readings that came since the last call."""
+        del stored
+        self._there()
+        messages, self._readings = self._readings, []
+        return [self._received(message) for message in messages]
+
+    def _received(self, message: aiomqtt.Message) -> Received:
+        payload = bytes(message.payload)
+        body, fault = _read(payload)
+        key: Any = body.get("key")
+        if fault is None and not (isinstance(key, str) and 1 <= len(key) <= LONGEST_KEY):
+            fault = f"The reading has no key of 1 to {LONGEST_KEY} characters: without one nobody can tell a repeat from a reading."
+        if fault is not None:
+            digest = hashlib.sha256(payload).hexdigest()[:32]
+            name = key if isinstance(key, str) and 1 <= len(key) <= LONGEST_KEY else None
+            shown = {"message": payload[:200].decode("utf-8", "replace")}
+            return Received(f"{self.machine.key}:refused:{digest}", shown, fault=fault, mark=(message, name))
+        name = str(body["characteristic"])
+        content = {each: value for each, value in body.items() if each != "key"}
+        content["characteristic"] = self.machine.characteristics.get(name, name)
+        for each in ("measured", "touches"):
+            if each in content:
+                content[each] = self._in_mm(content[each])
+        return Received(key, content, mark=(message, key))
+
+    def _in_mm(self, value: Any) -> Any:
+        if isinstance(value, list):
+            return [self._in_mm(each) for each in value]
+        is_length = isinstance(value, int | float) and not isinstance(value, bool)
+        return round(value * self.scale, 9) if is_length and self.scale != 1.0 else value
+
+    async def acknowledge(self, received: Sequence[Received]) -> None:
+        """Tell the machine which keys are stored, then the broker that the messages are done."""
+        for each in received:
+            message, key = each.mark
+            if key is not None:
+                await self._publish("stored", {"key": key} | ({"refused": each.fault} if each.fault else {}))
+            else:
+                await self._publish("stored", {"key": None, "refused": each.fault})
+            self._done(message)
+
+    # --- corrections
+
+    async def offer(self, orders: Sequence[Order]) -> None:
+        """Publish the pending list, retained, when it has changed, and before it expires."""
+        self._there()
+        while self._told:
+            self._done(self._told.pop())
+        if self.machine.corrections == "none":
+            return
+        now = time.monotonic()
+        valid = self.settings.valid
+        if self._offered is not None and self._offered[0] == tuple(orders) and now < self._offered[1] + valid / 2:
+            return
+        expires = datetime.now(UTC) + timedelta(seconds=valid)
+        content = [self._told_as(order, expires) for order in orders]
+        await self._publish("corrections", {"corrections": content}, retain=True, expires=valid if content else None)
+        self._offered = (tuple(orders), now)
+
+    def _told_as(self, order: Order, expires: datetime) -> dict[str, object]:
+        location = self._location(order.tool_memory)
+        assert location is not None  # the guards have seen to it
+        unit = self.machine.unit
+        return {
+            "number": order.number,
+            "tool_memory": order.tool_memory,
+            "tool": location.tool,
+            "edge": location.edge,
+            "register": location.register,
+            "before": round(location.to_control(order.before, unit), 6),
+            "after": round(location.to_control(order.after, unit), 6),
+            "unit": unit,
+            "expires_at": expires.isoformat(timespec="seconds"),
+        }
+
+    def _location(self, tool_memory: int) -> Location | None:
+        return next((place for place in self.machine.location if place.tool_memory == tool_memory), None)
+
+    async def outcomes(self) -> Sequence[Outcome]:
+        """The machine's answers since the last call."""
+        self._there()
+        messages, self._answers = self._answers, []
+        self._told += messages
+        found = []
+        for message in messages:
+            try:
+                found.append(self._outcome(_object(bytes(message.payload))))
+            except ValueError as error:
+                log.warning("%s: an answer on %s/applied is passed over: %s", self.machine.key, self.base, error)
+        return found
+
+    def _outcome(self, body: Mapping[str, Any]) -> Outcome:
+        number, after, refused = (body.get(name) for name in ("number", "offset_after", "refused"))
+        if not isinstance(number, int) or isinstance(number, bool):
+            raise ValueError("it has no number of a correction")  # noqa: TRY004 - of a message, not of a caller
+        if (after is None) == (refused is None):
+            raise ValueError("it has either offset_after, applied, or refused, a reason")
+        order = next((each for each in (self._offered or ((), 0.0))[0] if each.number == number), None)
+        location = self._location(order.tool_memory if order else int(body.get("tool_memory") or 0))
+        held = after if after is not None else body.get("offset")
+        if held is not None and (isinstance(held, bool) or not isinstance(held, int | float)):
+            raise ValueError("the offset is not a number")
+        offset = None if held is None or location is None else location.from_control(held, self.machine.unit)
+        if refused is None:
+            return Outcome(number, applied=True, offset=offset)
+        return Outcome(number, False, offset, str(refused)[:500], differs=body.get("differs") is True)
+
+    # --- offsets
+
+    async def offsets(self) -> dict[int, float]:
+        """The offsets that the machine has published, if it does."""
+        return dict(self._offsets)
+
+    def _take_offsets(self, message: aiomqtt.Message) -> None:
+        try:
+            body = _object(bytes(message.payload))
+        except ValueError as error:
+            log.warning("%s: %s/offsets is passed over: %s", self.machine.key, self.base, error)
+            return
+        for location in self.machine.location:
+            value = body.get(str(location.tool_memory))
+            if isinstance(value, int | float) and not isinstance(value, bool):
+                self._offsets[location.tool_memory] = location.from_control(value, self.machine.unit)
+
+
+def _connect_properties(session: int) -> Properties:
+    properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+    properties.SessionExpiryInterval = session
+    properties.ReceiveMaximum = IN_FLIGHT
+    return properties
+
+
+def _object(payload: bytes) -> dict[str, Any]:
+    """The JSON object of a message. Raises `ValueError` with a sentence."""
+    if len(payload) > LARGEST:
+        raise ValueError(f"The message has {len(payload)} bytes, the most is {LARGEST}.")
+    try:
+        content = json.loads(payload, parse_constant=_no_number)
+    except UnicodeDecodeError:
+        raise ValueError("The message is not UTF-8.") from None
+    except json.JSONDecodeError as error:
+        raise ValueError(f"The message is no JSON: {error}. Was it cut off?") from None
+    except RecursionError:
+        raise ValueError("The message is no reading: its JSON is nested too deep.") from None
+    if not isinstance(content, dict):
+        raise ValueError("The message is no JSON object {…}.")  # noqa: TRY004 - as above
+    return content
+
+
+def _no_number(text: str) -> None:
+    raise ValueError(f"The message holds {text}, which is no number.")
+
+
+def _read(payload: bytes) -> tuple[dict[str, Any], str | None]:
+    """The body of a reading, and what is wrong with it."""
+    try:
+        body = _object(payload)
+    except ValueError as error:
+        return {}, str(error)
+    if unknown := sorted(body.keys() - FIELDS.keys()):
+        return body, f"The reading has a field that is not known: {unknown[0]!r}. Known are {', '.join(FIELDS)}."
+    for name, value in body.items():
+        wanted: Any = FIELDS[name]
+        if value is not None and (
+            not isinstance(value, wanted) or (isinstance(value, bool) and name != "first_move_triggered")
+        ):
+            return body, f"{name} = {str(value)[:40]!r} is not of the kind that a reading has there."
+    if not body.get("characteristic"):
+        return body, "The reading has no characteristic."
+    if (body.get("measured") is None) == (body.get("touches") is None):
+        return body, "The reading has either measured or touches."
+    return {name: value for name, value in body.items() if value is not None}, None
+
+
+def link(machine: Machine) -> MqttLink:
+    """The link to a machine by a broker."""
+    return MqttLink(machine)

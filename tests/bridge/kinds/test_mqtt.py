@@ -1,0 +1,395 @@
+"""MQTT over a real broker (mosquitto): killed and restarted, half messages, repeats, two bridges, refused logins."""
+
+import asyncio
+import json
+import subprocess
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any, Self
+
+import aiomqtt
+import msgspec
+import pytest
+
+from app.bridge import control_side
+from app.bridge.configuration import ConfigurationError, Machine, configuration_from
+from app.bridge.kinds.mqtt import MqttLink, link
+from app.bridge.links import ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.simulators.model import Model
+from app.bridge.simulators.mqtt import MqttSimulator, free_port, mosquitto, start_broker
+from app.bridge.store import Store
+from app.bridge.unit import Unit
+from tests.bridge.plant import bridge, store_in, until
+from tests.loops import run
+from tests.shop import Shop
+
+pytestmark = pytest.mark.skipif(mosquitto() is None, reason="mosquitto is not installed")
+TOPIC = "inband/v1/lathe-1"
+READING = {"characteristic": "1", "measured": 40.012, "part": "P1"}
+
+
+class Broker:
+    """A mosquitto that can be killed; what it has saved survives."""
+
+    def __init__(self, folder: Path, *lines: str) -> None:
+        self.folder, self.lines = folder, lines
+        self.port = free_port()
+        self.process: asyncio.subprocess.Process | None = None
+
+    async def start(self) -> None:
+        self.process = await start_broker(self.folder, self.port, *self.lines)
+
+    async def kill(self) -> None:
+        assert self.process is not None
+        self.process.kill()
+        await self.process.wait()
+
+    async def __aenter__(self) -> Self:
+        await self.start()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        if self.process is not None and self.process.returncode is None:
+            await self.kill()
+
+
+def machine(port: int, unit: str = "mm", corrections: str = "control", **settings: Any) -> Machine:
+    place = {"tool_memory": 3, "tool": 3, "register": "wear_length_1", "holds": "diameter"}
+    table = {
+        "kind": "mqtt",
+        "unit": unit,
+        "secret": "x",
+        "corrections": corrections,
+        "interval": 0.02,
+        "patience": 30.0,
+    }
+    table |= {"proof_needed": False, "location": [place], "characteristics": {"1": "shaft-1"}}
+    content = {
+        "server": {"url": "http://127.0.0.1:1"},
+        "machine": {"lathe-1": table | {"mqtt": {"host": "127.0.0.1", "port": port} | settings}},
+    }
+    return configuration_from(content, Path()).machines[0]
+
+
+@asynccontextmanager
+async def connected(chosen: Machine) -> AsyncIterator[MqttLink]:
+    there = link(chosen)
+    try:
+        await there.connect()
+        yield there
+    finally:
+        await there.close()
+
+
+@asynccontextmanager
+async def fetching(chosen: Machine, store: Store) -> AsyncIterator[Unit]:
+    unit = Unit(chosen, link(chosen), store)
+    task = asyncio.create_task(control_side.run(unit))
+    try:
+        yield unit
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+async def fetched(there: MqttLink, count: int = 1) -> list[Received]:
+    found: list[Received] = []
+
+    async def enough() -> bool:
+        found.extend(await there.fetch(Position()))
+        return len(found) >= count
+
+    await until(enough, "messages")
+    return found
+
+
+async def say(port: int, topic: str, *contents: object, **other: Any) -> None:
+    async with aiomqtt.Client("127.0.0.1", port, **other) as client:
+        for content in contents:
+            payload = content if isinstance(content, bytes) else json.dumps(content)
+            await client.publish(f"{TOPIC}/{topic}", payload, qos=1)
+
+
+def test_a_reading_is_answered_with_its_key_when_it_is_stored(tmp_path: Path) -> None:
+    async def work() -> None:
+        async with Broker(tmp_path) as broker, connected(machine(broker.port)) as there:
+            async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+                await client.subscribe(f"{TOPIC}/stored", qos=1)
+                await say(broker.port, "readings", READING | {"key": "a"})
+                received = await fetched(there)
+                await there.acknowledge(received)
+                message = await anext(aiter(client.messages))
+                assert json.loads(bytes(message.payload)) == {"key": "a"}
+            assert received[0].key == "a"
+            assert received[0].body == READING | {"characteristic": "shaft-1"}
+
+    run(work())
+
+
+def test_what_was_not_stored_comes_again_from_the_broker(tmp_path: Path) -> None:
+    """Acknowledged to the broker is what is stored: a bridge that is killed in between loses nothing."""
+
+    async def work() -> None:
+        async with Broker(tmp_path) as broker:
+            chosen = machine(broker.port)
+            async with connected(chosen) as there:
+                await say(broker.port, "readings", READING | {"key": "a"}, READING | {"key": "b"})
+                first, _ = await fetched(there, 2)
+                await there.acknowledge([first])
+            await say(broker.port, "readings", READING | {"key": "c"})  # while nobody listens
+            async with connected(chosen) as there:
+                assert [each.key for each in await fetched(there, 2)] == ["b", "c"]
+
+    run(work())
+
+
+@pytest.mark.parametrize(
+    ("payload", "words"),
+    [
+        (b'{"characteristic": "shaft-1", "meas', "is no JSON"),
+        (b"\xff\xfe{}", "is no"),
+        (b"[1]", "is no JSON object"),
+        (b'{"characteristic": "1", "measured": NaN, "key": "a"}', "holds NaN, which is no number"),
+        (b'{"characteristic": "1", "measured": 1}', "has no key"),
+        (b'{"characteristic": "1", "key": "a"}', "has either measured or touches"),
+        (b'{"characteristic": "1", "measured": "40,01", "key": "a"}', "measured = '40,01' is not of the kind"),
+        (b'{"characteristic": "1", "measured": 1, "size": 2, "key": "a"}', "not known: 'size'"),
+        (b'{"measured": 1, "key": "a"}', "has no characteristic"),
+    ],
+)
+def test_what_is_no_reading_goes_to_the_quarantine(tmp_path: Path, payload: bytes, words: str) -> None:
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        async with Broker(tmp_path) as broker, fetching(machine(broker.port), store) as unit:
+            await until(lambda: unit.state == "online", "the bridge is connected")
+            await say(broker.port, "readings", payload, READING | {"key": "good"})
+
+            async def both() -> bool:
+                return bool(await store.quarantine("lathe-1")) and bool(await store.waiting("lathe-1"))
+
+            await until(both, "the bad one and the good one")
+        [bad] = await store.quarantine("lathe-1")
+        assert words in bad.reason
+        assert [row.key for row in await store.waiting("lathe-1")] == ["good"]
+        store.close()
+
+    run(work())
+
+
+def test_sizes_are_in_the_unit_of_the_machine(tmp_path: Path) -> None:
+    async def work() -> None:
+        async with Broker(tmp_path) as broker, connected(machine(broker.port, unit="inch")) as there:
+            await say(broker.port, "readings", {"characteristic": "1", "touches": [[1.0, None]], "key": "a"})
+            [received] = await fetched(there)
+            assert received.body["touches"] == [[25.4, None]]
+
+    run(work())
+
+
+def test_the_pending_list_is_retained_and_expires(tmp_path: Path) -> None:
+    async def work() -> None:
+        async with Broker(tmp_path) as broker:
+            chosen = machine(broker.port)
+            async with connected(chosen) as there:
+                await there.offer([Order(7, 3, 0.01, 0.002)])
+            async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+                await client.subscribe(f"{TOPIC}/corrections", qos=1)
+                message = await anext(aiter(client.messages))
+                [told] = json.loads(bytes(message.payload))["corrections"]
+                assert message.retain
+                assert (told["number"], told["before"], told["after"], told["unit"]) == (7, 0.01, 0.002, "mm")
+                async with connected(chosen) as there:  # begun anew: nothing is pending until the server has said so
+                    await there.offer([])
+                    message = await anext(aiter(client.messages))
+                    assert json.loads(bytes(message.payload)) == {"corrections": []}
+
+    run(work())
+
+
+def test_answers_to_corrections_are_read(tmp_path: Path) -> None:
+    async def work() -> None:
+        async with Broker(tmp_path) as broker, connected(machine(broker.port)) as there:
+            await there.offer([Order(7, 3, 0.01, 0.002)])
+            answers = ({"number": 7}, {"number": 7, "offset_after": 0.002}, {"number": 7, "refused": "locked"})
+            await say(broker.port, "applied", b"{", *answers)
+            found: list[Outcome] = []
+
+            async def enough() -> bool:
+                found.extend(await there.outcomes())
+                return len(found) == 2
+
+            await until(enough, "both answers")
+            assert found == [Outcome(7, applied=True, offset=0.002), Outcome(7, False, None, "locked")]
+            await say(broker.port, "offsets", {"3": 0.05})
+
+            async def offsets() -> bool:
+                return await there.offsets() == {3: 0.05}
+
+            await until(offsets, "the offsets")
+
+    run(work())
+
+
+def test_a_broker_that_is_away_and_direct_writing_are_told() -> None:
+    async def work() -> None:
+        with pytest.raises(ControlAway, match=r"The broker 127\.0\.0\.1:\d+ does not answer"):
+            await link(machine(free_port())).connect()
+        with pytest.raises(Misconfigured, match="sets its offsets itself"):
+            await link(machine(1, corrections="direct")).connect()
+
+    run(work())
+
+
+def test_a_refused_login_is_told(tmp_path: Path) -> None:
+    async def work() -> None:
+        users = tmp_path / "users"
+        users.write_text("other:$7$101$AAAA$AAAA\n", encoding="utf-8")
+        async with Broker(tmp_path, "allow_anonymous false") as broker:
+            with pytest.raises(Misconfigured, match="refuses the login"):
+                await link(machine(broker.port)).connect()
+
+    run(work())
+
+
+def test_two_bridges_with_one_client_id_are_told(tmp_path: Path) -> None:
+    async def work() -> None:
+        async with Broker(tmp_path) as broker:
+            chosen = machine(broker.port)
+            async with connected(chosen) as first, connected(chosen):
+                with pytest.raises(LinkError, match="a second bridge"):
+                    for _ in range(600):
+                        await first.fetch(Position())
+                        await asyncio.sleep(0.05)
+
+    run(work())
+
+
+@pytest.mark.filterwarnings(
+    "ignore::pytest.PytestUnraisableExceptionWarning"
+)  # paho leaves the socket of a failed handshake
+def test_certificates_on_both_sides(tmp_path: Path) -> None:
+    """The broker wants a certificate of the client; a bridge without one, or with another authority, is told."""
+    for name in ("ca", "other"):
+        _openssl(tmp_path, "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", f"/CN={name}",
+                 "-keyout", f"{name}.key", "-out", f"{name}.crt")  # fmt: skip
+    for name in ("broker", "client"):
+        _openssl(tmp_path, "req", "-newkey", "rsa:2048", "-nodes", "-subj", f"/CN={name}",
+                 "-keyout", f"{name}.key", "-out", f"{name}.csr")  # fmt: skip
+        (tmp_path / "names").write_text("subjectAltName=IP:127.0.0.1\n", encoding="utf-8")
+        _openssl(tmp_path, "x509", "-req", "-in", f"{name}.csr", "-CA", "ca.crt", "-CAkey", "ca.key", "-CAcreateserial",
+                 "-days", "2", "-extfile", "names", "-out", f"{name}.crt")  # fmt: skip
+    for file in tmp_path.iterdir():
+        file.chmod(0o644)  # mosquitto leaves root's rights
+    lines = [f"cafile {tmp_path}/ca.crt", f"certfile {tmp_path}/broker.crt", f"keyfile {tmp_path}/broker.key"]
+    lines += ["require_certificate true", "use_identity_as_username true"]
+    own = {"certificate": f"{tmp_path}/client.crt", "private_key": f"{tmp_path}/client.key"}
+
+    async def work() -> None:
+        async with Broker(tmp_path, *lines) as broker:
+            async with connected(machine(broker.port, tls=True, ca=f"{tmp_path}/ca.crt", **own)) as there:
+                assert await there.fetch(Position()) == []
+            with pytest.raises(Misconfigured, match="is not to be trusted"):
+                await link(machine(broker.port, tls=True, ca=f"{tmp_path}/other.crt", **own)).connect()
+            with pytest.raises(Misconfigured, match="cannot be read"):
+                await link(machine(broker.port, tls=True, ca=f"{tmp_path}/missing.crt")).connect()
+
+    run(work())
+
+
+def _openssl(folder: Path, *words: str) -> None:
+    subprocess.run(["openssl", *words], cwd=folder, check=True, capture_output=True)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"ca": "a.crt"}, "need tls = true"),
+        ({"tls": True, "certificate": "a"}, "belong together"),
+        ({"prefix": "inband/#"}, "is no part of a topic"),
+        ({"password_env": "X"}, "a password needs a username"),
+    ],
+)
+def test_contradictions_are_told_with_their_place(settings: dict[str, Any], words: str) -> None:
+    with pytest.raises(ConfigurationError, match=r"machine.lathe-1.mqtt") as caught:
+        machine(1, **settings)
+    assert words in str(caught.value)
+
+
+def test_every_reading_once_while_broker_and_bridge_are_killed(tmp_path: Path) -> None:
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        async with Broker(tmp_path) as broker:
+            model = Model(serial="LATHE-1")
+            simulator = MqttSimulator(model, "127.0.0.1", broker.port, again=0.5)
+            await simulator.start()
+            chosen = machine(broker.port)
+            try:
+                for number in range(4):
+                    async with fetching(chosen, store):
+                        for _ in range(5):
+                            await _part(model)
+                        if number % 2 == 0:
+                            await broker.kill()
+                            await _part(model)
+                            await broker.start()
+                        await asyncio.sleep(0.2)
+                async with fetching(chosen, store):
+                    await until(lambda: len(simulator.stored) == len(model.truth()), "everything is stored")
+            finally:
+                await simulator.stop()
+            rows = await store.waiting("lathe-1", 1000)
+            assert {row.key: row.body["measured"] for row in rows} == {
+                f"lathe-1:{key}": size for key, size in model.truth().items()
+            }
+            assert len(rows) == len(model.truth())
+        store.close()
+
+    run(work())
+
+
+async def _part(model: Model) -> None:
+    for _ in model.part():
+        await asyncio.sleep(0.005)
+
+
+def test_corrections_reach_the_machine_once_through_a_server(shop: Shop, tmp_path: Path) -> None:
+    """The loop closed over the broker, which is killed in between."""
+
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        async with Broker(tmp_path) as broker:
+            model = Model(serial=shop.machine.upper())
+            simulator = MqttSimulator(model, "127.0.0.1", broker.port, again=0.5)
+            await simulator.start()
+            fields = {"key": shop.machine, "characteristics": {"1": shop.characteristic}}
+            chosen = msgspec.structs.replace(machine(broker.port), **fields)
+            unit = Unit(chosen, link(chosen), store)
+            secret = shop.machine_client.headers["Authorization"].split()[1]
+            try:
+                async with bridge(shop.server.url, secret, unit):
+                    for number in range(14):
+                        await _part(model)
+                        if number == 6:
+                            await broker.kill()
+                            await broker.start()
+                        await until(lambda: len(simulator.stored) == len(model.truth()), "everything is stored")
+
+                    async def applied() -> bool:
+                        if not model.applied:
+                            await _part(model)
+                            await asyncio.sleep(0.3)
+                            return False
+                        answer = await asyncio.to_thread(shop.correction, model.applied[0].number)
+                        return bool(answer["status"] == "applied")
+
+                    await until(applied, "the server knows of the first correction")
+            finally:
+                await simulator.stop()
+            numbers = [each.number for each in model.applied]
+            assert numbers == sorted(set(numbers))
+            total = sum(each.after - each.before for each in model.applied)
+            assert model.offsets[3, 1, "wear_length_1"] == pytest.approx(total, abs=1e-6)
+        store.close()
+
+    run(work())
