@@ -68,12 +68,12 @@ class Applied(NamedTuple):
 
 @dataclass(slots=True)
 class Model:
-    """A machine. history: every change of an offset, before and after, by the NC program or by hand."""
+    """A machine. seed: None for another noise, and another epoch, each time. history: every change of an offset, before and after, by the NC program or by hand."""
 
     features: tuple[Feature, ...] = (Feature(),)
     unit: Unit = Unit.MM
     serial: str = "SIM-0001"
-    seed: int = 1
+    seed: int | None = 1
     clock_ahead: float = 0.0
     registers: list[float] = field(default_factory=lambda: [0.0] * SIZE)
     offsets: dict[tuple[int, int, str], float] = field(default_factory=dict)

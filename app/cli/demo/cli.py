@@ -39,6 +39,10 @@ def demo(
             help="So many days of past at the first start, one shift a day: 42 for six weeks. Else some hours.",
         ),
     ] = None,
+    bridge: Annotated[
+        bool,
+        typer.Option("--bridge", envvar="INBAND_BRIDGE", help="One more machine: a simulated control, and a bridge."),
+    ] = False,
     log_level: LogLevel = None,
     log_format: LogForm = None,
 ) -> None:
@@ -59,6 +63,10 @@ def demo(
 
     def beside(settings: "Settings") -> None:
         start(settings, plant_key[0], seed, speed, past)
+        if bridge:
+            from app.cli.demo import bridging
+
+            bridging.start(f"http://{_here(settings.host)}:{settings.port}", plant_key[0], speed)
 
     run(settings, prepare=prepare, beside=beside)
 
