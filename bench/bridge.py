@@ -22,6 +22,7 @@ import httpx
 from app.bridge.simulators import simulator_named
 from app.bridge.simulators.model import Model
 from app.cli.bridge import toml_of
+from app.core.ring import SLOTS, Register
 from bench.plant import PARAMETERS, median, plant
 
 WARM = 20.0  # s
@@ -44,7 +45,9 @@ async def simulate(kind: str, machines: int) -> None:
         while True:
             began = time.monotonic()
             for _ in models[number].part():
-                pass
+                registers = models[number].registers
+                if registers[Register.WRITTEN] - registers[Register.ACK] >= SLOTS:
+                    await asyncio.sleep(0.05)
             times[number].append(time.time())
             await asyncio.sleep(max(0.0, CYCLE - (time.monotonic() - began)))
 

@@ -26,13 +26,13 @@ def test_of_several_hosts_the_one_is_taken_that_can_be_written_to() -> None:
 
 def test_what_a_block_does_is_committed_or_undone_as_one(database: Database) -> None:
     with database.begin() as session:
-        session.execute(text("CREATE TABLE note (words text)"))
-        session.execute(text("INSERT INTO note VALUES ('kept')"))
+        session.execute(text("CREATE TABLE slip (words text)"))
+        session.execute(text("INSERT INTO slip VALUES ('kept')"))
     with pytest.raises(ZeroDivisionError), database.begin() as session:
-        session.execute(text("INSERT INTO note VALUES ('undone')"))
+        session.execute(text("INSERT INTO slip VALUES ('undone')"))
         raise ZeroDivisionError
     with psycopg.connect(database.dsn) as connection:
-        assert connection.execute("SELECT words FROM note").fetchall() == [("kept",)]
+        assert connection.execute("SELECT words FROM slip").fetchall() == [("kept",)]
 
 
 def test_times_come_back_in_utc_and_need_an_offset(database: Database) -> None:

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import logging
-import tempfile
+import shutil
 import threading
 from pathlib import Path
 from typing import Any
@@ -34,13 +34,16 @@ PARAMETERS = {
 CYCLE = 120.0  # s of life per part
 
 
-def start(url: str, admin_key: str, speed: float) -> None:
-    """Set the machine up, and let its control and the bridge run in a thread until the server's process ends."""
+def start(url: str, admin_key: str, speed: float, folder: Path) -> None:
+    """Set the machine up, and let its control and the bridge run in a thread until the server's process ends.
+
+    folder: of the bridge's store, begun anew each time as the control's counters are.
+    """
     with Client(url, admin_key) as admin:
         _set_up(admin)
         secret = new_key(admin, f"/machines/{MACHINE}/keys", {"name": KEY_NAME})
         offset = admin.get(f"/machines/{MACHINE}/tools/{TOOL}")["offset"]
-    threading.Thread(target=_run, args=(url, secret, offset, speed), name="demo bridge", daemon=True).start()
+    threading.Thread(target=_run, args=(url, secret, offset, speed, folder), name="demo bridge", daemon=True).start()
 
 
 def _set_up(admin: Client) -> None:
@@ -53,10 +56,10 @@ def _set_up(admin: Client) -> None:
         admin.post("/characteristics", body | {"parameters": PARAMETERS})
 
 
-def _run(url: str, secret: str, offset: float, speed: float) -> None:
+def _run(url: str, secret: str, offset: float, speed: float, folder: Path) -> None:
     try:
-        with tempfile.TemporaryDirectory(prefix="inband-demo-bridge-") as folder:
-            asyncio.run(_machine_and_bridge(url, secret, offset, speed, Path(folder)))
+        shutil.rmtree(folder, ignore_errors=True)
+        asyncio.run(_machine_and_bridge(url, secret, offset, speed, folder))
     except Exception:
         log.exception("the bridge of the demonstration plant has ended")
 

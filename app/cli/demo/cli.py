@@ -66,7 +66,8 @@ def demo(
         if bridge:
             from app.cli.demo import bridging
 
-            bridging.start(f"http://{_here(settings.host)}:{settings.port}", plant_key[0], speed)
+            url = f"http://{_here(settings.host)}:{settings.port}"
+            bridging.start(url, plant_key[0], speed, settings.data_dir / "demo-bridge")
 
     run(settings, prepare=prepare, beside=beside)
 

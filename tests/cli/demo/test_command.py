@@ -22,6 +22,7 @@ def begin(port: int, url: str, folder: Path, log: Path) -> "subprocess.Popen[byt
                 "-m",
                 "app",
                 "demo",
+                "--bridge",
                 "--port",
                 str(port),
                 "--database-url",
@@ -39,16 +40,22 @@ def begin(port: int, url: str, folder: Path, log: Path) -> "subprocess.Popen[byt
 
 
 def signed_in(port: int, log: Path) -> None:
-    """Sign in with what is printed, and see readings come."""
+    """Sign in with what is printed, and see readings come, those of the bridged machine too."""
     found = re.search(r"engineer\s+(\S{14})", log.read_text())
     assert found, log.read_text()
     with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=10) as client:
         body = {"name": "engineer", "password": found[1]}
         assert client.post("/sign-in", data=body).is_redirect
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + 60
         while time.monotonic() < deadline:
             answer = client.get("/api/v1/readings", params={"characteristic": "plate-d30", "limit": 50})
-            if answer.is_success and len(answer.json()["items"]) == 50:
+            bridged = client.get("/api/v1/readings", params={"characteristic": "spigot-d30"})
+            if (
+                answer.is_success
+                and len(answer.json()["items"]) == 50
+                and bridged.is_success
+                and bridged.json()["items"]
+            ):
                 return
             time.sleep(0.2)
     pytest.fail(log.read_text())
