@@ -85,5 +85,5 @@ async def _connected(unit: Unit) -> None:
             offsets_at = time.monotonic() + machine.offsets_every
         unit.polls += 1
         remark = getattr(link, "remark", "")  # of kinds that see gaps in what a control prints
-        unit.say("held" if unit.hold_all else "online", " ".join(filter(None, (*unit.held_back, remark))))
+        unit.say("held" if unit.held else "online", " ".join(filter(None, (*unit.held_back, remark))))
         await asyncio.sleep(machine.interval)

@@ -140,9 +140,9 @@ async def _ask(unit: Unit, client: AsyncClient) -> None:
     if machine.corrections == "none":
         return
     pending = await client.pending(machine.key)
-    closed = {intent.order.number for intent in await store.intents(machine.key, "told")}
+    told = {intent.order.number: intent for intent in await store.intents(machine.key, "told")} if pending else {}
     known = await store.known(machine.key)
-    held = (
+    unit.held = (
         unit.hold_all
         or await store.fact("", "hold_all") is not None
         or await store.fact(machine.key, "hold") is not None
@@ -151,13 +151,14 @@ async def _ask(unit: Unit, client: AsyncClient) -> None:
     waiting: list[str] = []
     now = datetime.now(UTC)
     for correction in pending:
-        order = _order(correction)
-        if correction.number in closed:
-            await client.reject(
-                machine.key, order.number, "The control has refused this correction; its offset was reported."
-            )
+        if correction.offset_expected is None:
+            waiting.append(f"Correction {correction.number} waits: the server does not say which offset it leads to.")
+            break
+        order = _order(correction, correction.offset_expected)
+        if earlier := told.get(correction.number):
+            await _tell_again(unit, client, order, earlier)
             continue
-        verdict = against(order, correction.created_at or now, now, machine, known, held)
+        verdict = against(order, correction.created_at or now, now, machine, known, unit.held)
         if verdict is None:
             orders.append(order)
         elif verdict.final:
@@ -182,8 +183,21 @@ async def _intend(unit: Unit, orders: Sequence[Order]) -> None:
     unit.orders = tuple(orders[:1])
 
 
-def _order(correction: Correction) -> Order:
-    after = correction.offset_expected or 0.0
+async def _tell_again(unit: Unit, client: AsyncClient, order: Order, earlier: Intent) -> None:
+    """A correction waits whose answer the server has heard: the answer was lost when the server went back in time, or the
+    control has refused it, or the number was given anew to another correction.
+    """
+    same = abs(order.after - earlier.order.after) <= NOTICED and order.tool_memory == earlier.order.tool_memory
+    if same and earlier.outcome is not None and earlier.outcome.applied:
+        await _tell_one(unit, client, earlier)
+        return
+    reason = "The control has refused this correction; its offset was reported."
+    if not same:
+        reason = "The control has had another correction with this number, before the server went back in time."
+    await client.reject(unit.machine.key, order.number, reason)
+
+
+def _order(correction: Correction, after: float) -> Order:
     return Order(correction.number, correction.tool_memory, round(after - correction.amount, 6), round(after, 6))
 
 
@@ -243,7 +257,7 @@ async def heartbeat(unit: Unit) -> dict[str, Any]:
         "clock_offset": unit.link.clock.offset,
         "started_at": unit.started_at,
         "mapping": machine.mapping_hash(),
-        "hold_all": unit.hold_all,
+        "hold_all": unit.held,
         "identity": unit.identity,
         "locations": locations,
     }

@@ -43,8 +43,7 @@ CREATE TABLE IF NOT EXISTS location (
 CREATE TABLE IF NOT EXISTS fact (machine TEXT NOT NULL, name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (machine, name));
 """
 PAGE_ROWS: Final = 200
-ALL: Final = ""
-"""The machine of facts that hold for all."""
+ANSWERS_KEPT: Final = 90 * 86_400.0  # s
 
 
 class StoreError(Exception):
@@ -237,13 +236,16 @@ class Store:
         )
 
     async def tidy(self, keep: float) -> int:
-        """Delete what the server has had for ``keep`` seconds. How many."""
-        before = time.time() - keep
-        return await self._run(
-            lambda database: (
-                database.execute("DELETE FROM reading WHERE state = 'sent' AND sent_at < ?", (before,)).rowcount
+        """Delete readings that the server has had for ``keep`` seconds (how many), and old answers to corrections."""
+        now = time.time()
+
+        def write(database: sqlite3.Connection) -> int:
+            database.execute(
+                "DELETE FROM intent WHERE state IN ('told', 'withdrawn') AND at < ?", (now - ANSWERS_KEPT,)
             )
-        )
+            return database.execute("DELETE FROM reading WHERE state = 'sent' AND sent_at < ?", (now - keep,)).rowcount
+
+        return await self._run(write)
 
     def is_full(self) -> bool:
         """True if the store has reached its largest size. Space that was freed counts as free."""
@@ -280,8 +282,8 @@ class Store:
             ).rowcount
             if changed and outcome.offset is not None:
                 database.execute(
-                    "INSERT INTO location (machine, tool_memory, held)"
-                    " SELECT machine, tool_memory, held FROM intent WHERE machine = ? AND number = ?"
+                    "INSERT INTO location (machine, tool_memory, held, told)"
+                    " SELECT machine, tool_memory, held, held FROM intent WHERE machine = ? AND number = ?"
                     " ON CONFLICT (machine, tool_memory) DO UPDATE SET held = excluded.held, told = excluded.held",
                     (machine, outcome.number),
                 )

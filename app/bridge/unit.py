@@ -18,7 +18,8 @@ log = logging.getLogger(__name__)
 class Unit:
     """One machine.
 
-    orders: corrections that passed the guards; the control side offers them. news: something waits for the server. state and
+    hold_all: by the configuration; held: by that or by command. orders: corrections that passed the guards; the control side
+    offers them. news: something waits for the server. state and
     detail: the control's side, as the heartbeat tells it. held_back: sentences why corrections wait. trouble: the server's
     side, None while it answers. context: what an MTConnect agent tells of the machine.
     """
@@ -27,6 +28,7 @@ class Unit:
     link: Link
     store: Store
     hold_all: bool = False
+    held: bool = False
     identity: str | None = None
     orders: Sequence[Order] = ()
     news: asyncio.Event = field(default_factory=asyncio.Event)

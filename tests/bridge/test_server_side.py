@@ -1,0 +1,220 @@
+"""The server's side of one machine, against a server that is scripted: what is told, what is refused, what is told again."""
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+from app.bridge import server_side
+from app.bridge.links import Order, Outcome, Position, Received
+from app.bridge.simulators.model import Model
+from app.bridge.store import Store
+from app.bridge.unit import Unit
+from inband_client import AsyncClient, Conflict, Correction, Invalid
+from tests.bridge.plant import store_in, unit_of
+from tests.loops import run
+
+M = "lathe-1"
+
+
+def correction(number: int, after: float | None = -0.01, amount: float = -0.01, tool: int = 3) -> Correction:
+    return Correction(
+        number=number,
+        tool_memory=tool,
+        amount=amount,
+        status="pending",
+        offset_expected=after,
+        created_at=datetime.now(UTC),
+    )
+
+
+class Scripted:
+    """A server: what waits, what it refuses, and what it has heard."""
+
+    def __init__(self, *pending: Correction) -> None:
+        self.waiting = list(pending)
+        self.heard: list[tuple[Any, ...]] = []
+        self.refuses: Callable[[dict[str, Any]], Exception | None] = lambda _reading: None
+        self.confirming: Exception | None = None
+
+    async def pending(self, machine: str) -> list[Correction]:
+        return self.waiting
+
+    async def push(self, reading: dict[str, Any]) -> None:
+        if error := self.refuses(reading):
+            raise error
+        self.heard.append(("push", reading["key"]))
+
+    async def push_many(self, readings: list[dict[str, Any]]) -> None:
+        for reading in readings:
+            if error := self.refuses(reading):
+                raise error
+        self.heard += [("push", reading["key"]) for reading in readings]
+
+    async def confirm(self, machine: str, number: int, **said: Any) -> None:
+        if self.confirming is not None:
+            raise self.confirming
+        self.heard.append(("confirm", number, said["offset_after"]))
+
+    async def reject(self, machine: str, number: int, reason: str) -> None:
+        self.heard.append(("reject", number, reason))
+
+    async def report_offset(self, machine: str, tool: int, offset: float, *, none_applied: bool) -> None:
+        self.heard.append(("report", tool, offset))
+
+
+def story(tmp_path: Path, server: Scripted, before: Callable[[Store], Any] | None = None) -> Unit:
+    """One round of the server's side, after something has happened."""
+
+    async def work() -> Unit:
+        store = store_in(tmp_path)
+        unit = unit_of(Model(), store)
+        if before is not None:
+            await before(store)
+        for step in (server_side._tell, server_side._forward, server_side._ask):
+            await step(unit, cast("AsyncClient", server))
+        return unit
+
+    return run(work())
+
+
+def answered(outcome: Outcome, order: Order, *, told: bool) -> Callable[[Store], Any]:
+    async def before(store: Store) -> None:
+        await store.intend(M, order, "hash")
+        await store.answered(M, outcome)
+        if told:
+            await store.set_intent(M, order.number, "told")
+
+    return before
+
+
+ORDER = Order(18, 3, 0.0, -0.01)
+
+
+def test_the_oldest_correction_is_offered_and_noted_first(tmp_path: Path) -> None:
+    unit = story(tmp_path, Scripted(correction(18), correction(19, -0.02)))
+    assert unit.orders == (ORDER,)
+    assert [intent.order for intent in run(unit.store.intents(M, "open"))] == [ORDER]
+
+
+def test_what_is_no_longer_pending_is_withdrawn(tmp_path: Path) -> None:
+    unit = story(tmp_path, Scripted(), lambda store: store.intend(M, ORDER, "hash"))
+    assert unit.orders == ()
+    assert [intent.order.number for intent in run(unit.store.intents(M, "withdrawn"))] == [18]
+
+
+@pytest.mark.parametrize(
+    ("outcome", "heard"),
+    [
+        (Outcome(18, applied=True, offset=-0.01), [("confirm", 18, -0.01)]),
+        (Outcome(18, applied=False, offset=0.004, differs=True), [("report", 3, 0.004)]),
+        (Outcome(18, applied=False, offset=0.0, reason="no tool"), [("reject", 18, "no tool")]),
+    ],
+)
+def test_each_answer_is_told_once(tmp_path: Path, outcome: Outcome, heard: list[tuple[Any, ...]]) -> None:
+    server = Scripted()
+    unit = story(tmp_path, server, answered(outcome, ORDER, told=False))
+    assert server.heard == heard
+    run(server_side._tell(unit, cast("AsyncClient", server)))
+    assert server.heard == heard
+
+
+def test_a_correction_that_was_superseded_while_the_control_took_it_is_reported(tmp_path: Path) -> None:
+    server = Scripted()
+    server.confirming = Conflict("POST applied", "superseded", status=409)
+    story(tmp_path, server, answered(Outcome(18, applied=True, offset=-0.01), ORDER, told=False))
+    assert server.heard == [("report", 3, -0.01)]
+
+
+def test_what_a_server_has_forgotten_is_confirmed_again(tmp_path: Path) -> None:
+    """It went back in time: the correction waits again that the control has applied."""
+    server = Scripted(correction(18))
+    unit = story(tmp_path, server, answered(Outcome(18, applied=True, offset=-0.01), ORDER, told=True))
+    assert server.heard == [("confirm", 18, -0.01)]
+    assert unit.orders == ()
+
+
+@pytest.mark.parametrize(
+    ("outcome", "after", "words"),
+    [
+        (Outcome(18, applied=True, offset=-0.01), -0.07, "another correction with this number"),
+        (Outcome(18, applied=False, offset=0.004, differs=True), -0.01, "has refused this correction"),
+    ],
+)
+def test_a_number_that_the_control_has_answered_is_not_offered_again(
+    tmp_path: Path, outcome: Outcome, after: float, words: str
+) -> None:
+    server = Scripted(correction(18, after))
+    unit = story(tmp_path, server, answered(outcome, ORDER, told=True))
+    [(what, number, reason)] = server.heard
+    assert (what, number) == ("reject", 18)
+    assert words in reason
+    assert unit.orders == ()
+
+
+def test_what_stands_behind_a_correction_that_waits_waits_too(tmp_path: Path) -> None:
+    unit = story(tmp_path, Scripted(correction(18, tool=9), correction(19)))
+    assert unit.orders == ()
+    assert "tool memory 9" in unit.held_back[0]
+    unit = story(tmp_path / "other", Scripted(correction(18, after=None)))
+    assert unit.orders == ()
+    assert "does not say which offset" in unit.held_back[0]
+
+
+def test_a_step_beyond_the_limit_is_rejected_with_its_reason(tmp_path: Path) -> None:
+    server = Scripted(correction(18, after=-0.2, amount=-0.2), correction(19))
+    unit = story(tmp_path, server)
+    [(what, number, reason)] = server.heard
+    assert (what, number) == ("reject", 18)
+    assert "larger than 0.1 mm" in reason
+    assert [order.number for order in unit.orders] == [19]
+
+
+def test_a_hold_by_command_is_seen_and_released(tmp_path: Path) -> None:
+    unit = story(tmp_path, Scripted(correction(18)), lambda store: store.note("", "hold_all", "x"))
+    assert (unit.held, unit.orders) == (True, ())
+    run(unit.store.note("", "hold_all", None))
+    run(server_side._ask(unit, cast("AsyncClient", Scripted(correction(18)))))
+    assert (unit.held, unit.orders) == (False, (ORDER,))
+
+
+def test_a_reading_that_is_refused_holds_up_no_other(tmp_path: Path) -> None:
+    server = Scripted()
+    server.refuses = lambda reading: (
+        Invalid("POST /readings", "not a size", status=422) if reading["measured"] > 90 else None
+    )
+
+    async def before(store: Store) -> None:
+        sizes = (40.0, 99.0, 41.0)
+        rows = [Received(f"k{n}", {"measured": size}, Position(7, n)) for n, size in enumerate(sizes, 1)]
+        await store.add(M, rows)
+
+    unit = story(tmp_path, server, before)
+    assert server.heard == [("push", "k1"), ("push", "k3")]
+    [refused] = run(unit.store.quarantine(M))
+    assert refused.key == "k2"
+    assert "not a size" in refused.reason
+
+
+@pytest.mark.parametrize(
+    ("change", "again"),
+    [({}, 0), ({"last_event": 9}, 1), ({"timeline": 2}, 1), ({"system": "other"}, 1), ({"last_event": 99}, 0)],
+)
+def test_readings_are_sent_again_to_a_server_that_went_back_in_time(
+    tmp_path: Path, change: dict[str, Any], again: int
+) -> None:
+    seen = {"system": "one", "timeline": 1, "last_event": 10}
+
+    async def before(store: Store) -> None:
+        await store.add(M, [Received("k1", {"measured": 40.0}, Position(7, 1))])
+
+    unit = story(tmp_path, Scripted(), before)
+
+    async def look() -> int:
+        await server_side._look_back(unit, seen)
+        await server_side._look_back(unit, seen | change)
+        return (await unit.store.counts(M)).waiting
+
+    assert run(look()) == again
