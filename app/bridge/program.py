@@ -12,7 +12,7 @@ from app.bridge.kinds import kind_named
 from app.bridge.kinds.mtconnect import Context
 from app.bridge.links import Link
 from app.bridge.store import Store, StoreError
-from app.bridge.unit import Unit
+from app.bridge.unit import Unit, ended
 from inband_client import AsyncClient
 
 log = logging.getLogger(__name__)
@@ -54,9 +54,7 @@ async def run(configuration: Configuration, store: Store) -> None:
         try:
             await asyncio.gather(*tasks)
         finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+            await ended(tasks)
 
 
 async def _tidy(store: Store, keep: float) -> None:

@@ -55,3 +55,12 @@ class Unit:
             else:
                 log.warning("%s: %s", self.machine.key, trouble)
         self.trouble = trouble
+
+
+async def ended(tasks: Sequence["asyncio.Task[None]"]) -> None:
+    """Cancel tasks until they have ended: a library may swallow a cancellation (``asyncio.wait_for`` of Python 3.11 can)."""
+    while waiting := [task for task in tasks if not task.done()]:
+        for task in waiting:
+            task.cancel()
+        await asyncio.wait(waiting, timeout=1.0)
+    await asyncio.gather(*tasks, return_exceptions=True)

@@ -12,7 +12,7 @@ from app.bridge.links import ControlAway
 from app.bridge.registers import RegisterLink
 from app.bridge.simulators.model import Feature, Model
 from app.bridge.store import Store
-from app.bridge.unit import Unit
+from app.bridge.unit import Unit, ended
 from app.core.ring import Register
 from inband_client import AsyncClient
 
@@ -122,9 +122,7 @@ async def bridge(url: str, secret: str, unit: Unit, *, heartbeat: bool = False) 
         try:
             yield unit
         finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+            await ended(tasks)
 
 
 def unit_of(model: Model, store: Store, registers: ModelRegisters | None = None, **fields: Any) -> Unit:

@@ -8,7 +8,6 @@ import asyncio
 import contextlib
 import getpass
 import json
-import math
 import shutil
 import socket
 import tempfile
@@ -20,11 +19,13 @@ import aiomqtt
 
 from app.bridge.simulators import NoPlace
 from app.bridge.simulators.model import Feature, Model
+from app.bridge.unit import ended
 from app.core.ring import Answer, Mail, Register, Slot, Unit, mail_registers
 
 AT = "the broker as host:port; mosquitto is started if left out"
 AGAIN = 3.0  # s until what was not stored is sent again
 TICK = 0.05  # s
+ANSWER = 5.0  # s in which the broker answers
 REFUSALS = {
     Answer.OFFSET_DIFFERS: "The offset is not the one that was expected.",
     Answer.NOT_POSSIBLE: "Tool or register is not known.",
@@ -56,8 +57,7 @@ class MqttSimulator:
     async def stop(self) -> None:
         """End it, and its broker."""
         if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
+            await ended([self._task])
         if self.broker is not None:
             with contextlib.suppress(ProcessLookupError):
                 self.broker.terminate()
@@ -87,7 +87,7 @@ class MqttSimulator:
         while True:
             with contextlib.suppress(aiomqtt.MqttError):
                 async with aiomqtt.Client(
-                    self.host, self.port, identifier=self.name, clean_session=False, timeout=math.inf, keepalive=5
+                    self.host, self.port, identifier=self.name, clean_session=False, timeout=ANSWER, keepalive=5
                 ) as client:
                     self._sent.clear()
                     for topic in ("stored", "corrections"):

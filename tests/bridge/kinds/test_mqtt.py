@@ -19,7 +19,7 @@ from app.bridge.links import ControlAway, LinkError, Misconfigured, Order, Outco
 from app.bridge.simulators.model import Model
 from app.bridge.simulators.mqtt import MqttSimulator, free_port, mosquitto, start_broker
 from app.bridge.store import Store
-from app.bridge.unit import Unit
+from app.bridge.unit import Unit, ended
 from tests.bridge.plant import bridge, store_in, until
 from tests.loops import run
 from tests.shop import Shop
@@ -89,8 +89,7 @@ async def fetching(chosen: Machine, store: Store) -> AsyncIterator[Unit]:
     try:
         yield unit
     finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+        await ended([task])
 
 
 async def fetched(there: MqttLink, count: int = 1) -> list[Received]:
