@@ -236,6 +236,15 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/work-zeros/{number}/acknowledge": WHY,
     "POST /api/v1/kinematics/runs/{run}/acknowledge": WHY,
     "POST /api/v1/kinematics/measuring-plans": example_of("MeasuringPlanIn"),
+    "POST /api/v1/machines/{machine}/heartbeat": example_of("HeartbeatIn"),
+    "POST /api/v1/machines/{machine}/tools/{tool}/reported": {"offset": 0.0, "none_applied": True},
+    "POST /api/v1/notes": {
+        "characteristic": "{characteristic}",
+        "sequence": 1,
+        "at": "2026-11-21T08:15:02Z",
+        "text": "New bar",
+    },
+    "POST /api/v1/notes/{note}/withdraw": WHY,
     "POST /api/v1/machines/{machine}/faults": {"kind": "battery_low", "text": "low", "active": True},
     "POST /api/v1/alignments/{number}/recompute": {"method": "small", "leave_out": []} | WHY,
     "POST /api/v1/kinematics/runs": {
@@ -270,6 +279,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/people/invitations": {"role": "viewer"},
     "POST /api/v1/keys": {"name": "Dashboard", "role": "viewer"},
 }
+NEWER = {"POST /api/v1/machines/{machine}/heartbeat"}  # a bridge that is newer than the server may say more
 DOORS = ("POST /api/v1/readings", "POST /api/v1/readings/batch")
 
 # JSON that no field anywhere may take.
@@ -455,6 +465,7 @@ class Place:
             "signal": line.signals()[0]["id"],
             "version": 1,
             "pair": pairs[0]["id"],
+            "note": shop.call("POST", "/notes", 201, machine=shop.machine, text="New bar")["id"],
             "proposal": proposal["id"],
             "form": "csv",
             "person": next(person[name] for name in ("id", "name", "key") if name in person),
@@ -595,8 +606,9 @@ def test_bad_fields(operation: Operation, place: Place) -> None:
                 yield tried(field, "null")
                 without = {name: value for name, value in body.items() if name != field}
                 yield complaint(place.send(operation, as_text(operation, without)), f"without {field}")
-        yield tried("colour", '"red"')
-        yield tried("colo\\u0000ur", '"red"')
+        if operation.name not in NEWER:
+            yield tried("colour", '"red"')
+            yield tried("colo\\u0000ur", '"red"')
         first, value = next(iter(body.items()))
         doubled = as_text(operation, body).replace("{", f"{{{json.dumps(first)}: {json.dumps(value)}, ", 1)
         yield complaint(place.send(operation, doubled), "doubled")

@@ -92,7 +92,8 @@ class HeartbeatIn(Body):
         Field(default_factory=list, max_length=MOST_QUARANTINED, description="The newest of them, at most 20."),
     ]
     clock_offset: Annotated[
-        float | None, Field(ge=-1e9, le=1e9, description="The control's clock less the bridge's, s; null: unknown.")
+        float | None,
+        Field(strict=True, ge=-1e9, le=1e9, description="The control's clock less the bridge's, s; null: unknown."),
     ] = None
     kind: Annotated[
         Text200 | None, Field(max_length=32, description="How it reaches the control: opcua, haas, dprnt, ...")
