@@ -39,7 +39,7 @@ def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def commands() -> Iterator[tuple[str, Any]]:
-    """Every command with its whole name, as typer has it."""
+    """Every command with its whole name, as typer has it, in the order of the names: modules are imported in any."""
     from typer.main import get_command
 
     from app.cli import PARTS as COMMANDS
@@ -49,7 +49,7 @@ def commands() -> Iterator[tuple[str, Any]]:
         import_module(module)
 
     def walk(group: Any, words: list[str]) -> Iterator[tuple[str, Any]]:
-        for name, command in group.commands.items():
+        for name, command in sorted(group.commands.items()):
             if hasattr(command, "commands"):
                 yield from walk(command, [*words, name])
             else:
