@@ -53,7 +53,7 @@ def test_by_name_key_number_and_beginning(shop: Shop) -> None:
 
 def test_rights(shop: Shop, server: Server) -> None:
     assert ("page", "/setup/people") in found(shop, "people")
-    assert found(shop, "people", server.client(server.key("viewer"))) == []
+    assert ("page", "/setup/people") not in found(shop, "people", server.client(server.key("viewer")))
     assert shop.machine_client.get("/api/v1/search?q=a").status_code == 403
     assert shop.admin.get("/api/v1/search").status_code == 422
     assert shop.admin.get("/api/v1/search?q=a%00").status_code == 422
