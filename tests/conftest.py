@@ -24,7 +24,7 @@ from urllib.parse import urlsplit
 import httpx
 import psycopg
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from playwright.sync_api import Browser, Page, Playwright, Request, expect, sync_playwright
 from sqlalchemy.orm import Session
 from xdist import plugin as xdist_plugin
@@ -40,7 +40,9 @@ for name in [name for name in os.environ if name.startswith(("INBAND_", "PG")) a
     del os.environ[name]  # no test may meet a real installation
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # hundreds of servers start; each would compile the whole house anew
 
-settings.register_profile("inband", deadline=None)  # a computer that is busy is no fault of what is tested
+settings.register_profile(
+    "inband", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)  # a computer that is busy is no fault of what is tested
 settings.load_profile("inband")
 expect.set_options(timeout=20_000)  # ms; what is expected comes at once where the computer has nothing else to do
 
