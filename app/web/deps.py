@@ -6,6 +6,7 @@ from typing import Annotated, cast
 from urllib.parse import urlsplit
 
 from fastapi import Depends, Query, Request
+from pydantic import AfterValidator
 from sqlalchemy.orm import Session
 from starlette.datastructures import FormData
 
@@ -20,6 +21,8 @@ Number = Annotated[int | None, Query(ge=0, le=LARGEST_ID)]
 Before = Annotated[int | None, Query(ge=1, le=LARGEST_ID)]
 """Number of the last item of the part before."""
 Word = Annotated[str | None, Query(max_length=64)]
+Sought = Annotated[str, Query(max_length=200), AfterValidator(lambda typed: typed.replace("\0", "").strip())]
+"""Words that the rows of a list have to hold."""
 SESSION_COOKIE = "inband_session"
 STATION_COOKIE = "inband_station"
 """Of a device that is bound to a machine; sent to the pages below /station only."""
@@ -65,7 +68,13 @@ def _place(text: str | None) -> int:
     return min(int(text), LARGEST_ID) if text and text.isascii() and text.isdigit() and len(text) < 20 else 0
 
 
-SessionDep = Annotated[Session, Depends(get_session, scope="function")]
+MOST_SESSIONS = 32
+"""Requests of one process that have a session at once; others wait without a thread.
+
+Fewer than the 40 threads that answer: a request needs one for each of its steps. If all of them waited for a connection, or for a
+lock, none would be left for whoever holds it.
+"""
+SessionDep = Annotated[Session, Depends(get_session, scope="function", max_concurrency=MOST_SESSIONS)]
 
 
 def get_settings(request: Request) -> Settings:

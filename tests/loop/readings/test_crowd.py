@@ -1,5 +1,6 @@
 """Many at once: 64 clients on one characteristic, two servers on one database, neighbours in one commit."""
 
+import asyncio
 import random
 import threading
 import time
@@ -18,6 +19,7 @@ from app.core.parameters import Parameters, read
 from tests.conftest import RunServer, Server
 from tests.loop.readings.load import Sender, all_at_once, scattered
 from tests.loop.readings.record import history, must_be_stored, must_hold, must_replay
+from tests.loops import run
 from tests.shop import PARAMETERS, Shop
 
 
@@ -65,6 +67,25 @@ def test_readings_are_let_in_while_every_other_request_is_busy(shop: Shop) -> No
         assert not any(each.done() for each in waiting)
         holding.rollback()
         assert {each.result().status_code for each in waiting} == {200}
+
+
+def test_a_hundred_machines_that_ask_and_tell_at_once_do_not_hold_each_other_up(shop: Shop) -> None:
+    """Each second request publishes, under a lock; the others hold a connection while their answer is written."""
+    url, headers = shop.server.url, dict(shop.machine_client.headers)
+
+    async def ask(client: httpx.AsyncClient, number: int) -> int:
+        path = f"/api/v1/machines/{shop.machine}"
+        if number % 2:
+            return (await client.get(f"{path}/corrections")).status_code
+        beat = {"version": "1", "state": "online" if number % 4 else "held", "waiting": 0}
+        return (await client.post(f"{path}/heartbeat", json=beat)).status_code
+
+    async def all_at_once() -> set[int]:
+        limits = httpx.Limits(max_connections=200)
+        async with httpx.AsyncClient(base_url=url, headers=headers, timeout=30, limits=limits) as client:
+            return set(await asyncio.gather(*(ask(client, number) for number in range(200))))
+
+    assert {status for _ in range(3) for status in run(all_at_once())} == {200}
 
 
 def test_two_servers_on_one_database_decide_like_one(run_server: RunServer, parameters: Parameters) -> None:
