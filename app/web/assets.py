@@ -1,8 +1,8 @@
 """Files the browser loads: our own under `frontend/static` and plotly.js out of the installed plotly package.
 
 Their URLs carry a hash of the content (`/static/<hash>/css/base.css`), so browsers may keep them for ever and still see
-every new version. Our own tree has one hash for all its files: ES modules and style sheets name each other by relative
-paths, which stay inside the tree. Hashes are computed once, at start.
+every new version. Our own tree has one hash for all its files: scripts name each other by relative paths, which stay inside
+the tree. What belongs together is joined (`app.web.joining`) and hashed once, at start.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from app import HOUSE
+from app.web.joining import joined
 
 STATIC_DIR = HOUSE / "frontend" / "static"
 PLOTLY = "plotly.min.js"
@@ -60,11 +61,12 @@ class Assets:
 
     def __init__(self, directory: Path = STATIC_DIR, prefix: str = "/static") -> None:
         self.prefix = prefix
-        self._assets = {
-            path.relative_to(directory).as_posix(): Asset(path.relative_to(directory).as_posix(), path.read_bytes())
+        found = {
+            path.relative_to(directory).as_posix(): path.read_bytes()
             for path in sorted(directory.rglob("*"))
             if path.is_file()
         }
+        self._assets = {name: Asset(name, content) for name, content in joined(found).items()}
         tree = _hash(*(part for name, asset in self._assets.items() for part in (name.encode(), asset.content)))
         for asset in self._assets.values():
             asset.version = tree

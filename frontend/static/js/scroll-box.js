@@ -4,16 +4,20 @@
 const BOXES = ".table-wrap, .sheet-table, .sheet figure, .secret, pre, .flaws, .strings";
 const watched = new WeakSet();
 
-const look = (box) => {
-  const scrolls = box.scrollWidth > box.clientWidth + 1 || box.scrollHeight > box.clientHeight + 1;
-  if (scrolls) box.tabIndex = 0;
-  else box.removeAttribute("tabindex");
+const scrolls = (box) => box.scrollWidth > box.clientWidth + 1 || box.scrollHeight > box.clientHeight + 1;
+
+// All are measured before one is changed: otherwise the browser lays the page out anew for each box.
+const look = (boxes) => {
+  const stops = boxes.filter(scrolls);
+  for (const box of boxes) if (box.tabIndex === 0 && !stops.includes(box)) box.removeAttribute("tabindex");
+  for (const box of stops) box.tabIndex = 0;
 };
-const sizes = new ResizeObserver((entries) => entries.forEach(({ target }) => look(target)));
+const sizes = new ResizeObserver((entries) => look(entries.map(({ target }) => target)));
 
 function watchAll() {
-  for (const box of document.querySelectorAll(BOXES)) {
-    look(box);
+  const boxes = [...document.querySelectorAll(BOXES)];
+  look(boxes.filter((box) => watched.has(box))); // their content may be another one; a new box is looked at once it is laid out
+  for (const box of boxes) {
     if (!watched.has(box)) sizes.observe(box);
     watched.add(box);
   }
