@@ -22,6 +22,7 @@ from app.bridge.configuration import Machine, Positive
 from app.bridge.links import Received
 from app.core.ring import INCH
 from app.files.formats import aqdef, aqdef_values, delimited
+from app.files.formats.aqdef_context import context_of
 from app.files.formats.aqdef_times import WallClock
 from app.files.formats.cell_values import UNITS, Unreadable, moment, number, unit_in, zone_named
 
@@ -322,7 +323,7 @@ class _Reader:
                 self.content.skipped += 1
                 self.content.remarks.append(f"line {item.line}: {name} is marked as not valid (K0002); passed over")
             else:
-                self._measured(item, key, name, value, characteristic.fields.get("K2142", ""), clock)
+                self._measured(item, key, name, value, description, clock)
 
     def _measured(
         self,
@@ -330,17 +331,20 @@ class _Reader:
         key: str,
         name: str,
         value: aqdef_values.Measured,
-        unit: str,
+        description: aqdef.Description,
         clock: WallClock | None,
     ) -> None:
+        unit = description.characteristics[item.characteristic].fields.get("K2142", "")
         said = unit_in(f"[{unit}]") if unit else None
         if unit and said is None:
             self._fault(item.line, "K2142", f"{unit!r} is no unit of length that is known; known are mm, µm and inch.")
             return
         scale = self.scale if said is None else UNITS[said]
         body: dict[str, Any] = {"characteristic": key, "measured": round(value.measured * scale, 9)}
-        if value.part:
-            body["part"] = value.part[:128]
+        if part := value.part or value.batch:
+            body["part"] = part[:128]
+        if context := context_of(item, value, description, self._remark):
+            body["context"] = context
         if value.at is not None:
             if value.at.tzinfo is None and clock is None:
                 self._fault(item.line, "K0004", "does not say its time zone: set zone, such as Europe/Belgrade.")

@@ -64,11 +64,7 @@ def import_file(
         on = actions.machine_for(session, found, machine)
     chosen |= _said(mapping, characteristic, found)
     if create_missing:
-        chosen |= {
-            each.index: matching.NEW
-            for each in found
-            if each.index not in chosen and not each.obstacle and not each.not_new
-        }
+        chosen = actions.with_missing(chosen, found)
     _tell(found, chosen, description.encoding)
     outcome = actions.import_aqdef(
         database,

@@ -6,7 +6,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MEGABYTE = 1_000_000
 DEFAULT = MEGABYTE
-LARGER: dict[str, int] = {"/api/v1/readings/batch": 32 * MEGABYTE, "/import": 64 * MEGABYTE}
+LARGER: dict[str, int] = {
+    "/api/v1/readings/batch": 32 * MEGABYTE,
+    "/api/v1/readings/aqdef": 64 * MEGABYTE,
+    "/import": 64 * MEGABYTE,
+}
 """Paths, by their beginning, that take more than the default."""
 
 

@@ -23,7 +23,10 @@ Item = TypeVar("Item")
 
 
 class AsyncClient:
-    """`Client` for asyncio: the same methods and options. Cancelling the task that waits for one ends it at once."""
+    """`Client` for asyncio: the same methods and options. Cancelling the task that waits for one ends it at once.
+
+    transport: what carries the requests, in place of connections of this client's own; `verify` is then the transport's.
+    """
 
     def __init__(
         self,
@@ -34,8 +37,9 @@ class AsyncClient:
         timeout: float = TIMEOUT,
         verify: Verify = True,
         stop: asyncio.Event | None = None,
+        transport: httpx.AsyncBaseTransport | None = None,
     ) -> None:
-        self._http = httpx.AsyncClient(**options(url, key, verify=verify, timeout=timeout))
+        self._http = httpx.AsyncClient(transport=transport, **options(url, key, verify=verify, timeout=timeout))
         self._patience = patience
         self._stop = stop or asyncio.Event()
 

@@ -31,6 +31,7 @@ class ReadingFields(TypedDict, total=False):
     key: str
     correction_in_effect: int | None
     first_move_triggered: bool
+    context: Mapping[str, Any] | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +41,8 @@ class Reading:
     touches: in place of `measured`, one list per point, each with its repeats. key: names this measurement for ever; one is
     made if you give none, so pushing the same object twice stores it once. correction_in_effect: number of the last
     correction that was in the offset when the part was **cut**, 0 for none yet; machined_at may say it by time.
-    first_move_triggered: the probe triggered on its first move, where there should have been air.
+    first_move_triggered: the probe triggered on its first move, where there should have been air. context: order, batch, nest,
+    operator, events, process and more, as the contract names them.
     """
 
     characteristic: str
@@ -52,6 +54,7 @@ class Reading:
     key: str = field(default_factory=new_key)
     correction_in_effect: int | None = None
     first_move_triggered: bool = False
+    context: Mapping[str, Any] | None = None
 
 
 class Unreadable(ValueError):

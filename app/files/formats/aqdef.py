@@ -1,7 +1,7 @@
 """AQDEF files (Q-DAS ASCII transfer format) read: `.dfq`, or a description `.dfd` with its values `.dfx`.
 
-A line is `Kxxxx/i value`: K1… belongs to a part, K2…, K3… and K8… to the characteristic i, K4… to catalogues, K0001 to K0099 to
-measured values. Without an index it is 1; index 0 is all. Values stand in K lines, or in one line for all characteristics:
+A line is `Kxxxx/i value`: K1… belongs to a part, K2…, K3… and K8… to the characteristic i, K4… to catalogues, K51… to the tree, K0001 to
+K0099 to measured values. Without an index it is 1; index 0 is all. Values stand in K lines, or in one line for all characteristics:
 `aqdef_values` takes both. A file is read twice, once for what it
 describes and once for its values, one line after the other: however long it is, little of it is in memory.
 Sources: the fields and catalogues as Hexagon lists them for *Q-DAS ASCII Transfer Format*, version 12; how files deviate
@@ -26,6 +26,8 @@ MOST_REMARKS = 200
 LINE = re.compile(r"[Kk](\d{4,5})(?:/(\d*)(?:/(\d*))?)?(?:[ \t]+(.*))?", re.DOTALL)
 _WHO = {"K1001", "K2001", "K2002"}
 _FAMILIES = set("1234580")
+HIERARCHY = {"K5102", "K5103", "K5111", "K5112"}
+"""The file's tree by the numbers of nodes: characteristics and nodes below one, the part and the characteristic that it is."""
 
 
 class Remark(NamedTuple):
@@ -83,11 +85,12 @@ class Description:
         """The fields of its part."""
         return self.parts.get(characteristic.part, {})
 
-    def named(self, catalogue: str, number: int | None) -> str:
-        """The text of a catalogue's entry (`K4093`, 3), else its number as text, else nothing."""
-        if number is None:
-            return ""
-        return self.catalogues.get(catalogue, {}).get(number, "") or (str(number) if number else "")
+    def named(self, entry: int | str, *catalogues: str) -> str:
+        """The text of an entry (3, "K4093", "K4092") in the first of these catalogues that has it, else the entry as it is."""
+        if isinstance(entry, str):
+            return entry
+        texts = (self.catalogues.get(each, {}).get(entry, "") for each in catalogues)
+        return next(filter(None, texts), str(entry or ""))
 
 
 @dataclass(frozen=True)
@@ -152,6 +155,16 @@ def open_text(path: Path, encoding: str) -> TextIO:
     return path.open(encoding=encoding, errors="strict" if encoding.startswith("utf") else "replace", newline=None)
 
 
+def _several_files(key: str, value: str, before: str, line: int, of: str = "{name}") -> Unusable:
+    return Unusable(
+        _(
+            "{key} is {value} here and was {before} above, with values between: several files stand one after the other. "
+            "Part them."
+        ).format(key=key, value=of.format(name=repr(value)), before=of.format(name=repr(before))),
+        line,
+    )
+
+
 class _Describing:
     """Takes the lines that describe, and passes over the values."""
 
@@ -160,6 +173,7 @@ class _Describing:
         self._part = 1
         self._values_came = self._any = False
         self._lines: dict[tuple[str, int], int] = {}
+        self._nodes: dict[str, dict[int, list[int]]] = {}
         self._all_parts: dict[str, str] = {}
         self._all_characteristics: dict[str, str] = {}
 
@@ -188,6 +202,9 @@ class _Describing:
             self._of_characteristic(number, key, index, value)
         elif family == "4":
             self.found.catalogues.setdefault(key, {})[index] = value
+        elif key in HIERARCHY:
+            if value.isascii() and value.isdigit():
+                self._nodes.setdefault(key, {}).setdefault(index, []).append(int(value))
         elif key == "K0100":
             self.found.declared = int(value) if value.isascii() and value.isdigit() else None
         else:
@@ -213,6 +230,10 @@ class _Describing:
             self._all_characteristics[key] = value
             return
         known = self.found.characteristics.get(index)
+        if known is not None and self._values_came and known.part != self._part and key in _WHO:
+            raise _several_files(
+                f"{key}/{index}", self._name_of(self._part), self._name_of(known.part), line, _("of the part {name}")
+            )
         if known is None:
             known = self.found.characteristics[index] = Characteristic(index, self._part)
         self._put(line, key, index, value, known.fields)
@@ -221,13 +242,7 @@ class _Describing:
         before = fields.get(key)
         if before is not None and before != value:
             if key in _WHO and self._values_came:
-                raise Unusable(
-                    _(
-                        "{key}/{index} is {value} here and was {before} above, with values between: several files stand one "
-                        "after the other. Part them."
-                    ).format(key=key, index=index, value=repr(value), before=repr(before)),
-                    line,
-                )
+                raise _several_files(f"{key}/{index}", value, before, line)
             first = self._lines.get((key, index), 0)
             self._remark(
                 line,
@@ -237,6 +252,35 @@ class _Describing:
             )
         self._lines[key, index] = line
         fields[key] = value
+
+    def _name_of(self, part: int) -> str:
+        return self.found.parts.get(part, {}).get("K1001", "") or str(part)
+
+    def _place(self) -> None:
+        """Put characteristics below the part that the file's tree (K51xx) says."""
+        nodes = self._nodes
+        open_nodes = [(node, part) for node, (part, *_more) in nodes.get("K5111", {}).items()]
+        seen: set[int] = set()
+        for node, part in open_nodes:
+            if node in seen or part not in self.found.parts:
+                continue
+            seen.add(node)
+            for index in nodes.get("K5102", {}).get(node, []) + nodes.get("K5112", {}).get(node, []):
+                if index in self.found.characteristics:
+                    self.found.characteristics[index].part = part
+            open_nodes += [(child, part) for child in nodes.get("K5103", {}).get(node, [])]
+
+    def _tell_of_bare_parts(self) -> None:
+        used = {each.part for each in self.found.characteristics.values()}
+        for part in self.found.parts.keys() - used:
+            self._remark(
+                self._lines.get(("K1001", part), 0),
+                f"K1001/{part}",
+                self._name_of(part),
+                _("has no characteristic below it: those of the file count as parts of {other}").format(
+                    other=", ".join(self._name_of(each) for each in sorted(used))
+                ),
+            )
 
     def _remark(self, line: int, key: str, value: str, reason: str) -> None:
         if len(self.found.remarks) < MOST_REMARKS:
@@ -250,6 +294,9 @@ class _Describing:
             if index not in found.characteristics:
                 found.characteristics[index] = Characteristic(index, self._part)
         found.characteristics = dict(sorted(found.characteristics.items()))
+        self._place()
+        if found.characteristics:
+            self._tell_of_bare_parts()
         for characteristic in found.characteristics.values():
             found.parts.setdefault(characteristic.part, {})
             for key, value in self._all_characteristics.items():

@@ -14,7 +14,7 @@ DayOrder = Literal["month_first", "day_first"]
 _DATE = re.compile(
     r"(\d{1,4})([./-])(\d{1,2})\2(\d{1,4})\.?"
     r"(?:[/ .T]\s*(\d{1,2}):(\d{1,2})(?::(\d{1,2})(?:[.,](\d{1,9}))?)?(?:\s*([AaPp])\.?[Mm]\.?)?"
-    r"\s*([Zz]|[+-]\d{2}:?\d{2})?)?",
+    r"\s*([Zz]|[+-]\d{2}:?\d{2})?)?/?",
     re.ASCII,
 )
 _CENTURY = 70  # two digits from here on are of the last century

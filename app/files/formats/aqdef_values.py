@@ -16,6 +16,8 @@ from app.files.formats.delimited import Unusable
 from app.language.i18n import _
 
 OF_CHARACTERISTIC, OF_FIELD = "\x0f", "\x14"
+SHOWN_CHARACTERISTIC, SHOWN_FIELD = "¤☼", "¶"
+"""The signs by which manuals and editors show these two; a file that went through one has them in their place."""
 FIELDS = ("K0001", "K0002", "K0004", "K0005", "K0006", "K0007", "K0008", "K0010", "K0011", "K0012")
 COUNTED = ("K0020", "K0021", "")
 """What stands before the attribute in place of the value where parts are counted, not measured."""
@@ -39,6 +41,11 @@ NO_VALUE = {255, 256}
 """K0002: missing, deleted. Any other than 0: there, but not to be evaluated."""
 
 
+_PARAMETER = r"(\d{1,9})/([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)(?=$|[,;\s])"
+_ONE_PARAMETER = re.compile(_PARAMETER, re.ASCII)
+_PROCESS = re.compile(f"{_PARAMETER}(?:[,;\\s]+{_PARAMETER})*", re.ASCII)
+
+
 class Value(NamedTuple):
     """One value of one characteristic: the line where it begins, and its fields as they are written."""
 
@@ -50,7 +57,7 @@ class Value(NamedTuple):
 class Measured(NamedTuple):
     """A value read. measured: in the unit of its characteristic. at: without a zone unless the file names an offset.
 
-    attribute: K0002, 0 for a good one. Numbers are those of the file's catalogues, 0 for none.
+    attribute: K0002, 0 for a good one. Numbers are those of the file's catalogues, 0 for none; some programs write names there.
     """
 
     measured: float
@@ -59,12 +66,13 @@ class Measured(NamedTuple):
     part: str
     batch: str
     order: str
-    nest: int
-    operator: int
-    machine: int
-    gauge: int
-    events: tuple[int, ...]
+    nest: int | str
+    operator: int | str
+    machine: int | str
+    gauge: int | str
+    events: tuple[int | str, ...]
     process: str
+    text: str = ""
 
 
 def values(source: Source, description: Description) -> Iterator[Value | Remark]:
@@ -100,7 +108,9 @@ class _Reading:
         if line[0] in "Kk":
             if line[1:3] == "00":
                 yield from self._field(number, line)
-        elif OF_FIELD in line or OF_CHARACTERISTIC in line or _is_number(line):
+            return
+        line = _with_separators(line)
+        if OF_FIELD in line or OF_CHARACTERISTIC in line or _is_number(line):
             yield from self._row(number, line)
         else:
             yield Remark(number, "", line[:40], _("is neither a K field nor a value; it is passed over"))
@@ -197,26 +207,21 @@ class _Reading:
 
 
 def read_value(value: Value, order: DayOrder | None = None) -> "Measured | Remark | None":
-    """The fields of a value as what they mean; None where nothing was measured (K0002 says missing or deleted).
+    """The fields of a value as what they mean; None where nothing was measured: it is empty, or K0002 says missing or deleted.
 
     order: which comes first in dates with slashes, day or month.
     """
     fields, name = value.fields, "K0001"
     try:
         name = "K0002"
-        attribute = _whole(fields.get(name, ""))
-        if attribute in NO_VALUE:
-            return None
+        attributes = [_whole(each) for each in _several(fields.get(name, ""))]
+        attribute = next(filter(None, attributes), 0)
         name = "K0001"
-        measured = number_of(fields.get(name, ""))
+        if not fields.get(name, "").strip() or not NO_VALUE.isdisjoint(attributes):
+            return None
+        measured = number_of(fields[name])
         name = "K0004"
         at = time_of(fields[name], order) if fields.get(name) else None
-        nest = _whole(fields.get(name := "K0007", ""))
-        operator = _whole(fields.get(name := "K0008", ""))
-        machine = _whole(fields.get(name := "K0010", ""))
-        gauge = _whole(fields.get(name := "K0012", ""))
-        name = "K0005"
-        events = tuple(_whole(each) for each in re.split(r"[,; ]+", fields.get(name, "")) if each.strip())
     except Unreadable as error:
         return Remark(value.line, f"{name}/{value.characteristic}", fields.get(name, "")[:40], str(error), wrong=True)
     return Measured(
@@ -226,13 +231,27 @@ def read_value(value: Value, order: DayOrder | None = None) -> "Measured | Remar
         fields.get("K0014", ""),
         fields.get("K0006", ""),
         fields.get("K0053", ""),
-        nest,
-        operator,
-        machine,
-        gauge,
-        tuple(each for each in events if each),
+        _entry(fields.get("K0007", "")),
+        _entry(fields.get("K0008", "")),
+        _entry(fields.get("K0010", "")),
+        _entry(fields.get("K0012", "")),
+        tuple(filter(None, map(_entry, _several(fields.get("K0005", ""))))),
         fields.get("K0011", ""),
+        fields.get("K0009", ""),
     )
+
+
+def process_of(text: str) -> dict[int, float] | None:
+    """Process parameters (K0011) by their number in the catalogue; None where the text is something else.
+
+    A comma parts them, unless what stands behind it can only be decimal places.
+
+    >>> process_of("1/0.5,2/-3"), process_of("1/21,5"), process_of("21,5")
+    ({1: 0.5, 2: -3.0}, {1: 21.5}, None)
+    """
+    if not _PROCESS.fullmatch(text.strip()):
+        return None
+    return {int(number): number_of(value) for number, value in _ONE_PARAMETER.findall(text)}
 
 
 def has_doubtful_date(value: Value) -> bool:
@@ -253,6 +272,31 @@ def number_of(text: str) -> float:
         raise Unreadable(reason) from None
 
 
+def _with_separators(line: str) -> str:
+    """The line with the separators that the signs stand for; a lone sign with a time in its third place parts fields."""
+    shown = SHOWN_CHARACTERISTIC + SHOWN_FIELD
+    if OF_FIELD in line or not any(sign in line for sign in shown):
+        return line
+    first = next((sign for sign in SHOWN_CHARACTERISTIC if sign in line), None)
+    fields_only = first is not None and SHOWN_FIELD not in line and ":" in "".join(line.split(first)[2:3])
+    if OF_CHARACTERISTIC in line or fields_only:
+        return re.sub(f"[{shown}]", OF_FIELD, line)
+    return re.sub(f"[{SHOWN_CHARACTERISTIC}]", OF_CHARACTERISTIC, line).replace(SHOWN_FIELD, OF_FIELD)
+
+
+def _several(text: str) -> list[str]:
+    return [each for each in re.split(r"[,;\s]+", text) if each]
+
+
+def _entry(text: str) -> int | str:
+    """The number of a catalogue's entry, 0 where nothing is said; or the name that stands in its place."""
+    text = text.strip()
+    try:
+        return _whole(text)
+    except Unreadable:
+        return text
+
+
 def _is_number(text: str) -> bool:
     try:
         read_number(text)
@@ -262,7 +306,7 @@ def _is_number(text: str) -> bool:
 
 
 def _whole(text: str) -> int:
-    """A whole number, 0 where nothing is said; a name in a catalogue's place is none."""
+    """A whole number, 0 where nothing is said."""
     text = text.strip()
     if not text:
         return 0

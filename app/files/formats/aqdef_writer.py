@@ -5,6 +5,7 @@ said by its certification, which this is not.
 """
 
 import re
+import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
@@ -20,8 +21,10 @@ LENGTHS = {
     "K1001": 30, "K1002": 80, "K1053": 40, "K1081": 24, "K1082": 40, "K1085": 40, "K1086": 40, "K2001": 20, "K2002": 80,
     "K2142": 20, "K2402": 40, "K4062": 40, "K4063": 100, "K4072": 40, "K4073": 80, "K4092": 50, "K4093": 50, "K4222": 40,
     "K4223": 100, "K4242": 40, "K4243": 100, "K0014": 40, "K0053": 20,
+    "K0006": 40, "K0009": 255,
 }  # fmt: skip
 """Characters that a field holds."""
+MOST = 255  # characters of a field that is not named there
 MISSING = 255
 SAME_PART = timedelta(hours=1)
 """Readings of a part further apart than this are of two measurements."""
@@ -84,20 +87,26 @@ class Written(NamedTuple):
     characteristic: int
     measured: float
     at: datetime
-    validity: Validity = Validity.GOOD
+    validity: int = Validity.GOOD
     part: str = ""
     events: Sequence[str] = ()
     order: str = ""
+    batch: str = ""
     nest: int = 0
     operator: str = ""
     machine: str = ""
     gauge: str = ""
     process: Mapping[str, float] = {}
+    comment: str = ""
+    fields: Mapping[str, str] = {}
 
 
 @dataclass
 class Catalogues:
-    """Texts that values name by number: those of the events, machines, gauges, operators and process parameters."""
+    """Texts that values name by number: those of the events, machines, gauges, operators and process parameters.
+
+    What a value names besides comes behind them.
+    """
 
     events: Sequence[str] = ()
     machines: Sequence[tuple[str, str]] = ()
@@ -124,21 +133,56 @@ def write(
 ) -> Outcome:
     """Write a `.dfq` under a temporary name and rename it when it is complete.
 
-    values: of each characteristic in their order. Windows-1252 where that has all letters, else UTF-8 with its mark.
+    values: of each characteristic in their order. They are written first, so that the catalogues know what they name. Windows-1252 where that has all letters, else UTF-8 with its mark.
     """
-    draft = path.with_name(f".{path.name}.part")
+    draft, body = path.with_name(f".{path.name}.part"), path.with_name(f".{path.name}.values")
     done = Outcome()
+    used = _Used(catalogues)
     try:
-        with draft.open("w", encoding="utf-8", newline="") as file:
-            header = _Header(done)
-            file.writelines(f"{line}\r\n" for line in header.lines(parts, characteristics, catalogues))
-            texts = _Values(len(characteristics), catalogues, done)
+        with body.open("w", encoding="utf-8", newline="") as file:
+            texts = _Values(len(characteristics), used, done)
             file.writelines(f"{line}\r\n" for line in texts.lines(values))
+        with draft.open("w", encoding="utf-8", newline="") as file, body.open(encoding="utf-8", newline="") as rest:
+            header = _Header(done)
+            file.writelines(f"{line}\r\n" for line in header.lines(parts, characteristics, used))
+            shutil.copyfileobj(rest, file)
         _settle_encoding(draft)
         draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)
+        body.unlink(missing_ok=True)
     return done
+
+
+class _Catalogue:
+    """Entries by number: a short text and a long one. Either names the entry; a short one that is empty is its number."""
+
+    def __init__(self, entries: Iterable[tuple[str, str]]) -> None:
+        self.entries = list(entries)
+        self._numbers: dict[str, int] = {}
+        for number, entry in enumerate(self.entries, 1):
+            for text in filter(None, entry):
+                self._numbers.setdefault(text, number)
+
+    def number(self, text: str, *, both: bool = True) -> int:
+        """The number of the entry with this text, 0 for none; a new one comes at the end."""
+        if not text:
+            return 0
+        if text not in self._numbers:
+            self.entries.append((text if both else "", text))
+            self._numbers[text] = len(self.entries)
+        return self._numbers[text]
+
+
+class _Used:
+    """The catalogues of a file while it is written."""
+
+    def __init__(self, given: Catalogues) -> None:
+        self.machines = _Catalogue(given.machines)
+        self.gauges = _Catalogue(given.gauges)
+        self.operators = _Catalogue((name, name) for name in given.operators)
+        self.events = _Catalogue(("", text) for text in given.events)
+        self.process = _Catalogue(("", text) for text in given.process)
 
 
 def _settle_encoding(path: Path) -> None:
@@ -161,7 +205,7 @@ class _Texts:
 
     def fit(self, key: str, text: str) -> str:
         plain = _SIGNS.sub(lambda signs: "," if signs[0] == ";" else " ", text).strip()
-        most = LENGTHS[key]
+        most = LENGTHS.get(key, MOST)
         short = plain[:most].rstrip()
         if short != text.strip() and (key, text) not in self._told and len(self._told) < 100:
             self._told.add((key, text))
@@ -176,9 +220,7 @@ class _Texts:
 class _Header(_Texts):
     """Lines that describe."""
 
-    def lines(
-        self, parts: Sequence[Part], characteristics: Sequence[Described], catalogues: Catalogues
-    ) -> Iterator[str]:
+    def lines(self, parts: Sequence[Part], characteristics: Sequence[Described], catalogues: _Used) -> Iterator[str]:
         yield f"K0100 {len(characteristics)}"
         for number, part in enumerate(parts, 1):
             where = f"/{number}" if len(parts) > 1 else ""  # without one some take it for that of a characteristic
@@ -189,16 +231,11 @@ class _Header(_Texts):
             for index, described in enumerate(characteristics, 1):
                 if described.part == number - 1:
                     yield from self._characteristic(index, described, taken)
-        yield from self._catalogue("K4060", "machines", ("K4062", "K4063"), catalogues.machines)
-        yield from self._catalogue("K4070", "gauges", ("K4072", "K4073"), catalogues.gauges)
-        yield from self._catalogue(
-            "K4090", "operators", ("K4092", "K4093"), [(name, name) for name in catalogues.operators]
-        )
-        for key, name, fields, texts in (
-            ("K4220", "events", ("K4222", "K4223"), catalogues.events),
-            ("K4240", "process parameters", ("K4242", "K4243"), catalogues.process),
-        ):
-            yield from self._catalogue(key, name, fields, [(str(at), text) for at, text in enumerate(texts, 1)])
+        yield from self._catalogue("K4060", "machines", ("K4062", "K4063"), catalogues.machines.entries)
+        yield from self._catalogue("K4070", "gauges", ("K4072", "K4073"), catalogues.gauges.entries)
+        yield from self._catalogue("K4090", "operators", ("K4092", "K4093"), catalogues.operators.entries)
+        yield from self._catalogue("K4220", "events", ("K4222", "K4223"), catalogues.events.entries)
+        yield from self._catalogue("K4240", "process parameters", ("K4242", "K4243"), catalogues.process.entries)
 
     def _characteristic(self, index: int, described: Described, taken: set[str]) -> Iterator[str]:
         number = self.fit("K2001", described.number)
@@ -233,7 +270,7 @@ class _Header(_Texts):
             yield f"{key}/1 Inband {name}"
         for number, texts in enumerate(entries, 1):
             for one, text in zip(fields, texts, strict=True):
-                yield f"{one}/{number} {self.fit(one, text)}"
+                yield f"{one}/{number} {self.fit(one, text or str(number))}"
 
 
 @dataclass
@@ -250,15 +287,12 @@ class _Line:
 class _Values(_Texts):
     """Lines of values. Those of one part come into one line where that leaves the order of each characteristic as it is."""
 
-    def __init__(self, count: int, catalogues: Catalogues, done: Outcome) -> None:
+    def __init__(self, count: int, catalogues: _Used, done: Outcome) -> None:
         super().__init__(done)
         self._count = count
         self._fields = 3  # of a value: at least itself, its attribute and its time
-        self._events = {text: at for at, text in enumerate(catalogues.events, 1)}
-        self._machines = {text: at for at, (text, _name) in enumerate(catalogues.machines, 1)}
-        self._gauges = {text: at for at, (text, _name) in enumerate(catalogues.gauges, 1)}
-        self._operators = {text: at for at, text in enumerate(catalogues.operators, 1)}
-        self._process = {text: at for at, text in enumerate(catalogues.process, 1)}
+        self._catalogues = catalogues
+        self._batch = False  # some value before had one: it holds on until another is said
 
     def lines(self, values: Iterable[Written]) -> Iterator[str]:
         waiting: list[_Line] = []
@@ -301,25 +335,29 @@ class _Values(_Texts):
             yield f"K0014/0 {self.fit('K0014', line.part)}"
         if line.order:
             yield f"K0053/0 {self.fit('K0053', line.order)}"
+        for at, value in sorted(line.values.items()):
+            for key, text in {"K0009": value.comment, **value.fields}.items():
+                if fitted := self.fit(key, text):
+                    yield f"{key}/{at + 1} {fitted}"
 
     def _portion(self, value: Written) -> str:
+        names = self._catalogues
         process = ",".join(
-            f"{self._process[name]}/{plain_number(number)}"
-            for name, number in value.process.items()
-            if name in self._process
+            f"{names.process.number(name, both=False)}/{plain_number(number)}" for name, number in value.process.items()
         )
         cells = [
             plain_number(value.measured),
-            str(value.validity.value),
+            str(int(value.validity)),
             value.at.strftime("%d.%m.%Y/%H:%M:%S"),
-            ",".join(str(self._events[text]) for text in value.events if text in self._events),
-            "",
+            ",".join(str(names.events.number(text, both=False)) for text in value.events),
+            f"#{self.fit('K0006', value.batch)}" if value.batch or self._batch else "",
             str(value.nest),
-            str(self._operators.get(value.operator, 0)),
-            str(self._machines.get(value.machine, 0)),
+            str(names.operators.number(value.operator)),
+            str(names.machines.number(value.machine)),
             process,
-            str(self._gauges.get(value.gauge, 0)),
+            str(names.gauges.number(value.gauge)),
         ]
+        self._batch = self._batch or bool(value.batch)
         # What is not said holds on from the value before: a field that was filled once is always written from then on.
         self._fields = max(self._fields, *(at for at, cell in enumerate(cells, 1) if cell not in {"", "0"}))
         return OF_FIELD.join(cells[: self._fields])

@@ -167,6 +167,23 @@ class ReadingRow(ReadingAnswer):
     excluded: Annotated[Excluded | None, Field(description="If it was taken out of the statistics.")]
 
 
+class ReadingContextOut(BaseModel):
+    """The circumstances of a reading, as they were sent with it; null where nothing was said."""
+
+    order: str | None = None
+    batch: str | None = None
+    nest: int | None = None
+    operator: str | None = None
+    machine: Annotated[str | None, Field(description="The machine that made the part, as the sender calls it.")] = None
+    gauge: str | None = None
+    comment: str | None = None
+    events: list[str] | None = None
+    process: Annotated[dict[str, float] | None, Field(description="Process parameters by name.")] = None
+    fields: Annotated[
+        dict[str, str] | None, Field(description="Further fields of a value in an AQDEF file, by their K number.")
+    ] = None
+
+
 class ReadingDetail(ReadingRow):
     """A stored reading with everything about it."""
 
@@ -174,3 +191,4 @@ class ReadingDetail(ReadingRow):
     touches: Annotated[list[list[float]] | None, Field(description="One list per point, each with its repeats.")]
     machined_at: datetime | None
     correction_in_effect: int | None
+    context: Annotated[ReadingContextOut | None, Field(description="Its circumstances, if any were sent.")]

@@ -123,22 +123,33 @@ def _values(
         at: datetime = row["measured_at"]
         changed = before is not None and any(before < each <= at for each in changes)
         before = at
+        context = row["context"] or {}
+        kept = dict(context.get("fields") or {})
         yield Written(
             of.place,
             row["corrected_size"],
             at.astimezone(zone).replace(tzinfo=None, microsecond=0),
-            _validity(row),
+            _validity(row, kept.pop("K0002", "")),
             row["part"] or "",
-            _events(row, changed=changed),
-            machine=machine.key,
-            gauge=machine.key,
-            process=_process(row, offsets),
+            list(dict.fromkeys([*(context.get("events") or ()), *_events(row, changed=changed)])),
+            order=context.get("order") or "",
+            batch=context.get("batch") or "",
+            nest=context.get("nest") or 0,
+            operator=context.get("operator") or "",
+            machine=context.get("machine") or machine.key,
+            gauge=context.get("gauge") or machine.key,
+            process=(context.get("process") or {}) | _process(row, offsets),
+            comment=context.get("comment") or "",
+            fields=kept,
         )
 
 
-def _validity(row: dict[str, Any]) -> Validity:
+def _validity(row: dict[str, Any], as_it_came: str) -> int:
+    """K0002: of an excluded reading the one that it came with, if any."""
     if row["excluded"] is None:
         return Validity.GOOD
+    if as_it_came.isascii() and as_it_came.isdigit():
+        return int(as_it_came)
     return Validity.IMPLAUSIBLE if row["zone"] == Zone.PROBE_FAULT else Validity.INVALID
 
 

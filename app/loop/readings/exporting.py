@@ -17,7 +17,7 @@ from app.loop.characteristics.queries import parameters_of
 from app.loop.readings.by_hand import queries as by_hand
 from app.loop.readings.by_hand.wording import verdict_of
 from app.loop.readings.records import Entry
-from app.loop.tables.readings import Exclusion, Reading, ReadingResults, ReadingTouches
+from app.loop.tables.readings import Exclusion, Reading, ReadingContext, ReadingResults, ReadingTouches
 
 COLUMNS = (
     "sequence",
@@ -69,6 +69,13 @@ def rows(
             hand.measured,
             hand.good,
             ReadingTouches.touches,
+            ReadingContext.context,
+        )
+        .outerjoin(
+            ReadingContext,
+            (ReadingContext.machine_id == Reading.machine_id)
+            & (ReadingContext.characteristic_id == Reading.characteristic_id)
+            & (ReadingContext.sequence == Reading.sequence),
         )
         .outerjoin(
             ReadingTouches,
@@ -110,8 +117,8 @@ def rows(
     session.execute(text("SET LOCAL idle_in_transaction_session_timeout = 0"))
     targets: dict[int, float] = {}
     fetched = session.execute(query.execution_options(yield_per=AT_ONCE))
-    for *values, good, touches in fetched:
-        row = dict(zip(COLUMNS, (*values, verdict_of(good)), strict=True)) | {"touches": touches}
+    for *values, good, touches, context in fetched:
+        row = dict(zip(COLUMNS, (*values, verdict_of(good)), strict=True)) | {"touches": touches, "context": context}
         version = row["parameters_version"]
         if version not in targets:
             targets[version] = parameters_of(session, entry.machine_id, entry.characteristic_id, version).target
@@ -141,11 +148,12 @@ def _cell(value: Any) -> Any:
 
 
 def write_ndjson(readings: Iterator[dict[str, Any]], file: TextIO) -> int:
-    """One JSON object per line, with the touches of those that have them. The number of rows."""
+    """One JSON object per line, with the touches and the context of those that have them. The number of rows."""
     count = 0
     for row in readings:
-        if row["touches"] is None:
-            del row["touches"]
+        for name in ("touches", "context"):
+            if row[name] is None:
+                del row[name]
         file.write(msgspec.json.encode(row).decode() + "\n")
         count += 1
     return count

@@ -26,6 +26,7 @@ from app.loop.tables.readings import (
     Exclusion,
     HandMeasurement,
     Reading,
+    ReadingContext,
     ReadingResults,
     ReadingTouches,
     ResultReading,
@@ -266,12 +267,20 @@ def detail(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
             ReadingTouches.sequence == sequence,
         )
     )
+    context = session.scalar(
+        select(ReadingContext.context).where(
+            ReadingContext.machine_id == entry.machine_id,
+            ReadingContext.characteristic_id == entry.characteristic_id,
+            ReadingContext.sequence == sequence,
+        )
+    )
     measurements = by_hand.of_readings(session, entry.machine_id, entry.characteristic_id, [sequence])
     return answers(session, entry, [record])[0] | {
         "by_hand": [in_json(measurement) for measurement in measurements.get(sequence, ())],
         "touches": touches,
         "machined_at": record.machined_at,
         "correction_in_effect": record.correction_in_effect,
+        "context": context,
     }
 
 

@@ -24,6 +24,43 @@ AHEAD = timedelta(hours=24)  # of this server's clock; more is a wrong clock or 
 MOST_POINTS, MOST_REPEATS = 100, 100
 
 
+MOST_OF_CONTEXT = 100  # events, process parameters, further fields
+LONGEST_COMMENT = 1000
+_Text = Annotated[str, Meta(min_length=1, max_length=128)]
+_Comment = Annotated[str, Meta(min_length=1, max_length=LONGEST_COMMENT)]
+_Number = Annotated[float, Meta(ge=-1e300, le=1e300)]
+
+
+class Context(Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """The circumstances of a reading. Nothing is decided by them; they are shown and handed on."""
+
+    order: Annotated[_Text | None, Meta(description="Number of the order.")] = None
+    batch: Annotated[_Text | None, Meta(description="Batch or charge of the material.")] = None
+    nest: Annotated[
+        Annotated[int, Meta(ge=0, le=999_999)] | None, Meta(description="Number of the nest, spindle or cavity.")
+    ] = None
+    operator: Annotated[_Text | None, Meta(description="Who measured.")] = None
+    machine: Annotated[_Text | None, Meta(description="The machine that made the part, as the sender calls it.")] = None
+    gauge: Annotated[_Text | None, Meta(description="What it was measured with.")] = None
+    comment: _Comment | None = None
+    events: Annotated[
+        Annotated[list[_Text], Meta(max_length=MOST_OF_CONTEXT)] | None,
+        Meta(description="What happened at the part or before it, such as a change of the tool."),
+    ] = None
+    process: Annotated[
+        Annotated[dict[_Text, _Number], Meta(max_length=MOST_OF_CONTEXT)] | None,
+        Meta(description="Process parameters by name, with their unit in the name: a temperature, a spindle speed."),
+    ] = None
+    fields: Annotated[
+        Annotated[
+            dict[Annotated[str, Meta(pattern=r"^K00[0-9]{2}$")], _Comment],
+            Meta(max_length=MOST_OF_CONTEXT),
+        ]
+        | None,
+        Meta(description="Further fields of a value in an AQDEF file, by their K number."),
+    ] = None
+
+
 class ReadingIn(Struct, forbid_unknown_fields=True, gc=False):
     """One reading as it is sent. Lengths in mm, times RFC 3339 with an offset."""
 
@@ -71,6 +108,9 @@ class ReadingIn(Struct, forbid_unknown_fields=True, gc=False):
             "wrong part). measured is then the position where it did; it is judged a probe fault whatever its value."
         ),
     ] = False
+    context: Annotated[Context | None, Meta(description="Its circumstances: order, batch, nest, events and more.")] = (
+        None
+    )
 
 
 FIELDS = ReadingIn.__struct_fields__
@@ -132,7 +172,7 @@ def _quotes(reading: ReadingIn) -> int:
     """Return the number of quotation marks that a reading is written with, if each field is there once and no text holds any.
 
     msgspec takes the last of two fields of one name. A second one brings quotation marks of its own, so a body with
-    another number of them is looked at by the reader that refuses it; one with as many has none.
+    another number of them is looked at by the reader that refuses it; one with as many has none. A context always brings more.
     """
     return 4 + 2 * (
         (reading.measured is not None)
@@ -236,6 +276,7 @@ def _plain(reading: ReadingIn, latest: datetime) -> bool:
         reading.measured is not None
         and reading.touches is None
         and reading.machined_at is None
+        and reading.context is None
         and (measured_at is None or EARLIEST <= measured_at <= latest)
         and reading.characteristic.isprintable()
         and (key is None or key.isprintable())
@@ -251,7 +292,10 @@ def _all_plain(readings: list[ReadingIn], latest: datetime) -> bool:
         "".join(texts).isprintable()
         and "".join({reading.characteristic for reading in readings}).isprintable()
         and (not times or (min(times) >= EARLIEST and max(times) <= latest))
-        and all(r.measured is not None and r.touches is None and r.machined_at is None for r in readings)
+        and all(
+            r.measured is not None and r.touches is None and r.machined_at is None and r.context is None
+            for r in readings
+        )
     )
 
 
@@ -277,6 +321,10 @@ def _sense(reading: ReadingIn, now: datetime, prefix: str) -> Iterator[FieldErro
             yield FieldError(
                 f"{prefix}{name}", _("This text holds control characters; send letters, digits and signs only.")
             )
+    if reading.context is not None and not all(map(clean_text, _texts(reading.context))):
+        yield FieldError(
+            f"{prefix}context", _("This text holds control characters; send letters, digits and signs only.")
+        )
     for name in ("measured_at", "machined_at"):
         moment = getattr(reading, name)
         if moment is None:
@@ -300,6 +348,44 @@ def _sense(reading: ReadingIn, now: datetime, prefix: str) -> Iterator[FieldErro
             f"{prefix}machined_at",
             _("A part cannot be measured before it is machined: machined_at lies after measured_at."),
         )
+
+
+def _texts(context: Context) -> Iterator[str]:
+    for value in msgspec.structs.astuple(context):
+        if isinstance(value, str):
+            yield value
+        elif isinstance(value, list | dict):
+            yield from value
+    yield from (context.fields or {}).values()
+
+
+def _context(value: Any) -> str | None:
+    if not isinstance(value, dict):
+        return _("A context is a JSON object, such as {example}.").format(example='{"order": "A-77", "nest": 2}')
+    names = Context.__struct_fields__
+    if unknown := [name for name in value if name not in names]:
+        return _("There is no {name} in a context; there are: {names}.").format(
+            name=repr(unknown[0]), names=", ".join(names)
+        )
+    for name, each in value.items():
+        try:
+            msgspec.convert({name: each}, Context)
+        except msgspec.ValidationError:
+            return _("{name} is not right: {must}.").format(name=name, must=_MUST[name]())
+    return None
+
+
+def _short_text() -> str:
+    return _("a text of 1 to 128 characters")
+
+
+_MUST: dict[str, Callable[[], str]] = dict.fromkeys(("order", "batch", "operator", "machine", "gauge"), _short_text) | {
+    "nest": lambda: _("a whole number from 0 to 999999"),
+    "comment": lambda: _("a text of 1 to {most} characters").format(most=LONGEST_COMMENT),
+    "events": lambda: _("a list of at most {most} texts").format(most=MOST_OF_CONTEXT),
+    "process": lambda: _("an object of at most {most} numbers by name").format(most=MOST_OF_CONTEXT),
+    "fields": lambda: _("an object of texts by field, K0009 for example"),
+}
 
 
 def _number(value: Any) -> str | None:
@@ -381,6 +467,7 @@ _CHECKS: dict[str, Callable[[Any], str | None]] = {
     "key": _text(128),
     "correction_in_effect": _correction_number,
     "first_move_triggered": _yes_or_no,
+    "context": _context,
 }
 
 

@@ -141,6 +141,17 @@ class ReadingTouches(Base):
     touches: Mapped[list[Any]]
 
 
+class ReadingContext(Base):
+    """The circumstances of a reading, as `app.loop.readings.schemas.Context` has them; only for readings that have any."""
+
+    __tablename__ = "reading_context"
+
+    machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    characteristic_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    sequence: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    context: Mapped[dict[str, Any]]
+
+
 class ReadingResults(Base):
     """Results of the measuring variant beside the value of a reading; only for readings that have any of it.
 

@@ -266,10 +266,70 @@ def test_the_hour_that_is_there_twice_goes_by_the_order_of_the_file() -> None:
     [
         ("K0002/1 a", "line 7, K0002/1: 'a' is not a whole number"),
         ("K0004/1 32.1.2026/0:0", "line 7, K0004/1: '32.1.2026/0:0' is not a time: day is out of range for month"),
-        ("K0007/1 x", "line 7, K0007/1: 'x' is not a whole number"),
+        ("K0002/1 0,a", "line 7, K0002/1: '0,a' is not a whole number"),
     ],
 )
 def test_fields_that_cannot_be_read_are_named(tmp_path: Path, field: str, said: str) -> None:
     _description, found = parsed(tmp_path, [*HEAD, "K0001/1 1", field])
     assert isinstance(found[0], Value)
     assert str(aqdef_values.read_value(found[0])) == said
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        "1¶0¶2.3.2026/6:00¤2¶0¶2.3.2026/6:00",  # as manuals print both
+        f"1¤0¤2.3.2026/6:00{C}2¤0¤2.3.2026/6:00",  # one of them came through
+        "1☼2",
+    ],
+)
+def test_separators_as_they_are_shown(tmp_path: Path, row: str) -> None:
+    _description, found = parsed(tmp_path, [*HEAD, row])
+    assert numbers(found) == [(1, "1"), (2, "2")]
+
+
+def test_a_lone_sign_with_a_time_behind_it_parts_fields(tmp_path: Path) -> None:
+    _description, found = parsed(tmp_path, [*HEAD, "1¤0¤2.3.2026/6:00¤¤#7"])
+    assert [(good(each).measured, good(each).batch) for each in found] == [(1.0, "7")]
+
+
+def test_names_in_place_of_numbers_are_taken(tmp_path: Path) -> None:
+    rows = ["K0001/1 1", "K0007/1 A", "K0008/1 Eva", "K0005/1 2, chip", "K0009/1 a remark"]
+    catalogue = ["K4092/1 EV", "K4093/2 Adam", "K4092/2 AD"]
+    description, found = parsed(tmp_path, [*HEAD, *catalogue, *rows])
+    value = good(found[0])
+    assert (value.nest, value.operator, value.events, value.text) == ("A", "Eva", (2, "chip"), "a remark")
+    assert [description.named(entry, "K4093", "K4092") for entry in (1, 2, 3, 0, "Eva")] == [
+        "EV",
+        "Adam",
+        "3",
+        "",
+        "Eva",
+    ]
+
+
+@pytest.mark.parametrize("fields", ["K0002/1 0", "K0002/1 255", "K0002/1 129,256"])
+def test_what_is_empty_missing_or_deleted_is_no_value(tmp_path: Path, fields: str) -> None:
+    lines = [f"K0001/1 {'' if fields.endswith(' 0') else '1'}", fields]
+    _description, found = parsed(tmp_path, HEAD + lines)
+    assert isinstance(found[0], Value)
+    assert aqdef_values.read_value(found[0]) is None
+
+
+def test_the_tree_says_which_part_a_characteristic_is_of(tmp_path: Path) -> None:
+    lines = ["K0100 3", "K1001/1 A", "K1001/2 B", "K2001/1 D1", "K2001/2 D2", "K2001/3 D3"]
+    flat, _found = parsed(tmp_path, lines)
+    assert [each.part for each in flat.characteristics.values()] == [2, 2, 2]
+    assert str(flat.remarks[0]) == (
+        "line 2, K1001/1: 'A' has no characteristic below it: those of the file count as parts of B"
+    )
+    tree = ["K5111/1 1", "K5111/2 2", "K5112/3 2", "K5102/1 1", "K5103/1 3", "K5102/2 3", "K5103/3 1"]
+    description, _found = parsed(tmp_path, lines + tree)
+    assert [each.part for each in description.characteristics.values()] == [1, 1, 2]
+    assert description.remarks == []
+
+
+def test_a_second_file_with_the_same_characteristics_is_refused(tmp_path: Path) -> None:
+    first = ["K0100 1", "K1001 P", "K2001 D40", "1"]
+    with pytest.raises(Unusable, match="K2001/1 is of the part 'Q' here and was of the part 'P' above"):
+        parsed(tmp_path, [*first, *(line.replace("P", "Q") for line in first)])

@@ -1,12 +1,15 @@
 """Readings out of a real database as AQDEF, by the command; read back by the reader and imported again."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
+from sqlalchemy import text
 
 from app.db.engine import Database
 from app.files.formats import aqdef, aqdef_values
 from app.files.formats.aqdef import Source
+from app.files.formats.aqdef_values import OF_FIELD as F
 from app.files.formats.aqdef_values import Measured, Value
 from app.loop.readings import queries
 from app.loop.readings.actions import exclude
@@ -59,8 +62,8 @@ def test_readings_of_several_are_written_with_what_belongs_to_them(plant: Databa
     assert found[0][1].at is not None
     assert found[0][1].at.isoformat() == "2026-03-02T06:00:00"
     last = next(each for at, each in found if each.part == "SN-3")
-    assert [description.named("K4223", event) for event in last.events] == ["probe fault", "excluded"]
-    assert description.named("K4063", last.machine) == "Lathe 1"
+    assert [description.named(event, "K4223") for event in last.events] == ["probe fault", "excluded"]
+    assert description.named(last.machine, "K4063") == "Lathe 1"
     assert scalar(plant, "SELECT count(*) FROM audit_entry WHERE action = 'readings exported'") == 2
 
 
@@ -73,6 +76,64 @@ def test_what_was_written_is_imported_as_it_was(plant: Database, tmp_path: Path)
     assert "2 are excluded, as the file marks them (K0002)." in done.stderr
     again = inband("import", path, "--map", "shaft-d40=shaft-d41", database=plant, folder=tmp_path)
     assert "4 were stored before" in again.stderr
+
+
+CIRCUMSTANCES = [
+    "K0100 1", "K1001 shaft-0815", "K2001/1 shaft-d40", "K2002/1 Seat", "K2142/1 mm",
+    "K4062/1 M1", "K4062/2 M2", "K4063/2 Lathe", "K4092/1 EV", "K4093/1 Eva", "K4072/1 Probe",
+    "K4222/1 1", "K4223/1 tool changed", "K4222/2 2", "K4223/2 door opened", "K4243/1 temperature, °C",
+    F.join(["39,991", "0", "02.03.2026/06:00:00", "1,2", "#C1", "3", "1", "2", "1/21,5", "1"]),
+    "K0014/0 SN-1", "K0053/0 A-77", "K0009/1 chip, washed", "K0081/1 7",
+    F.join(["39,992", "290", "02.03.2026/06:01:00", "", "#", "0", "0", "1", "", "0"]),
+    F.join(["39,993", "0", "02.03.2026/06:02:00", "", "", "A", "", "0"]),
+]  # fmt: skip
+
+
+def contexts(database: Database, key: str) -> list[dict[str, Any] | None]:
+    with database.begin() as session:
+        rows = session.execute(
+            text(
+                "SELECT x.context FROM reading r LEFT JOIN reading_context x USING (machine_id, characteristic_id, sequence) "
+                "JOIN characteristic c ON c.machine_id = r.machine_id AND c.id = r.characteristic_id "
+                "WHERE c.key = :key ORDER BY sequence"
+            ),
+            {"key": key},
+        )
+        return list(rows.scalars())
+
+
+def test_the_circumstances_of_readings_are_kept_and_handed_on(database: Database, tmp_path: Path) -> None:
+    set_up(database)
+    path, out = tmp_path / "in.dfq", tmp_path / "out.dfq"
+    path.write_bytes("\r\n".join([*CIRCUMSTANCES, ""]).encode("cp1252"))
+    done = inband("import", path, database=database, folder=tmp_path)
+    assert (done.returncode, "'A' is not the number of a nest; it is kept as a text" in done.stderr) == (0, True)
+    kept = contexts(database, "shaft-d40")
+    assert kept == [
+        {
+            "order": "A-77",
+            "batch": "C1",
+            "nest": 3,
+            "operator": "Eva",
+            "machine": "Lathe",
+            "gauge": "Probe",
+            "comment": "chip, washed",
+            "events": ["tool changed", "door opened"],
+            "process": {"temperature, °C": 21.5},
+            "fields": {"K0081": "7"},
+        },
+        {"machine": "M1", "fields": {"K0002": "290"}},
+        {"fields": {"K0007": "A"}},
+    ]
+    inband("export", "--characteristic", "shaft-d40", "-o", out, database=database, folder=tmp_path)
+    again = inband("import", out, "--map", "shaft-d40=shaft-d41", database=database, folder=tmp_path)
+    assert (again.returncode, "1 are excluded" in again.stderr) == (0, True), again.stderr
+    probe = {"gauge": "probe of Lathe 1"}
+    assert contexts(database, "shaft-d41") == [
+        kept[0],
+        (kept[1] or {}) | probe | {"events": ["excluded"]},
+        (kept[2] or {}) | probe | {"machine": "Lathe 1"},
+    ]
 
 
 def test_the_command_teaches(plant: Database, tmp_path: Path) -> None:

@@ -238,10 +238,22 @@ def send(client: httpx.Client, *files: tuple[str, str]) -> httpx.Response:
     return client.post("/import", data={"csrf": csrf[1], "characteristic": ""}, files=parts)
 
 
+def own_lines(shop: Shop) -> list[str]:
+    """The lines for this shop's machine, with characteristics that no other test sets up."""
+    own = {"shaft-d40": shop.characteristic, "shaft-0815": shop.machine}
+    own |= {
+        f"K200{field}/{number} ": f"K200{field}/{number} {shop.machine}-" for field in (1, 2) for number in (2, 3, 4)
+    }
+    lines = "\n".join(HEAD + ROWS)
+    for written_in, here in own.items():
+        lines = lines.replace(written_in, here)
+    return lines.split("\n")
+
+
 @pytest.mark.browser
 def test_a_file_on_the_page(server: Server, page: Page, tmp_path: Path) -> None:
     shop = Shop(server)
-    lines = [line.replace("shaft-d40", shop.characteristic).replace("shaft-0815", shop.machine) for line in HEAD + ROWS]
+    lines = own_lines(shop)
     page.goto("/sign-in?next=/import")
     page.fill("[name=name]", "Eva")
     page.fill("[name=password]", "correct horse battery")
@@ -289,3 +301,54 @@ def test_a_pair_is_sent_together_and_what_is_wrong_is_shown(server: Server) -> N
         "machine=nobody&to_1=%2B",
     ):
         assert client.get(f"{address}?{said}").status_code == 200, said
+
+
+def test_a_file_by_the_api(server: Server) -> None:
+    shop = Shop(server)
+    lines = own_lines(shop)
+    body: dict[str, Any] = {"name": "shift.dfq", "content": "\r\n".join(lines), "timezone": "Europe/Berlin"}
+    tried = shop.call("POST", "/readings/aqdef", **body, dry_run=True)["characteristics"][0]
+    assert (tried["stored"], shop.call("GET", f"/readings?characteristic={shop.characteristic}")["items"]) == (3, [])
+    done = shop.call(
+        "POST", "/readings/aqdef", **body, characteristics={f"{shop.machine}-L1": "+"}, machine=shop.machine
+    )
+    seat, roundness, length, angle = done["characteristics"]
+    assert (done["stored"], seat["characteristic"], seat["stored"], seat["excluded"]) == (5, shop.characteristic, 3, 1)
+    assert (length["created"], length["stored"], length["notes"][0][:17]) == (True, 2, "its unit is inch ")
+    assert ("name it under characteristics" in roundness["left_out"], "not a length" in angle["left_out"]) == (
+        True,
+        True,
+    )
+    again = shop.call("POST", "/readings/aqdef", **body, create_missing=True, machine=shop.machine)
+    assert (again["stored"], again["repeated"], again["characteristics"][1]["created"]) == (2, 5, True)
+    pair: dict[str, Any] = {"content": "\n".join(lines[: len(HEAD)]), "values": row(9, "39.994")}
+    assert shop.call("POST", "/readings/aqdef", **body | pair)["stored"] == 1
+
+
+@pytest.mark.parametrize(
+    ("wrong", "field", "said"),
+    [
+        ({"content": "measured\n1"}, "file", "no line begins with a K field"),
+        ({"content": "\n".join(HEAD)}, "file", "lie in the .dfx that belongs to it"),
+        (
+            {"content": "\n".join([*HEAD, row(1, "39.9"), row(2, "x")])},
+            f"line {len(HEAD) + 2}, K0001/1",
+            "is not a number",
+        ),
+        ({"characteristics": {"X": "shaft"}}, "characteristics", "X is no characteristic of the file"),
+        ({"characteristics": {"L1": "+"}, "machine": None}, "machine", "say on which machine"),
+        ({"timezone": "Mars"}, "timezone", ""),
+        ({"values": ""}, "values", ""),
+    ],
+)
+def test_the_api_says_what_is_wrong(server: Server, wrong: dict[str, Any], field: str, said: str) -> None:
+    shop = Shop(server)
+    body = {
+        "name": "a.dfq",
+        "content": "\n".join(HEAD + ROWS),
+        "characteristics": {"shaft-d40": shop.characteristic},
+    }
+    shop.call("POST", "/machines", 201, key=f"{shop.machine}-b", name="Other", control="fanuc")
+    answer = shop.admin.post("/api/v1/readings/aqdef", json=body | wrong)
+    assert answer.status_code == 422, answer.text
+    assert [(each["field"], said in each["message"]) for each in answer.json()["errors"]] == [(field, True)]

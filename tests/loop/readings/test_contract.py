@@ -374,6 +374,23 @@ class TestTimes:
 
 
 class TestRefusals:
+    @pytest.mark.parametrize(
+        ("context", "says"),
+        [
+            ([], "A context is a JSON object"),
+            ({"colour": "red"}, "There is no 'colour' in a context; there are: order, batch,"),
+            ({"order": 7}, "order is not right: a text of 1 to 128 characters."),
+            ({"nest": -1}, "nest is not right: a whole number from 0"),
+            ({"events": ["a\nb"]}, "holds control characters"),
+            ({"process": {"T": "warm"}}, "process is not right: an object of at most 100 numbers"),
+            ({"fields": {"x": "1"}}, "fields is not right: an object of texts by field"),
+        ],
+    )
+    def test_circumstances_that_cannot_be(self, shop: Shop, context: Any, says: str) -> None:
+        problem = refused(shop, 422, context=context)
+        assert fields(problem) == {"context"}
+        assert says in problem["detail"]
+
     def test_a_correction_that_was_never_issued(self, shop: Shop) -> None:
         shop.read(7.0)
         problem = refused(shop, 422, correction_in_effect=2)
@@ -470,9 +487,29 @@ class TestLookingUp:
         assert {name: detail[name] for name in given} == given
         assert datetime.fromisoformat(detail["machined_at"]) == datetime.fromisoformat(machined_at)
         assert (detail["correction_in_effect"], detail["touches"], detail["excluded"]) == (0, None, None)
+        assert detail["context"] is None
         shop.call("GET", f"/readings/{shop.characteristic}/2", 404)
         shop.call("GET", f"/readings/{shop.characteristic}/0", 422)
         shop.call("GET", "/readings/nowhere/1", 404)
+
+    def test_the_circumstances_of_a_reading(self, shop: Shop) -> None:
+        context = {"order": "A-77", "nest": 2, "events": ["door opened"], "process": {"temperature, °C": 21.5}}
+        shop.read(3.0, key="k", context=context)
+        again: dict[str, Any] = {
+            "characteristic": shop.characteristic,
+            "measured": 40.003,
+            "key": "k",
+            "context": {"order": "B"},
+        }
+        shop.call("POST", "/readings", 200, **again)  # the first one stays
+        batch = [{"characteristic": shop.characteristic, "measured": 40.0, "context": {"nest": at}} for at in (0, 1)]
+        assert shop.admin.post("/api/v1/readings/batch", json=batch).status_code == 201
+        found = [shop.call("GET", f"/readings/{shop.characteristic}/{number}")["context"] for number in (1, 2, 3)]
+        assert [{name: value for name, value in each.items() if value is not None} for each in found] == [
+            context,
+            {"nest": 0},
+            {"nest": 1},
+        ]
 
     def test_another_machine_may_not_look(self, shop: Shop, server: Any) -> None:
         other = Shop(server).machine_client

@@ -39,12 +39,13 @@ Progress = Callable[[], None]
 
 STAGE = """
 CREATE TEMPORARY TABLE staged (line bigint, key text, measured float8, deviation float8, average_before float8,
-    average_after float8, measured_at timestamptz, machined_at timestamptz, zone text, part text, touches jsonb, results jsonb
+    average_after float8, measured_at timestamptz, machined_at timestamptz, zone text, part text, touches jsonb, results jsonb,
+    context jsonb
 ) ON COMMIT DROP
 """
 COPY = """
 COPY staged (line, key, measured, deviation, average_before, average_after, measured_at, machined_at, zone, part, touches,
-    results)
+    results, context)
 FROM STDIN
 """
 # The same key with another value, in the record or further up in the file.
@@ -80,6 +81,12 @@ INSERT INTO reading_touches (machine_id, characteristic_id, sequence, touches)
 SELECT r.machine_id, r.characteristic_id, r.sequence, s.touches FROM staged s
 JOIN reading r ON r.machine_id = %(machine)s AND r.characteristic_id = %(characteristic)s AND r.key = s.key
 WHERE s.touches IS NOT NULL
+"""
+CONTEXT = """
+INSERT INTO reading_context (machine_id, characteristic_id, sequence, context)
+SELECT r.machine_id, r.characteristic_id, r.sequence, s.context FROM staged s
+JOIN reading r ON r.machine_id = %(machine)s AND r.characteristic_id = %(characteristic)s AND r.key = s.key
+WHERE s.context IS NOT NULL
 """
 RESULTS = f"""
 INSERT INTO reading_results (machine_id, characteristic_id, sequence, {", ".join(Results._fields)})
@@ -176,6 +183,7 @@ class _Judge:
             reading.part,
             None if reading.touches is None else msgspec.json.encode(reading.touches).decode(),
             None if results is None else msgspec.json.encode(results._asdict()).decode(),
+            None if reading.context is None else msgspec.json.encode(reading.context).decode(),
         )
 
 
@@ -319,6 +327,7 @@ def _move_over(cursor: Cursor[Any], entry: Entry, version: int, now: datetime, s
     summary.first_sequence, summary.last_sequence = before + 1, before + summary.stored
     cursor.execute(TOUCHES, where)
     cursor.execute(RESULTS, where)
+    cursor.execute(CONTEXT, where)
     cursor.execute(MOVE_STREAM, where | {"count": summary.stored, "now": now})
     for statement, rows in full_blocks([(entry, before, summary.last_sequence)]):
         RawCursor(cursor.connection).execute(statement, (as_json(rows),))

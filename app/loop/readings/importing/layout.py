@@ -39,6 +39,7 @@ NAMES: dict[str, tuple[str, ...]] = {
     "key": ("key", "schlussel", "kljuc", "ключ", "кључ"),
     "correction_in_effect": ("correction in effect",),
     "touches": ("touches",),
+    "context": ("context",),
 }  # fmt: skip
 MOST_COLUMNS = 500
 DATES = {"date", "datum", "дата", "датум"}

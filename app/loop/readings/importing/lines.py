@@ -137,6 +137,7 @@ def _readers(layout: Layout) -> list[tuple[str, tuple[int, ...], Callable[[str],
         "machined_at": lambda text: time(text) if text else None,
         "correction_in_effect": whole,
         "touches": _touches,
+        "context": _context,
     }
     return [(name, places, kinds.get(name, lambda text: text or None)) for name, places in layout.columns.items()]
 
@@ -146,6 +147,13 @@ def _touches(text: str) -> Any:
         return json.loads(text) if text else None
     except (ValueError, RecursionError):
         raise Unreadable(_("is not a list of touches such as [[39.998, 39.9982]]")) from None
+
+
+def _context(text: str) -> Any:
+    try:
+        return json.loads(text) if text else None
+    except (ValueError, RecursionError):
+        raise Unreadable(_("is not an object such as {example}").format(example='{"order": "A-77"}')) from None
 
 
 def _json(path: Path, layout: Layout) -> Found:

@@ -85,7 +85,10 @@ class ColumnarReadings:
         streams = np.array([self._streams[group.stream.entry.characteristic_id][0] for group in self._groups])
         self._stream_of = streams[self._group_of]
         never = [
-            reading.measured is None or reading.machined_at is not None or reading.first_move_triggered
+            reading.measured is None
+            or reading.machined_at is not None
+            or reading.context is not None
+            or reading.first_move_triggered
             for _, reading in readings
         ]
         self._series_of = np.where(never, -1, self._group_of)

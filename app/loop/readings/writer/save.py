@@ -16,6 +16,7 @@ from app.loop.readings.writer.statements import (
     ALARM_NUMBERS,
     BASE_LEVEL,
     CHANGE_CORRECTIONS,
+    CONTEXT,
     COPY,
     COPY_TYPES,
     COUNTERS,
@@ -158,6 +159,19 @@ def _rarer(pending: PendingWrites) -> Iterable[tuple[str, list[Any]]]:
             }
             for v in pending.verdicts
             if v.reading.touches is not None
+        ],
+    )
+    yield (
+        CONTEXT,
+        [
+            {
+                "machine_id": v.stream.entry.machine_id,
+                "characteristic_id": v.stream.entry.characteristic_id,
+                "sequence": v.sequence,
+                "context": v.reading.context,
+            }
+            for v in pending.verdicts
+            if v.reading.context is not None
         ],
     )
     yield (

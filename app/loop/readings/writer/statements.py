@@ -144,6 +144,10 @@ TOUCHES = """
 INSERT INTO reading_touches (machine_id, characteristic_id, sequence, touches)
 SELECT * FROM json_to_recordset($1) AS r(machine_id int, characteristic_id int, sequence bigint, touches jsonb)
 """
+CONTEXT = """
+INSERT INTO reading_context (machine_id, characteristic_id, sequence, context)
+SELECT * FROM json_to_recordset($1) AS r(machine_id int, characteristic_id int, sequence bigint, context jsonb)
+"""
 _RESULTS = """machine_id int, characteristic_id int, sequence bigint, run_out float8, out_of_roundness float8, taper float8,
     slope float8, repeat_range float8, repeat_deviation float8, sections_outside smallint, rejected bool"""
 RESULTS = f"""

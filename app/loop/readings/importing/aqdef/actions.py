@@ -87,6 +87,13 @@ def guess(session: Session, found: Sequence[Content]) -> dict[int, str]:
     return matching.guessed(found, known, remembered(session))
 
 
+def with_missing(chosen: Mapping[int, str], found: Sequence[Content]) -> dict[int, str]:
+    """The choices, and `NEW` for all others that can be set up."""
+    return dict(chosen) | {
+        each.index: NEW for each in found if each.index not in chosen and not each.obstacle and not each.not_new
+    }
+
+
 def machine_for(session: Session, found: Sequence[Content], named: str | None) -> str | None:
     """The machine on which missing ones are set up: the one named, the one the file names, or the only one."""
     if named:
@@ -128,6 +135,11 @@ def import_aqdef(
         ):
             if readings.flaws:
                 raise Flawed(readings.flaws, readings.flaw_count)
+            if not readings.counted.total() and not readings.missing.total():
+                raise Invalid.at(
+                    "file",
+                    _("it holds no value of what is chosen; the values of a .dfd lie in the .dfx that belongs to it"),
+                )
             outcome.remarks = [str(each) for each in description.remarks] + readings.sentences()
             outcome.results = _store_all(session, readings, wanted, chosen, machine, actor, name)
             if dry_run:

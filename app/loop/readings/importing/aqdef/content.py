@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 from zoneinfo import ZoneInfo
 
 import msgspec
@@ -16,6 +17,7 @@ import msgspec
 from app.errors import Invalid
 from app.files.formats import aqdef_values
 from app.files.formats.aqdef import Description, Remark, Source
+from app.files.formats.aqdef_context import context_of
 from app.files.formats.aqdef_times import DayOrder, WallClock
 from app.files.formats.aqdef_values import Value
 from app.language.i18n import _, ngettext
@@ -25,10 +27,6 @@ from app.loop.readings.importing.lines import Flaw, Line, fingerprint
 from app.loop.readings.schemas import reading_of
 
 AT_ONCE = 20_000  # readings in memory before they are put down
-_NOT_KEPT = {
-    "K0005": "events", "K0007": "nest", "K0008": "operator", "K0009": "text", "K0010": "machine", "K0011": "process parameters",
-    "K0012": "gauge", "K0053": "order",
-}  # fmt: skip
 _WHO = ("K0001", "K0004", "K0014", "K0006", "K0053", "K0007")
 
 
@@ -50,6 +48,7 @@ class _Kept(msgspec.Struct, array_like=True):
     at: datetime | None
     part: str
     key: str
+    context: dict[str, Any] | None = None
 
 
 @dataclass
@@ -63,7 +62,6 @@ class Readings:
     missing: Counter[int] = field(default_factory=Counter)
     without_time: int = 0
     doubtful_dates: int = 0
-    not_kept: Counter[str] = field(default_factory=Counter)
     flaws: list[Flaw] = field(default_factory=list)
     flaw_count: int = 0
     remarks: list[Remark] = field(default_factory=list)
@@ -84,6 +82,7 @@ class Readings:
                     "measured_at": kept.at,
                     "part": kept.part or None,
                     "key": kept.key,
+                    "context": kept.context,
                 }
                 try:
                     yield Line(kept.line, reading_of(fields, now))
@@ -108,15 +107,12 @@ class Readings:
         if missing := sum(self.missing.values()):
             texts.append(
                 ngettext(
-                    "%(num)d value is marked as missing or deleted (K0002 = 255, 256) and left out.",
-                    "%(num)d values are marked as missing or deleted (K0002 = 255, 256) and left out.",
+                    "%(num)d value is empty, or marked as missing or deleted (K0002 = 255, 256), and left out.",
+                    "%(num)d values are empty, or marked as missing or deleted (K0002 = 255, 256), and left out.",
                     missing,
                 )
                 % {"num": missing}
             )
-        if self.not_kept:
-            what = ", ".join(f"{_NOT_KEPT[key]} ({key})" for key in sorted(self.not_kept))
-            texts.append(_("Not kept with readings here: {what}.").format(what=what))
         return texts
 
 
@@ -195,13 +191,11 @@ class _Sorter:
         readings.counted[index] += 1
         readings.without_time += at is None
         readings.doubtful_dates += self._wishes.order is None and aqdef_values.has_doubtful_date(value)
-        for name in _NOT_KEPT.keys() & value.fields.keys():
-            if value.fields[name] not in {"", "0"}:
-                readings.not_kept[name] += 1
         if read.attribute:
             readings.excluded.setdefault(index, {}).setdefault(read.attribute, []).append(key)
         measured = read.measured if content.scale == 1.0 else round(read.measured * content.scale, 9)
-        return _Kept(value.line, measured, at, (read.part or read.batch)[:128], key)
+        context = context_of(value, read, readings.description, self._remark)
+        return _Kept(value.line, measured, at, (read.part or read.batch)[:128], key, context or None)
 
     def _key(self, value: Value, content: Content) -> str:
         """The same value of the same part has the same key, in whatever file it comes; without a time it is the file's line."""

@@ -16,8 +16,11 @@ from app.loop.warnings.wording import sentence
 
 WORDS = {
     "mm": "mm", "millimeter": "mm", "millimetre": "mm", "µm": "um", "μm": "um", "um": "um", "mikrometer": "um",
-    "micrometer": "um", "micrometre": "um", "in": "inch", "inch": "inch", "inches": "inch", "zoll": "inch", '"': "inch",
+    "micrometer": "um", "micrometre": "um", "мм": "mm", "мкм": "um", "毫米": "mm", "in": "inch", "inch": "inch", "inches": "inch", "zoll": "inch", '"': "inch",
+    "дюйм": "inch", "cm": "cm", "см": "cm", "m": "m", "м": "m", "nm": "nm",
 }  # fmt: skip
+LENGTHS = UNITS | {"cm": 10.0, "m": 1000.0, "nm": 1e-6}
+"""Millimetres in each unit."""
 NEW = "+"
 """Chosen for a characteristic that is to be set up."""
 SLACK = 5e-7  # mm; limits that differ by less are the same
@@ -54,7 +57,7 @@ class Content:
     @property
     def scale(self) -> float:
         """Millimetres in its unit."""
-        return UNITS[self.unit]
+        return LENGTHS[self.unit]
 
     @property
     def identity(self) -> tuple[str, str, str]:
@@ -85,7 +88,7 @@ def _content(description: Description, each: Characteristic, unit: str | None) -
     own_unit, obstacle = _unit(word, unit, said)
     if each.counts:
         obstacle = _("counts parts (K2004 = {kind}); Inband keeps measured sizes").format(kind=each.fields["K2004"])
-    nominal, lower, upper = (None, None, None) if obstacle else _limits(each.fields, UNITS[own_unit], said)
+    nominal, lower, upper = (None, None, None) if obstacle else _limits(each.fields, LENGTHS[own_unit], said)
     machine = part.get("K1081", "") or part.get("K1082", "") or _only(description.catalogues.get("K4062", {}))
     return Content(
         each.index,
@@ -111,11 +114,13 @@ def _only(entries: Mapping[int, str]) -> str:
 def _unit(word: str, said_unit: str | None, said: _Said) -> tuple[str, str]:
     """Return the unit and why it cannot be used. Only what the file does not say is taken from elsewhere."""
     if word.strip():
-        known = WORDS.get(word.strip().casefold())
+        known = WORDS.get(word.strip(" []()").casefold())
         if known is None:
             return "mm", _("is not a length: its unit is {unit} (K2142)").format(unit=repr(word))
-        if known == "inch":
-            said.remarks.append(_("its unit is inch (K2142): values and limits are converted to mm"))
+        if known not in {"mm", "um"}:
+            said.remarks.append(
+                _("its unit is {unit} (K2142): values and limits are converted to mm").format(unit=known)
+            )
         return known, ""
     if said_unit is None:
         said.remarks.append(_("the file names no unit (K2142): taken for mm"))
@@ -265,11 +270,19 @@ def said(text: str, found: Sequence[Content]) -> dict[int, str]:
 
     Raises `ValueError` with a sentence.
     """
-    chosen: dict[int, str] = {}
+    pairs: list[tuple[str, str]] = []
     for pair in filter(None, (each.strip() for each in text.split(","))):
         name, sign, key = (each.strip() for each in pair.rpartition("="))
         if not sign or not name or not key:
             raise ValueError(_("Write it as D40=shaft-d40, or D40=+ to set it up."))
+        pairs.append((name, key))
+    return named(pairs, found)
+
+
+def named(pairs: Iterable[tuple[str, str]], found: Sequence[Content]) -> dict[int, str]:
+    """Choices out of pairs of a name in the file, as `said` has it, and a key. Raises `ValueError` with a sentence."""
+    chosen: dict[int, str] = {}
+    for name, key in pairs:
         part, _colon, own = name.rpartition(":")
         fitting = [
             each

@@ -1,0 +1,65 @@
+"""The circumstances of a value in an AQDEF file: order, batch, nest, people and means by the file's catalogues, events, process."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+from app.files.formats.aqdef import Description, Remark
+from app.files.formats.aqdef_values import Measured, Value, process_of
+from app.language.i18n import _
+
+LONGEST = 128  # characters of a text
+LONGEST_COMMENT = 1000
+HIGHEST_NEST = 999_999
+_WITH_A_PLACE = {
+    "K0001", "K0002", "K0004", "K0005", "K0006", "K0007", "K0008", "K0009", "K0010", "K0011", "K0012", "K0014", "K0053",
+}  # fmt: skip
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
+
+
+def context_of(
+    value: Value, read: Measured, description: Description, tell: Callable[[Remark], None]
+) -> dict[str, Any]:
+    """The context of a reading as the contract has it, empty where nothing was said.
+
+    What has no place of its own there, or is not as it should be, is kept as it is written, by its K number. tell: takes what
+    a person should know.
+    """
+
+    def remark(name: str, text: str, reason: str) -> None:
+        tell(Remark(value.line, f"{name}/{value.characteristic}", text[:40], reason))
+
+    def fit(name: str, text: str, most: int = LONGEST) -> str:
+        plain = _CONTROL.sub(" ", text).strip()
+        if len(plain) > most:
+            remark(name, plain, _("is longer than {most} characters; it is shortened").format(most=most))
+        return plain[:most].strip()
+
+    named = description.named
+    further = {name: text for name, text in value.fields.items() if name not in _WITH_A_PLACE}
+    if read.attribute:
+        further["K0002"] = str(read.attribute)
+    nest = read.nest
+    if isinstance(nest, str) or not 0 <= nest <= HIGHEST_NEST:
+        further["K0007"] = str(nest)
+        remark("K0007", str(nest), _("is not the number of a nest; it is kept as a text"))
+        nest = 0
+    process = process_of(read.process) if read.process else {}
+    if process is None:
+        further["K0011"] = read.process
+        remark("K0011", read.process, _("is not written as number/value; it is kept as a text"))
+    found = {
+        "order": fit("K0053", read.order),
+        "batch": fit("K0006", read.batch),
+        "nest": nest,
+        "operator": fit("K0008", named(read.operator, "K4093", "K4092")),
+        "machine": fit("K0010", named(read.machine, "K4063", "K4062")),
+        "gauge": fit("K0012", named(read.gauge, "K4073", "K4072")),
+        "comment": fit("K0009", read.text, LONGEST_COMMENT),
+        "events": [text for each in read.events if (text := fit("K0005", named(each, "K4223", "K4222")))],
+        "process": {
+            fit("K0011", named(number, "K4243", "K4242")) or "0": size for number, size in (process or {}).items()
+        },
+        "fields": {name: fitted for name, text in further.items() if (fitted := fit(name, text, LONGEST_COMMENT))},
+    }
+    return {name: each for name, each in found.items() if each}
