@@ -43,6 +43,8 @@ from app.loop.characteristics import api as characteristics
 from app.loop.connections import api as connections_api
 from app.loop.connections import jobs as connection_jobs
 from app.loop.connections import pages as connection_pages
+from app.loop.connections.touch_tests import api as touch_tests_api
+from app.loop.connections.touch_tests import pages as touch_test_pages
 from app.loop.faults import api as faults
 from app.loop.machines import api as machines
 from app.loop.machines import keys_api as machine_keys
@@ -120,6 +122,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     machines.router,
     faults.router,
     connections_api.router,
+    touch_tests_api.router,
     characteristics.router,
     figures_api.router,
     statistics.router,
@@ -165,6 +168,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     api_docs.router,
     machine_pages.router,
     connection_pages.router,
+    touch_test_pages.router,
     plant_pages.router,
     station_pages.router,
     search_pages.router,
@@ -355,12 +359,12 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     }
     add_problem_handlers(app, recognise)
     app.add_middleware(BodyLimit)
+    app.mount("/static", assets())  # first, so that no file waits until hundreds of routes have been looked through
     for router in ROUTERS:
         app.include_router(router, dependencies=[Depends(may_read_replica)] if router in FROM_REPLICA else [])
     if replica is not None:
         app.add_middleware(OwnChanges, replica=replica, secure=settings.secure_cookies)
     app.openapi = partial(document, app, readings.SCHEMAS, prefix or "/")  # type: ignore[method-assign]
-    app.mount("/static", assets())
     answers = UnderPrefix(app, prefix) if prefix else app
     small = GZipMiddleware(answers, minimum_size=1024, compresslevel=5, exclude_content_types=NOT_COMPRESSED)
     door = ReadingsDoor(SecurityHeaders(small), keys.lookup, directory, writer, letting_in)

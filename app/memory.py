@@ -36,5 +36,7 @@ async def give_back_free_memory() -> None:
     """Give it back again and again, until cancelled; in a thread, which lets everybody else go on."""
     library = _glibc()
     while library is not None:
+        await asyncio.to_thread(
+            library.malloc_trim, 0
+        )  # first what starting has left: reading modules takes more than they keep
         await asyncio.sleep(EVERY)
-        await asyncio.to_thread(library.malloc_trim, 0)

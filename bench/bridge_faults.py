@@ -1,9 +1,10 @@
 """A bridge whose every part is killed or cut at random points: every reading exactly once, every correction exactly once.
 
 A simulated control makes parts, a bridge (a process of its own) brings them to a server (another process). Meanwhile the
-bridge is killed, the server is killed, the links are cut, the power of the control fails, its network goes, and an operator
-edits the offset by hand. At the end what the control has written is compared with what the server holds.
-``python -m bench.bridge_faults [--faults 30] [--kind haas] [--seed 1]``; the long run is ``--faults 1000``.
+bridge is killed, the server is killed, the broker is killed, the links are cut, the power of the control fails, its network goes,
+and an operator edits the offset by hand. At the end what the control has written is compared with what the server holds.
+``python -m bench.bridge_faults [--faults 30] [--kind haas] [--seed 1]`` goes through all kinds if none is named; the long run is
+``--faults 1000``.
 """
 
 import argparse
@@ -12,6 +13,7 @@ import contextlib
 import os
 import random
 import signal
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -26,14 +28,53 @@ from typing import Any, Protocol
 import httpx
 
 from app.bridge.simulators import simulator_named
-from app.bridge.simulators.model import Feature, Model
+from app.bridge.simulators.model import TOLERANCE, Feature, Model
+from app.bridge.simulators.mqtt import start_broker
 from app.cli.bridge import toml_of
 from app.core.ring import SLOTS, Register
-from bench.plant import PARAMETERS, plant, wait_until_ready
+from bench.plant import PARAMETERS, free_port, plant, wait_until_ready
 
-MACHINE, CHARACTERISTIC, TOOL = "faults", "shaft", 3
+TOOL = 3
 SETTLE = 240.0  # s that everything may take to come to rest afterwards
+CYCLE = 0.15  # s between two parts
+UNHEARD = SLOTS - 2  # readings that are printed while nobody listens
 NOTICED = 90.0  # s within which an edit by hand is noticed
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What of the campaign differs by kind of control.
+
+    feature: words of that control. corrections: it takes them. decimals: of a size as it is carried. ordered: readings arrive in
+    the order in which they were measured; what is printed or published again comes later than its followers. waits: its ring
+    waits for the bridge; where it does not, parts are held up, so that they take longer than an outage as real ones do.
+    """
+
+    feature: dict[str, Any] = field(default_factory=dict)
+    corrections: bool = True
+    decimals: int = 6
+    ordered: bool = True
+    waits: bool = True
+
+
+KINDS = {
+    "dprnt": Kind(corrections=False, decimals=4, ordered=False, waits=False),
+    "folder": Kind(corrections=False),
+    "haas": Kind({"register": "wear_diameter", "parameter": 2600}),
+    "heidenhain": Kind({"register": "QR31", "parameter": 31, "holds": "radius"}, decimals=4, waits=False),
+    "mqtt": Kind(ordered=False),
+    "opcua": Kind({"register": "wear_length_1", "parameter": 12}),
+}
+FAULTS = {
+    "bridge killed": 5,
+    "server killed": 1,
+    "link to the server cut": 4,
+    "link to the control cut": 4,
+    "power of the control lost": 3,
+    "broker killed": 3,
+    "edited by hand": 1,
+}
+"""Faults, and how often each comes in proportion."""
 
 
 class Restartable(Protocol):
@@ -99,22 +140,24 @@ async def _pump(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> N
 
 @dataclass
 class Control:
-    """The simulated control and the links, in a thread of their own."""
+    """The simulated control and the links, in a thread of their own. share: a folder's link; a cut takes it away."""
 
-    kind: str
+    name: str
     server_port: int
     seed: int
-    cycle: float = 0.15
+    folder: Path
     model: Model = field(init=False)
+    simulator: Any = field(init=False)
     loop: asyncio.AbstractEventLoop = field(init=False)
     to_server: Proxy = field(init=False)
     to_control: Proxy = field(init=False)
     making: bool = True
 
     def __post_init__(self) -> None:
-        feature = Feature(nominal=39.992, tool=TOOL, bias=0.001, wear=0.0006, noise=0.0003, **_REGISTERS[self.kind])
-        self.model = Model((feature,), seed=self.seed)
-        self.feature = feature
+        self.kind = KINDS[self.name]
+        self.feature = Feature(nominal=39.992, tool=TOOL, bias=0.001, wear=0.0006, noise=0.0003, **self.kind.feature)
+        self.model = Model((self.feature,), seed=self.seed)
+        self.files, self.share = self.folder / "files", self.folder / "share"
 
     @contextmanager
     def running(self) -> Iterator["Control"]:
@@ -134,10 +177,22 @@ class Control:
             self.loop.close()
 
     def do(self, work: Coroutine[Any, Any, Any]) -> Any:
-        return asyncio.run_coroutine_threadsafe(work, self.loop).result(60)
+        return asyncio.run_coroutine_threadsafe(work, self.loop).result(SETTLE)
 
     async def _start(self) -> None:
-        self.simulator = await simulator_named(self.kind).serve(self.model, 0)
+        place: tuple[str, ...] = ()
+        if self.name == "folder":
+            place = (str(self.files),)
+            self.share.symlink_to(self.files)
+        elif self.name == "mqtt":
+            self.files.mkdir()
+            self.broker_port = free_port()
+            broker = await start_broker(self.files, self.broker_port)
+            place = (f"127.0.0.1:{self.broker_port}",)
+        more = {"secure": False} if self.name == "opcua" else {}  # keys take long to make
+        self.simulator = await simulator_named(self.name).serve(self.model, 0, *place, **more)
+        if self.name == "mqtt":
+            self.simulator.broker = broker
         self.to_control, self.to_server = Proxy(self.simulator.port), Proxy(self.server_port)
         await self.to_control.start()
         await self.to_server.start()
@@ -148,21 +203,48 @@ class Control:
         await self.to_server.stop()
         await self.simulator.stop()
 
+    def by_the_link(self, setting: object) -> object:
+        """A setting of the control, so that the bridge reaches it by the link that can be cut."""
+        if setting == self.simulator.port:
+            return self.to_control.port
+        if isinstance(setting, str):
+            port = f":{self.simulator.port}"
+            return setting.replace(port, f":{self.to_control.port}").replace(str(self.files), str(self.share))
+        return setting
+
     async def _parts(self) -> None:
         while True:
             if next(self._program, self) is self:
-                await asyncio.sleep(self.cycle)
+                await asyncio.sleep(CYCLE)
+                while not self.kind.waits and len(self.model.written) - self._stored() > UNHEARD:
+                    await self.print_again()
+                    await asyncio.sleep(0.5)
                 self._program = self.model.part() if self.making else iter(())
             full = self.model.registers[Register.WRITTEN] - self.model.registers[Register.ACK] >= SLOTS
             await asyncio.sleep(0.02 if full else 0.001)
 
+    def _stored(self) -> int:
+        """The number of readings that the bridge has stored."""
+        place = f"file:{self.folder}/inband-bridge.sqlite3?mode=ro"
+        try:
+            with contextlib.closing(sqlite3.connect(place, uri=True)) as store:
+                return int(store.execute("SELECT count(*) FROM reading").fetchone()[0])
+        except sqlite3.OperationalError:  # the bridge has not made it yet
+            return 0
+
     async def power_loss(self) -> None:
         self.model.power_loss()
         self._program = iter(())
-        self.to_control.open = False
-        self.to_control.cut()
-        await asyncio.sleep(0.5)
-        self.to_control.open = True
+        await self.cut_control(0.5)
+
+    async def cut_control(self, seconds: float) -> None:
+        """Cut the link to the control; a share goes away."""
+        mounted = self.share.is_symlink()
+        if mounted:
+            self.share.unlink()
+        await self.cut(self.to_control, seconds)
+        if mounted:
+            self.share.symlink_to(self.files)
 
     async def cut(self, proxy: Proxy, seconds: float) -> None:
         proxy.open = seconds == 0
@@ -170,16 +252,37 @@ class Control:
         await asyncio.sleep(seconds)
         proxy.open = True
 
+    async def kill_broker(self, seconds: float) -> None:
+        self.simulator.broker.kill()
+        await self.simulator.broker.wait()
+        await asyncio.sleep(seconds)
+        self.simulator.broker = await start_broker(self.files, self.broker_port)
+
     async def edit(self, change: float) -> float:
         place = (self.feature.tool, self.feature.edge, self.feature.register)
         self.model.edit(place, round(self.model.offsets[place] + change, 4))
         return self.model.offsets[place]
 
+    async def print_again(self) -> None:
+        """The program that prints the last eight again, where there is one."""
+        if self.name == "dprnt":
+            self.simulator.print_again()
 
-_REGISTERS: dict[str, dict[str, Any]] = {
-    "haas": {"register": "wear_diameter", "parameter": 2600},
-    "opcua": {"register": "wear_length_1", "parameter": 12},
-}
+    @property
+    def offset(self) -> float:
+        """The offset as the server has it: of a diameter."""
+        [held] = self.model.offsets.values()
+        return held * (2.0 if self.feature.holds == "radius" else 1.0)
+
+    def truth(self) -> dict[str, float]:
+        """Name and size of each reading that was written completely; the files of a folder name the part only."""
+        if self.name == "folder":
+            return {f"P{slot.part}": slot.measured for _, slot in self.model.written}
+        return self.model.truth()
+
+    def named(self, reading: dict[str, Any]) -> str:
+        """The name of a reading of the server, as in the truth."""
+        return str(reading["part"]) if self.name == "folder" else ":".join(reading["key"].split(":")[-2:])
 
 
 class Bridge:
@@ -210,34 +313,38 @@ class Campaign:
     kind: str = "haas"
     seed: int = 1
     faults: dict[str, int] = field(default_factory=dict)
-    edits: int = 0
+
+    def __post_init__(self) -> None:
+        self.machine, self.characteristic = f"faults-{self.kind}", f"shaft-{self.kind}"
 
     def run(self, count: int) -> dict[str, int]:
         """Cause so many faults; what was compared. Raises `AssertionError` for anything lost, doubled or overwritten."""
         secret = self._set_up()
-        chance = random.Random(self.seed)
+        chance = random.Random(f"{self.seed} {self.kind}")
         port = int(self.server.url.rpartition(":")[2])
-        with Control(self.kind, port, self.seed).running() as control:
+        with Control(self.kind, port, self.seed, self.folder).running() as control:
             bridge = Bridge(self._configuration(control, secret))
             bridge.start()
             try:
-                self._until(lambda: len(self._readings()) >= 3, "the first readings", 60)
+                self._until(lambda: len(self._readings()) >= 3, "the first readings", SETTLE)
                 for number in range(count):
                     self._one_fault(chance, control, bridge)
                     time.sleep(chance.uniform(0.05, 4.0))
-                    if sys.stderr.isatty():
-                        print(f"\r{number + 1}/{count} {self.faults}", end="", file=sys.stderr)
+                    self._acknowledge()
+                    if sys.stderr.isatty() or (number + 1) % 25 == 0:
+                        print(f"\r{self.kind} {number + 1}/{count} {self.faults}", end="", file=sys.stderr)
                 return self._compare(control)
             finally:
                 bridge.end(signal.SIGTERM)
                 bridge.log.close()
 
     def _one_fault(self, chance: random.Random, control: Control, bridge: Bridge) -> None:
-        kinds: list[tuple[str, int]] = [
-            ("bridge killed", 5), ("server killed", 1), ("link to the server cut", 4), ("link to the control cut", 4),
-            ("power of the control lost", 3), ("edited by hand", 1),
-        ]  # fmt: skip
-        [name] = chance.choices([name for name, _ in kinds], [weight for _, weight in kinds])
+        there = dict(FAULTS)
+        if self.kind != "mqtt":
+            del there["broker killed"]
+        if not control.kind.corrections:
+            del there["edited by hand"]
+        [name] = chance.choices(list(there), list(there.values()))
         self.faults[name] = self.faults.get(name, 0) + 1
         match name:
             case "bridge killed":
@@ -251,63 +358,58 @@ class Campaign:
             case "link to the server cut":
                 control.do(control.cut(control.to_server, chance.choice([0, 0.5])))
             case "link to the control cut":
-                control.do(control.cut(control.to_control, chance.choice([0, 0.5])))
+                control.do(control.cut_control(chance.choice([0, 0.5])))
             case "power of the control lost":
                 control.do(control.power_loss())
+            case "broker killed":
+                control.do(control.kill_broker(chance.uniform(0, 0.5)))
             case _:
                 self._edit(chance, control)
 
     def _edit(self, chance: random.Random, control: Control) -> None:
         """An operator changes the offset, and says at the alarm that it is true."""
-        held = control.do(control.edit(chance.choice([-0.004, 0.003, 0.005])))
-        self.edits += 1
+        control.do(control.edit(chance.choice([-0.004, 0.003, 0.005])))
+        held = control.offset
 
         def noticed() -> bool:
-            alarms = self.call("GET", f"/alarms?state=active&machine={MACHINE}")["items"]
-            for alarm in alarms:
-                with contextlib.suppress(httpx.HTTPStatusError):
-                    self.call("POST", f"/alarms/{alarm['id']}/acknowledge", action="noted", comment="edited")
-            tool = self.call("GET", f"/machines/{MACHINE}/tools/{TOOL}")
-            now = self._offset(control)
-            return bool(abs(tool["offset"] - now) < 0.0006 or now != held)
+            self._acknowledge()
+            tool = self.call("GET", f"/machines/{self.machine}/tools/{TOOL}")
+            return bool(abs(tool["offset"] - control.offset) < TOLERANCE or control.offset != held)
 
         self._until(noticed, f"the edit to {held} is noticed", NOTICED)
 
-    def _offset(self, control: Control) -> float:
-        feature = control.feature
-        return control.model.offsets[feature.tool, feature.edge, feature.register]
+    def _acknowledge(self) -> None:
+        """An operator looks at the alarms, so that corrections go on."""
+        with contextlib.suppress(httpx.HTTPError):
+            for alarm in self.call("GET", f"/alarms?state=active&machine={self.machine}")["items"]:
+                with contextlib.suppress(httpx.HTTPStatusError):
+                    self.call("POST", f"/alarms/{alarm['id']}/acknowledge", action="noted", comment="seen")
 
     # --- before and after
 
     def _set_up(self) -> str:
-        self.call("POST", "/machines", key=MACHINE, name="Faults", control="other")
+        self.call("POST", "/machines", key=self.machine, name=self.machine, control="other")
         parameters = PARAMETERS | {"tool_memory": TOOL, "average_memory": 5}
-        self.call("POST", "/characteristics", key=CHARACTERISTIC, name="Shaft", machine=MACHINE, parameters=parameters)
-        return str(self.call("POST", f"/machines/{MACHINE}/keys", name="bridge")["secret"])
+        self.call(
+            "POST",
+            "/characteristics",
+            key=self.characteristic,
+            name="Shaft",
+            machine=self.machine,
+            parameters=parameters,
+        )
+        return str(self.call("POST", f"/machines/{self.machine}/keys", name="bridge")["secret"])
 
     def _configuration(self, control: Control, secret: str) -> Path:
         table: dict[str, Any] = dict(control.simulator.table())
-        settings = dict(table[self.kind])
-        for name, value in settings.items():
-            if value == control.simulator.port:
-                settings[name] = control.to_control.port
-            elif isinstance(value, str):
-                settings[name] = value.replace(f":{control.simulator.port}", f":{control.to_control.port}")
-        feature = control.feature
-        place = {
-            "tool_memory": TOOL,
-            "tool": feature.tool,
-            "edge": 1,
-            "register": feature.register,
-            "holds": "diameter",
-        }
+        settings = {name: control.by_the_link(value) for name, value in table[self.kind].items()}
+        if self.kind == "folder":
+            settings["every"] = 0.2
         for name in ("secret_file", "secret_env"):
             table.pop(name, None)
         table |= {
-            "unit": "mm",
             "secret": secret,
-            "characteristics": {"1": CHARACTERISTIC},
-            "location": [place],
+            "characteristics": dict.fromkeys(table["characteristics"], self.characteristic),
             "interval": 0.05,
             "offsets_every": 1.0,
             "patience": 5.0,
@@ -317,7 +419,7 @@ class Campaign:
         }
         file = self.folder / "plant.toml"
         server = f'[server]\nurl = "http://127.0.0.1:{control.to_server.port}"\nask = 0.5\nheartbeat = 2\n\n'
-        file.write_text(server + toml_of(MACHINE, table), encoding="utf-8")
+        file.write_text(server + toml_of(self.machine, table), encoding="utf-8")
         return file
 
     def _until(self, met: Callable[[], bool], what: str, seconds: float) -> None:
@@ -330,44 +432,72 @@ class Campaign:
         log = (self.folder / "plant.log").read_text(encoding="utf-8", errors="replace")[-3000:]
         raise AssertionError(f"{what}: not within {seconds:g} s. The bridge said:\n{log}")
 
-    def _readings(self) -> list[dict[str, Any]]:
+    def _all(self, path: str) -> list[dict[str, Any]]:
         found: list[dict[str, Any]] = []
-        after = 0
-        while True:
-            page = self.call("GET", f"/readings?characteristic={CHARACTERISTIC}&order=oldest&limit=1000&after={after}")
+        after: int | None = 0
+        while after is not None:
+            page = self.call("GET", f"{path}limit=1000&after={after}")
             found += page["items"]
-            if page["next"] is None:
-                return found
             after = page["next"]
+        return found
+
+    def _readings(self) -> list[dict[str, Any]]:
+        return self._all(f"/readings?characteristic={self.characteristic}&order=oldest&")
+
+    def _corrections(self) -> dict[int, dict[str, Any]]:
+        return {each["number"]: each for each in self._all(f"/machines/{self.machine}/corrections?")}
 
     def _compare(self, control: Control) -> dict[str, int]:
         """Let everything come to rest, and compare."""
-        control.making = False
         model = control.model
 
+        def tried() -> bool:
+            self._acknowledge()
+            return bool(model.applied) or not control.kind.corrections
+
+        self._until(tried, "a first correction is applied", SETTLE)
+        control.making = False
+
         def at_rest() -> bool:
+            control.do(control.print_again())
             stored = len(self._readings())
             return stored >= len(model.written) and model.registers[Register.ACK] == model.registers[Register.WRITTEN]
 
         self._until(at_rest, f"all {len(model.written)} readings at the server", SETTLE)
+        readings, truth = self._readings(), control.truth()
+        found = [control.named(reading) for reading in readings]
+        assert sorted(found) == sorted(truth), _difference(found, list(truth))
+        assert found == list(truth) or not control.kind.ordered, "they are in another order"
+        least = 0.51 * 10**-control.kind.decimals
+        for name, reading in zip(found, readings, strict=True):
+            assert abs(reading["measured"] - truth[name]) < least, f"{name} was {truth[name]}, is {reading['measured']}"
+        assert [reading["sequence"] for reading in readings] == list(range(1, len(readings) + 1)), "numbers have gaps"
+        if control.kind.corrections:
+            self._compare_corrections(control)
+        return {"readings": len(readings), "corrections": len(model.applied), **self.faults}
+
+    def _compare_corrections(self, control: Control) -> None:
+        model, scale = control.model, 2.0 if control.feature.holds == "radius" else 1.0
+        numbers = [each.number for each in model.applied]
 
         def settled() -> bool:
-            applied = self.call("GET", f"/machines/{MACHINE}/corrections?status=applied&limit=1000")["items"]
-            return {each.number for each in model.applied} <= {each["number"] for each in applied} or not model.applied
+            known = self._corrections()
+            return all(known[number]["status"] == "applied" for number in numbers)
 
         with contextlib.suppress(AssertionError):  # those superseded by an edit are compared below
             self._until(settled, "corrections are confirmed", 15)
-        readings = self._readings()
-        keys = [reading["key"].removeprefix(f"{MACHINE}:") for reading in readings]
-        assert keys == list(model.truth()), _difference(keys, list(model.truth()))
-        sizes = [reading["measured"] for reading in readings]
-        assert all(abs(a - b) < 1e-6 for a, b in zip(sizes, model.truth().values(), strict=True)), "a size was changed"
-        assert [reading["sequence"] for reading in readings] == list(range(1, len(readings) + 1)), "numbers have gaps"
-        numbers = [each.number for each in model.applied]
-        assert numbers, "no correction was applied: nothing was tried"
         assert len(set(numbers)) == len(numbers), f"applied twice: {sorted(n for n in numbers if numbers.count(n) > 1)}"
+        known = self._corrections()
+        for number, before, after in model.applied:
+            step, wanted = scale * (after - before), known[number]["amount"]
+            assert abs(step - wanted) < scale * TOLERANCE, (
+                f"correction {number} was {wanted}, the offset went by {step}"
+            )
         _no_edit_overwritten(model)
-        return {"readings": len(readings), "corrections": len(numbers), "edits": self.edits, **self.faults}
+        self._until(lambda: abs(self._told() - control.offset) < TOLERANCE, f"the offset {control.offset} is told", 30)
+
+    def _told(self) -> float:
+        return float(self.call("GET", f"/machines/{self.machine}/tools/{TOOL}")["offset"])
 
 
 def _difference(found: list[str], written: list[str]) -> str:
@@ -390,9 +520,10 @@ def _no_edit_overwritten(model: Model) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--faults", type=int, default=30)
-    parser.add_argument("--kind", default="haas", choices=sorted(_REGISTERS))
+    parser.add_argument("--kind", choices=sorted(KINDS), help="all, one after the other, if left out")
     parser.add_argument("--seed", type=int, default=1)
     chosen = parser.parse_args()
+    kinds = [chosen.kind] if chosen.kind else sorted(KINDS)
     with plant() as running, tempfile.TemporaryDirectory(prefix="inband-faults-") as folder:
         client = httpx.Client(
             base_url=f"{running.url}/api/v1", headers={"Authorization": f"Bearer {running.key}"}, timeout=30
@@ -419,11 +550,25 @@ def main() -> None:
                 )
                 wait_until_ready(running.url, running.process)
 
-        began = time.monotonic()
-        found = Campaign(Server(), call, Path(folder), chosen.kind, chosen.seed).run(chosen.faults)
-    print(f"\n{chosen.faults} faults in {time.monotonic() - began:.0f} s, nothing lost, doubled or overwritten:")
-    for name, number in found.items():
-        print(f"{number:8d}  {name}")
+        lost = []
+        for place, kind in enumerate(kinds):
+            count = (chosen.faults + place) // len(kinds)
+            own = Path(folder, kind)
+            own.mkdir()
+            began = time.monotonic()
+            try:
+                found = Campaign(Server(), call, own, kind, chosen.seed).run(count)
+            except AssertionError as error:
+                lost.append(kind)
+                print(f"\n{kind}: {error}", flush=True)
+                continue
+            print(
+                f"\n{kind}: {count} faults in {time.monotonic() - began:.0f} s, nothing lost, doubled or overwritten:"
+            )
+            for name, number in found.items():
+                print(f"{number:8d}  {name}", flush=True)
+    if lost:
+        raise SystemExit(f"Failed: {', '.join(lost)}.")
 
 
 if __name__ == "__main__":

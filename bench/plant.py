@@ -64,6 +64,7 @@ def plant(characteristics: int = 0, machine: str = "bench") -> Iterator[Plant]:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
+        running: Plant | None = None
         try:
             url = f"http://127.0.0.1:{port}"
             wait_until_ready(url, process)
@@ -74,16 +75,19 @@ def plant(characteristics: int = 0, machine: str = "bench") -> Iterator[Plant]:
             _set_up(url, key, machine, characteristics)
             with psycopg.connect(dsn, autocommit=True) as connection:
                 connection.execute("VACUUM ANALYZE")
-            yield Plant(url, port, dsn, key, process, binary("pgbench").parent)
+            running = Plant(url, port, dsn, key, process, binary("pgbench").parent)
+            yield running
         finally:
+            if running is not None:
+                process = running.process  # another one, where the server was killed and started again
             process.terminate()
             process.wait(30)
             server.stop()
 
 
 def wait_until_ready(url: str, process: subprocess.Popen[bytes]) -> None:
-    """Until it answers, at most half a minute."""
-    for _attempt in range(300):
+    """Until it answers, at most three minutes: the computer may be busy."""
+    for _attempt in range(1800):
         if process.poll() is not None:
             raise SystemExit("the server ended before it was ready")
         try:
@@ -92,7 +96,7 @@ def wait_until_ready(url: str, process: subprocess.Popen[bytes]) -> None:
         except httpx.HTTPError:
             pass
         time.sleep(0.1)
-    raise SystemExit("the server was not ready within 30 seconds")
+    raise SystemExit("the server was not ready within three minutes")
 
 
 def _set_up(url: str, key: str, machine: str, characteristics: int) -> None:

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 from app.bridge.configuration import Configuration, Machine
 from app.bridge.kinds.mtconnect import AgentError, Context
-from app.bridge.links import LinkError, Position
+from app.bridge.links import LinkError, Position, look_who_answers, silence
 from app.bridge.program import link_of
-from inband_client import AsyncClient, Forbidden, NotFound, ProblemError, Unauthorized
+from inband_client import AsyncClient, Forbidden, NotFound, ProblemError, Unauthorized, Unavailable
 
 
 class Finding(NamedTuple):
@@ -61,8 +61,11 @@ async def _server(configuration: Configuration, machine: Machine) -> AsyncIterat
                     )
         except (Unauthorized, Forbidden) as error:
             yield Finding(machine.key, f"the server refuses the key: {error.detail} Make a new one in Set-up.", False)
+        except Unavailable as error:
+            words = f"the server {url} does not answer ({error.detail}) Does it run, and is the address right?"
+            yield Finding(machine.key, words, False)
         except ProblemError as error:
-            yield Finding(machine.key, f"the server {url}: {error.detail}", False)
+            yield Finding(machine.key, f"the server {url}: {error}", False)
 
 
 async def _control(machine: Machine) -> AsyncIterator[Finding]:
@@ -70,18 +73,21 @@ async def _control(machine: Machine) -> AsyncIterator[Finding]:
     try:
         async with asyncio.timeout(machine.patience):
             identity = await link.connect()
-        if machine.identity not in {None, identity}:
-            yield Finding(machine.key, f"machine {identity!r} answers at this address, not {machine.identity!r}", False)
-            return
+        look_who_answers(identity, machine.identity)
         named = "" if machine.identity else f"; put identity = {identity!r} into the configuration"
         yield Finding(machine.key, f"the control answers as {identity!r}{named}", True)
         async with asyncio.timeout(machine.patience):
             received = await link.fetch(Position())
             yield Finding(machine.key, f"{len(received)} readings can be fetched now", True)
+            if faults := [each.fault for each in received if each.fault]:
+                words = f"{len(faults)} of them would go to the quarantine, the first because: {faults[0]}"
+                yield Finding(machine.key, words, False)
+            if remark := getattr(link, "remark", ""):
+                yield Finding(machine.key, remark, False)
             for memory, offset in (await link.offsets()).items():
                 yield Finding(machine.key, f"tool memory {memory} holds {offset:.4f} mm", True)
     except TimeoutError:
-        yield Finding(machine.key, f"the control has not answered for {machine.patience:g} s", False)
+        yield Finding(machine.key, silence(machine.patience), False)
     except LinkError as error:
         yield Finding(machine.key, str(error), False)
     finally:

@@ -66,7 +66,8 @@ class Machine(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
     identity: what the control must answer as its serial number. corrections: the control takes them from the mailbox
     (``control``), the bridge writes the offset itself (``direct``), or there are ``none``. proof_needed: corrections wait
     until a touch test has proved the mapping of their location. offsets_every: how often offsets are read, which is how an edit
-    at the panel is noticed. patience: how long one call to the control may take. context: an MTConnect agent that tells the part
+    at the panel is noticed. touch_tests_by_page: a person in the browser may have an offset changed by the amount of a touch
+    test, besides the command at this computer. patience: how long one call to the control may take. context: an MTConnect agent that tells the part
     of readings that have none.
     """
 
@@ -87,6 +88,7 @@ class Machine(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
     largest_distance: Positive = 0.5
     largest_age: Positive = 8 * 3600.0
     proof_needed: bool = True
+    touch_tests_by_page: bool = False
     context: mtconnect.Settings | None = None
 
     def mapping_hash(self, location: Location | None = None) -> str:

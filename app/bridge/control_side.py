@@ -4,7 +4,8 @@ import asyncio
 import logging
 import time
 
-from app.bridge.links import LinkError, WrongMachine
+from app.bridge import guided_test
+from app.bridge.links import LinkError, look_who_answers, silence
 from app.bridge.store import StoreError
 from app.bridge.unit import Unit
 
@@ -23,7 +24,7 @@ async def run(unit: Unit) -> None:
         except (LinkError, StoreError) as error:
             unit.say(error.state if isinstance(error, LinkError) else "full", str(error))
         except TimeoutError:
-            unit.say("control_away", f"The control has not answered for {unit.machine.patience:g} s.")
+            unit.say("control_away", silence(unit.machine.patience))
         except Exception as error:
             log.exception("%s", unit.machine.key)
             unit.say("control_away", f"{type(error).__name__}: {error}")
@@ -31,6 +32,11 @@ async def run(unit: Unit) -> None:
             await _closed(unit)
         pause = FIRST_PAUSE if unit.polls > began else min(2 * pause, LONGEST_PAUSE)
         await asyncio.sleep(pause)
+
+
+def _until_next(interval: float) -> float:
+    """Seconds until the next poll. All machines with the same interval are polled together, which shares wake-ups and commits."""
+    return interval - time.monotonic() % interval
 
 
 async def _closed(unit: Unit) -> None:
@@ -43,20 +49,19 @@ async def _closed(unit: Unit) -> None:
 
 async def _connected(unit: Unit) -> None:
     machine, link, store = unit.machine, unit.link, unit.store
+    await guided_test.resume(unit)
     async with asyncio.timeout(machine.patience):
         unit.identity = await link.connect()
-    if machine.identity is not None and unit.identity != machine.identity:
-        raise WrongMachine(
-            f"At this address machine {unit.identity!r} answers, not {machine.identity!r}: look at address and network."
-            " Nothing is fetched or written."
-        )
+    look_who_answers(unit.identity, machine.identity)
     position = await store.position(machine.key)
     answered: int | None = None
     offsets_at = full_at = 0.0
     full = False
     while True:
+        if unit.test is not None:
+            await guided_test.advance(unit)
         if time.monotonic() >= full_at:
-            full, full_at = store.is_full(), time.monotonic() + FULL_EVERY
+            full, full_at = await store.is_full(), time.monotonic() + FULL_EVERY
         if full:
             raise StoreError(
                 f"The store holds {store.largest / 1e6:g} MB, its largest size: nothing is fetched until the server has"
@@ -75,15 +80,19 @@ async def _connected(unit: Unit) -> None:
         async with asyncio.timeout(machine.patience):
             for outcome in await link.outcomes():
                 if outcome.number != answered and await store.answered(machine.key, outcome):
+                    unit.to_tell = True
                     unit.news.set()
                 answered = outcome.number
-            await link.offer(unit.orders)
+            await link.offer(() if unit.test is not None and unit.test.holds else unit.orders)
         if time.monotonic() >= offsets_at:
             async with asyncio.timeout(machine.patience):
-                if offsets := await link.offsets():
+                offsets = await link.offsets()
+                if unit.test is not None and unit.test.changed:
+                    offsets.pop(unit.test.tool_memory, None)  # nobody's edit
+                if offsets:
                     await store.held(machine.key, offsets)
             offsets_at = time.monotonic() + machine.offsets_every
         unit.polls += 1
         remark = getattr(link, "remark", "")  # of kinds that see gaps in what a control prints
         unit.say("held" if unit.held else "online", " ".join(filter(None, (*unit.held_back, remark))))
-        await asyncio.sleep(machine.interval)
+        await asyncio.sleep(_until_next(machine.interval))

@@ -69,7 +69,8 @@ def against(
         hours = (now - issued).total_seconds() / 3600
         return Verdict(
             f"The bridge refuses correction {order.number}: it is {hours:.1f} h old, more than"
-            f" {machine.largest_age / 3600:g} h (largest_age).",
+            f" {machine.largest_age / 3600:g} h (largest_age). If it was made just now, a clock is wrong: the bridge's says"
+            f" {now:%Y-%m-%d %H:%M} UTC.",
             final=True,
         )
     return None

@@ -36,6 +36,23 @@ class Misconfigured(LinkError):
     state = "configuration"
 
 
+def look_who_answers(identity: str, wanted: str | None) -> None:
+    """Raises `WrongMachine` where another machine answers than the one that the configuration names."""
+    if wanted not in {None, identity}:
+        raise WrongMachine(
+            f"At this address machine {identity!r} answers, not {wanted!r}: look at address and network. If the control was"
+            " exchanged, name the new one in identity. Nothing is fetched or written."
+        )
+
+
+def silence(seconds: float) -> str:
+    """The sentence about a control that does not answer."""
+    return (
+        f"The control has not answered for {seconds:g} s: is it on, do address and port lead to it, and does a firewall stand"
+        " between?"
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Position:
     """The part of a control's ring that is stored.

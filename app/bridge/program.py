@@ -6,13 +6,15 @@ import logging
 import ssl
 from pathlib import Path
 
-from app.bridge import control_side, server_side
+from app import memory
+from app.bridge import control_side, guided_test, server_side
 from app.bridge.configuration import Configuration, Machine
 from app.bridge.kinds import kind_named
 from app.bridge.kinds.mtconnect import Context
 from app.bridge.links import Link
 from app.bridge.store import Store, StoreError
 from app.bridge.unit import Unit, ended
+from app.bridge.wire import Wire
 from inband_client import AsyncClient
 
 log = logging.getLogger(__name__)
@@ -34,12 +36,15 @@ async def run(configuration: Configuration, store: Store) -> None:
     """Run all machines until cancelled."""
     trusted = ssl.create_default_context(cafile=configuration.server.ca)  # one for all: each costs a megabyte
     async with contextlib.AsyncExitStack() as stack:
-        tasks = []
+        wire = Wire(trusted)
+        stack.callback(wire.close)
+        tasks, units = [], []
         for machine in configuration.machines:
             client = await stack.enter_async_context(
-                AsyncClient(configuration.server.url, machine.secret, verify=trusted, patience=0.0)
+                AsyncClient(configuration.server.url, machine.secret, verify=trusted, patience=0.0, transport=wire)
             )
             unit = Unit(machine, link_of(machine), store, configuration.hold_all)
+            units.append(unit)
             if machine.context is not None:
                 unit.context = Context(machine.key, machine.context)
                 tasks.append(asyncio.create_task(unit.context.run(), name=f"{machine.key} context"))
@@ -47,14 +52,21 @@ async def run(configuration: Configuration, store: Store) -> None:
                 ("control", control_side.run(unit)),
                 ("server", server_side.run(unit, client, configuration.server)),
                 ("heartbeat", server_side.beat(unit, client, configuration.server)),
+                ("touch test", guided_test.run(unit, client)),
             ):
                 tasks.append(asyncio.create_task(work, name=f"{machine.key} {name}"))
+        tasks.append(asyncio.create_task(memory.give_back_free_memory(), name="memory"))
         tasks.append(asyncio.create_task(_tidy(store, configuration.store.keep * 3600), name="tidy"))
         log.info("%d machines, server %s", len(configuration.machines), configuration.server.url)
         try:
-            await asyncio.gather(*tasks)
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_EXCEPTION)  # cancelled, the tasks go on
+            for task in done:
+                task.result()
         finally:
-            await ended(tasks)
+            try:
+                await guided_test.end_all(units)
+            finally:
+                await ended(tasks)
 
 
 async def _tidy(store: Store, keep: float) -> None:

@@ -20,9 +20,9 @@ from app.bridge.links import (
     Received,
 )
 from app.bridge.moments import learn, measured_at
+from app.bridge.slots import reading_of
 from app.core.ring import (
     FIRST_SLOT,
-    INCH,
     SIZE,
     SLOT_SIZE,
     SLOTS,
@@ -32,7 +32,6 @@ from app.core.ring import (
     Mail,
     Register,
     Slot,
-    Status,
     Unit,
     mail_registers,
     read_block,
@@ -42,15 +41,12 @@ from app.core.ring import (
 )
 
 HEADS = tuple(range(FIRST_SLOT))
+WHOLE = range(SIZE)
 WATCHED = (Register.WRITTEN, Register.ANSWERED, Register.ANSWER, Register.EPOCH)
 """What a poll looks at where registers are read one by one; the other heads change only with these, or by the bridge."""
 HEADS_EVERY = 10.0  # s: all heads are read again at the latest
 SLOTS_AT_ONCE = 4  # where registers are read one by one, so that a call does not take too long
 FRESH = 2.0  # polls: a reading that was not there so long ago was measured just now
-FAULTS = {
-    Status.NO_TRIGGER: "The probe did not trigger (status 1): there is no size.",
-    Status.MARKED: "The NC program has marked the reading as not valid (status 3).",
-}
 REFUSALS = {
     Answer.OFFSET_DIFFERS: "The control holds another offset than expected.",
     Answer.NOT_POSSIBLE: "The control has no such tool, edge or offset (answer 3).",
@@ -74,7 +70,10 @@ class Registers(Protocol):
         """Registers of the block, in the order of the places."""
 
     async def write(self, place: int, value: float) -> None:
-        """Write one register of the block."""
+        """Write one register of the block. A control may show it only after its next sampling tick."""
+
+    async def shown(self, place: int, value: float) -> None:
+        """Wait until the control shows what was written, or for as long as that may take."""
 
     async def read_offset(self, location: Location) -> float | None:
         """The control's offset of a location, in its own unit and sense; None where it cannot be read."""
@@ -86,32 +85,6 @@ class Registers(Protocol):
         """A reason why the offset must not be written now (program running, tool in use); None if it may be."""
 
 
-def body_of(machine: Machine, slot: Slot) -> dict[str, object]:
-    """A reading as ``POST /readings`` takes it, without key and time."""
-    body: dict[str, object] = {
-        "characteristic": machine.characteristics.get(str(slot.characteristic)),
-        "measured": round(slot.measured * (INCH if machine.unit == "inch" else 1.0), 9),
-        "correction_in_effect": slot.in_effect,
-    }
-    if slot.part:
-        body["part"] = str(slot.part)
-    if slot.status == Status.FIRST_MOVE:
-        body["first_move_triggered"] = True
-    return body
-
-
-def fault_of(machine: Machine, slot: Slot) -> str | None:
-    """A sentence why this is no reading for the server; None if it is one."""
-    if str(slot.characteristic) not in machine.characteristics:
-        return (
-            f"The control sends characteristic {slot.characteristic}, which machine.{machine.key}.characteristics does not"
-            " name."
-        )
-    if slot.status not in list(Status):
-        return f"Status {slot.status} is not known."
-    return FAULTS.get(Status(slot.status))
-
-
 class RegisterLink:
     """A control with a register block: a `Link` and an `OffsetAccess`."""
 
@@ -120,6 +93,7 @@ class RegisterLink:
         self.registers = registers
         self.clock = Clock()
         self._block: Block | None = None
+        self._numbers: list[float] = []  # those that the block was made of
         self._polled: tuple[datetime, int] | None = None
         self._direct: list[Outcome] = []
         self._heads: list[float] = []
@@ -164,9 +138,15 @@ class RegisterLink:
         return received
 
     async def acknowledge(self, received: Sequence[Received]) -> None:
-        """Write the highest stored sequence where the NC waits for it, and read it back."""
+        """Write the highest stored sequence where the NC waits for it, and read it back.
+
+        The next poll reads it back where it reads the whole block; if it is not there, `fetch` writes it again.
+        """
         if received and (last := received[-1].position):
-            await self._write(Register.ACK, last.sequence)
+            if self.registers.whole:
+                await self.registers.write(Register.ACK, float(last.sequence))
+            else:
+                await self._write(Register.ACK, last.sequence)
 
     async def _read(self, stored: int | None) -> Block:
         """The block; from a control that is read number by number only the heads and the slots that matter.
@@ -174,9 +154,11 @@ class RegisterLink:
         stored: the highest stored sequence, None at the first contact.
         """
         if self.registers.whole:
-            registers = await self.registers.read(range(SIZE))
+            registers = await self.registers.read(WHOLE)
         else:
             registers = await self._one_by_one(stored)
+        if self._block is not None and registers == self._numbers:
+            return self._block
         try:
             block = read_block(registers)
         except BlockError as error:
@@ -189,6 +171,7 @@ class RegisterLink:
                 f"The control says that it works in {says or f'unit {block.unit}'}, the configuration says unit ="
                 f" {self.machine.unit!r}. Nothing is fetched or corrected until they agree."
             )
+        self._numbers = registers
         return block
 
     async def _one_by_one(self, stored: int | None) -> list[float]:
@@ -216,15 +199,10 @@ class RegisterLink:
         self._heads_at = time.monotonic()
 
     def _received(self, slot: Slot, stored: Position, now: datetime, *, fresh: bool) -> Received:
-        body = body_of(self.machine, slot)
         if slot.time is not None and fresh:
             learn(self.clock, slot.time, now)
-        if at := measured_at(self.clock, slot.time, now, fresh=fresh):
-            body["measured_at"] = at.isoformat()
-        position = Position(stored.epoch, slot.sequence, stored.generation)
-        again = f".{stored.generation}" if stored.generation else ""  # counters that went back name new readings
-        key = f"{self.machine.key}:{stored.epoch}{again}:{slot.sequence}"
-        return Received(key, body, position, fault_of(self.machine, slot))
+        at = measured_at(self.clock, slot.time, now, fresh=fresh)
+        return reading_of(self.machine, slot, Position(stored.epoch, slot.sequence, stored.generation), at)
 
     # --- corrections
 
@@ -377,6 +355,8 @@ class RegisterLink:
             await self.registers.write(place, float(value))
             if self._heads:
                 self._heads[place] = float(value)
+        for place, value in content:
+            await self.registers.shown(place, float(value))
         for _ in range(1 if self.registers.whole else 2):
             held = await self.registers.read([place for place, _ in content])
             for (place, value), found in zip(content, held, strict=True):

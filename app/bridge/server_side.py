@@ -4,20 +4,24 @@ import asyncio
 import contextlib
 import json
 import logging
-from collections.abc import Sequence
+import time
+from collections.abc import Awaitable, Callable, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
 from app import __version__
+from app.bridge import guided_test
 from app.bridge.configuration import Server
 from app.bridge.guards import against
 from app.bridge.links import Order
+from app.bridge.offset_change import writes_offsets
 from app.bridge.store import Intent, StoreError, Waiting
 from app.bridge.unit import Unit
 from inband_client import (
     AsyncClient,
     Conflict,
     Correction,
+    Decision,
     Forbidden,
     Invalid,
     NotFound,
@@ -37,18 +41,28 @@ NOTICED = 0.0005  # mm: what an offset may differ by without being told
 
 
 async def run(unit: Unit, client: AsyncClient, server: Server) -> None:
-    """Send what waits, bring corrections, until cancelled; whatever fails is said, and tried again."""
+    """Send what waits, bring corrections, until cancelled; whatever fails is said, and tried again.
+
+    Corrections are asked for when a decision makes some, when the control has answered one, and every `Server.ask` seconds.
+    """
+    ask_at = 0.0
     while True:
         unit.news.clear()
         pause, trouble, away = server.ask, None, False
-        for step in (_tell, _forward, _ask):
+        in_full = unit.to_tell or time.monotonic() >= ask_at
+        unit.to_tell = False
+        for step in STEPS:
+            if step is not _forward and not in_full:
+                continue
             try:
-                await step(unit, client)
+                in_full = bool(await step(unit, client)) or in_full
             except Exception as error:  # noqa: BLE001 - said below; one step that fails holds up no other
                 waits, trouble = _sentence(unit, error)
-                pause = max(pause, waits)
+                pause, ask_at = max(pause, waits), 0.0
                 if away := isinstance(error, AWAY):
                     break
+        if in_full and trouble is None:
+            ask_at = time.monotonic() + server.ask
         unit.complain(trouble)
         if away:
             await asyncio.sleep(pause)
@@ -67,7 +81,7 @@ def _sentence(unit: Unit, error: Exception) -> tuple[float, str]:
             )
         case Unavailable():
             waits = min(max(error.retry_after or SHORTEST_PAUSE, SHORTEST_PAUSE), LONGEST_PAUSE)
-            return waits, f"The server does not answer: {error.detail}"
+            return waits, f"The server does not answer ({error.detail}) Does it run, and is server.url right?"
         case ProblemError() | StoreError():
             return LONGEST_PAUSE, str(error)
     log.error("%s", unit.machine.key, exc_info=error)
@@ -77,29 +91,43 @@ def _sentence(unit: Unit, error: Exception) -> tuple[float, str]:
 # --- readings
 
 
-async def _forward(unit: Unit, client: AsyncClient) -> None:
-    """Everything that waits, oldest first."""
+async def _forward(unit: Unit, client: AsyncClient) -> bool:
+    """Everything that waits, oldest first; whether corrections have to be asked for."""
+    concerned = False
     while rows := await unit.store.waiting(unit.machine.key, TOGETHER):
-        if len(rows) > 1:
-            try:
-                await client.push_many([row.body | {"key": row.key} for row in rows])
-            except REFUSED:
-                pass  # one of them: each by itself, below
-            else:
-                await unit.store.sent(unit.machine.key, [row.id for row in rows])
-                continue
-        for row in rows:
-            await _push(unit, client, row)
+        decisions = await _push_all(unit, client, rows)
+        # while one is offered, any reading may supersede it
+        concerned = concerned or bool(unit.orders) or any(_concerns(decision) for decision in decisions)
+        if len(rows) < TOGETHER:
+            break  # `Unit.news` tells of later ones
+    return concerned
 
 
-async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> None:
+def _concerns(decision: Decision) -> bool:
+    return decision.correction is not None or decision.action != "none" or bool(decision.alarms)
+
+
+async def _push_all(unit: Unit, client: AsyncClient, rows: Sequence[Waiting]) -> Sequence[Decision]:
+    if len(rows) > 1:
+        try:
+            batch = await client.push_many([row.body | {"key": row.key} for row in rows])
+        except REFUSED:
+            pass  # one of them: each by itself, below
+        else:
+            await unit.store.sent(unit.machine.key, [row.id for row in rows])
+            return batch.decisions
+    return [decision for row in rows if (decision := await _push(unit, client, row))]
+
+
+async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | None:
     try:
-        await client.push(row.body | {"key": row.key})
+        decision = await client.push(row.body | {"key": row.key})
     except REFUSED as error:
         await unit.store.refuse(unit.machine.key, row.id, str(error))
         log.warning("%s: reading %s is in the quarantine: %s", unit.machine.key, row.key, error)
-    else:
-        await unit.store.sent(unit.machine.key, [row.id])
+        return None
+    await unit.store.sent(unit.machine.key, [row.id])
+    return decision
 
 
 # --- corrections
@@ -138,6 +166,10 @@ async def _ask(unit: Unit, client: AsyncClient) -> None:
     """The pending corrections, through the guards; what the control may have, and why others wait."""
     machine, store = unit.machine, unit.store
     if machine.corrections == "none":
+        return
+    if unit.test is not None and unit.test.holds:
+        unit.held_back = (guided_test.holds(unit.test),)
+        await _intend(unit, [])
         return
     pending = await client.pending(machine.key)
     told = {intent.order.number: intent for intent in await store.intents(machine.key, "told")} if pending else {}
@@ -201,6 +233,9 @@ def _order(correction: Correction, after: float) -> Order:
     return Order(correction.number, correction.tool_memory, round(after - correction.amount, 6), round(after, 6))
 
 
+STEPS: tuple[Callable[[Unit, AsyncClient], Awaitable[bool | None]], ...] = (_tell, _forward, _ask)
+
+
 # --- heartbeat
 
 
@@ -210,11 +245,15 @@ async def beat(unit: Unit, client: AsyncClient, server: Server) -> None:
         try:
             answer = await client.heartbeat(unit.machine.key, **await heartbeat(unit))
             await _look_back(unit, answer.get("server") or {})
+            await guided_test.hear(unit, answer.get("touch_test"))
         except ProblemError as error:
             log.debug("%s: heartbeat: %s", unit.machine.key, error)
         except Exception:
             log.exception("%s: heartbeat", unit.machine.key)
-        await asyncio.sleep(server.heartbeat)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(server.heartbeat):
+                await unit.beat_now.wait()
+        unit.beat_now.clear()
 
 
 async def heartbeat(unit: Unit) -> dict[str, Any]:
@@ -234,6 +273,7 @@ async def heartbeat(unit: Unit) -> dict[str, Any]:
                 "mapping": mapping,
                 "proved_at": _moment(here.proved_at) if here is not None and proved else None,
                 "offset": None if here is None else here.offset,
+                "touch_test_by_page": machine.touch_tests_by_page and writes_offsets(unit.link),
             }
         )
     return {

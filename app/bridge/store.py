@@ -1,7 +1,8 @@
 """The store: readings until the server has them, corrections on their way to the control, the quarantine. SQLite.
 
-Everything is durable (WAL, ``synchronous=FULL``) when a call returns. Calls that come together share one commit: a thread of
-its own takes whatever waits, writes it in one transaction, and lets all of them go on.
+Everything is durable (WAL, ``synchronous=FULL``) when a call returns, but for what the server has taken: losing that note is
+harmless, for a key that comes again is answered as before, so it goes with the next commit. Calls that come together share
+one commit: a thread of its own takes whatever waits, writes it in one transaction, and lets all of them go on.
 """
 
 import asyncio
@@ -20,6 +21,7 @@ from app.bridge.guards import Known
 from app.bridge.links import Order, Outcome, Position, Received
 
 T = TypeVar("T")
+Job = tuple[Callable[[sqlite3.Connection], Any], Future[Any]]
 SCHEMA: Final = """
 CREATE TABLE IF NOT EXISTS reading (
     id INTEGER PRIMARY KEY, machine TEXT NOT NULL, key TEXT NOT NULL, body TEXT NOT NULL,
@@ -42,6 +44,7 @@ CREATE TABLE IF NOT EXISTS location (
 );
 CREATE TABLE IF NOT EXISTS fact (machine TEXT NOT NULL, name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (machine, name));
 """
+NOTE: Final = "INSERT INTO fact (machine, name, value) VALUES (?, ?, ?) ON CONFLICT (machine, name) DO UPDATE SET value = excluded.value"
 PAGE_ROWS: Final = 200
 ANSWERS_KEPT: Final = 90 * 86_400.0  # s
 
@@ -92,9 +95,10 @@ class Store:
         """file: made if it is missing. largest: MB. Raises `StoreError`."""
         self.file = file
         self.largest = largest * 1e6
-        self._jobs: queue.SimpleQueue[tuple[Callable[[sqlite3.Connection], Any], Future[Any]] | None] = (
-            queue.SimpleQueue()
-        )
+        self._noting = threading.Lock()
+        self._sent: list[tuple[float, str, int]] = []
+        self._notes: Future[Any] | None = None
+        self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
             self._database = sqlite3.connect(file, isolation_level=None, check_same_thread=False, timeout=10)
@@ -102,9 +106,7 @@ class Store:
             self._database.execute("PRAGMA synchronous=FULL")
             self._database.executescript(SCHEMA)
         except (OSError, sqlite3.Error) as error:
-            raise StoreError(
-                f"The store {file} cannot be opened: {error}. It needs a folder that can be written."
-            ) from error
+            raise _in_words(error, file, "opened") from error
         self._thread = threading.Thread(target=self._work, name="store", daemon=True)
         self._thread.start()
 
@@ -156,14 +158,13 @@ class Store:
         return [Waiting(number, key, json.loads(body), at) for number, key, body, at in rows]
 
     async def sent(self, machine: str, numbers: Sequence[int]) -> None:
-        """The server has these."""
+        """The server has these: seen by every later call, durable with the next commit. Raises `StoreError` if the last one failed."""
+        if self._notes is not None and self._notes.done() and (error := self._notes.exception()):
+            self._notes = None
+            raise error
         now = time.time()
-        await self._run(
-            lambda database: database.executemany(
-                "UPDATE reading SET state = 'sent', sent_at = ?, reason = NULL WHERE machine = ? AND id = ?",
-                [(now, machine, number) for number in numbers],
-            )
-        )
+        with self._noting:
+            self._sent += [(now, machine, number) for number in numbers]
 
     async def refuse(self, machine: str, number: int, reason: str) -> None:
         """Put one into the quarantine."""
@@ -247,15 +248,16 @@ class Store:
 
         return await self._run(write)
 
-    def is_full(self) -> bool:
+    async def is_full(self) -> bool:
         """True if the store has reached its largest size. Space that was freed counts as free."""
-        with suppress(sqlite3.Error):
+
+        def read(database: sqlite3.Connection) -> bool:
             [pages], [free], [size] = (
-                self._database.execute(f"PRAGMA {name}").fetchone()
-                for name in ("page_count", "freelist_count", "page_size")
+                database.execute(f"PRAGMA {name}").fetchone() for name in ("page_count", "freelist_count", "page_size")
             )
             return bool((pages - free) * size >= self.largest)
-        return False
+
+        return await self._run(read)
 
     # --- corrections
 
@@ -362,16 +364,22 @@ class Store:
             )
         )
 
-    async def prove(self, machine: str, tool_memory: int, mapping: str | None) -> None:
-        """Note that a touch test has proved a mapping; with None, that it has not."""
+    async def prove(
+        self, machine: str, tool_memory: int, mapping: str | None, fact: tuple[str, str] | None = None
+    ) -> None:
+        """Note that a touch test has proved a mapping; with None, that it has not; and a fact with it, name and value."""
         now = None if mapping is None else time.time()
-        await self._run(
-            lambda database: database.execute(
+
+        def write(database: sqlite3.Connection) -> None:
+            database.execute(
                 "INSERT INTO location (machine, tool_memory, proved, proved_at) VALUES (?, ?, ?, ?)"
                 " ON CONFLICT (machine, tool_memory) DO UPDATE SET proved = excluded.proved, proved_at = excluded.proved_at",
                 (machine, tool_memory, mapping, now),
             )
-        )
+            if fact is not None:
+                database.execute(NOTE, (machine, *fact))
+
+        await self._run(write)
 
     async def fact(self, machine: str, name: str) -> str | None:
         """A fact that was noted, such as the server's time line; None if it was not."""
@@ -386,11 +394,7 @@ class Store:
         """Note a fact; None forgets it."""
         await self._run(
             lambda database: (
-                database.execute(
-                    "INSERT INTO fact (machine, name, value) VALUES (?, ?, ?)"
-                    " ON CONFLICT (machine, name) DO UPDATE SET value = excluded.value",
-                    (machine, name, value),
-                )
+                database.execute(NOTE, (machine, name, value))
                 if value is not None
                 else database.execute("DELETE FROM fact WHERE machine = ? AND name = ?", (machine, name))
             )
@@ -410,9 +414,18 @@ class Store:
             while not self._jobs.empty():
                 jobs.append(self._jobs.get())
             ending = None in jobs
-            self._together([job for job in jobs if job is not None])
+            self._together(self._what_was_sent() + [job for job in jobs if job is not None])
 
-    def _together(self, jobs: list[tuple[Callable[[sqlite3.Connection], Any], Future[Any]]]) -> None:
+    def _what_was_sent(self) -> list[Job]:
+        with self._noting:
+            rows, self._sent = self._sent, []
+        if not rows:
+            return []
+        self._notes = Future()
+        statement = "UPDATE reading SET state = 'sent', sent_at = ?, reason = NULL WHERE machine = ? AND id = ?"
+        return [(lambda database: database.executemany(statement, rows), self._notes)]
+
+    def _together(self, jobs: list[Job]) -> None:
         """Do these in one transaction; if it fails, each by itself, so that one cannot take the others along."""
         try:
             results = self._transaction([job for job, _ in jobs])
@@ -448,12 +461,15 @@ def _settle(done: "Future[Any]", result: Any = None, error: BaseException | None
         done.set_exception(error)
 
 
-def _in_words(error: BaseException, file: Path) -> BaseException:
-    if not isinstance(error, sqlite3.Error):
+def _in_words(error: BaseException, file: Path, verb: str = "written") -> BaseException:
+    if not isinstance(error, sqlite3.Error | OSError):
         return error
     words = str(error)
     if "full" in words:
         return StoreError(f"The disk of {file} is full: free space. Nothing is fetched from the controls until then.")
+    what = "Its folder has to be there, and the bridge needs the right to write in it."
+    if "not a database" in words or "malformed" in words:
+        what = "It is damaged, or another program's: move it away, or name another file in [store]."
     return StoreError(
-        f"The store {file} cannot be written: {words}. Nothing is fetched from the controls until it can."
+        f"The store {file} cannot be {verb}: {words}. {what} Nothing is fetched from the controls until then."
     )

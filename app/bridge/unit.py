@@ -9,9 +9,41 @@ from datetime import UTC, datetime
 from app.bridge.configuration import Machine
 from app.bridge.kinds.mtconnect import Context
 from app.bridge.links import Link, Order
+from app.bridge.offset_change import Change
 from app.bridge.store import Store
 
 log = logging.getLogger(__name__)
+
+
+@dataclass(slots=True)
+class Guided:
+    """A touch test that a person guides at the page.
+
+    number: at the server, None for one of the command that was cut off. heard: its state at the server; age: of that state, s.
+    refused: the question that was answered with no. reached: the state that the bridge has brought it to; told: the one of these
+    that the server knows. change: once it is read. changed: the control may hold its offset. ending: the state and the words
+    that it ends with as soon as the offset is taken back; end: these, when it is. until: when the bridge waits no longer for a
+    person, by its own clock.
+    """
+
+    number: int | None
+    tool_memory: int
+    amount: float
+    until: float
+    heard: str = "asked"
+    age: float = 0.0
+    refused: str | None = None
+    reached: str = "asked"
+    told: str = "asked"
+    change: Change | None = None
+    changed: bool = False
+    ending: tuple[str, str] | None = None
+    end: tuple[str, str] | None = None
+
+    @property
+    def holds(self) -> bool:
+        """Tell if corrections wait for it."""
+        return self.end is None
 
 
 @dataclass(slots=True)
@@ -19,9 +51,9 @@ class Unit:
     """One machine.
 
     hold_all: by the configuration; held: by that or by command. orders: corrections that passed the guards; the control side
-    offers them. news: something waits for the server. state and
-    detail: the control's side, as the heartbeat tells it. held_back: sentences why corrections wait. trouble: the server's
-    side, None while it answers. context: what an MTConnect agent tells of the machine.
+    offers them. news: something waits for the server; to_tell: an answer of the control is among it. state and detail: the control's side, as the heartbeat tells it. held_back: sentences why corrections wait. trouble: the server's
+    side, None while it answers. context: what an MTConnect agent tells of the machine. test: the touch test that is open; no
+    correction is offered meanwhile; test_open: there is one. beat_now: the heartbeat waits no longer.
     """
 
     machine: Machine
@@ -32,6 +64,7 @@ class Unit:
     identity: str | None = None
     orders: Sequence[Order] = ()
     news: asyncio.Event = field(default_factory=asyncio.Event)
+    to_tell: bool = False
     state: str = "starting"
     detail: str = ""
     held_back: tuple[str, ...] = ()
@@ -39,6 +72,9 @@ class Unit:
     started_at: datetime = field(default_factory=lambda: datetime.now(UTC))
     polls: int = 0
     context: Context | None = None
+    test: Guided | None = None
+    test_open: asyncio.Event = field(default_factory=asyncio.Event)
+    beat_now: asyncio.Event = field(default_factory=asyncio.Event)
 
     def say(self, state: str, detail: str = "") -> None:
         """Note how the control's side is doing; a change is logged."""

@@ -26,6 +26,7 @@ APPEND_ONLY = frozenset(
         "kinematics_run",
         "parameters_version",
         "reading",
+        "reading_context",
         "reading_results",
         "reading_summary",
         "reading_touches",
@@ -54,6 +55,7 @@ WITH_A_LIFE = frozenset(
         "signal",
         "stream",
         "tool",
+        "touch_test",
     }
 )
 """Tables whose rows change in the columns of their status or state only, and are never deleted."""

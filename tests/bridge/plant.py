@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
-from app.bridge import control_side, server_side
+from app.bridge import control_side, guided_test, server_side
 from app.bridge.configuration import Location, Machine, Server
 from app.bridge.links import ControlAway
 from app.bridge.registers import RegisterLink
@@ -51,6 +51,9 @@ class ModelRegisters:
         self._there()
         self.writes.append((place, value))
         self.model.registers[place] = value
+
+    async def shown(self, place: int, value: float) -> None:
+        pass
 
     async def read_offset(self, location: Location) -> float | None:
         self._there()
@@ -115,7 +118,7 @@ async def bridge(url: str, secret: str, unit: Unit, *, heartbeat: bool = False) 
     """The tasks of one machine, for as long as the block runs."""
     server = Server(url=url, ask=0.2, heartbeat=0.5)
     async with AsyncClient(url, secret, patience=0.0) as client:
-        work = [control_side.run(unit), server_side.run(unit, client, server)]
+        work = [control_side.run(unit), server_side.run(unit, client, server), guided_test.run(unit, client)]
         if heartbeat:
             work.append(server_side.beat(unit, client, server))
         tasks = [asyncio.create_task(each) for each in work]

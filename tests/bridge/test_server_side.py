@@ -1,6 +1,7 @@
 """The server's side of one machine, against a server that is scripted: what is told, what is refused, what is told again."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, cast
@@ -12,7 +13,7 @@ from app.bridge.links import Order, Outcome, Position, Received
 from app.bridge.simulators.model import Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit
-from inband_client import AsyncClient, Conflict, Correction, Invalid
+from inband_client import AsyncClient, Batch, Conflict, Correction, Decision, Invalid, Reason
 from tests.bridge.plant import store_in, unit_of
 from tests.loops import run
 
@@ -38,20 +39,31 @@ class Scripted:
         self.heard: list[tuple[Any, ...]] = []
         self.refuses: Callable[[dict[str, Any]], Exception | None] = lambda _reading: None
         self.confirming: Exception | None = None
+        self.decision = Decision(
+            characteristic="shaft-1",
+            sequence=1,
+            measured=40.0,
+            deviation=0.0,
+            zone="zero",
+            action="none",
+            reason=Reason(code="in_zero_range"),
+        )
 
     async def pending(self, machine: str) -> list[Correction]:
         return self.waiting
 
-    async def push(self, reading: dict[str, Any]) -> None:
+    async def push(self, reading: dict[str, Any]) -> Decision:
         if error := self.refuses(reading):
             raise error
         self.heard.append(("push", reading["key"]))
+        return self.decision
 
-    async def push_many(self, readings: list[dict[str, Any]]) -> None:
+    async def push_many(self, readings: list[dict[str, Any]]) -> Batch:
         for reading in readings:
             if error := self.refuses(reading):
                 raise error
         self.heard += [("push", reading["key"]) for reading in readings]
+        return Batch(stored=len(readings), repeated=0, items=(self.decision,) * len(readings))
 
     async def confirm(self, machine: str, number: int, **said: Any) -> None:
         if self.confirming is not None:
@@ -218,3 +230,23 @@ def test_readings_are_sent_again_to_a_server_that_went_back_in_time(
         return (await unit.store.counts(M)).waiting
 
     assert run(look()) == again
+
+
+@pytest.mark.parametrize(
+    ("action", "order", "asks"), [("none", None, False), ("correct", None, True), ("none", ORDER, True)]
+)
+def test_corrections_are_asked_for_when_a_decision_concerns_them(
+    tmp_path: Path, action: str, order: Order | None, *, asks: bool
+) -> None:
+    """A reading that calls for nothing costs one request; while a correction is offered, any reading may supersede it."""
+
+    async def story() -> None:
+        server = Scripted()
+        server.decision = replace(server.decision, action=action)
+        unit = unit_of(Model(), store_in(tmp_path))
+        unit.orders = () if order is None else (order,)
+        await unit.store.add(M, [Received("k1", {"measured": 40.0}, Position(7, 1))])
+        assert await server_side._forward(unit, cast("AsyncClient", server)) is asks
+        assert server.heard == [("push", "k1")]
+
+    run(story())

@@ -137,7 +137,9 @@ def test_one_call_that_fails_takes_no_other_along(store: Store) -> None:
 def test_a_store_that_cannot_be_written_says_so(tmp_path: Path) -> None:
     file = tmp_path / "store.sqlite3"
     file.write_bytes(b"no database at all, but long enough to be looked at" * 100)
-    with pytest.raises(StoreError, match="cannot be opened"):
+    with pytest.raises(
+        StoreError, match=r"cannot be opened: file is not a database\. It is damaged, or another program's"
+    ):
         Store(file)
     locked = Store(tmp_path / "locked.sqlite3")
     locked._database.execute("PRAGMA busy_timeout = 50")
@@ -149,17 +151,49 @@ def test_a_store_that_cannot_be_written_says_so(tmp_path: Path) -> None:
     assert run(locked.add(M, [received(1)])) == 1, "it goes on once it can"
 
 
+def test_a_full_disk_is_said_and_what_was_stored_stays(tmp_path: Path) -> None:
+    async def story() -> None:
+        store = Store(tmp_path / "store.sqlite3")
+        store._database.execute("PRAGMA max_page_count = 30")
+        stored = 0
+        with pytest.raises(StoreError, match=r"The disk of .* is full: free space"):
+            while True:
+                await store.add(M, [received(stored + 1)])
+                stored += 1
+        assert len(await store.waiting(M, 5000)) == stored
+        store._database.execute("PRAGMA max_page_count = 100000")
+        assert await store.add(M, [received(stored + 1)]) == 1, "it goes on once there is room"
+
+    run(story())
+
+
+def test_a_note_of_what_the_server_has_that_fails_is_told_with_the_next(store: Store) -> None:
+    async def story() -> None:
+        await store.add(M, [received(1)])
+        [row] = await store.waiting(M)
+        store._database.execute("CREATE TRIGGER no BEFORE UPDATE ON reading BEGIN SELECT RAISE(ABORT, 'no'); END")
+        await store.sent(M, [row.id])
+        assert await store.waiting(M) == [row], "it takes no other call along, and the reading is sent again"
+        with pytest.raises(StoreError, match="cannot be written: no"):
+            await store.sent(M, [row.id])
+        store._database.execute("DROP TRIGGER no")
+        await store.sent(M, [row.id])
+        assert await store.waiting(M) == []
+
+    run(story())
+
+
 def test_a_full_store_is_seen_and_room_that_was_freed_counts(tmp_path: Path) -> None:
     store = Store(tmp_path / "store.sqlite3", largest=0.2)
 
     async def story() -> None:
-        assert not store.is_full()
+        assert not await store.is_full()
         await store.add(M, [received(sequence) for sequence in range(1, 3000)])
-        assert store.is_full()
+        assert await store.is_full()
         rows = await store.waiting(M, 5000)
         await store.sent(M, [row.id for row in rows])
         await store.tidy(keep=-1)
-        assert not store.is_full()
+        assert not await store.is_full()
 
     run(story())
 

@@ -20,9 +20,8 @@ from msgspec import Meta
 from app.bridge.configuration import Machine
 from app.bridge.links import Clock, ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.moments import learn, measured_at
-from app.bridge.registers import body_of, fault_of
+from app.bridge.slots import printed_reading
 from app.core.printed_line import LineReader, Printed
-from app.core.ring import Unit
 
 NUMBERED = True
 HELD = 256 * 1024  # bytes that may wait for the next poll; then the sender has to
@@ -391,30 +390,16 @@ class PrintedLink:
         known = self._recent.get(place)
         if known == slot.measured:
             return None
-        again = f".{generation}" if generation else ""
-        key = f"{self.machine.key}:{printed.epoch}{again}:{slot.sequence}"
-        body = body_of(self.machine, slot)
-        fault = fault_of(self.machine, slot)
-        if known is not None:
-            key = f"{key}:{slot.measured:g}"
-            fault = (
-                f"Reading {slot.sequence} of epoch {printed.epoch} was printed as {known:g} before, and as"
-                f" {slot.measured:g} now: one of the two is wrong."
-            )
-        unit = "mm" if printed.unit is Unit.MM else "inch"
-        if unit != self.machine.unit:
-            fault = f"The line is in {unit}, the configuration says unit = {self.machine.unit!r}."
         next_one = self._count(place)
         if live and next_one and slot.time is not None:
             learn(self.clock, slot.time, now)
-        if at := measured_at(self.clock, slot.time, now, fresh=live and next_one):
-            body["measured_at"] = at.isoformat()
+        at = measured_at(self.clock, slot.time, now, fresh=live and next_one)
         if known is None:
             self._recent[place] = slot.measured
             if len(self._recent) > REMEMBERED:
                 self._recent.popitem(last=False)
         epoch, sequence = self._highest or place
-        return Received(key, body, Position(epoch, sequence, generation), fault)
+        return printed_reading(self.machine, printed, Position(epoch, sequence, generation), at, known)
 
     def _count(self, place: tuple[int, int]) -> bool:
         """Note which sequences are missing; whether this one is the next."""

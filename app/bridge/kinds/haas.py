@@ -170,6 +170,9 @@ class HaasRegisters:
             )
         return PARAMETERS[location.register]
 
+    async def shown(self, place: int, value: float) -> None:
+        """Nothing to wait for: what is written is shown at once."""
+
     async def read_offset(self, location: Location) -> float | None:
         """The offset; None where the variable is empty."""
         [value] = await self.variables([self.parameter(location) + location.tool])

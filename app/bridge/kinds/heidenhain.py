@@ -22,7 +22,7 @@ from msgspec import Meta
 from app.bridge.configuration import Location, Machine
 from app.bridge.links import Clock, ControlAway, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.moments import learn, measured_at
-from app.bridge.registers import body_of, fault_of
+from app.bridge.slots import printed_reading
 from app.core.printed_line import MODULUS, STEPS, LineReader, Printed
 from app.core.ring import Unit
 
@@ -403,31 +403,17 @@ class TncLink:
         known = self._sizes.get(place)
         if known == slot.measured:
             return None
-        again = f".{generation}" if generation else ""
-        key = f"{self.machine.key}:{printed.epoch}{again}:{slot.sequence}"
-        body = body_of(self.machine, slot)
-        fault = fault_of(self.machine, slot)
-        if known is not None:
-            key = f"{key}:{slot.measured:g}"
-            fault = (
-                f"Reading {slot.sequence} of epoch {printed.epoch} stands in the file as {known:g} and as {slot.measured:g}:"
-                " one of the two is wrong."
-            )
         self._sizes.setdefault(place, slot.measured)
-        unit = "mm" if printed.unit is Unit.MM else "inch"
-        if unit != self.machine.unit:
-            fault = f"The line is in {unit}, the configuration says unit = {self.machine.unit!r}."
         if fresh and slot.time is not None:
             learn(self.clock, slot.time, now)
-        if at := measured_at(self.clock, slot.time, now, fresh=fresh):
-            body["measured_at"] = at.isoformat()
+        at = measured_at(self.clock, slot.time, now, fresh=fresh)
         before = self._highest
         if before is None or before[0] != place[0] or place[1] > before[1]:
             if before is not None and before[0] == place[0]:
                 self._missing += place[1] - before[1] - 1
             self._highest = place
         epoch, sequence = self._highest or place
-        return Received(key, body, Position(epoch, sequence, generation), fault)
+        return printed_reading(self.machine, printed, Position(epoch, sequence, generation), at, known)
 
     def _remark(self) -> str:
         words = []

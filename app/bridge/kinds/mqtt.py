@@ -41,6 +41,7 @@ FIELDS: Final = {
     "key": str,
     "correction_in_effect": int,
     "first_move_triggered": bool,
+    "context": dict,
 }
 """What the body of a reading may hold."""
 LONGEST_KEY: Final = 128
@@ -94,6 +95,17 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
             raise ValueError("a password needs a username")
 
 
+class Client(aiomqtt.Client):
+    """A client that notes with which reason the broker has refused a message: the library passes over it."""
+
+    refused = ""
+
+    def _on_publish(self, client: Any, userdata: Any, mid: int, reason_code: Any, properties: Any) -> None:
+        if getattr(reason_code, "value", 0) >= REFUSED:
+            self.refused = str(reason_code)
+        super()._on_publish(client, userdata, mid, reason_code, properties)
+
+
 class MqttLink:
     """The link to one machine by a broker."""
 
@@ -105,7 +117,7 @@ class MqttLink:
         self.port = self.settings.port or (8883 if self.settings.tls else 1883)
         self.where = f"{self.settings.host}:{self.port}"
         self.scale = INCH if machine.unit == "inch" else 1.0
-        self._client: aiomqtt.Client | None = None
+        self._client: Client | None = None
         self._listening: asyncio.Task[None] | None = None
         self._readings: list[aiomqtt.Message] = []
         self._answers: list[aiomqtt.Message] = []
@@ -123,7 +135,7 @@ class MqttLink:
         if time.monotonic() < self._taken_over + OTHERS_TURN:
             raise Misconfigured(self._takeover())
         await self.close()
-        client = aiomqtt.Client(
+        client = Client(
             self.settings.host,
             self.port,
             identifier=self._client_id(),
@@ -137,6 +149,7 @@ class MqttLink:
             timeout=math.inf,  # the caller has one; that of aiomqtt may swallow a cancellation in Python 3.11
         )
         client._client.manual_ack_set(True)  # noqa: SLF001 - aiomqtt has no word of its own for it
+        client.pending_calls_threshold = IN_FLIGHT  # so many answers at once are meant: no warning about them
         try:
             await client.__aenter__()
             self._client = client
@@ -177,7 +190,7 @@ class MqttLink:
                     self._take_offsets(message)
                     self._done(message)
 
-    def _there(self) -> aiomqtt.Client:
+    def _there(self) -> Client:
         """The client; raises where the connection has ended."""
         if self._listening is not None and self._listening.done():
             error = self._listening.exception()
@@ -199,12 +212,18 @@ class MqttLink:
         properties = Properties(PacketTypes.PUBLISH)  # type: ignore[no-untyped-call]
         if expires is not None:
             properties.MessageExpiryInterval = round(expires)
+        client = self._there()
         try:
-            await self._there().publish(
+            await client.publish(
                 f"{self.base}/{topic}", json.dumps(content), qos=AT_LEAST_ONCE, retain=retain, properties=properties
             )
         except aiomqtt.MqttError as error:
             raise self._wrong(error) from error
+        if client.refused:
+            raise Misconfigured(
+                f"The broker {self.where} does not let the bridge write {self.base}/{topic}: {client.refused}. Look at its"
+                " list of rights."
+            )
 
     def _wrong(self, error: aiomqtt.MqttError) -> LinkError:
         """The error of ours that stands for one of the library."""
@@ -231,7 +250,7 @@ class MqttLink:
                 f" id {self._client_id()!r}, such as a second bridge? Each has its own, and one bridge alone serves a machine."
             )
         return ControlAway(
-            f"The broker {self.where} does not answer: {error}. Look at host, port and network; does it run?"
+            f"The broker {self.where} does not answer: {error}. Look at host, port, tls and network; does it run?"
         )
 
     def _takeover(self) -> str:
@@ -299,14 +318,18 @@ class MqttLink:
         return round(value * self.scale, 9) if is_length and self.scale != 1.0 else value
 
     async def acknowledge(self, received: Sequence[Received]) -> None:
-        """Tell the machine which keys are stored, then the broker that the messages are done."""
+        """Tell the machine which keys are stored, then the broker that the messages are done.
+
+        All at once: one by one, each waits for the broker's answer, and a backlog takes longer than a call may take.
+        """
+        answers = []
         for each in received:
-            message, key = each.mark
-            if key is not None:
-                await self._publish("stored", {"key": key} | ({"refused": each.fault} if each.fault else {}))
-            else:
-                await self._publish("stored", {"key": None, "refused": each.fault})
-            self._done(message)
+            _, key = each.mark
+            refused = {"refused": each.fault} if each.fault or key is None else {}
+            answers.append(self._publish("stored", {"key": key} | refused))
+        await asyncio.gather(*answers)
+        for each in received:
+            self._done(each.mark[0])
 
     # --- corrections
 

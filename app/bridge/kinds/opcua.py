@@ -10,13 +10,17 @@ arrives late. A wear is written only over a connection over which it was read be
 import asyncio
 import logging
 import os
+import struct
 from collections.abc import Awaitable, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Final, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
 import msgspec
 from asyncua import Client, ua
+from asyncua.client.ua_session import UaSession
 from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
+from asyncua.ua.ua_binary import struct_from_binary
 from asyncua.ua.uaerrors import UaError
 from msgspec import Meta, Struct
 
@@ -43,6 +47,13 @@ ABORTED: Final = 5
 SHOWN_WITHIN: Final = 1.0
 """s: a value that was written is shown after the control's next sampling tick."""
 LOOK_EVERY: Final = 0.04  # s
+
+ANSWER: Final = struct.Struct("<4s12xIBi3siBBi")
+"""Beginning of an answer to a read: type, service result, diagnostics, texts, more of a header, number of values; of the first
+value what it has, its type, and its length."""
+READ_ANSWER: Final = b"\x01\x00\x7a\x02"
+GOOD: Final = b"\0\0\0\0"
+DOUBLES: Final = 0x80 | ua.VariantType.Double.value
 
 T = TypeVar("T")
 Codes = ua.StatusCodes
@@ -152,6 +163,7 @@ class SinumerikRegisters:
         self.settings: Settings = machine.settings
         self._client: Client | None = None
         self._edge_size = 0
+        self._requests: dict[str, ua.ReadRequest] = {}
         self._read: set[str] = set()
         """Identifiers of offsets that were read over this connection."""
 
@@ -211,7 +223,8 @@ class SinumerikRegisters:
                     settings.key,
                     server_certificate=settings.control_certificate,
                 )
-            await client.connect()
+            async with asyncio.timeout(self.machine.patience * 0.8):  # so that it is told what is asked for in vain
+                await client.connect()
         except BaseException as error:
             client.disconnect_socket()
             if isinstance(error, Exception):
@@ -269,9 +282,12 @@ class SinumerikRegisters:
         code = getattr(error, "code", None)
         shown = settings.certificate or "certificate"
         if isinstance(error, OSError | TimeoutError) or (code is None and isinstance(error, ConnectionError)):
+            other = (
+                " Does it still have the certificate of control_certificate?" if settings.control_certificate else ""
+            )
             return ControlAway(
                 f"No OPC UA server answers at {settings.url} ({_words(error)}). Look at the address, the cable, the firewall"
-                " of the control (port 4840), and whether OPC UA is switched on there."
+                f" of the control (port 4840), and whether OPC UA is switched on there.{other}"
             )
         if code in NO_SESSION:
             return ControlAway(
@@ -317,19 +333,22 @@ class SinumerikRegisters:
         """Registers of the block, by one read of all from the first to the last."""
         first, count = min(places), max(places) - min(places) + 1
         identifier = self.block_id(first, count)
-        found = await self._value(identifier)
-        values = list(found) if isinstance(found, list | tuple) else [found]
+        values = await self._values(identifier)
         if len(values) != count:
             raise Misconfigured(
                 f"{identifier} answers {len(values)} values in place of {count}: the field has to have {SIZE} elements"
                 f" (DEF CHAN REAL INBAND[{SIZE}])."
             )
-        numbers = [_number(value, identifier) for value in values]
-        return [numbers[place - first] for place in places]
+        numbers = values if set(map(type, values)) == {float} else [_number(value, identifier) for value in values]
+        return numbers if len(places) == count else [numbers[place - first] for place in places]
 
     async def write(self, place: int, value: float) -> None:
-        """Write one register, and wait until the control shows it."""
+        """Write one register."""
         await self._set(self.block_id(place), value)
+
+    async def shown(self, place: int, value: float) -> None:
+        """Wait until the control shows a register."""
+        await self._shown(self.block_id(place), value)
 
     async def read_offset(self, location: Location) -> float | None:
         """The wear of an edge."""
@@ -344,6 +363,7 @@ class SinumerikRegisters:
         if identifier not in self._read:
             raise ControlAway(f"{identifier} was not read since the connection was made: it is not written blindly.")
         await self._set(identifier, value)
+        await self._shown(identifier, value)
 
     async def against_writing(self, location: Location) -> str | None:
         """The reason while a program that has not ended has the tool in use."""
@@ -355,23 +375,34 @@ class SinumerikRegisters:
 
     # --- requests
 
+    async def _values(self, identifier: str) -> list[Any]:
+        """The values of a field; a request that comes again is put together once, an answer with numbers read at once."""
+        request = self._requests.get(identifier)
+        if request is None:
+            request = self._requests[identifier] = ua.ReadRequest(Parameters=_parameters([node_of(identifier)]))
+        request.RequestHeader.Timestamp = datetime.now(UTC)
+        answer = await self._sent(_answered(self._connected().uaclient.session, request))
+        if isinstance(answer, tuple):
+            return list(answer)
+        found = self._good(answer, identifier)
+        return list(found) if isinstance(found, list | tuple) else [found]
+
     async def _value(self, identifier: str) -> object:
         """The value behind an identifier."""
         [found] = await self._ask([node_of(identifier)])
+        return self._good(found, identifier)
+
+    def _good(self, found: ua.DataValue, identifier: str) -> object:
         code = found.StatusCode.value if found.StatusCode is not None else 0
         if code and not ua.StatusCode(ua.UInt32(code)).is_good():
             raise self._refused(identifier, code, "read")
         return found.Value.Value if found.Value is not None else None
 
     async def _ask(self, nodes: Sequence[ua.NodeId]) -> list[ua.DataValue]:
-        request = ua.ReadParameters(
-            TimestampsToReturn=ua.TimestampsToReturn.Neither,
-            NodesToRead=[ua.ReadValueId(NodeId=node, AttributeId=ua.AttributeIds.Value) for node in nodes],
-        )
-        return await self._sent(self._connected().uaclient.session.read(request))
+        return await self._sent(self._connected().uaclient.session.read(_parameters(nodes)))
 
     async def _set(self, identifier: str, value: float) -> None:
-        """Write a value without time stamps, which controls refuse, and wait until it is shown."""
+        """Write a value without time stamps, which controls refuse."""
         wanted = ua.WriteValue(
             NodeId=node_of(identifier),
             AttributeId=ua.AttributeIds.Value,
@@ -381,6 +412,8 @@ class SinumerikRegisters:
         [status] = await self._sent(self._connected().uaclient.session.write(request))
         if not status.is_good():
             raise self._refused(identifier, status.value, "write")
+
+    async def _shown(self, identifier: str, value: float) -> None:
         for _ in range(round(SHOWN_WITHIN / LOOK_EVERY)):
             if abs(_number(await self._value(identifier), identifier) - value) <= 1e-7 * max(1.0, abs(value)):
                 return
@@ -415,6 +448,43 @@ class SinumerikRegisters:
                 f' GiveUserAccess("{given}", "{_realms(identifier, verb)}") with any OPC UA client.'
             )
         return ControlAway(f"The control does not {verb} {identifier}: {name}.")
+
+
+def _parameters(nodes: Sequence[ua.NodeId]) -> ua.ReadParameters:
+    return ua.ReadParameters(
+        TimestampsToReturn=ua.TimestampsToReturn.Neither,
+        NodesToRead=[ua.ReadValueId(NodeId=node, AttributeId=ua.AttributeIds.Value) for node in nodes],
+    )
+
+
+async def _answered(session: UaSession, request: ua.ReadRequest) -> tuple[float, ...] | ua.DataValue:
+    """The answer to a read of one field: ``session.read``, but for how numbers are read."""
+    answer = await session._send_request(request)  # noqa: SLF001 - the answer as it came
+    if (numbers := doubles_in(bytes(answer))) is not None:
+        return numbers
+    response = struct_from_binary(ua.ReadResponse, answer)
+    response.ResponseHeader.ServiceResult.check()
+    found: ua.DataValue
+    [found] = response.Results
+    return found
+
+
+def doubles_in(answer: bytes) -> tuple[float, ...] | None:
+    """The numbers of an answer to a read of one field of Double; None for any other answer.
+
+    asyncua reads an answer value by value, which costs as much as the rest of a poll.
+    """
+    if len(answer) < ANSWER.size:
+        return None
+    kind, result, diagnostics, texts, more, count, mask, variant, length = ANSWER.unpack_from(answer)
+    plain = (kind, result, diagnostics, more, count) == (READ_ANSWER, 0, 0, b"\0\0\0", 1) and texts <= 0
+    has_value, has_status = mask & 1, mask & 2
+    end = ANSWER.size + 8 * length
+    if not plain or not has_value or variant != DOUBLES or length < 0 or len(answer) < end + 4:
+        return None
+    if has_status and answer[end : end + 4] != GOOD:
+        return None
+    return struct.unpack_from(f"<{length}d", answer, ANSWER.size)
 
 
 def _name(code: int) -> str:

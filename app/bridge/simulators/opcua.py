@@ -99,6 +99,8 @@ class Nc:
     def write(self, identifier: str, value: ua.DataValue) -> None:
         """Set one number of the model. Raises `ServiceError`."""
         path, column, place, last = _parsed(identifier)
+        if path == SERIAL.partition("[")[0]:
+            raise ServiceError(Codes.BadNotWritable)
         if place not in self._cells(path, column) or last != place:
             raise ServiceError(Codes.BadAttributeIdInvalid)
         if value.SourceTimestamp is not None or value.ServerTimestamp is not None:
@@ -216,6 +218,16 @@ class Control(InternalServer):
             raise ServiceError(Codes.BadCertificateUriInvalid)
         if self.trusted is not None and certificate not in [read_certificate(each) for each in self.trusted]:
             raise ServiceError(Codes.BadCertificateUntrusted)
+
+    def add_endpoint(self, endpoint: ua.EndpointDescription) -> None:
+        """Offer an endpoint: passwords are encrypted where messages are, else some clients refuse to sign in."""
+        for token in endpoint.UserIdentityTokens:
+            if (
+                token.TokenType == ua.UserTokenType.UserName
+                and endpoint.SecurityMode == ua.MessageSecurityMode.SignAndEncrypt
+            ):
+                token.SecurityPolicyUri = endpoint.SecurityPolicyUri
+        super().add_endpoint(endpoint)
 
     def create_session(
         self,

@@ -18,6 +18,8 @@ from app.loop.connections import jobs, queries
 from app.loop.connections.alarm_kinds import GONE
 from app.loop.connections.queries import ServerMark
 from app.loop.connections.schemas import HeartbeatIn
+from app.loop.connections.touch_tests.actions import abandon
+from app.loop.connections.touch_tests.queries import TouchTestRow, open_test
 from app.loop.machines.queries import lock_machines, machine_for, machine_named
 from app.loop.tables.connections import Connection
 
@@ -26,10 +28,11 @@ _NO_DISK = text("SELECT set_config('synchronous_commit', 'off', true), now()")
 
 
 class Beat(NamedTuple):
-    """A heartbeat that was taken: when, and where the database stands."""
+    """A heartbeat that was taken: when, where the database stands, and the touch test that is open."""
 
     received_at: datetime
     server: ServerMark
+    touch_test: TouchTestRow | None
 
 
 def take_heartbeat(
@@ -71,7 +74,7 @@ def take_heartbeat(
         or now - known.received_at > timedelta(seconds=silent_after)
     ):
         publish(session, {"kind": "connection", "machine": owner.key, "state": beat.state})
-    return Beat(now, queries.server_mark(session))
+    return Beat(now, queries.server_mark(session), open_test(session, owner))
 
 
 def remove_connection(session: Session, machine: str, caller: Caller) -> None:
@@ -82,6 +85,7 @@ def remove_connection(session: Session, machine: str, caller: Caller) -> None:
     owner = machine_named(session, machine)
     lock_machines(session, [owner.id])
     gone = session.scalar(delete(Connection).where(Connection.machine_id == owner.id).returning(Connection.received_at))
+    abandon(session, owner, caller)
     for name in GONE:
         jobs.end(session, owner, name, caller.name, _("The machine has no bridge any more"), "connection_removed")
     if gone is not None:

@@ -8,6 +8,7 @@ from app.access.deps import Admin, AnyCaller
 from app.loop.connections import actions, queries
 from app.loop.connections.queries import ConnectionRow
 from app.loop.connections.schemas import ConnectionOut, HeartbeatIn, HeartbeatOut, ServerOut
+from app.loop.connections.touch_tests.schemas import TouchTestOut
 from app.loop.machines.queries import machine_for
 from app.settings import Settings
 from app.web.api import KeyAfter, Limit, MachineKey, api_router, problems
@@ -22,7 +23,8 @@ def take_heartbeat(
     request: Request, session: SessionDep, caller: AnyCaller, machine: MachineKey, heartbeat: HeartbeatIn
 ) -> HeartbeatOut:
     """A bridge says, every ten seconds, that it lives and how it stands with this machine. The answer tells where the
-    server's database stands: one that was restored or has failed over may lack readings that it had stored.
+    server's database stands: one that was restored or has failed over may lack readings that it had stored; and which touch
+    test is open.
     """
     settings: Settings = request.app.state.settings
     taken = actions.take_heartbeat(
@@ -33,7 +35,11 @@ def take_heartbeat(
         silent_after=settings.bridge_silent_after,
         backlog_after=settings.bridge_backlog_after,
     )
-    return HeartbeatOut(received_at=taken.received_at, server=ServerOut(**taken.server._asdict()))
+    return HeartbeatOut(
+        received_at=taken.received_at,
+        server=ServerOut(**taken.server._asdict()),
+        touch_test=TouchTestOut.of(taken.touch_test) if taken.touch_test else None,
+    )
 
 
 @router.get("/connections")

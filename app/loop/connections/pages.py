@@ -1,6 +1,7 @@
 """Pages: every connection, and that of one machine with its locations and its quarantine."""
 
 from datetime import datetime, timedelta
+from functools import partial
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -8,9 +9,10 @@ from starlette.responses import RedirectResponse
 
 from app.access.deps import Admin, require
 from app.loop.connections import actions, queries, wording
+from app.loop.connections.touch_tests.queries import touch_tests
 from app.loop.machines import queries as machines
 from app.settings import Settings
-from app.web.deps import SessionDep, Word
+from app.web.deps import SessionDep, Sought, Word
 from app.web.paging import address, part_of
 from app.web.templates import page
 
@@ -24,13 +26,18 @@ def _silent_after(request: Request) -> timedelta:
 
 
 @router.get("/connections", dependencies=[require("viewer")])
-def connections_page(request: Request, session: SessionDep, after: Word = None) -> Response:
+def connections_page(request: Request, session: SessionDep, after: Word = None, q: Sought = "") -> Response:
     """Every machine that has or had a bridge, and how it stands."""
-    rows = queries.connections(session, after or "", ON_PAGE + 1)
-    part = part_of(
-        rows, ON_PAGE, after, lambda row: row.machine.key, lambda **query: address("/connections", **query), "after"
+    rows = queries.connections(session, after or "", ON_PAGE + 1, holding=q)
+    link = partial(address, "/connections", q=q or None)
+    return page(
+        request,
+        "connections/list.html",
+        part=part_of(rows, ON_PAGE, after, lambda row: row.machine.key, link, "after"),
+        q=q,
+        wording=wording,
+        silent_after=_silent_after(request),
     )
-    return page(request, "connections/list.html", part=part, wording=wording, silent_after=_silent_after(request))
 
 
 @router.get("/machines/{machine}/connection", dependencies=[require("viewer")])
@@ -43,6 +50,7 @@ def connection_page(request: Request, session: SessionDep, machine: str) -> Resp
         machine=chosen,
         machines=machines.machines(session),
         row=queries.find_connection(session, chosen.id),
+        tests=touch_tests(session, chosen),
         wording=wording,
         silent_after=_silent_after(request),
         moment=_moment,

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from sqlalchemy import Select, func, select, text
 from sqlalchemy.orm import Session
 
+from app.db.text import holds_words
 from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.tables.connections import Connection
@@ -68,10 +69,14 @@ def _rows() -> Select[Connection, Machine, datetime]:
 
 
 def connections(
-    session: Session, after: str = "", limit: int = 1000, only: int | None = None
+    session: Session, after: str = "", limit: int = 1000, only: int | None = None, holding: str = ""
 ) -> Sequence[ConnectionRow]:
-    """The connections by the key of their machine; ``only`` this one for the key of a machine."""
-    query = _rows().where(Machine.key > after).order_by(Machine.key).limit(limit)
+    """The connections by the key of their machine; ``only`` this one for the key of a machine.
+
+    ``holding``: those in whose machine, kind, version or last error these words stand.
+    """
+    names = (Machine.name, Machine.key, Connection.kind, Connection.version, Connection.error)
+    query = _rows().where(*holds_words(holding, *names)).where(Machine.key > after).order_by(Machine.key).limit(limit)
     query = query if only is None else query.where(Machine.id == only)
     return [ConnectionRow(*row) for row in session.execute(query)]
 

@@ -1,14 +1,15 @@
 """Heartbeats and connections as JSON."""
 
 from datetime import UTC, datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
 from app.core.parameters import MOST_LOCATIONS
 from app.language.i18n import _
-from app.web.fields import LARGEST_SERIAL, Body, Length, MappingHash, Moment, Text200, one_line
+from app.loop.connections.touch_tests.schemas import Sentence, TouchTestOut
+from app.web.fields import LARGEST_SERIAL, Body, Length, MappingHash, Moment, Text200
 
 ConnectionState = Literal[
     "starting", "online", "control_away", "wrong_machine", "counters_lost", "full", "held", "configuration"
@@ -35,12 +36,6 @@ AnyMoment = Annotated[Moment, AfterValidator(_storable)]
 """A time by a clock that may be wrong: a bridge is heard all the same."""
 
 
-def _in_one_line(text: Any) -> Any:
-    return " ".join(text.split()) if isinstance(text, str) else text
-
-
-Sentence = Annotated[str, BeforeValidator(_in_one_line), StringConstraints(max_length=1000), AfterValidator(one_line)]
-"""What a bridge says; line breaks become blanks."""
 Count = Annotated[int, Field(strict=True, ge=0, le=LARGEST_SERIAL)]
 
 
@@ -55,6 +50,9 @@ class LocationIn(BaseModel):
         AnyMoment | None, Field(description="When the touch test proved this mapping; null: not yet.")
     ] = None
     offset: Annotated[Length | None, Field(description="The offset that the control held last, mm.")] = None
+    touch_test_by_page: Annotated[
+        bool, Field(strict=True, description="true: the bridge makes touch tests of it that are asked for here.")
+    ] = False
 
 
 class QuarantinedIn(BaseModel):
@@ -123,6 +121,7 @@ class HeartbeatOut(BaseModel):
 
     received_at: datetime
     server: ServerOut
+    touch_test: Annotated[TouchTestOut | None, Field(description="The touch test of this machine that is open.")]
 
 
 class LocationOut(BaseModel):
@@ -132,6 +131,7 @@ class LocationOut(BaseModel):
     mapping: str | None
     proved_at: datetime | None
     offset: float | None
+    touch_test_by_page: bool = False
 
 
 class QuarantinedOut(BaseModel):

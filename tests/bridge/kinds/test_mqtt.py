@@ -251,6 +251,20 @@ def test_a_refused_login_is_told(tmp_path: Path) -> None:
     run(work())
 
 
+def test_a_broker_that_lets_the_bridge_not_write_is_told(tmp_path: Path) -> None:
+    async def work() -> None:
+        rights = tmp_path / "rights"
+        rights.write_text("topic read inband/v1/#\n", encoding="utf-8")
+        async with (
+            Broker(tmp_path, "allow_anonymous true", f"acl_file {rights}") as broker,
+            connected(machine(broker.port)) as there,
+        ):
+            with pytest.raises(Misconfigured, match=r"does not let the bridge write .*/corrections: Not authorized"):
+                await there.offer([])
+
+    run(work())
+
+
 def test_two_bridges_with_one_client_id_are_told(tmp_path: Path) -> None:
     async def work() -> None:
         async with Broker(tmp_path) as broker:

@@ -5,16 +5,19 @@ import random
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import replace
+from datetime import UTC
 from pathlib import Path
 from typing import Any
 
 import pytest
 from asyncua import Client, ua
+from asyncua.ua.ua_binary import struct_to_binary
 from typer.testing import CliRunner
 
 from app.bridge.certificates import new_pair
 from app.bridge.configuration import ConfigurationError, Machine, configuration_from
 from app.bridge.kinds import opcua
+from app.bridge.kinds.opcua import doubles_in
 from app.bridge.links import ControlAway, LinkError, Misconfigured, Order, Position
 from app.bridge.registers import RegisterLink
 from app.bridge.simulators.model import Feature, Model
@@ -176,6 +179,7 @@ def test_what_was_written_is_waited_for_until_it_is_shown() -> None:
         model = Model((QUIET,))
         async with control(model) as simulator, linked(simulator) as link:
             await link.registers.write(Register.ACK, 7.0)
+            await link.registers.shown(Register.ACK, 7.0)
             assert await link.registers.read([Register.ACK]) == [7.0]
             assert simulator.control.nc.registers[Register.ACK] == 7.0
 
@@ -389,6 +393,12 @@ def test_an_encrypted_connection_needs_a_trusted_certificate(tmp_path: Path) -> 
             model.clock_ahead = 0.0
             other = new_pair("other", "edge-1", "urn:other")
             (tmp_path / "other.der").write_bytes(other.certificate)
+            other_client = Client(f"opc.tcp://127.0.0.1:{simulator.port}", timeout=30)
+            for endpoint in await other_client.connect_and_get_server_endpoints():
+                policies = {token.TokenType: token.SecurityPolicyUri for token in endpoint.UserIdentityTokens}
+                assert policies[ua.UserTokenType.UserName].endswith("#Basic256Sha256"), (
+                    "strict clients send no plain password"
+                )
             pinned = machine(simulator, tmp_path, patience=2.0, opcua=ours | {"control_certificate": "other.der"})
             with pytest.raises(LinkError):
                 await opcua.link(pinned).connect()
@@ -439,6 +449,8 @@ def test_the_simulated_control_answers_as_the_manual_says() -> None:
                 await value("/Channel/Parameter/R[u3,1]")
             with pytest.raises(ua.uaerrors.BadWriteNotSupported):
                 await other.get_node(opcua.node_of("/Channel/Parameter/R[u1,1]")).write_value(1.0)
+            with pytest.raises(ua.uaerrors.BadNotWritable):
+                await other.get_node(opcua.node_of(opcua.SERIAL)).write_value(ua.DataValue(ua.Variant(1.0)))
             root = other.get_node(opcua.node_of("/"))
             assert root in await other.nodes.objects.get_children()
             names = [(await node.read_browse_name()).Name for node in await root.get_children()]
@@ -452,3 +464,41 @@ def test_the_simulated_control_answers_as_the_manual_says() -> None:
             assert await value(f"/NC/_N_CH_GD3_ACX/INBAND[u1,{Register.OFFSET + 1}]") == 1.0
 
     run(scenario())
+
+
+def answer_to_a_read(*values: ua.DataValue, **header: Any) -> bytes:
+    return struct_to_binary(ua.ReadResponse(ResponseHeader=ua.ResponseHeader(**header), Results=list(values)))
+
+
+def test_numbers_are_read_out_of_an_answer_as_asyncua_reads_them() -> None:
+    numbers = [1.5, -2.0, float("inf"), 0.0]
+    whole = ua.Variant(numbers, ua.VariantType.Double)
+    assert doubles_in(answer_to_a_read(ua.DataValue(whole))) == tuple(numbers)
+    assert doubles_in(answer_to_a_read(ua.DataValue(whole, SourceTimestamp=ua.DateTime.now(UTC)))) == tuple(numbers)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        answer_to_a_read(ua.DataValue(ua.Variant(1.5, ua.VariantType.Double))),
+        answer_to_a_read(ua.DataValue(ua.Variant([1.5, 2.0], ua.VariantType.Float))),
+        answer_to_a_read(ua.DataValue(ua.Variant([1, 2], ua.VariantType.Int32))),
+        answer_to_a_read(ua.DataValue(StatusCode=ua.StatusCode(ua.UInt32(ua.StatusCodes.BadNodeIdUnknown)))),
+        answer_to_a_read(
+            ua.DataValue(
+                ua.Variant([1.5, 2.0], ua.VariantType.Double),
+                StatusCode=ua.StatusCode(ua.UInt32(ua.StatusCodes.UncertainLastUsableValue)),
+            )
+        ),
+        answer_to_a_read(*[ua.DataValue(ua.Variant([1.5, 2.0], ua.VariantType.Double))] * 2),
+        answer_to_a_read(
+            ua.DataValue(ua.Variant([1.5, 2.0], ua.VariantType.Double)),
+            ServiceResult=ua.StatusCode(ua.UInt32(ua.StatusCodes.BadTimeout)),
+        ),
+        answer_to_a_read(ua.DataValue(ua.Variant([1.5] * 96, ua.VariantType.Double)))[:200],
+        b"",
+    ],
+    ids=["one", "floats", "integers", "unknown", "uncertain", "two", "fault", "half", "nothing"],
+)
+def test_any_other_answer_is_left_to_asyncua(answer: bytes) -> None:
+    assert doubles_in(answer) is None

@@ -1,0 +1,71 @@
+"""Slots of a control's ring as readings for the server, whether registers or printed lines bring them."""
+
+from dataclasses import replace
+from datetime import datetime
+
+from app.bridge.configuration import Machine
+from app.bridge.links import Position, Received
+from app.core.printed_line import Printed
+from app.core.ring import INCH, Slot, Status, Unit
+
+FAULTS = {
+    Status.NO_TRIGGER: "The probe did not trigger (status 1): there is no size.",
+    Status.MARKED: "The NC program has marked the reading as not valid (status 3).",
+}
+
+
+def reading_of(machine: Machine, slot: Slot, position: Position, at: datetime | None) -> Received:
+    """The reading in a slot. position: the slot's own, which names the reading for ever. at: when it was measured."""
+    again = f".{position.generation}" if position.generation else ""  # counters that went back name new readings
+    key = f"{machine.key}:{position.epoch}{again}:{position.sequence}"
+    body = _body(machine, slot)
+    if at is not None:
+        body["measured_at"] = at.isoformat()
+    return Received(key, body, position, _fault(machine, slot))
+
+
+def printed_reading(
+    machine: Machine, printed: Printed, highest: Position, at: datetime | None, known: float | None
+) -> Received:
+    """The reading on a printed line.
+
+    highest: the position that is stored with it, as lines come again and out of order. known: another size that came under
+    the same number before.
+    """
+    slot = printed.slot
+    received = reading_of(machine, slot, Position(printed.epoch, slot.sequence, highest.generation), at)
+    key, fault = received.key, received.fault
+    if known is not None:
+        key = f"{key}:{slot.measured:g}"
+        fault = (
+            f"Reading {slot.sequence} of epoch {printed.epoch} was printed as {known:g} before, and as {slot.measured:g} now:"
+            " one of the two is wrong."
+        )
+    unit = "mm" if printed.unit is Unit.MM else "inch"
+    if unit != machine.unit:
+        fault = f"The line is in {unit}, the configuration says unit = {machine.unit!r}."
+    return replace(received, key=key, fault=fault, position=highest)
+
+
+def _body(machine: Machine, slot: Slot) -> dict[str, object]:
+    body: dict[str, object] = {
+        "characteristic": machine.characteristics.get(str(slot.characteristic)),
+        "measured": round(slot.measured * (INCH if machine.unit == "inch" else 1.0), 9),
+        "correction_in_effect": slot.in_effect,
+    }
+    if slot.part:
+        body["part"] = str(slot.part)
+    if slot.status == Status.FIRST_MOVE:
+        body["first_move_triggered"] = True
+    return body
+
+
+def _fault(machine: Machine, slot: Slot) -> str | None:
+    if str(slot.characteristic) not in machine.characteristics:
+        return (
+            f"The control sends characteristic {slot.characteristic}, which machine.{machine.key}.characteristics does not"
+            " name."
+        )
+    if slot.status not in list(Status):
+        return f"Status {slot.status} is not known."
+    return FAULTS.get(Status(slot.status))

@@ -1,0 +1,51 @@
+"""The check of a configuration: what would go to the quarantine, and who does not answer."""
+
+import socket
+from pathlib import Path
+
+from app.bridge.checking import check
+from app.bridge.configuration import configuration_from
+from app.core.printed_line import Printed, line_of
+from app.core.ring import Slot, Unit
+from tests.loops import run
+
+SERVER = {"url": "http://127.0.0.1:9"}
+
+
+def table(kind: str, **settings: object) -> dict[str, object]:
+    return {
+        "kind": kind,
+        "unit": "inch",
+        "secret": "key-of-the-machine",
+        "corrections": "none",
+        "characteristics": {"1": "shaft"},
+        kind: settings,
+    }
+
+
+def findings(tmp_path: Path, machine: dict[str, object]) -> list[str]:
+    content = {"server": SERVER, "machine": {"lathe-1": machine}}
+    return [str(each) for each in run(check(configuration_from(content, tmp_path)))]
+
+
+def test_readings_for_the_quarantine_and_remarks_are_told(tmp_path: Path) -> None:
+    lines = [line_of(Printed(7, Unit.MM, Slot(number, 1, 40.0, 0, number, 3, 0, None))) for number in (1, 2, 4)]
+    file = tmp_path / "printed.txt"
+    file.write_text("\n".join(lines) + "\n", encoding="ascii")
+    said = findings(tmp_path, table("dprnt", file=str(file)))
+    assert "✓ lathe-1: 3 readings can be fetched now" in said
+    wanted = (
+        "✗ lathe-1: 3 of them would go to the quarantine, the first because: The line is in mm, the configuration says"
+    )
+    assert [each for each in said if each.startswith(wanted)]
+    assert [each for each in said if each.startswith("✗ lathe-1: Missing readings: 3.")]
+
+
+def test_a_machine_or_a_server_that_is_silent_or_another_is_told_with_what_to_do(tmp_path: Path) -> None:
+    folder = table("folder", path=str(tmp_path), format="csv") | {"identity": "cmm-7"}
+    said = findings(tmp_path, folder)
+    assert [each for each in said if "does not answer (" in each and "Does it run, and is the address right?" in each]
+    assert [each for each in said if "answers, not 'cmm-7': look at address and network" in each]
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        haas = table("haas", address="127.0.0.1", port=silent.getsockname()[1]) | {"patience": 0.3}
+        assert [each for each in findings(tmp_path, haas) if "is it on" in each or "has not answered" in each]

@@ -1,0 +1,396 @@
+"""The touch test that a person guides at the page: server, bridge, control, and a browser."""
+
+import asyncio
+import threading
+from collections.abc import Callable, Coroutine
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.bridge import control_side, guided_test, offset_change
+from app.bridge.configuration import Machine
+from app.bridge.kinds import opcua
+from app.bridge.offset_change import noted
+from app.bridge.simulators.model import Feature, Model
+from app.bridge.simulators.opcua import serve
+from app.bridge.store import Store
+from app.bridge.unit import Unit, ended
+from tests.bridge.kinds.test_opcua import machine as opcua_machine
+from tests.bridge.plant import ModelRegisters, bridge, store_in, unit_of, until
+from tests.conftest import Server
+from tests.loops import run
+from tests.shop import Person, Shop
+
+PLACE = (3, 1, "wear_length_1")
+BEFORE, AFTER = 0.0, 0.01
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guided_test, "EVERY", 0.05)
+    monkeypatch.setattr(offset_change, "LEAST_PAUSE", 0.02)
+
+
+@pytest.fixture
+def model() -> Model:
+    made = Model((Feature(bias=0.0, wear=0.0, noise=0.0),))
+    for _ in made.part():  # the NC program has set the block up
+        pass
+    made.offsets[PLACE] = BEFORE
+    return made
+
+
+def unit(shop: Shop, model: Model, store: Store, registers: ModelRegisters | None = None, **fields: Any) -> Unit:
+    fields = {"characteristics": {"1": shop.characteristic}, "touch_tests_by_page": True, "proof_needed": True} | fields
+    return unit_of(model, store, registers, key=shop.machine, **fields)
+
+
+def secret(shop: Shop) -> str:
+    return shop.machine_client.headers["Authorization"].split()[1]
+
+
+class Guide:
+    """A person at the page, and what the tests look at."""
+
+    def __init__(self, shop: Shop) -> None:
+        self.shop = shop
+        self.number = 0
+
+    async def call(self, method: str, path: str, status: int = 200, **body: Any) -> Any:
+        return await asyncio.to_thread(
+            self.shop.call, method, f"/machines/{self.shop.machine}/touch-tests{path}", status, **body
+        )
+
+    async def ask(self, status: int = 201, **body: Any) -> Any:
+        async def heard() -> bool:
+            answer = await asyncio.to_thread(self.shop.admin.get, f"/api/v1/machines/{self.shop.machine}/connection")
+            return answer.status_code == 200 and answer.json()["state"] == "online"
+
+        await until(heard, "a heartbeat")
+        made = await self.call("POST", "", status, **{"tool_memory": 3} | body)
+        self.number = made.get("id", 0)
+        return made
+
+    async def look(self) -> Any:
+        return await self.call("GET", f"/{self.number}")
+
+    async def reaches(self, state: str) -> Any:
+        async def there() -> bool:
+            seen = await self.look()
+            assert seen["ended_at"] is None or seen["state"] == state, seen
+            return bool(seen["state"] == state)
+
+        await until(there, f"the test {state}")
+        return await self.look()
+
+    async def says(self, question: str, yes: bool = True) -> Any:
+        return await self.call("POST", f"/{self.number}/answer", question=question, yes=yes)
+
+    async def comes_to(self, state: str) -> Any:
+        """Answer yes until the test is in this state."""
+        steps = (("before", "read"), ("after", "written"), ("size", "compared"))
+        for question, open_in in steps[: [each for _, each in steps].index(state)]:
+            await self.reaches(open_in)
+            await self.says(question)
+        return await self.reaches(state)
+
+
+@asynccontextmanager
+async def running(shop: Shop, one: Unit) -> Any:
+    async with bridge(shop.server.url, secret(shop), one, heartbeat=True):
+        yield Guide(shop)
+
+
+def scenario(work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    run(work())
+
+
+async def proof(one: Unit) -> str | None:
+    known = (await one.store.known(one.machine.key)).get(3)
+    return known.proved if known else None
+
+
+def test_a_location_is_proved_at_the_page(shop: Shop, server: Server, model: Model, page: Page, tmp_path: Path) -> None:
+    """The page in a browser, the bridge, and a simulated SINUMERIK; the browser has this thread, the bridge another."""
+    enough = asyncio.Event()
+    loop: dict[str, asyncio.AbstractEventLoop] = {}
+    facts: dict[str, Any] = {}
+
+    async def plant() -> None:
+        loop["of"] = asyncio.get_running_loop()
+        simulator = await serve(model, 0, secure=False)
+        store = store_in(tmp_path)
+        chosen: Machine = opcua_machine(simulator, touch_tests_by_page=True, proof_needed=True)
+        chosen = type(chosen)(
+            **{name: getattr(chosen, name) for name in chosen.__struct_fields__} | {"key": shop.machine}
+        )
+        one = Unit(chosen, opcua.link(chosen), store)
+        async with bridge(server.url, secret(shop), one, heartbeat=True):
+            facts["unit"] = one
+            await enough.wait()
+        facts["proof"], facts["hash"] = await proof(one), chosen.mapping_hash(chosen.location[0])
+        store.close()
+        await simulator.stop()
+
+    thread = threading.Thread(target=lambda: asyncio.run(plant()))
+    thread.start()
+    try:
+        Person(server, "operator").sign_in(page)
+        page.goto(f"/machines/{shop.machine}/connection")
+        page.get_by_role("button", name="Touch test of tool 3").click()
+        part = page.locator("#touch-test")
+        expect(part.locator(".readout.big")).to_contain_text("0.0000mm")
+        expect(part).to_contain_text("wear_length_1 of tool 3, edge 1")
+        assert model.offsets[PLACE] == BEFORE
+        part.get_by_role("button", name="Yes, change it").click()
+        expect(part.locator(".readout.big")).to_contain_text("0.0100mm")
+        assert model.offsets[PLACE] == pytest.approx(AFTER)
+        part.get_by_role("button", name="Yes").click()
+        expect(part).to_contain_text("10 µm larger in size")
+        part.get_by_role("button", name="Yes").click()
+        expect(part).to_contain_text("Proved")
+        expect(part).to_contain_text("Taken back: 0.0000 mm")
+        page.goto(f"/machines/{shop.machine}/connection")
+        expect(page.locator("#locations .proved")).to_be_visible()
+        expect(page.locator("#touch-tests tbody tr")).to_contain_text("Proved")
+    finally:
+        loop["of"].call_soon_threadsafe(enough.set)
+        thread.join()
+    assert model.offsets[PLACE] == pytest.approx(BEFORE)
+    assert facts["proof"] == facts["hash"]
+    assert shop.alarms() == []
+    said = [
+        entry["action"] for entry in shop.call("GET", "/audit?limit=50")["items"] if shop.machine in entry["subject"]
+    ]
+    assert [each for each in reversed(said) if "touch test" in each] == [
+        "touch test asked for", "touch test answered", "touch test answered", "touch test answered", "touch test proved",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("question", ["before", "after", "size"])
+def test_a_no_proves_nothing_and_takes_back(shop: Shop, model: Model, tmp_path: Path, question: str) -> None:
+    async def work() -> None:
+        one = unit(shop, model, store_in(tmp_path))
+        await one.store.prove(one.machine.key, 3, one.machine.mapping_hash(one.machine.location[0]))
+        async with running(shop, one) as guide:
+            await guide.ask()
+            await guide.comes_to({"before": "read", "after": "written", "size": "compared"}[question])
+            await guide.says(question, yes=False)
+            over = await guide.reaches("not_proved")
+            assert over["refused"] == question
+            assert model.offsets[PLACE] == pytest.approx(BEFORE)
+            assert await proof(one) is None
+        one.store.close()
+
+    scenario(work)
+
+
+def test_a_person_stops_it_and_it_is_taken_back(shop: Shop, model: Model, tmp_path: Path) -> None:
+    async def work() -> None:
+        one = unit(shop, model, store_in(tmp_path))
+        proved = one.machine.mapping_hash(one.machine.location[0])
+        await one.store.prove(one.machine.key, 3, proved)
+        async with running(shop, one) as guide:
+            await guide.ask()
+            await guide.comes_to("written")
+            await guide.call("POST", f"/{guide.number}/stop")
+            over = await guide.reaches("cancelled")
+            assert "Taken back" in over["detail"]
+            assert model.offsets[PLACE] == pytest.approx(BEFORE)
+            assert await proof(one) == proved, "what was proved before stays proved"
+            await until(lambda: one.test is None, "the end")
+            await guide.ask()  # the next one may begin
+        one.store.close()
+
+    scenario(work)
+
+
+def test_after_a_crash_the_next_start_takes_back(shop: Shop, model: Model, tmp_path: Path) -> None:
+    async def work() -> None:
+        store = store_in(tmp_path)
+        one = unit(shop, model, store)
+        async with running(shop, one) as guide:
+            await guide.ask()
+            await guide.comes_to("written")
+        store.close()  # the tasks were cut off: nothing was taken back
+        assert model.offsets[PLACE] == pytest.approx(AFTER)
+        store = store_in(tmp_path)
+        other = unit(shop, model, store)
+        async with bridge(shop.server.url, secret(shop), other, heartbeat=True):
+            over = await guide.reaches("cancelled")
+            assert "was ended during the touch test" in over["detail"]
+            assert model.offsets[PLACE] == pytest.approx(BEFORE)
+            await until(lambda: other.test is None, "the end")
+        assert await noted(store, shop.machine) is None
+        store.close()
+
+    scenario(work)
+
+
+def test_an_offset_that_somebody_else_has_set_is_left_alone_after_a_crash(
+    shop: Shop, model: Model, tmp_path: Path
+) -> None:
+    async def work() -> None:
+        store = store_in(tmp_path)
+        async with running(shop, unit(shop, model, store)) as guide:
+            await guide.ask()
+            await guide.comes_to("written")
+        model.edit(PLACE, 0.5)
+        async with bridge(shop.server.url, secret(shop), unit(shop, model, store), heartbeat=True):
+            over = await guide.reaches("failed")
+        assert "Set 0.0000 mm in wear_length_1 of tool 3, edge 1 by hand." in over["detail"]
+        assert model.offsets[PLACE] == 0.5
+        store.close()
+
+    scenario(work)
+
+
+def test_while_the_server_is_away_the_time_limit_takes_back(
+    shop: Shop, model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def work() -> None:
+        one = unit(shop, model, store_in(tmp_path))
+        async with running(shop, one) as guide:
+            await guide.ask()
+            await guide.comes_to("written")
+            test = one.test
+            assert test is not None
+        # all tasks are cut off; that of the control goes on without those that speak with the server
+        test.until = 0.0
+        task = asyncio.create_task(control_side.run(one))
+        await until(lambda: test.end is not None, "the end")
+        assert model.offsets[PLACE] == pytest.approx(BEFORE)
+        await ended([task])
+        async with bridge(shop.server.url, secret(shop), one, heartbeat=True):  # the server is there again
+            over = await guide.reaches("cancelled")
+            assert "No answer came" in over["detail"]
+        one.store.close()
+
+    scenario(work)
+
+
+def test_a_control_that_lets_nothing_be_written_ends_the_test(shop: Shop, model: Model, tmp_path: Path) -> None:
+    async def work() -> None:
+        registers = ModelRegisters(model)
+        registers.may_write = "Tool 3 is in use by a program that has not ended."
+        one = unit(shop, model, store_in(tmp_path), registers)
+        async with running(shop, one) as guide:
+            await guide.ask()
+            await guide.reaches("read")
+            await guide.says("before")
+            over = await guide.reaches("failed")
+            assert "in use" in over["detail"]
+            assert model.offsets[PLACE] == BEFORE
+        one.store.close()
+
+    scenario(work)
+
+
+def test_taking_back_waits_for_a_control_that_is_away(shop: Shop, model: Model, tmp_path: Path) -> None:
+    async def work() -> None:
+        registers = ModelRegisters(model)
+        one = unit(shop, model, store_in(tmp_path), registers)
+        async with running(shop, one) as guide:
+            await guide.ask()
+            await guide.comes_to("written")
+            registers.away = True
+            await until(lambda: one.state == "control_away", "the cable out")
+            await guide.call("POST", f"/{guide.number}/stop")
+            await guide.reaches("stopping")
+            assert model.offsets[PLACE] == pytest.approx(AFTER)
+            registers.away = False
+            await guide.reaches("cancelled")
+            assert model.offsets[PLACE] == pytest.approx(BEFORE)
+        one.store.close()
+
+    scenario(work)
+
+
+def test_no_correction_is_offered_and_no_edit_reported_meanwhile(shop: Shop, model: Model, tmp_path: Path) -> None:
+    async def work() -> None:
+        one = unit(shop, model, store_in(tmp_path), proof_needed=False, offsets_every=0.02)
+        async with running(shop, one) as guide:
+            await guide.ask()
+            await guide.comes_to("written")
+            await asyncio.to_thread(shop.read, 6.0)
+
+            async def waits() -> bool:
+                pending = await asyncio.to_thread(shop.call, "GET", f"/machines/{shop.machine}/corrections")
+                return bool(pending["items"]) and "touch test" in " ".join(one.held_back)
+
+            await until(waits, "a correction that waits")
+            assert await one.store.intents(one.machine.key, "open") == []
+            assert (await one.store.known(one.machine.key))[3].offset == pytest.approx(BEFORE)
+            await guide.call("POST", f"/{guide.number}/stop")
+            await guide.reaches("cancelled")
+
+            async def offered() -> bool:
+                return bool(await one.store.intents(one.machine.key, "open"))
+
+            await until(offered, "the correction")
+        one.store.close()
+        assert shop.alarms() == []
+
+    scenario(work)
+
+
+def test_what_is_refused(shop: Shop, model: Model, tmp_path: Path) -> None:
+    async def work() -> None:
+        guide = Guide(shop)
+        await guide.call("POST", "", 404, tool_memory=3)  # no bridge
+        one = unit(shop, model, store_in(tmp_path))
+        async with running(shop, one) as guide:
+            await guide.ask(404, tool_memory=4)
+            await guide.ask(422, amount=0.2)
+            await guide.ask()
+            refused = await guide.call("POST", "", 409, tool_memory=3)
+            assert "is open" in refused["title"] + refused["detail"]
+            first = guide.shop.call("GET", f"/machines/{shop.machine}/touch-tests")["items"][0]["id"]
+            guide.number = first
+            await guide.reaches("read")
+            await guide.call("POST", f"/{first}/answer", 409, question="size", yes=True)
+            await guide.call("POST", f"/{first + 1000}/stop", 404)
+            await guide.call("POST", f"/{first}/stop")
+            await until(lambda: one.test is None, "the end")
+        one.store.close()
+
+    scenario(work)
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"touch_tests_by_page": False}, "touch_tests_by_page = true in [machine."),
+        ({"location": ()}, "has no [[machine."),
+    ],
+)
+def test_the_bridge_refuses_by_itself(
+    shop: Shop, model: Model, tmp_path: Path, fields: dict[str, Any], said: str
+) -> None:
+    async def work() -> None:
+        one = unit(shop, model, store_in(tmp_path), **fields)
+        one.state = "online"
+        await guided_test.hear(one, {"id": 1, "tool_memory": 3, "amount": 0.01, "state": "asked"})
+        assert one.test is not None
+        assert one.test.end is not None
+        assert one.test.end[0] == "failed"
+        assert said in one.test.end[1]
+        one.store.close()
+
+    scenario(work)
+
+
+def test_the_end_of_the_program_takes_back(shop: Shop, model: Model, tmp_path: Path) -> None:
+    async def work() -> None:
+        one = unit(shop, model, store_in(tmp_path))
+        async with running(shop, one) as guide:
+            await guide.ask()
+            await guide.comes_to("written")
+            await guided_test.end_all([one])
+            assert model.offsets[PLACE] == pytest.approx(BEFORE)
+        one.store.close()
+
+    scenario(work)
