@@ -26,6 +26,27 @@ class Part(Generic[Row]):
     on: str | None
     back: str | None
 
+    @property
+    def whole(self) -> bool:
+        """True where the page shows all of the list, so that the browser can sort and filter it."""
+        return not self.on and not self.back
+
+
+@dataclass(frozen=True)
+class Order:
+    """Column by which the server sorts a list of several pages, the largest first after a minus; link makes the page's address."""
+
+    by: str
+    link: Callable[..., str]
+
+    def turned(self, column: str) -> str:
+        """Address of the page sorted by this column; the other way round where it is already."""
+        return self.link(sort=f"-{column}" if self.by == column else column)
+
+    def direction(self, column: str) -> str | None:
+        """Direction of this column as `aria-sort` names it; None if the list is sorted by another."""
+        return {column: "ascending", f"-{column}": "descending"}.get(self.by)
+
 
 def part_of(
     rows: Sequence[Row],
@@ -41,6 +62,16 @@ def part_of(
     """
     shown = list(rows[:limit])
     return Part(shown, link(**{name: cursor(shown[-1])}) if len(rows) > limit else None, link() if at else None)
+
+
+def holds(text: str, *places: str | None) -> bool:
+    """Tell if every word of the text stands in one of these places, in capitals or not: `app.db.text.holds_words` for values.
+
+    >>> holds("lathe SEAT", "Lathe 3", None, "Seat 4"), holds("mill", "Lathe 3")
+    (True, False)
+    """
+    lower = [place.lower() for place in places if place]
+    return all(any(word in place for place in lower) for word in text.lower().split())
 
 
 def slice_of(rows: Sequence[Row], limit: int, after: int, link: Callable[..., str]) -> Part[Row]:

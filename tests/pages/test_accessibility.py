@@ -24,6 +24,7 @@ STATES: list[tuple[Any, Literal["light", "dark"], str | None]] = [
 
 # Every rule that is on by default, and the size of targets (WCAG 2.5.8: 24 px, or as far from the next one); or one rule.
 AXE = """async (only) => {
+  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));  // boxes have seen their new size
   const rules = only ? { runOnly: [only] } : { rules: { "target-size": { enabled: true } } };
   const { violations } = await axe.run({ ...rules, resultTypes: ["violations"], preload: false });
   return violations.flatMap(({ id, nodes }) => nodes.map(({ target, html }) => `${id}: ${target.flat().join(" ")} ${html.slice(0, 160)}`));
@@ -83,6 +84,7 @@ OPERATOR_PAGES = [
     "/todo",
     "/connections",
     "/machines/{machine}/connection",
+    "/machines/{machine}/touch-tests/{touch_test}",
     "/corrections",
     "/corrections/{machine}/tools/5",
     "/machines/{machine}/tools/3/change",
@@ -142,6 +144,7 @@ def test_targets_beside_the_machine_are_as_large_as_a_finger(
             small[address] = found
 
     values = {"machine": shop.machine, "characteristic": shop.characteristic, "alarm": shop.alarms()[0]["id"]}
+    values["touch_test"] = shop.call("GET", f"/machines/{shop.machine}/touch-tests")["items"][0]["id"]
     look("/sign-in")
     look(f"/station?code={code}")
     page.get_by_role("button", name="Bind").click()

@@ -12,6 +12,7 @@ from fastapi.routing import APIRoute
 from playwright.sync_api import Browser, Page, expect
 
 from app.main import ROUTERS
+from app.web.openapi import example_of
 from tests.conftest import Server
 from tests.geometry.alignment.test_alignments import SIX
 from tests.geometry.geometric_form.test_forms import BORE
@@ -21,7 +22,7 @@ from tests.shop import Person, Shop
 
 SIZES = {"desk": (1280, 800), "large": (1920, 1080), "panel": (800, 1280), "phone": (390, 844)}
 # Zoomed to 200 %, a screen has letters of twice the size and half as many pixels of the page (WCAG 1.4.4).
-SIZES |= {"desk-zoomed": (640, 400)}
+SIZES |= {"desk-zoomed": (640, 400), "phone-zoomed": (195, 422)}
 
 # By the address of the route: how it is opened, as a function of the shop.
 PAGES = {
@@ -30,6 +31,7 @@ PAGES = {
     "/plant/{machine}": ["/plant/{machine}"],
     "/connections": ["/connections"],
     "/machines/{machine}/connection": ["/machines/{machine}/connection"],
+    "/machines/{machine}/touch-tests/{number}": ["/machines/{machine}/touch-tests/{touch_test}"],
     "/station/{machine}": ["/station/{machine}", "/station/{machine}?tool=3"],
     "/station/{machine}/alarms/{number}": ["/station/{machine}/alarms/{alarm}?action=noted"],
     "/station/{machine}/corrections/{number}": ["/station/{machine}/corrections/{waiting}?do=approve"],
@@ -224,6 +226,7 @@ HEARTBEAT: dict[str, Any] = {
     "locations": [
         {"tool_memory": 3, "mapping": "77d09a12", "proved_at": "2026-11-01T08:00:00Z", "offset": -0.0123},
         {"tool_memory": 13, "mapping": "1c2d3e4f", "proved_at": None, "offset": None},
+        {"tool_memory": 14, "mapping": "9a8b7c6d", "proved_at": None, "offset": 0.25, "touch_test_by_page": True},
     ],
 }
 
@@ -265,6 +268,9 @@ def furnished(server: Server) -> Shop:
         sister=13,
     )
     made.call("POST", f"/machines/{made.machine}/heartbeat", **HEARTBEAT)
+    tests = f"/machines/{made.machine}/touch-tests"
+    test = made.call("POST", tests, 201, tool_memory=14)["id"]
+    made.call("POST", f"{tests}/{test}/report", **example_of("TouchTestReport"))
     calibrations = f"/machines/{made.machine}/calibrations"
     limits: dict[str, Any] = {"zero_range": 0.001, "averaging_limit": 0.01, "confidence_limit": 1.0}
     for touches in ([199.8553], [201.9]):
@@ -367,6 +373,7 @@ def addresses(shop: Shop) -> list[str]:
         "signal": signal,
         "note": shop.call("GET", f"/notes?machine={shop.machine}")["items"][-1]["id"],
         **dict(zip(("repeated", "crossed"), (each["id"] for each in studies), strict=True)),
+        "touch_test": shop.call("GET", f"/machines/{shop.machine}/touch-tests")["items"][0]["id"],
         "zero": shop.call("GET", f"/work-zeros?machine={shop.machine}")["items"][0]["id"],
         "alignment": shop.call("GET", f"/alignments?machine={shop.machine}")["items"][0]["id"],
         "form": shop.call("GET", f"/forms?machine={shop.machine}")["items"][0]["id"],

@@ -5,6 +5,8 @@ import re
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.loop.notes.pages import ON_PAGE as NOTES_ON_PAGE
+from app.views.set_up.characteristic_pages import ON_PAGE
 from tests.conftest import Server
 from tests.shop import Person, Shop
 
@@ -50,10 +52,78 @@ def test_the_server_filters_by_name_where_a_list_has_pages(shop: Shop, viewer: P
         return re.findall(r'<code class="quiet">([^<]+)</code>', viewer.open(f"/setup/characteristics?{query}"))
 
     assert listed("q=RING") == ["ring-a", "ring-b"]
+    assert listed("q=RING%20b%20lathe") == ["ring-b"]  # each word, wherever it stands in the row
+    assert listed("q=ring&sort=-name") == ["ring-b", "ring-a"]
+    assert listed("q=ring&sort=no-column") == ["ring-a", "ring-b"]
     assert listed("q=_") == ["disc_c"]
     assert listed(f"q=ring-b&machine={shop.machine}") == ["ring-b"]
     assert listed("q=ring&machine=sorted-0") == []
     assert listed("q=zzz") == []
+
+
+def test_the_server_sorts_a_list_of_several_pages_by_its_headers(shop: Shop, viewer: Person) -> None:
+    for number in range(ON_PAGE + 1):
+        shop.add(f"paged-{number:03}", tool_memory=0, average_memory=0, target=20.0 + number % 7)
+    page = viewer.open("/setup/characteristics?q=paged&sort=-target")
+    targets = [float(text) for text in re.findall(r"(2\d\.0000)", page)]
+    assert targets == sorted(targets, reverse=True)
+    assert len(targets) == ON_PAGE
+    assert re.search(r'aria-sort="descending"><a class="sorts" href="[^"]*sort=target"', page)
+    on = re.search(r'href="([^"]+)" rel="next"', page)
+    assert on is not None
+    assert re.findall(r"(2\d\.0000)", viewer.open(on[1].replace("&amp;", "&"))) == ["20.0000"]
+
+
+def test_the_server_filters_lists_that_have_pages(shop: Shop, viewer: Person) -> None:
+    """Notes and alarms that stand on a later page are found; what no row holds is said."""
+    for number in range(NOTES_ON_PAGE + 1):
+        shop.call("POST", "/notes", 201, machine=shop.machine, text="A rare bird" if number == 0 else f"Note {number}")
+    assert "A rare bird" not in viewer.open("/notes")
+    assert "A rare bird" in viewer.open("/notes?q=BIRD%20lathe")
+    assert "No row holds" in viewer.open("/notes?q=no-such-word")
+    assert "A rare bird" in viewer.open("/notes?q=%20%00bird")  # what cannot be stored is no word
+    for key in ("worn", "small"):
+        shop.add(key, tool_memory=11, average_memory=0)
+    shop.read(350.0, "worn")
+    shop.read(-12.0, "small")
+    history = viewer.open("/alarms/history?q=tool%20worn")
+    assert "Seat worn" in history
+    assert "Seat small" not in history
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/alarms/history",
+        "/alignments",
+        "/calibration",
+        "/connections",
+        "/gauges",
+        "/machines",
+        "/notes",
+        "/overview",
+        "/proposals",
+        "/setup/characteristics",
+        "/work-zeros",
+    ],
+)
+def test_a_filter_that_no_row_holds_says_so(shop: Shop, viewer: Person, path: str) -> None:
+    shop.read(0.0)
+    page = viewer.open(f"{path}?q=no-such-word")
+    assert "No row holds “no-such-word”" in page
+    assert 'value="no-such-word"' in page
+
+
+@pytest.mark.browser
+def test_all_ticks_only_what_the_filter_shows(shop: Shop, viewer: Person, page: Page) -> None:
+    viewer.sign_in(page)
+    page.goto("/reports")
+    page.get_by_label("Show those with").fill("ring-a")
+    page.get_by_role("button", name="All", exact=True).click()
+    chosen = page.locator("input[name=characteristic]:checked")
+    expect(chosen).to_have_count(1)
+    page.get_by_label("Show those with").fill("")
+    expect(chosen).to_have_value("ring-a")
 
 
 @pytest.mark.browser

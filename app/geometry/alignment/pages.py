@@ -20,7 +20,7 @@ from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named, machine_of
 from app.loop.machines.wording import texts_by_control
 from app.loop.readings import actions as readings
-from app.web.deps import FormDep, Number, SessionDep, Word
+from app.web.deps import FormDep, Number, SessionDep, Sought, Word
 from app.web.forms import parsed, whole
 from app.web.paging import address, part_of
 from app.web.templates import page
@@ -38,16 +38,20 @@ def history_url(machine: str, name: str) -> str:
 
 
 @router.get("/alignments", dependencies=[require("viewer")])
-def overview(request: Request, session: SessionDep, machine: Word = None, before: Number = None) -> Response:
+def overview(
+    request: Request, session: SessionDep, machine: Word = None, q: Sought = "", before: Number = None
+) -> Response:
     """Every set-up with where it lay last, and the alignments, newest first."""
     chosen = machine_named(session, machine) if machine else None
     only = chosen.id if chosen else None
-    rows = queries.alignments(session, only, before=before, newest_first=True, limit=ON_PAGE + 1)
+    rows = queries.alignments(session, only, holding=q, before=before, newest_first=True, limit=ON_PAGE + 1)
+    link = partial(address, "/alignments", machine=machine, q=q or None)
     return page(
         request,
         "alignment/overview.html",
-        set_ups=queries.set_ups(session, only) if before is None else [],
-        part=part_of(rows, ON_PAGE, before, lambda row: row.id, partial(address, "/alignments", machine=machine)),
+        set_ups=queries.set_ups(session, only) if before is None and not q else [],
+        part=part_of(rows, ON_PAGE, before, lambda row: row.id, link),
+        q=q,
         keys=machines.machine_keys_by_id(session),
         machine=chosen,
         machines=machines.machines(session),

@@ -5,6 +5,7 @@ from typing import NamedTuple
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from app.db.text import holds_words
 from app.errors import NotFound
 from app.geometry.alignment.tables import Alignment
 from app.language.i18n import _
@@ -51,12 +52,16 @@ def alignments(
     machine_id: int | None = None,
     *,
     after: int = 0,
+    holding: str = "",
     before: int | None = None,
     newest_first: bool = False,
     limit: int = 100,
 ) -> list[Alignment]:
     """Alignments of all machines or of one, in the order in which they came."""
     query = select(Alignment).where(Alignment.id > after).limit(limit)
+    if holding:
+        names = (Alignment.name, Alignment.part, Machine.name, Machine.key)
+        query = query.join(Machine, Machine.id == Alignment.machine_id).where(*holds_words(holding, *names))
     if machine_id is not None:
         query = query.where(Alignment.machine_id == machine_id)
     if before is not None:

@@ -20,7 +20,7 @@ from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named, machine_of
 from app.loop.machines.wording import texts_by_control
 from app.loop.readings import actions as readings
-from app.web.deps import FormDep, Number, SessionDep, Word
+from app.web.deps import FormDep, Number, SessionDep, Sought, Word
 from app.web.forms import parsed
 from app.web.paging import address, part_of
 from app.web.templates import page
@@ -32,16 +32,20 @@ KINDS = ("bore", "boss", "pocket", "web", "corner")
 
 
 @router.get("/work-zeros", dependencies=[require("viewer")])
-def overview(request: Request, session: SessionDep, machine: Word = None, before: Number = None) -> Response:
+def overview(
+    request: Request, session: SessionDep, machine: Word = None, q: Sought = "", before: Number = None
+) -> Response:
     """Every fixture with how far it has shifted, and the zeros, newest first."""
     chosen = machine_named(session, machine) if machine else None
     only = chosen.id if chosen else None
-    rows = queries.work_zeros(session, only, before=before, newest_first=True, limit=ON_PAGE + 1)
+    rows = queries.work_zeros(session, only, holding=q, before=before, newest_first=True, limit=ON_PAGE + 1)
+    link = partial(address, "/work-zeros", machine=machine, q=q or None)
     return page(
         request,
         "work_zero/overview.html",
-        fixtures=queries.fixtures(session, only) if before is None else [],
-        part=part_of(rows, ON_PAGE, before, lambda row: row.id, partial(address, "/work-zeros", machine=machine)),
+        fixtures=queries.fixtures(session, only) if before is None and not q else [],
+        part=part_of(rows, ON_PAGE, before, lambda row: row.id, link),
+        q=q,
         keys=machines.machine_keys_by_id(session),
         machine=chosen,
         machines=machines.machines(session),

@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session, aliased
 
 from app.core.decision.step import rounded
 from app.core.geometry.work_zero import Shift, judge_shift
+from app.db.text import holds_words
 from app.errors import NotFound
 from app.geometry.work_zero.tables import Fixture, WorkZero
 from app.language.i18n import _
@@ -87,12 +88,16 @@ def work_zeros(
     fixture: str | None = None,
     *,
     after: int = 0,
+    holding: str = "",
     before: int | None = None,
     newest_first: bool = False,
     limit: int = 100,
 ) -> list[WorkZero]:
     """Work zeros of all machines, of one, or of one fixture, in the order in which they came."""
     query = select(WorkZero).where(WorkZero.id > after).limit(limit)
+    if holding:
+        names = (WorkZero.fixture, WorkZero.part, WorkZero.work_offset, Machine.name, Machine.key)
+        query = query.join(Machine, Machine.id == WorkZero.machine_id).where(*holds_words(holding, *names))
     if machine_id is not None:
         query = query.where(WorkZero.machine_id == machine_id)
     if fixture is not None:

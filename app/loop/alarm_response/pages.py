@@ -14,7 +14,7 @@ from app.loop.alarm_response.form_reader import acknowledge_as_typed
 from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.machines import queries as machines
-from app.web.deps import FormDep, Number, SessionDep, Word
+from app.web.deps import FormDep, Number, SessionDep, Sought, Word
 from app.web.forms import by_field
 from app.web.paging import address, part_of
 from app.web.templates import page
@@ -55,17 +55,19 @@ def board(
 
 
 @router.get("/alarms/history", dependencies=[require("viewer")])
-def history(request: Request, session: SessionDep, machine: Word = None, before: Number = None) -> Response:
+def history(
+    request: Request, session: SessionDep, machine: Word = None, q: Sought = "", before: Number = None
+) -> Response:
     """All alarms, newest first."""
     machine_row = machines.machine_named(session, machine) if machine else None
-    rows = queries.history(
-        session, machine_id=machine_row.id if machine_row else None, before=before, limit=ON_HISTORY_PAGE + 1
-    )
-    link = partial(address, "/alarms/history", machine=machine)
+    only = machine_row.id if machine_row else None
+    rows = queries.history(session, machine_id=only, holding=q, before=before, limit=ON_HISTORY_PAGE + 1)
+    link = partial(address, "/alarms/history", machine=machine, q=q or None)
     return page(
         request,
         "alarms/history.html",
         part=part_of(rows, ON_HISTORY_PAGE, before, lambda row: row.alarm.id, link),
+        q=q,
         machines=machines.machines(session),
         machine=machine_row,
         wording=wording,

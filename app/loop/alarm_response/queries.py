@@ -6,8 +6,10 @@ from typing import Literal, NamedTuple
 from sqlalchemy import Select, any_, exists, func, literal, select
 from sqlalchemy.orm import Session, aliased
 
+from app.db.text import holds_words
 from app.errors import NotFound
 from app.language.i18n import _
+from app.loop.alarms.kinds import kinds
 from app.loop.alarms.reading_kinds import HOLDING
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
@@ -102,10 +104,13 @@ def _filtered(
 
 
 def history(
-    session: Session, *, machine_id: int | None = None, before: int | None = None, limit: int = 50
+    session: Session, *, machine_id: int | None = None, holding: str = "", before: int | None = None, limit: int = 50
 ) -> list[AlarmRow]:
-    """All alarms, newest first."""
+    """All alarms, newest first. holding: those in whose kind, names, comment or acknowledging person these words stand."""
     query = _filtered("all", machine_id)
+    names = (Machine.name, Machine.key, Characteristic.name, Characteristic.key, Alarm.comment, Alarm.acknowledged_by)
+    words = {kind.name: kind.word() for kind in kinds()}
+    query = query.where(*holds_words(holding, *names, coded=(Alarm.kind, words)))
     if before is not None:
         query = query.where(Alarm.id < before)
     return [AlarmRow(*row) for row in session.execute(query.order_by(Alarm.id.desc()).limit(limit))]

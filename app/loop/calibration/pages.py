@@ -19,7 +19,7 @@ from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named
 from app.loop.warnings.wording import sentence
 from app.web import paging
-from app.web.deps import FormDep, Number, SessionDep, Word
+from app.web.deps import FormDep, Number, SessionDep, Sought, Word
 from app.web.forms import by_field, parsed, words
 from app.web.templates import page
 
@@ -40,11 +40,14 @@ def overview(
     session: SessionDep,
     machine: Annotated[str | None, Query(max_length=64)] = None,
     after: Annotated[int, Query(ge=0, le=1_000_000)] = 0,
+    q: Sought = "",
 ) -> Response:
     """Machines and places: what was found last, and when the next calibration is places."""
     every = machines.machines(session)
     chosen = [machine_named(session, machine)] if machine else every
-    part = paging.slice_of(chosen, ON_PAGE, 0 if machine else after, partial(paging.address, "/calibration"))
+    chosen = [each for each in chosen if paging.holds(q, each.name, each.key)]
+    link = partial(paging.address, "/calibration", q=q or None)
+    part = paging.slice_of(chosen, ON_PAGE, 0 if machine else after, link)
     rows = places.places(session, part.rows)
     groups = [(machine, [row for row in rows if row.machine.id == machine.id]) for machine in part.rows]
     return page(
@@ -54,6 +57,8 @@ def overview(
         machines=every,
         machine=machine,
         after=after,
+        total=len(chosen),
+        q=q,
         part=part,
         most_locations=MOST_LOCATIONS,
         wording=wording,

@@ -1,13 +1,14 @@
 """Characteristics and the versions of their parameters. Never writes."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from sqlalchemy import func, or_, select
+from sqlalchemy import ColumnElement, Float, Integer, func, select
 from sqlalchemy.orm import Session
 
 from app.access.callers import Caller, Role
 from app.core.parameters import Parameters
+from app.db.text import holds_words
 from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
@@ -67,14 +68,40 @@ def key_is_taken(session: Session, key: str) -> bool:
     return session.scalar(select(Characteristic.id).where(Characteristic.key == key)) is not None
 
 
+_IN_FORCE = ParametersVersion.parameters
+ORDERS: dict[str, ColumnElement[Any]] = {
+    "key": Characteristic.key.expression,
+    "name": func.lower(Characteristic.name),
+    "machine": func.lower(Machine.name),
+    "part": func.lower(Characteristic.part),
+    "target": _IN_FORCE["target"].astext.cast(Float),
+    "tolerance": _IN_FORCE["tolerance_width"].astext.cast(Float),
+    "tool": _IN_FORCE["tool_memory"].astext.cast(Integer),
+    "mode": _IN_FORCE["mode"].astext,
+    "version": ParametersVersion.version.expression,
+}
+"""What lists of characteristics are sorted by."""
+
+
 def characteristics(
-    session: Session, *, machine_id: int | None = None, named: str = "", after: str = "", limit: int = 1000
+    session: Session,
+    *,
+    machine_id: int | None = None,
+    named: str = "",
+    after: str = "",
+    by: str = "key",
+    skip: int = 0,
+    limit: int = 1000,
 ) -> list[CurrentCharacteristic]:
-    """Characteristics by key, of one machine or of all; `named`: those whose name, key or part holds this."""
-    query = _CURRENT.where(Characteristic.key > after).order_by(Characteristic.key).limit(limit)
-    if named:
-        names = (Characteristic.name, Characteristic.key, Characteristic.part)
-        query = query.where(or_(*(name.icontains(named, autoescape=True) for name in names)))
+    """Characteristics of one machine or of all, by key or by another one of `ORDERS`, the largest first after a minus.
+
+    `named`: those in whose name, key, part or machine these words stand.
+    """
+    order = ORDERS[by.removeprefix("-")]
+    query = _CURRENT.where(Characteristic.key > after).offset(skip).limit(limit)
+    query = query.order_by(order.desc().nulls_last() if by.startswith("-") else order.nulls_last(), Characteristic.key)
+    names = (Characteristic.name, Characteristic.key, Characteristic.part, Machine.name, Machine.key)
+    query = query.where(*holds_words(named, *names))
     if machine_id is not None:
         query = query.where(Characteristic.machine_id == machine_id)
     return [CurrentCharacteristic(*row) for row in session.execute(query)]

@@ -16,7 +16,7 @@ from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named
 from app.loop.notes import actions, queries
 from app.loop.notes.form_reader import write_as_typed
-from app.web.deps import Before, FormDep, Number, SessionDep, Word
+from app.web.deps import Before, FormDep, Number, SessionDep, Sought, Word
 from app.web.fields import LARGEST_ID, Reason
 from app.web.forms import by_field
 from app.web.paging import address, part_of
@@ -30,7 +30,12 @@ OfReading = Annotated[int | None, Query(ge=1, le=LARGEST_ID)]
 
 @router.get("/notes", dependencies=[require("viewer")])
 def notes_page(
-    request: Request, session: SessionDep, machine: Word = None, characteristic: Word = None, before: Before = None
+    request: Request,
+    session: SessionDep,
+    machine: Word = None,
+    characteristic: Word = None,
+    q: Sought = "",
+    before: Before = None,
 ) -> Response:
     """Notes, the last written first: of a characteristic those on its charts, of a machine, or all."""
     current = characteristic_named(session, characteristic) if characteristic else None
@@ -39,14 +44,16 @@ def notes_page(
         session,
         machine_id=chosen.id if chosen else None,
         characteristic=current.characteristic if current else None,
+        holding=q,
         before=before,
         limit=ON_PAGE + 1,
     )
-    link = partial(address, "/notes", machine=machine, characteristic=characteristic)
+    link = partial(address, "/notes", machine=machine, characteristic=characteristic, q=q or None)
     return page(
         request,
         "notes/list.html",
         part=part_of(rows, ON_PAGE, before, lambda row: row.note.id, link),
+        q=q,
         machine=chosen,
         characteristic=current.characteristic if current else None,
         machines=machines.machines(session),

@@ -7,6 +7,7 @@ from sqlalchemy import ColumnElement, Select, or_, select
 from sqlalchemy.orm import Session
 
 from app.access.callers import Caller
+from app.db.text import holds_words
 from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.tables.characteristics import Characteristic
@@ -69,6 +70,7 @@ def notes(
     start: datetime | None = None,
     end: datetime | None = None,
     named: str = "",
+    holding: str = "",
     withdrawn: bool = False,
     before: int | None = None,
     limit: int = 100,
@@ -76,7 +78,7 @@ def notes(
     """Notes, the last written first.
 
     characteristic: those on its charts, its machine's too. start, end: of the moments that they are about. named: those whose
-    words hold this. withdrawn: these as well.
+    text holds this. holding: those in whose text, author or name of what they are about these words stand. withdrawn: these as well.
     """
     query = _ROWS.order_by(Note.id.desc()).limit(limit)
     if machine_id is not None:
@@ -89,6 +91,8 @@ def notes(
         query = query.where(Note.at <= end)
     if named:
         query = query.where(Note.text.icontains(named, autoescape=True))
+    names = (Note.text, Note.written_by, Machine.name, Characteristic.name)
+    query = query.where(*holds_words(holding, *names))
     if not withdrawn:
         query = query.where(Note.withdrawn_at.is_(None))
     if before is not None:

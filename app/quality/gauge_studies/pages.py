@@ -23,7 +23,7 @@ from app.quality.gauge_studies.schemas import CorrectionIn, StudyIn
 from app.quality.gauge_studies.tables import KINDS
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
-from app.web.deps import Before, FormDep, SessionDep
+from app.web.deps import Before, FormDep, SessionDep, Sought
 from app.web.forms import by_field, parsed
 from app.web.paging import address, part_of
 from app.web.templates import page
@@ -44,6 +44,7 @@ def list_page(
     caller: Viewer,
     machine: Annotated[str, Query(max_length=64)] = "",
     characteristic: Annotated[str, Query(max_length=64)] = "",
+    q: Sought = "",
     before: Before = None,
 ) -> Response:
     """Every study with its verdict, newest first; of a machine, or of a characteristic with what they say about its R33."""
@@ -53,6 +54,8 @@ def list_page(
         session,
         machine_id=chosen.id if chosen else None,
         characteristic_id=current.characteristic.id if current else None,
+        kinds={each: wording.kind(each) for each in KINDS},
+        holding=q,
         before=before,
         limit=ON_PAGE + 1,
     )
@@ -64,8 +67,9 @@ def list_page(
             ON_PAGE,
             before,
             lambda row: row.study.id,
-            partial(address, "/gauges", machine=machine or None, characteristic=characteristic or None),
+            partial(address, "/gauges", machine=machine or None, characteristic=characteristic or None, q=q or None),
         ),
+        q=q,
         machine=chosen,
         current=current,
         about=queries.latest_advice(session, current) if current else None,

@@ -1,8 +1,9 @@
 """Gauge studies with what they say now, and what they suggest for R33. Never writes. Lengths in mm."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 from sqlalchemy import ColumnElement, Select, and_, func, or_, select
@@ -13,6 +14,7 @@ from app.core.spc.gauge.single import FEWEST_REPEATS
 from app.core.spc.gauge.zero_range import Suggestion, suggest
 from app.core.spc.refusal import Reason, Refused
 from app.core.warning import CodedWarning
+from app.db.text import holds_words
 from app.errors import Invalid, NotFound
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
@@ -127,15 +129,23 @@ def studies(
     *,
     machine_id: int | None = None,
     characteristic_id: int | None = None,
+    holding: str = "",
+    kinds: Mapping[str, str] = MappingProxyType({}),
     before: int | None = None,
     limit: int = 100,
 ) -> list[StudyRow]:
-    """Studies, newest first; of one machine or of one characteristic."""
+    """Studies, newest first; of one machine or of one characteristic.
+
+    holding: those in whose kind, gauge, names or author these words stand. kinds: what each kind is called.
+    """
     query = _rows().where(GaugeStudyRevision.revision == _NEWEST).order_by(GaugeStudy.id.desc()).limit(limit)
     if machine_id is not None:
         query = query.where(GaugeStudy.machine_id == machine_id)
     if characteristic_id is not None:
         query = query.where(GaugeStudy.characteristic_id == characteristic_id)
+    gauge = GaugeStudyRevision.settings["gauge"].as_string()
+    names = (gauge, Machine.name, Characteristic.name, Characteristic.key, GaugeStudy.created_by)
+    query = query.where(*holds_words(holding, *names, coded=(GaugeStudy.kind, kinds)))
     if before is not None:
         query = query.where(GaugeStudy.id < before)
     return [StudyRow(*row) for row in session.execute(query)]

@@ -24,7 +24,7 @@ from app.quality.what_if.evidence import effect_of, period_of, quote_of
 from app.quality.what_if.map_view import view_of
 from app.quality.what_if.queries import Map, Simulation
 from app.quality.what_if.schemas import ProposalDecisionIn, ProposalIn
-from app.web.deps import Before, FormDep, SessionDep, Word
+from app.web.deps import Before, FormDep, SessionDep, Sought, Word
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed
 from app.web.paging import address, part_of
@@ -156,15 +156,19 @@ def proposals_page(
     request: Request,
     session: SessionDep,
     status: Annotated[str | None, Query(max_length=20)] = None,
+    q: Sought = "",
     before: Before = None,
 ) -> Response:
     """Proposals, newest first: those that wait, or all."""
     chosen = status if status in proposals.STATUSES else "all" if status == "all" else "open"
-    rows = proposals.proposals(session, status=None if chosen == "all" else chosen, before=before, limit=ON_PAGE + 1)
+    wanted = None if chosen == "all" else chosen
+    rows = proposals.proposals(session, status=wanted, holding=q, before=before, limit=ON_PAGE + 1)
+    link = partial(address, "/proposals", status=chosen, q=q or None)
     return page(
         request,
         "what_if/proposals.html",
-        part=part_of(rows, ON_PAGE, before, lambda row: row.proposal.id, partial(address, "/proposals", status=chosen)),
+        part=part_of(rows, ON_PAGE, before, lambda row: row.proposal.id, link),
+        q=q,
         chosen=chosen,
         statuses=[*proposals.STATUSES, "all"],
         wording=wording,

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import Select, case, func, select
 from sqlalchemy.orm import Session
 
+from app.db.text import holds_words
 from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.tables.characteristics import Characteristic
@@ -54,11 +55,22 @@ def proposals(
     characteristic: Characteristic | None = None,
     machine_id: int | None = None,
     status: str | None = None,
+    holding: str = "",
     before: int | None = None,
     limit: int = 100,
 ) -> list[ProposalRow]:
-    """Newest first: of one characteristic, of one machine, of all; with one status or any."""
-    query = _ROWS.order_by(ParameterProposal.id.desc()).limit(limit)
+    """Newest first: of one characteristic, of one machine, of all; with one status or any.
+
+    holding: those in whose names, reason or author these words stand.
+    """
+    names = (
+        Characteristic.name,
+        Characteristic.key,
+        Machine.name,
+        ParameterProposal.reason,
+        ParameterProposal.proposed_by,
+    )
+    query = _ROWS.where(*holds_words(holding, *names)).order_by(ParameterProposal.id.desc()).limit(limit)
     if characteristic is not None:
         query = query.where(
             ParameterProposal.machine_id == characteristic.machine_id,

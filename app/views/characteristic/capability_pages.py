@@ -89,7 +89,6 @@ def capability_page(
         address = f"/api/v1/characteristics/{current.characteristic.key}/figures/capability"
         return f"{address}?{urlencode(now | {'picture': picture})}"
 
-    place = {"machine_id": current.machine.id, "characteristic_id": current.characteristic.id}
     timed = choice.start is not None or choice.end is not None
     failing = proof.failing()
     return page(
@@ -123,7 +122,9 @@ def capability_page(
         refused=lambda value: isinstance(value, Refused),
         wording=wording,
         words=statistics,
-        gauge_studies=gauges.studies(session, **place, limit=3),
+        gauge_studies=gauges.studies(
+            session, machine_id=current.machine.id, characteristic_id=current.characteristic.id, limit=3
+        ),
         about_zero_range=gauges.latest_advice(session, current),
         gauge_wording=gauge_wording,
         may_enter=caller.may("operator"),

@@ -16,8 +16,8 @@ from app.views.characteristic.wording import state_word
 from app.views.overview import queries, wording
 from app.views.overview.queries import By
 from app.views.overview.ranking import CAPABLE
-from app.web.deps import SessionDep
-from app.web.paging import address, slice_of
+from app.web.deps import SessionDep, Sought
+from app.web.paging import address, holds, slice_of
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False, dependencies=[require("viewer")])
@@ -32,13 +32,28 @@ def overview_page(
     machine: Annotated[str | None, Query()] = None,
     by: Annotated[By, Query()] = By.ATTENTION,
     after: Annotated[int, Query(ge=0, le=1_000_000)] = 0,
+    q: Sought = "",
 ) -> Response:
     """Every characteristic ranked, with the reasons in words."""
-    ranked = queries.ranking(session, machine=machine or None, by=by)
+    ranked = [
+        each
+        for each in queries.ranking(session, machine=machine or None, by=by)
+        if holds(
+            q,
+            each.row.characteristic.name,
+            each.row.characteristic.key,
+            each.row.characteristic.part,
+            each.machine.name,
+        )
+    ]
 
     def link(**changes: object) -> str:
         """This page with something else chosen."""
-        chosen = {"machine": machine or None, "by": by.value if by is not By.ATTENTION else None} | changes
+        chosen = {
+            "machine": machine or None,
+            "by": by.value if by is not By.ATTENTION else None,
+            "q": q or None,
+        } | changes
         return address("/overview", **chosen)
 
     return page(
@@ -48,6 +63,7 @@ def overview_page(
         total=len(ranked),
         need=sum(1 for entry in ranked if entry.inputs.reasons),
         after=after,
+        q=q,
         by=by.value,
         machine=machine or "",
         machines=machines.machines(session),

@@ -1,5 +1,6 @@
 """Pages: all machines, and the geometry of one of them."""
 
+from functools import partial
 from typing import Annotated, NamedTuple
 
 from fastapi import APIRouter, Query, Request, Response
@@ -10,8 +11,8 @@ from app.language.i18n import _
 from app.loop.machines import queries as machines
 from app.views.characteristic import state_queries
 from app.views.plant import geometry_queries
-from app.web.deps import SessionDep
-from app.web.paging import address, slice_of
+from app.web.deps import SessionDep, Sought
+from app.web.paging import address, holds, slice_of
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False, dependencies=[require("viewer")])
@@ -30,12 +31,13 @@ class Geometry(NamedTuple):
 
 @router.get("/machines")
 def machines_page(
-    request: Request, session: SessionDep, after: Annotated[int, Query(ge=0, le=1_000_000)] = 0
+    request: Request, session: SessionDep, after: Annotated[int, Query(ge=0, le=1_000_000)] = 0, q: Sought = ""
 ) -> Response:
     """Every machine with how it stands."""
     groups = state_queries.plant(session, trends=False)
-    part = slice_of(groups, ON_PAGE, after, lambda **query: address("/machines", **query))
-    return page(request, "machines/list.html", part=part, last=_last)
+    groups = [group for group in groups if holds(q, group.machine.name, group.machine.key, group.machine.control)]
+    part = slice_of(groups, ON_PAGE, after, partial(address, "/machines", q=q or None))
+    return page(request, "machines/list.html", part=part, q=q, last=_last)
 
 
 def _last(group: state_queries.Group) -> object:

@@ -1,6 +1,7 @@
 """Page: many reports at once – choose, watch, fetch, cancel."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Request, Response
@@ -21,8 +22,9 @@ from app.views.reports.actions import KEPT_DAYS
 from app.views.reports.bundle import Bundle
 from app.views.reports.jobs_api import Number, report_worker
 from app.views.reports.request import SectionName, typed
-from app.web.deps import SessionDep, texts
+from app.web.deps import Before, SessionDep, texts
 from app.web.forms import by_field
+from app.web.paging import address, part_of
 from app.web.period import with_preset
 from app.web.templates import page
 
@@ -37,10 +39,11 @@ def reports_page(
     session: SessionDep,
     caller: Viewer,
     characteristic: Annotated[list[str] | None, Query()] = None,
+    before: Before = None,
     x_live_part: Annotated[str | None, Header()] = None,
 ) -> Response:
     """Requests for reports, and a form for a new one."""
-    return _page(request, session, caller, chosen=characteristic or (), part=x_live_part)
+    return _page(request, session, caller, chosen=characteristic or (), before=before, part=x_live_part)
 
 
 @router.post("/reports")
@@ -106,16 +109,18 @@ def _page(
     chosen: Sequence[str] = (),
     given: dict[str, str] | None = None,
     problem: InbandError | None = None,
+    before: int | None = None,
     part: str | None = None,
 ) -> Response:
     failing = proof.failing()
-    jobs = queries.jobs(session, limit=SHOWN)
+    rows = queries.jobs(session, before=before, limit=SHOWN + 1)
+    jobs = part_of(rows, SHOWN, before, lambda job: job.id, partial(address, "/reports"))
     return page(
         request,
         "reports/jobs.html",
         status=problem.status if problem else 200,
         jobs=jobs,
-        troubles={job.id: queries.troubles(session, job.id) for job in jobs if job.problems},
+        troubles={job.id: queries.troubles(session, job.id) for job in jobs.rows if job.problems},
         may_cancel=lambda job: queries.may_end(job, caller),
         state_word=state_word,
         wanted=lambda name: part is None or part == name,

@@ -24,9 +24,9 @@ from app.quality.what_if import queries as what_if
 from app.quality.what_if import wording
 from app.views.set_up import parameter_form
 from app.views.set_up.frame import setup_page
-from app.web.deps import FormDep, SessionDep
+from app.web.deps import FormDep, SessionDep, Sought
 from app.web.forms import by_field, parsed
-from app.web.paging import address, part_of
+from app.web.paging import Order, address, part_of
 
 router = APIRouter()
 ON_PAGE = 200
@@ -39,22 +39,24 @@ def characteristics_page(
     session: SessionDep,
     caller: Viewer,
     machine: str = "",
-    after: str = "",
-    q: Annotated[str, Query(max_length=128)] = "",
+    skip: Annotated[int, Query(ge=0, le=1_000_000)] = 0,
+    sort: Annotated[str, Query(max_length=20)] = "key",
+    q: Sought = "",
 ) -> Response:
-    chosen, named = machines.find_machine(session, machine), q.replace("\0", "").strip()
+    chosen, by = machines.find_machine(session, machine), sort if sort.removeprefix("-") in queries.ORDERS else "key"
     only = chosen.id if chosen else None
-    rows = queries.characteristics(session, machine_id=only, named=named, after=after, limit=ON_PAGE + 1)
-    link = partial(address, "/setup/characteristics", machine=chosen.key if chosen else None, q=named or None)
+    rows = queries.characteristics(session, machine_id=only, named=q, by=by, skip=skip, limit=ON_PAGE + 1)
+    link = partial(address, "/setup/characteristics", machine=chosen.key if chosen else None, q=q or None)
     return setup_page(
         request,
         "characteristics.html",
         caller,
         "characteristics",
-        part=part_of(rows, ON_PAGE, after, lambda current: current.characteristic.key, link, "after"),
+        part=part_of(rows, ON_PAGE, skip, lambda _last: skip + ON_PAGE, partial(link, sort=by), "skip"),
+        order=Order(by, link),
         machines=machines.machines(session, limit=100_000),
         machine=chosen,
-        q=named,
+        q=q,
         mode_words=cache(lambda mode: parameter_form.choice("mode", mode.value)),
     )
 

@@ -20,7 +20,7 @@ from app.web.deps import FormDep, SessionDep
 from app.web.paging import address
 
 router = APIRouter()
-MOST = 1000  # characteristics on the page
+MOST = 2000  # characteristics on the page
 
 
 @router.get("/setup/parameters")

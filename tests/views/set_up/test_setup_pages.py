@@ -186,7 +186,7 @@ class TestCharacteristics:
         shown = [re.findall(r'href="/setup/characteristics/([^"?]+)"><strong>', page) for page in (first, second)]
         assert sorted(shown[0] + shown[1]) == sorted([shop.characteristic, *keys])
         assert (len(shown[0]), len(shown[1])) == (200, 2)
-        assert f'href="/setup/characteristics?machine={shop.machine}" rel="prev"' in second
+        assert f'href="/setup/characteristics?machine={shop.machine}&amp;sort=key" rel="prev"' in second
 
     def test_a_factor_of_ones_own(self, engineer: Browser, shop: Shop) -> None:
         self.new(engineer, shop, "own-factor", factor="other", factor_other="0,25")

@@ -152,6 +152,22 @@ def test_it_is_read_from_two_metres(page: Page, shop: Shop, operator: Person, si
         assert place["height"] >= 64
 
 
+@pytest.mark.parametrize("size", TABLETS, ids=["upright", "across"])
+def test_alarms_and_corrections_that_wait_stand_one_below_the_other(
+    page: Page, shop: Shop, operator: Person, size: Any
+) -> None:
+    page.set_viewport_size(size)
+    shop.add(f"{shop.characteristic}-asked", tool_memory=4, mode="approval")
+    shop.read(6.0, f"{shop.characteristic}-asked")
+    shop.read(12.5)
+    operator.sign_in(page)
+    page.goto(f"/station/{shop.machine}")
+    boxes = [card.bounding_box() for card in page.locator(".station-alarm").all()]
+    assert len(boxes) == 2
+    alarm, correction = (box for box in boxes if box is not None)
+    assert alarm["y"] + alarm["height"] <= correction["y"]
+
+
 def test_by_touch_live_with_two_touches(page: Page, shop: Shop, operator: Person) -> None:
     page.set_viewport_size(TABLET)  # type: ignore[arg-type]
     operator.sign_in(page)
