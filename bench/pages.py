@@ -3,7 +3,7 @@
 Usable is a page whose first chart is drawn, or whose words all stand where it has no chart. With ``--against`` a folder in
 which another version is checked out, with a ``.venv`` of its own, both versions serve the same plant and are opened in turn;
 printed are this one, that one, and the ratio of the medians (below 1: this one is better).
-``python -m bench.pages [--rounds 5] [--readings 300] [--against ../first-version]``
+``python -m bench.pages [--rounds 5] [--readings 300] [--against ../first-version] [--page plant --page "control chart"]``
 """
 
 import argparse
@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -29,16 +30,59 @@ HOUSE = Path(__file__).parents[1]
 PYTHON = Path(".venv/bin/python")
 PASSWORD = "correct horse battery"
 CHARACTERISTICS = 6
-# What a page is called, and its addresses: the second one where a version does not have the first.
+# What a page is called, and its addresses: the second one where a version does not have the first. All pages that the first
+# version has are here but those of what this plant does not hold: a signal, a proposal, a study, a run, a form, an alignment.
+MACHINE, CHARACTERISTIC = "/machines/bench", "/characteristics/c1"
 PAGES = {
     "plant": ["/"],
-    "to do": ["/todo", "/alarms"],
-    "characteristic": ["/characteristics/c1"],
-    "control chart": ["/characteristics/c1/control"],
-    "capability": ["/characteristics/c1/capability"],
-    "report": ["/characteristics/c1/report"],
-    "set-up list": ["/setup/characteristics"],
+    "plant, a machine": ["/plant/bench"],
     "station": ["/station/bench", "/plant/bench"],
+    "to do": ["/todo", "/alarms"],
+    "alarms": ["/alarms"],
+    "alarm": ["/alarms/1"],
+    "alarms, history": ["/alarms/history"],
+    "approvals": ["/corrections"],
+    "proposals": ["/proposals"],
+    "characteristic": [CHARACTERISTIC],
+    "reading": [f"{CHARACTERISTIC}/readings/3"],
+    "control chart": [f"{CHARACTERISTIC}/control"],
+    "control, freeze": [f"{CHARACTERISTIC}/control/freeze"],
+    "rules": [f"{CHARACTERISTIC}/rules"],
+    "signals": [f"{CHARACTERISTIC}/signals"],
+    "capability": [f"{CHARACTERISTIC}/capability"],
+    "what if": [f"{CHARACTERISTIC}/what-if"],
+    "report": [f"{CHARACTERISTIC}/report"],
+    "reports": ["/reports"],
+    "overview": ["/overview"],
+    "proof": ["/proof"],
+    "gauge studies": ["/gauges"],
+    "gauge study, new": ["/gauges/new?kind=grr"],
+    "tools": [f"{MACHINE}/tools"],
+    "tool": [f"{MACHINE}/tools/1"],
+    "tool, edit": [f"{MACHINE}/tools/1/edit"],
+    "tool, change": [f"{MACHINE}/tools/1/change"],
+    "average, edit": [f"{MACHINE}/averages/1/edit"],
+    "correction": [f"{MACHINE}/corrections/1"],
+    "program text": [f"{MACHINE}/corrections/program"],
+    "calibration": ["/calibration"],
+    "calibrated place": ["/calibration/bench/averages/1"],
+    "import": ["/import"],
+    "set-up list": ["/setup/characteristics"],
+    "set-up, new": ["/setup/characteristics/new"],
+    "machine, new": ["/setup/machines/new"],
+    "people": ["/setup/people"],
+    "audit": ["/setup/audit"],
+    "account": ["/account"],
+    "alignments": ["/alignments"],
+    "alignment, new": ["/alignments/new"],
+    "forms": ["/forms"],
+    "form, new": ["/forms/new"],
+    "rotary axes": ["/kinematics"],
+    "rotary axes, new": ["/kinematics/new"],
+    "axes of a machine": ["/kinematics/machines/bench"],
+    "work zeros": ["/work-zeros"],
+    "work zero, new": ["/work-zeros/new"],
+    "API": ["/api/docs"],
 }
 QUIET = 0.5  # s without an open request until everything has come
 PATIENCE = 120.0  # s
@@ -63,7 +107,7 @@ class Version:
 
     url: str
     signed_in: StorageState
-    opened: dict[str, list[Opened]] = field(default_factory=lambda: {name: [] for name in PAGES})
+    opened: dict[str, list[Opened]] = field(default_factory=lambda: defaultdict(list))
 
     def address(self, name: str) -> str:
         """The first address of this page that the version has."""
@@ -178,7 +222,9 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--readings", type=int, default=300)
     parser.add_argument("--against", type=Path, help="a folder with another version and its .venv")
+    parser.add_argument("--page", action="append", choices=PAGES, help="this page, not all; may be given several times")
     arguments = parser.parse_args()
+    names: list[str] = arguments.page or list(PAGES)
     if arguments.against and not (arguments.against / PYTHON).exists():
         parser.error(f"{arguments.against / PYTHON} is missing: install that version into a .venv of its own first")
     homes = [HOUSE] + ([arguments.against.resolve()] if arguments.against else [])
@@ -186,9 +232,9 @@ def main() -> None:
     with sync_playwright() as playwright, ExitStack() as running:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         versions = [running.enter_context(version(home, arguments.readings, browser)) for home in homes]
-        addresses = [{name: of.address(name) for name in PAGES} for of in versions]
+        addresses = [{name: of.address(name) for name in names} for of in versions]
         for turn in range(arguments.rounds + 1):
-            for name in PAGES:
+            for name in names:
                 for of, at in zip(versions, addresses, strict=True):
                     opened = cold(browser, of, at[name])
                     if turn:  # the first time the server reads templates and figures for the first time too
@@ -196,15 +242,15 @@ def main() -> None:
         browser.close()
     against = arguments.against is not None
     titles = ("first byte, ms", "usable, ms", "over the wire, kB")
-    print(f"{'':<16}" + "".join(f"{title:>{24 if against else 20}}" for title in titles))
-    for name in PAGES:
+    print(f"{'':<18}" + "".join(f"{title:>{24 if against else 20}}" for title in titles))
+    for name in names:
         rows = [of.row(name) for of in versions]
         cells = [
             f"{values[0]:>8.0f} {values[1]:>7.0f} {values[0] / values[1]:>7.2f}" if against else f"{values[0]:>20.0f}"
             for values in zip(*rows, strict=True)
         ]
         other = "" if not against or len({at[name] for at in addresses}) == 1 else f"  (there {addresses[1][name]})"
-        print(f"{name:<16}" + "".join(cells) + other)
+        print(f"{name:<18}" + "".join(cells) + other)
 
 
 if __name__ == "__main__":

@@ -269,9 +269,13 @@ class Server:
         """After ``kill`` or ``stop``: the same address, the same database."""
         self.process = self.start()
 
-    def close(self) -> None:
+    def hang_up(self) -> None:
+        """Close the clients that were given out."""
         for client in self._clients:
             client.close()
+
+    def close(self) -> None:
+        self.hang_up()
         if self.process.poll() is None:
             self.process.terminate()
             try:

@@ -7,7 +7,7 @@ from concurrent.futures import Future
 from typing import Any, TypeVar
 
 Result = TypeVar("Result")
-LIMIT = 900.0  # s: what hangs fails, and holds up no other test
+LIMIT = 600.0  # s: what hangs fails, and holds up no other test
 
 
 def in_thread(call: Callable[[], Result]) -> Result:

@@ -30,7 +30,9 @@ FULL_READING = READING | {
     "part": "SN-1",
     "key": "bad-input",
     "correction_in_effect": 0,
+    "context": {"order": "A-77", "nest": 2, "events": ["door opened"]},
 }
+AQDEF = "K0100 1\nK2001/1 {characteristic}\nK2142/1 mm\nK0001/1 40\nK0004/1 21.11.2026/08:15:02\n"
 WHY = {"reason": "Compared with a micrometer"}
 WHAT_IF = {"averaging_limit": 0.006, "factor": -1.0, "delay": 1, "effect": 1.0, "last": 1000}
 PERIOD: dict[str, Any] = {
@@ -61,6 +63,7 @@ GAUGE: dict[str, Any] = {
     "rows": [{"part": part, "operator": "A", "values": [40.0, 40.001]} for part in ("1", "2")],
 }
 BODIES: dict[str, dict[str, Any]] = {
+    "POST /api/v1/readings/aqdef": {"name": "bad.dfq", "content": AQDEF},
     "POST /api/v1/machines": {"key": "mill-bad", "name": "Mill", "control": "heidenhain"},
     "PATCH /api/v1/machines/{machine}": {"name": "Lathe", "control": "fanuc", "corrections_expire_after": 8.0},
     "POST /api/v1/machines/{machine}/keys": {"name": "Second control"},
@@ -237,6 +240,9 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/kinematics/runs/{run}/acknowledge": WHY,
     "POST /api/v1/kinematics/measuring-plans": example_of("MeasuringPlanIn"),
     "POST /api/v1/machines/{machine}/heartbeat": example_of("HeartbeatIn"),
+    "POST /api/v1/machines/{machine}/touch-tests": example_of("TouchTestIn"),
+    "POST /api/v1/machines/{machine}/touch-tests/{number}/answer": example_of("TouchTestAnswer"),
+    "POST /api/v1/machines/{machine}/touch-tests/{number}/report": example_of("TouchTestReport"),
     "POST /api/v1/machines/{machine}/tools/{tool}/reported": {"offset": 0.0, "none_applied": True},
     "POST /api/v1/notes": {
         "characteristic": "{characteristic}",
@@ -279,7 +285,10 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/people/invitations": {"role": "viewer"},
     "POST /api/v1/keys": {"name": "Dashboard", "role": "viewer"},
 }
-NEWER = {"POST /api/v1/machines/{machine}/heartbeat"}  # a bridge that is newer than the server may say more
+NEWER = {
+    "POST /api/v1/machines/{machine}/heartbeat",
+    "POST /api/v1/machines/{machine}/touch-tests/{number}/report",
+}  # a bridge that is newer than the server may say more
 DOORS = ("POST /api/v1/readings", "POST /api/v1/readings/batch")
 
 # JSON that no field anywhere may take.
@@ -477,6 +486,13 @@ class Place:
             path: shop.call("POST", path, 201, **body) for path, body in (("/work-zeros", zero), ("/alignments", side))
         }
         self.zero = made["/work-zeros"]["id"]
+        self.tested = Shop(server)  # one touch test is open per machine
+        beat = BODIES["POST /api/v1/machines/{machine}/heartbeat"]
+        for each in (shop, self.tested):
+            shop.call("POST", f"/machines/{each.machine}/heartbeat", **beat)
+        tests = f"/machines/{self.tested.machine}/touch-tests"
+        self.test = shop.call("POST", tests, 201, tool_memory=3)["id"]
+        shop.call("POST", f"{tests}/{self.test}/report", **example_of("TouchTestReport"))
         doubtful = {  # with warnings that somebody may acknowledge
             "/work-zeros": {name: value for name, value in zero.items() if name != "fixture"} | {"feeler": 5.0},
             "/alignments": side
@@ -515,6 +531,8 @@ class Place:
         verb = operation.path.rpartition("/")[2]
         values["number"] = self.numbers.get(operation.path) or self.numbers.get(verb, values["number"])
         values["run"] = self.runs.get(verb, values["run"])
+        if "/touch-tests/" in operation.path:
+            values |= {"machine": self.tested.machine, "number": self.test}
         if "/baselines" in operation.path:
             values["characteristic"] = self.line.key
         if operation.path.endswith("/retire"):

@@ -38,6 +38,8 @@ BLOCK_RANGES = "0104 Block ranges of readings by time of arrival and by part, in
 CONNECTIONS = "0105 Connections: the last heartbeat of each bridge, the last use of keys, the mapping of corrections"
 IMPORT_MAPPINGS = "0107 Import mappings: which characteristics of measuring machines' files belong to which here"
 NOTES = "0108 Notes that people write at a machine or at a characteristic"
+CONTEXTS = "0109 Contexts of readings: order, batch, nest, people and means, events, process parameters"
+TOUCH_TESTS = "0110 Touch tests of tool locations, guided at the page"
 Rows = dict[str, list[dict[str, Any]]]
 ADDED: dict[str, dict[str, Any]] = {
     "machine": {
@@ -66,7 +68,9 @@ ADDED_TABLES = {
     "station_device",
     "note",
     "badge",
+    "reading_context",
     "connection",
+    "touch_test",
     "import_mapping",
 }
 
@@ -111,6 +115,8 @@ def test_a_database_of_the_first_program_is_brought_to_the_head_with_its_rows(fi
         CONNECTIONS,
         IMPORT_MAPPINGS,
         NOTES,
+        CONTEXTS,
+        TOUCH_TESTS,
     ]
     assert migrate.current(first_program) == migrate.head()
     assert migrate.differences(first_program) == []

@@ -85,7 +85,9 @@ def front(both: list[Server]) -> Iterator[Server]:
     """What people and machines see: one address."""
     with Front(both) as made:
         database = Database(both[0].database.dsn, pool_size=2)
-        yield Server(made.url, database, both[0].process, both[0].start, both[0].stderr)
+        seen = Server(made.url, database, both[0].process, both[0].start, both[0].stderr)
+        yield seen
+        seen.hang_up()
         database.close()
 
 

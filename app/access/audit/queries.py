@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 
-from sqlalchemy import or_, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.access.audit.tables import AuditEntry
+from app.db.text import holds_words
 
 
 def entries(
@@ -21,7 +22,7 @@ def entries(
 ) -> Sequence[AuditEntry]:
     """The newest first. ``person`` and ``key``: by their numbers. ``subject`` takes what lies below it too: `tool/lathe-1` has `tool/lathe-1/3`.
 
-    ``text``: anywhere in who, what or why, in capitals or not.
+    ``text``: words that stand anywhere in who, what or why.
     """
     query = select(AuditEntry).order_by(AuditEntry.id.desc()).limit(limit)
     if subject:
@@ -31,7 +32,7 @@ def entries(
         query = query.where(AuditEntry.actor == actor)
     if text:
         places = (AuditEntry.actor, AuditEntry.action, AuditEntry.subject, AuditEntry.why)
-        query = query.where(or_(*(place.icontains(text, autoescape=True) for place in places)))
+        query = query.where(*holds_words(text, *places))
     if person is not None:
         query = query.where(AuditEntry.person_id == person)
     if key is not None:
