@@ -4,7 +4,7 @@ import platform
 import re
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -14,6 +14,7 @@ from app.cli.base import (
     DataDir,
     cli,
     explain,
+    opened,
     people,
     reachable,
     refuse_empty,
@@ -26,9 +27,9 @@ from app.errors import InbandError
 if TYPE_CHECKING:
     import psycopg
 
-    from app.db.engine import Database
     from app.db.rights import Rights
     from app.jobs.tables import JobFailure
+    from app.plants.registry import Plant
     from app.settings import Settings
 
 
@@ -44,7 +45,8 @@ def migrate(
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="With --back-to: what is lost may be lost.")] = False,
 ) -> None:
-    """Bring the database to the schema of this program."""
+    """Bring the database to the schema of this program, each of its plants."""
+    from app.cli.plants import schemas
     from app.db import migrate as migrations
 
     settings = settings_from(data_dir=data_dir, database_url=database_url)
@@ -53,11 +55,24 @@ def migrate(
         if back_to is not None:
             _go_back(url, back_to, sure=yes)
             return
-        done = migrations.upgrade(url)
-        for revision in done:
-            say(f"migrated: {revision}")
-        if not done:
-            say(f"nothing to do: the database is at {migrations.current(url)}")
+        failed = False
+        for plant, address in schemas(url, settings):
+            of_plant = f"plant {plant.key}: " if plant else ""
+            try:
+                done = migrations.upgrade(address)
+            except Exception as error:  # the other plants are migrated all the same
+                words, _status = explain(error)
+                if plant is None or not words:
+                    raise
+                say(f"{of_plant}{words}", style="bold red")
+                failed = True
+                continue
+            for revision in done:
+                say(f"{of_plant}migrated: {revision}")
+            if not done:
+                say(f"{of_plant}nothing to do: the database is at {migrations.current(address)}")
+        if failed:
+            raise typer.Exit(1)
 
 
 def _go_back(url: str, revision: str, *, sure: bool) -> None:
@@ -84,8 +99,8 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
     """Look at configuration, database and migrations, and say what is wrong and what to do. Changes nothing."""
     from sqlalchemy import text
 
+    from app.cli.plants import schemas
     from app.db import citus
-    from app.db import migrate as migrations
     from app.db.binaries import advice as release_advice
     from app.db.binaries import binaries
     from app.db.connections import Connections
@@ -100,7 +115,10 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
         _well("time zone", f"{settings.timezone}; INBAND_TIMEZONE names another")
         refuse_nothing_there(settings)
         with reachable(settings) as url:
-            refuse_empty(url)
+            places = schemas(url, settings)
+            own = places[0][0] is None
+            if own:
+                refuse_empty(url)
             with (
                 Connections(url, settings.database_patience) as connections,
                 closing(Database(url, pool_size=1, connections=connections)) as database,
@@ -113,23 +131,24 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
                 ).one()
                 replication = replication_of(session)
                 driver: psycopg.Connection = session.connection().connection.driver_connection  # type: ignore[assignment]
-                distributed = citus.in_words(driver)
+                distributed = citus.in_words(driver, of_plant=own)
+                missing = citus.missing(driver, [plant.schema for plant, _address in places if plant])
                 answering = f"{driver.info.host} port {driver.info.port}"
-                todo = migrations.pending(url)
-                failing, rights = ([], None) if todo else _condition(database)
             where = "your own server" if settings.database_url else f"embedded in {settings.data_dir}"
             if settings.database_url is None:
                 where += f", programs of {binaries().folder}"
             _well("database", f"PostgreSQL {version}, {size}, {where}")
             if distributed:
                 _well("Citus", distributed)
+            for advice in missing:
+                _note(f"Citus: {advice}")
             if advice_on_release := release_advice(_release(version), embedded=settings.database_url is None):
                 _note(f"database: {advice_on_release}")
             if settings.database_url is not None:
                 _well("copies", f"{in_words(replication)} (asked of {answering})")
             for advice in advice_on(replication):
                 _note(advice)
-            now = migrations.current(url)
+            conditions = [_condition(plant, address, settings) for plant, address in places]
     except Exception as error:
         words, status = explain(error)
         if not words:
@@ -142,21 +161,9 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
         _wrong(full)
     else:
         _well("disk", f"{free(settings.data_dir) / 1e9:,.1f} GB free where {settings.data_dir} lies")
-    if todo:
-        _wrong(
-            f"{len(todo)} migration(s) to run: {', '.join(todo)}. `inband migrate` runs them, `inband serve` does so too."
-        )
-        raise typer.Exit(1)
-    _well("migrations", f"at {now}, none to run")
-    for failure in failing:
-        _wrong(
-            f"background job {failure.job} fails for {failure.subject or 'all'} since {failure.first_at:%Y-%m-%d %H:%M} UTC, "
-            f"{failure.failures} time(s): {failure.error} It is tried again by itself at {failure.retry_at:%H:%M} UTC."
-        )
-    if not failing:
-        _well("background jobs", "none fails")
-    protected = rights is None or _rights(rights, own=settings.database_url is not None)
-    if failing or full or away or not protected:
+    well = [_plant(condition) for condition in conditions]
+    well += [_rights(conditions, own=settings.database_url is not None)]
+    if full or away or not all(well):
         raise typer.Exit(1)
 
 
@@ -196,34 +203,100 @@ def _replica(settings: "Settings") -> bool:
     return False
 
 
-def _condition(database: "Database") -> "tuple[Sequence[JobFailure], Rights | None]":
+class _Condition(NamedTuple):
+    """A plant: `wrong` in words, or what was found in its schema. name: as lines begin; empty for the server's own."""
+
+    name: str
+    schema: str = ""
+    revision: str | None = None
+    todo: Sequence[str] = ()
+    failing: "Sequence[JobFailure]" = ()
+    rights: "Rights | None" = None
+    bare: Sequence[str] = ()
+    wrong: str = ""
+
+
+def _condition(plant: "Plant | None", address: str, settings: "Settings") -> _Condition:
+    from sqlalchemy import text
+
+    from app.db import citus, migrate
     from app.db.rights import rights_of
     from app.jobs import queries as jobs
 
-    with database.begin() as session:
-        return jobs.failures(session), rights_of(session.connection())
+    name = f"plant {plant.key}: " if plant else ""
+    try:
+        if todo := migrate.pending(address):
+            return _Condition(name, todo=todo)
+        with opened(address, settings) as database, database.begin() as session:
+            connection = session.connection()
+            driver: psycopg.Connection = connection.connection.driver_connection  # type: ignore[assignment]
+            return _Condition(
+                name,
+                connection.scalar(text("SELECT current_schema()")) or "",
+                migrate.current(address),
+                failing=jobs.failures(session),
+                rights=rights_of(connection),
+                bare=citus.unprotected(driver) if citus.version(driver) else (),
+            )
+    except Exception as error:
+        words, _status = explain(error)
+        if plant is None or not words:
+            raise
+        return _Condition(name, wrong=words)
 
 
-def _rights(rights: "Rights", *, own: bool) -> bool:
-    """Say what the role may do, and whether facts are protected. False if something has to be done."""
-    if rights.missing:
-        _wrong(
-            f"rights: the role {rights.role} lacks {', '.join(rights.missing)}. As the owner of the tables: "
-            f"GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA public TO {rights.role}; "
-            f"GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO {rights.role};"
-        )
-    if rights.unprotected:
-        _wrong(
-            f"rights: nothing protects the facts in {', '.join(rights.unprotected)} any more: their trigger was removed or "
-            "switched off. Find out by whom; `ALTER TABLE ... ENABLE TRIGGER ALL`, or restore a backup made before."
-        )
-    if rights.missing or rights.unprotected:
+def _plant(found: _Condition) -> bool:
+    """Say how a plant is. False if something has to be done."""
+    name = found.name
+    if found.wrong:
+        _wrong(f"{name}{found.wrong}")
         return False
-    if not rights.owner:
-        _well("rights", f"{rights.role} reads and writes rows, and can neither alter nor remove facts")
+    if found.todo:
+        _wrong(
+            f"{name}{len(found.todo)} migration(s) to run: {', '.join(found.todo)}. `inband migrate` runs them, `inband serve` does so too."
+        )
+        return False
+    _well(f"{name}migrations", f"at {found.revision}, none to run")
+    for failure in found.failing:
+        _wrong(
+            f"{name}background job {failure.job} fails for {failure.subject or 'all'} since {failure.first_at:%Y-%m-%d %H:%M} UTC, "
+            f"{failure.failures} time(s): {failure.error} It is tried again by itself at {failure.retry_at:%H:%M} UTC."
+        )
+    if not found.failing and not name:
+        _well("background jobs", "none fails")
+    if found.bare:
+        _wrong(
+            f"{name}rights: nothing protects the facts in {', '.join(found.bare)} on their node. "
+            "As the owner of the tables: `inband migrate`."
+        )
+    return not found.failing and not found.bare
+
+
+def _rights(conditions: "Sequence[_Condition]", *, own: bool) -> bool:
+    """Say what the role may do, and whether facts are protected. False if something has to be done."""
+    known = [(found, found.rights) for found in conditions if found.rights is not None]
+    for found, rights in known:
+        if rights.missing:
+            _wrong(
+                f"{found.name}rights: the role {rights.role} lacks {', '.join(rights.missing)}. As the owner of the tables: "
+                f"GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA {found.schema} TO {rights.role}; "
+                f"GRANT USAGE ON ALL SEQUENCES IN SCHEMA {found.schema} TO {rights.role};"
+            )
+        if rights.unprotected:
+            _wrong(
+                f"{found.name}rights: nothing protects the facts in {', '.join(rights.unprotected)} any more: their trigger was "
+                "removed or switched off. Find out by whom; `ALTER TABLE ... ENABLE TRIGGER ALL`, or restore a backup made before."
+            )
+    if any(rights.missing or rights.unprotected for _found, rights in known):
+        return False
+    owned = [rights for _found, rights in known if rights.owner]
+    if not known:
+        return True
+    if not owned:
+        _well("rights", f"{known[0][1].role} reads and writes rows, and can neither alter nor remove facts")
     elif own:
         _note(
-            f"rights: facts are protected by triggers, but the role {rights.role} could remove these (it owns tables or is a "
+            f"rights: facts are protected by triggers, but the role {owned[0].role} could remove these (it owns tables or is a "
             "superuser). Serve with a role of its own that may read and write rows only; the source says how, in "
             "docs/how-to/run-for-real.md, *A role that cannot alter facts*."
         )

@@ -185,34 +185,49 @@ def move_plant(
         except psycopg.Error as error:
             raise Conflict(
                 f"Citus could not move {moved.name}: {str(error).splitlines()[0]}.",
-                "It stays where it was. docs/how-to/citus.md names what each node needs.",
+                "It stays where it was. What it left on a node by an earlier move is cleared away within some minutes; "
+                "try again then. docs/how-to/citus.md names what each node needs.",
             ) from None
     say(f"{moved.name} lies on {node}.")
 
 
-def migrate_all(url: str, settings: "Settings") -> "list[Plant]":
-    """Bring the plant of the server's own schema and every plant of the list to the schema of this program; the list.
+def schemas(url: str, settings: "Settings") -> "list[tuple[Plant | None, str]]":
+    """Every plant of a database with its address; None: the one in the server's own schema, which comes first.
 
-    Where plants are listed and the own schema holds none, none is made there. A plant whose migration fails is not served.
+    Where plants are listed and the own schema holds none, it is not among them.
     """
     from app.db.connections import Connections, in_schema
-    from app.db.migrate import MigrationError, current, upgrade
+    from app.db.migrate import current
     from app.plants.registry import plants
 
-    if settings.schema_name is not None:
-        upgrade(url)
-        return []
-    with Connections(url) as connections, connections.connect(application_name="inband command") as connection:
-        listed = plants(connection)
-    if not listed or current(url) is not None:
-        upgrade(url)
+    listed = []
+    if settings.schema_name is None:
+        with Connections(url) as connections, connections.connect(application_name="inband command") as connection:
+            listed = plants(connection)
+    own: list[tuple[Plant | None, str]] = [] if listed and current(url) is None else [(None, url)]
+    return own + [(each, in_schema(url, each.schema)) for each in listed]
+
+
+def migrate_all(url: str, settings: "Settings") -> "list[Plant]":
+    """Bring every plant of a database to the schema of this program; those of the list that are ready to be served.
+
+    Raises what hinders the plant of the server's own schema; another plant whose migration fails is named, and not served.
+    """
+    from psycopg import Error
+    from sqlalchemy.exc import DBAPIError
+
+    from app.db.migrate import MigrationError, upgrade
+
     ready = []
-    for each in listed:
+    for plant, address in schemas(url, settings):
         try:
-            upgrade(in_schema(url, each.schema))
-            ready.append(each)
-        except MigrationError as error:
-            say(f"Plant {each.key} is not served: {error}", style="bold red")
+            upgrade(address)
+        except (MigrationError, DBAPIError, Error) as error:
+            if plant is None:
+                raise
+            say(f"Plant {plant.key} is not served: {str(error).strip().splitlines()[0]}", style="bold red")
+        else:
+            ready += [plant] if plant is not None else []
     return ready
 
 

@@ -11,9 +11,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+import psycopg
 from psycopg.errors import InsufficientPrivilege, LockNotAvailable, RaiseException
 
 from app import HOUSE
+from app.db import citus
 from app.db.connections import Connections
 
 if TYPE_CHECKING:  # SQLAlchemy and Alembic: half a second to read, which most commands need not spend
@@ -43,7 +45,7 @@ def upgrade(url: str) -> list[str]:
 
     A database at `SQUASHED` is stamped as the first schema, in one transaction with the migrations after it.
     """
-    if current(url) == head():
+    if current(url) == head() and not _bare(url):
         return []
     from alembic import command
 
@@ -56,7 +58,16 @@ def upgrade(url: str) -> list[str]:
                 _stamp(connection, SQUASHED, _scripts().get_base())
             command.upgrade(config(connection), "head")
             connection.commit()
+        if citus.version(driver := _driver(connection)):
+            citus.protect(driver)
+            connection.commit()
     return todo
+
+
+def _bare(url: str) -> bool:
+    """Tell if a node of Citus lacks a protection of facts: its migration ended before it was given."""
+    with Connections(url).connect(autocommit=True, options=OPTIONS) as connection:
+        return bool(citus.version(connection) and citus.unprotected(connection))
 
 
 def downgrade(url: str, revision: str) -> list[str]:
@@ -109,12 +120,20 @@ def _alone(url: str) -> Iterator[Connection]:
                 "if it does not, end it and try again."
             ) from error
         connection.execute(text(f"SET lock_timeout = '{LOCK_PATIENCE}'"))
+        if citus.version(driver := _driver(connection)):
+            citus.permit_triggers(driver)
         try:
             yield connection
         except DBAPIError as error:
             if (words := _in_words(error, connection)) is None:
                 raise
             raise MigrationError(words) from error
+
+
+def _driver(connection: Connection) -> psycopg.Connection[Any]:
+    driver = connection.connection.driver_connection
+    assert isinstance(driver, psycopg.Connection)
+    return driver
 
 
 def _in_words(error: DBAPIError, connection: Connection) -> str | None:
@@ -125,9 +144,8 @@ def _in_words(error: DBAPIError, connection: Connection) -> str | None:
                 "Stop the servers on this database, or try again at a quieter moment."
             )
         case InsufficientPrivilege():
-            driver = connection.connection.driver_connection
             return (
-                f"migrations have to run, and the role {driver.info.user if driver else ''} may not change tables. "
+                f"migrations have to run, and the role {_driver(connection).info.user} may not change tables. "
                 "Run `inband migrate` with INBAND_DATABASE_URL of the role that owns them, then start again."
             )
         case RaiseException() as refusal:  # a migration that looks at the rows before it goes back

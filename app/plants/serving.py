@@ -152,7 +152,7 @@ class Plants:
         self._connections = Connections(url, settings.database_patience)
         self._served: dict[str, Served] = {}
         self._listed: Sequence[Plant] = []
-        self._not_migrated: set[str] = set()
+        self._withheld: dict[str, str] = {}
         self._told: dict[str, str] = {}
         self._outage = Outage(log, "looks at the list of plants")
         front.state.plants = self
@@ -217,8 +217,8 @@ class Plants:
                 await self._served.pop(key).end()
                 log.info("plant %s is not served any more", key)
         for plant in listed:
-            if plant.key in self._not_migrated:
-                self._tell(plant, "its schema is of another Inband; `inband migrate` brings it here")
+            if plant.key in self._withheld:
+                self._tell(plant, self._withheld[plant.key])
             elif plant.key not in self._served:
                 self._begin(plant)
         self._served = {plant.key: self._served[plant.key] for plant in listed if plant.key in self._served}
@@ -227,12 +227,17 @@ class Plants:
         with self._connections.connect(autocommit=True, application_name="inband-plants") as connection:
             row = connection.execute("SELECT to_regclass('alembic_version') IS NOT NULL").fetchone()
             listed = plants(connection)
-        self._not_migrated = {
-            plant.key
-            for plant in listed
-            if plant.key not in self._served and current(in_schema(self._url, plant.schema)) != self._head
-        }
+        looked = {plant.key: self._hindrance(plant) for plant in listed if plant.key not in self._served}
+        self._withheld = {key: why for key, why in looked.items() if why}
         return listed, not listed or row is None or bool(row[0])
+
+    def _hindrance(self, plant: Plant) -> str | None:
+        """Why a plant cannot be served now; None if it can."""
+        try:
+            revision = current(in_schema(self._url, plant.schema))
+        except psycopg.Error as error:  # the node of Citus that it lies on is away: the others are served all the same
+            return str(error).strip().splitlines()[0]
+        return None if revision == self._head else "its schema is of another Inband; `inband migrate` brings it here"
 
     def _begin(self, plant: Plant) -> None:
         try:

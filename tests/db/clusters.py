@@ -41,6 +41,19 @@ def wait_for(condition: Callable[[], Any], what: str, seconds: float = 60) -> No
         time.sleep(0.02)
 
 
+def kill(node: EmbeddedServer) -> None:
+    """The whole server at once, as if the computer had gone: SIGKILL to each of its processes."""
+    pid = node.pid
+    assert pid is not None
+    children = _children(pid)
+    for process in (pid, *children):
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process, signal.SIGKILL)
+    with contextlib.suppress(ChildProcessError):  # a zombie would be taken for a server that runs
+        os.waitpid(pid, 0)
+    wait_for(lambda: not any(Path(f"/proc/{child}").exists() for child in children), "all of its processes are gone")
+
+
 class Cluster:
     """So many servers."""
 
@@ -121,18 +134,8 @@ class Cluster:
                 os.kill(sender, signal.SIGSTOP)
 
     def kill(self, node: EmbeddedServer) -> None:
-        """The whole server at once, as if the computer had gone: SIGKILL to each of its processes."""
-        pid = node.pid
-        assert pid is not None
-        children = _children(pid)
-        for process in (pid, *children):
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(process, signal.SIGKILL)
-        with contextlib.suppress(ChildProcessError):  # a zombie would be taken for a server that runs
-            os.waitpid(pid, 0)
-        wait_for(
-            lambda: not any(Path(f"/proc/{child}").exists() for child in children), "all of its processes are gone"
-        )
+        """Kill one of them, as if the computer had gone."""
+        kill(node)
 
     def promote(self) -> EmbeddedServer:
         """Promote the standby that has received most; it has everything that a quorum has confirmed."""

@@ -3,9 +3,13 @@
 Run where `INBAND_TEST_CITUS` names the folder of PostgreSQL's programs with the extension citus built for them.
 """
 
-import os
+import shutil
 import threading
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 import httpx
@@ -14,56 +18,43 @@ import pytest
 
 from app.access.keys import add_key
 from app.cli import plants as commands
+from app.core.parameters import read
 from app.db import citus, migrate
 from app.db.connections import in_schema
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
 from app.errors import Invalid, NotFound
 from tests.conftest import RunServer, Server
+from tests.db.clusters import kill, wait_for
+from tests.loop.readings.load import Sender, all_at_once, scattered
+from tests.loop.readings.record import history, must_replay
+from tests.plants.nodes import PROGRAMS, nodes, place
 from tests.shop import PARAMETERS
 
-PROGRAMS = os.environ.get("INBAND_TEST_CITUS", "")
 needs_citus = pytest.mark.skipif(not PROGRAMS, reason="INBAND_TEST_CITUS names no PostgreSQL with Citus")
-OPTIONS = {
-    "fsync": "off",
-    "shared_preload_libraries": "citus",
-    "wal_level": "logical",
-    "max_prepared_transactions": "200",
-    "citus.node_conninfo": "sslmode=disable",
-}
 
 
 @pytest.fixture(scope="module")
-def coordinator(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Address of the coordinator of three nodes, of which it is one."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("INBAND_POSTGRES_BIN", PROGRAMS)
-        nodes = [EmbeddedServer(tmp_path_factory.mktemp(name), dict(OPTIONS)) for name in ("c", "one", "two")]
-        for node in nodes:  # they are reached by their sockets, by themselves too
-            node.options["citus.local_hostname"] = str(psycopg.conninfo.conninfo_to_dict(node.url)["host"])
-        try:
-            urls = [node.start() for node in nodes]
-            for url in urls:
-                with psycopg.connect(url, autocommit=True) as connection:
-                    connection.execute("CREATE EXTENSION citus")
-            places = [psycopg.conninfo.conninfo_to_dict(url) for url in urls]
-            with psycopg.connect(urls[0], autocommit=True) as connection:
-                connection.execute(
-                    "SELECT citus_set_coordinator_host(%s, %s)", (places[0]["host"], int(str(places[0]["port"])))
-                )
-                for place in places[1:]:
-                    connection.execute("SELECT citus_add_node(%s, %s)", (place["host"], int(str(place["port"]))))
-            yield urls[0]
-        finally:
-            for node in nodes:
-                node.stop()
+def cluster() -> Iterator[list[EmbeddedServer]]:
+    """A coordinator and two workers."""
+    folder = Path(mkdtemp(prefix="inband-"))  # a socket's path is short
+    folder.chmod(0o711)
+    with nodes(folder, options={"fsync": "off"}) as made:
+        yield made
+    shutil.rmtree(folder)
+
+
+@pytest.fixture(scope="module")
+def coordinator(cluster: list[EmbeddedServer]) -> str:
+    return cluster[0].url
 
 
 @pytest.fixture(scope="module")
 def server(run_server: RunServer, coordinator: str) -> Iterator[Server]:
-    """A server with the plant `far`, which lies on the second node."""
+    """A server with the plant `far`, which lies on the second node, and `near` on the coordinator."""
     usual: dict[str, Any] = {"name": None, "schema": None, "host": None, "timezone": None, "shifts": None}
-    commands.add_plant("far", **usual, data_dir=None, database_url=coordinator)
+    for key in ("far", "near"):
+        commands.add_plant(key, **usual, data_dir=None, database_url=coordinator)
     with psycopg.connect(coordinator) as connection:
         node = citus.nodes(connection)[1]
     commands.move_plant("far", str(node), data_dir=None, database_url=coordinator)
@@ -73,18 +64,74 @@ def server(run_server: RunServer, coordinator: str) -> Iterator[Server]:
 
 @pytest.fixture(scope="module")
 def client(server: Server, coordinator: str) -> httpx.Client:
-    database = Database(in_schema(coordinator, "far"), pool_size=1)
-    with database.begin() as session:
-        secret = add_key(session, role="admin", machine=None, name="tests", actor="tests").secret
-    database.close()
-    made = server.client(secret)
-    made.base_url = httpx.URL(f"{server.url}/p/far")
+    return client_of(server, coordinator, "far")
+
+
+def client_of(server: Server, coordinator: str, plant: str) -> httpx.Client:
+    """A client of a plant in which a machine and its characteristic are set up."""
+    made = server.client(key_of(coordinator, plant, role="admin"))
+    made.base_url = httpx.URL(f"{server.url}/p/{plant}")
     for path, body in (
         ("machines", {"key": "lathe-1", "name": "Lathe", "control": "sinumerik"}),
         ("characteristics", {"key": "shaft", "name": "Seat", "machine": "lathe-1", "parameters": PARAMETERS}),
     ):
-        assert made.post(f"/api/v1/{path}", json=body).status_code == 201
+        assert made.post(f"/api/v1/{path}", json=body).status_code in {201, 409}
     return made
+
+
+def client_at(server: Server, client: httpx.Client) -> httpx.Client:
+    """The same caller at the plant `far` of another server."""
+    return httpx.Client(base_url=f"{server.url}/p/far", headers=client.headers, timeout=60)
+
+
+def key_of(coordinator: str, plant: str, *, role: str | None = None, machine: str | None = None) -> str:
+    database = Database(in_schema(coordinator, plant), pool_size=1)
+    with database.begin() as session:
+        secret = add_key(session, role=role, machine=machine, name="tests", actor="tests").secret
+    database.close()
+    return secret
+
+
+@contextmanager
+def under_load(server: Server, client: httpx.Client, coordinator: str, run: str) -> Iterator[list[Sender]]:
+    """Machines of the plant `far` send readings meanwhile; then everything that was answered is there once, without gaps."""
+    senders = []
+    for number in range(4):
+        machine, name = f"{run}-{number}", f"{run}-{number}-seat"
+        body: dict[str, Any] = {"key": machine, "name": "Lathe", "control": "other"}
+        assert client.post("/api/v1/machines", json=body).status_code == 201
+        body = {"key": name, "name": "Seat", "machine": machine, "parameters": PARAMETERS}
+        assert client.post("/api/v1/characteristics", json=body).status_code == 201
+        secret = key_of(coordinator, "far", machine=machine)
+        readings = scattered(name, 1_000_000, number)
+        senders.append(Sender(f"{server.url}/p/far", secret, readings, patience=120, pause=0.01))
+    stop = threading.Event()
+    with ThreadPoolExecutor(1) as pool:
+        working = pool.submit(all_at_once, senders, stop)
+        try:
+            answered(senders, working)
+            yield senders
+            answered(senders, working)
+        finally:
+            stop.set()
+        working.result(180)
+    url = in_schema(coordinator, "far")
+    for sender in senders:
+        assert sender.lost == 0
+        stored = history(url, sender.answers[0]["characteristic"])
+        assert [reading["key"] for reading in stored] == [answer["key"] for answer in sender.answers]
+        assert [reading["sequence"] for reading in stored] == list(range(1, len(stored) + 1))
+        must_replay(read(PARAMETERS)[0], stored)
+
+
+def answered(senders: list[Sender], working: Future[Any]) -> None:
+    """Until every machine has had two more answers: the first may have been on its way."""
+    before = [len(sender.answers) for sender in senders]
+    wait_for(
+        lambda: working.done() or all(len(s.answers) > count + 1 for s, count in zip(senders, before, strict=True)),
+        "every machine is answered",
+        120,
+    )
 
 
 def push(client: httpx.Client, micrometres: float) -> int:
@@ -138,6 +185,11 @@ class TestPlantOnANode:
         url = in_schema(coordinator, "far")
         migrate.downgrade(url, "0103")
         assert len(migrate.upgrade(url)) >= 1
+        with psycopg.connect(url, autocommit=True) as connection:  # facts in tables that were made there, too
+            assert citus.unprotected(connection) == []
+            for command in ("DELETE FROM reading", "DELETE FROM note", "DELETE FROM reading_context"):
+                with pytest.raises(psycopg.errors.RaiseException, match=r"append-only|is a fact"):
+                    connection.execute(command)
         before = push(client, 2)
         with psycopg.connect(coordinator) as connection:
             other = citus.nodes(connection)[2]
@@ -146,10 +198,70 @@ class TestPlantOnANode:
         with psycopg.connect(coordinator) as connection:
             assert citus.node_of(connection, "far") == other
             assert "this plant lies on the coordinator" in citus.in_words(connection)
+            assert citus.missing(connection, ["far", "near"]) == [
+                "not distributed: near. `inband plant move PLANT HOST:PORT` takes a plant to a node"
+            ]
         with psycopg.connect(url) as connection:
             assert f"this plant lies on {other}" in citus.in_words(connection)
         with pytest.raises(NotFound, match="no node"):
             commands.move_plant("far", "nowhere:5432", data_dir=None, database_url=coordinator)
+
+    def test_a_protection_that_a_node_lacks_is_given_by_the_next_migrate(
+        self, client: httpx.Client, coordinator: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        url = in_schema(coordinator, "far")
+        migrate.downgrade(url, "0107")
+        with monkeypatch.context() as ended:  # the migration ended before it came to that
+            ended.setattr(citus, "protect", lambda _connection: None)
+            migrate.upgrade(url)
+        with psycopg.connect(url) as connection:
+            assert "note" in citus.unprotected(connection)
+        assert migrate.upgrade(url) == []
+        with psycopg.connect(url) as connection:
+            assert citus.unprotected(connection) == []
+
+    def test_moved_under_load_nothing_is_lost_and_numbers_have_no_gaps(
+        self, server: Server, client: httpx.Client, coordinator: str
+    ) -> None:
+        with psycopg.connect(coordinator) as connection:
+            before, places = citus.node_of(connection, "far"), citus.nodes(connection)[1:]
+        (other,) = (each for each in places if each != before)
+        with under_load(server, client, coordinator, "moved"):
+            commands.move_plant("far", str(other), data_dir=None, database_url=coordinator)
+        with psycopg.connect(coordinator) as connection:
+            assert citus.node_of(connection, "far") == other
+
+    def test_a_node_that_is_killed_stops_its_plant_alone_and_loses_nothing(
+        self,
+        server: Server,
+        client: httpx.Client,
+        cluster: list[EmbeddedServer],
+        coordinator: str,
+        run_server: RunServer,
+    ) -> None:
+        near = client_of(server, coordinator, "near")
+        with psycopg.connect(coordinator) as connection:
+            place_of_far = citus.node_of(connection, "far")
+        (node,) = (each for each in cluster if place(each) == place_of_far)
+        with under_load(server, client, coordinator, "killed"):
+            kill(node)
+            refused = client.post(
+                "/api/v1/readings", json={"characteristic": "shaft", "measured": 40.001, "key": "away"}
+            )
+            assert refused.status_code == 503, refused.text
+            assert [push(near, 1), push(near, 2)] == [1, 2]
+            assert client.get("/characteristics/shaft").status_code == 503
+            with psycopg.connect(coordinator) as connection:
+                (told,) = (each for each in citus.missing(connection, []) if "answer" in each)
+            assert told.startswith(f"{place_of_far} does not answer, so its plants stand still; the others go on")
+            with run_server(coordinator) as begun:  # it serves the others; the plant as soon as its node is there
+                near.base_url = httpx.URL(f"{begun.url}/p/near")
+                assert push(near, 3) == 3
+                assert client_at(begun, client).get("/api/v1/machines").status_code == 503
+                node.start()
+                wait_for(
+                    lambda: client_at(begun, client).get("/api/v1/machines").status_code == 200, "it is served again"
+                )
 
 
 def test_without_citus_a_plant_does_not_move(database: Database) -> None:

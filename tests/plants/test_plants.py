@@ -1,5 +1,7 @@
 """Several plants in one installation: each with tables, people, keys and events of its own."""
 
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +15,7 @@ import pytest
 from playwright.sync_api import Page, expect
 from sqlalchemy.orm import Session
 
+from app import HOUSE
 from app.access import actions as people
 from app.access.keys import add_key
 from app.cli import plants as commands
@@ -268,6 +271,36 @@ def test_one_server_for_one_schema(
         )
         assert counts.fetchone() == (0, 1)
     drop_database(url)
+
+
+def test_migrate_and_check_look_at_every_plant(new_database: NewDatabase) -> None:
+    """Also where there is none at the root; what is wrong with one does not keep them from the others."""
+    url = new_database()
+    with psycopg.connect(url, autocommit=True) as connection:
+        connection.execute("DROP SCHEMA public CASCADE; CREATE SCHEMA public")
+        for key in ("east", "north", "west"):
+            commands.add_plant(
+                key, name=None, schema=None, host=None, timezone=None, shifts=None, data_dir=None, database_url=url
+            )
+        migrate.downgrade(in_schema(url, "west"), "0109")
+        connection.execute("UPDATE east.alembic_version SET version_num = '9999'")
+    pending, checked = migrate.pending(in_schema(url, "west"))[0], inband("check", url)
+    assert checked.returncode == 1
+    assert "wrong plant east: the database is at revision 9999, which this Inband does not know" in checked.stderr
+    assert f"ok    plant north: migrations: at {migrate.head()}, none to run" in checked.stderr
+    assert f"wrong plant west: 1 migration(s) to run: {pending}." in checked.stderr
+    migrated = inband("migrate", url)
+    assert migrated.returncode == 1
+    assert "plant east: the database is at revision 9999, which this Inband does not know" in migrated.stderr
+    assert f"plant north: nothing to do: the database is at {migrate.head()}" in migrated.stderr
+    assert f"plant west: migrated: {pending}" in migrated.stderr
+    assert [migrate.current(in_schema(url, schema)) for schema in ("west", "public")] == [migrate.head(), None]
+    drop_database(url)
+
+
+def inband(command: str, url: str) -> subprocess.CompletedProcess[str]:
+    words = [sys.executable, "-m", "app", command, "--database-url", url]
+    return subprocess.run(words, cwd=HOUSE, capture_output=True, text=True)
 
 
 class TestList:

@@ -17,6 +17,7 @@ class Sender:
     """One machine: its readings in order, each until it is answered."""
 
     url: str
+    """Of the server, or of its plant."""
     key: str
     readings: Iterable[dict[str, Any]]
     patience: float = 60.0
@@ -32,11 +33,13 @@ class Sender:
     """Readings that were answered, were gone afterwards, and have been stored anew."""
     longest: float = 0.0
     """Seconds that one reading took at most."""
+    path: str = field(init=False)
 
     def run(self, stop: threading.Event | None = None) -> "Sender":
         """Send them all. An answer other than 200, 201 or 503 fails."""
         address = urlsplit(self.url)
         assert address.hostname is not None
+        self.path = f"{address.path}/api/v1/readings"
         connection = HTTPConnection(address.hostname, address.port, timeout=20)
         for reading in self.readings:
             if stop is not None and stop.is_set():
@@ -57,7 +60,7 @@ class Sender:
             tries += 1
             status, text = 0, b""
             try:
-                connection.request("POST", "/api/v1/readings", body, {"Authorization": f"Bearer {self.key}"})
+                connection.request("POST", self.path, body, {"Authorization": f"Bearer {self.key}"})
                 answer = connection.getresponse()
                 status, text = answer.status, answer.read()
             except (OSError, HTTPException):
