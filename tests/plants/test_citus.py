@@ -63,8 +63,9 @@ def server(run_server: RunServer, coordinator: str) -> Iterator[Server]:
 
 
 @pytest.fixture(scope="module")
-def client(server: Server, coordinator: str) -> httpx.Client:
-    return client_of(server, coordinator, "far")
+def client(server: Server, coordinator: str) -> Iterator[httpx.Client]:
+    with client_of(server, coordinator, "far") as made:
+        yield made
 
 
 def client_of(server: Server, coordinator: str, plant: str) -> httpx.Client:
@@ -79,9 +80,9 @@ def client_of(server: Server, coordinator: str, plant: str) -> httpx.Client:
     return made
 
 
-def client_at(server: Server, client: httpx.Client) -> httpx.Client:
-    """The same caller at the plant `far` of another server."""
-    return httpx.Client(base_url=f"{server.url}/p/far", headers=client.headers, timeout=60)
+def machines_at(server: Server, client: httpx.Client) -> int:
+    """Status of the same caller's request to the plant `far` at another server."""
+    return httpx.get(f"{server.url}/p/far/api/v1/machines", headers=client.headers, timeout=60).status_code
 
 
 def key_of(coordinator: str, plant: str, *, role: str | None = None, machine: str | None = None) -> str:
@@ -239,11 +240,10 @@ class TestPlantOnANode:
         coordinator: str,
         run_server: RunServer,
     ) -> None:
-        near = client_of(server, coordinator, "near")
         with psycopg.connect(coordinator) as connection:
             place_of_far = citus.node_of(connection, "far")
         (node,) = (each for each in cluster if place(each) == place_of_far)
-        with under_load(server, client, coordinator, "killed"):
+        with client_of(server, coordinator, "near") as near, under_load(server, client, coordinator, "killed"):
             kill(node)
             refused = client.post(
                 "/api/v1/readings", json={"characteristic": "shaft", "measured": 40.001, "key": "away"}
@@ -257,11 +257,9 @@ class TestPlantOnANode:
             with run_server(coordinator) as begun:  # it serves the others; the plant as soon as its node is there
                 near.base_url = httpx.URL(f"{begun.url}/p/near")
                 assert push(near, 3) == 3
-                assert client_at(begun, client).get("/api/v1/machines").status_code == 503
+                assert machines_at(begun, client) == 503
                 node.start()
-                wait_for(
-                    lambda: client_at(begun, client).get("/api/v1/machines").status_code == 200, "it is served again"
-                )
+                wait_for(lambda: machines_at(begun, client) == 200, "it is served again")
 
 
 def test_without_citus_a_plant_does_not_move(database: Database) -> None:
