@@ -125,7 +125,7 @@ def in_words(connection: psycopg.Connection[Any], *, of_plant: bool = True) -> s
 
 
 def missing(connection: psycopg.Connection[Any], schemas: Sequence[str]) -> list[str]:
-    """What the cluster lacks to hold these schemas of plants, and what to do; empty without Citus."""
+    """Lacks of the cluster that is to hold these schemas of plants, and what to do; empty without Citus."""
     if version(connection) is None:
         return []
     known, told = nodes(connection), []

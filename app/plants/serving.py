@@ -232,7 +232,7 @@ class Plants:
         return listed, not listed or row is None or bool(row[0])
 
     def _hindrance(self, plant: Plant) -> str | None:
-        """Why a plant cannot be served now; None if it can."""
+        """The hindrance to serving a plant now; None if there is none."""
         try:
             revision = current(in_schema(self._url, plant.schema))
         except psycopg.Error as error:  # the node of Citus that it lies on is away: the others are served all the same
