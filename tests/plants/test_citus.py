@@ -7,7 +7,7 @@ import shutil
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
@@ -64,7 +64,7 @@ def server(run_server: RunServer, coordinator: str) -> Iterator[Server]:
 
 @pytest.fixture(scope="module")
 def client(server: Server, coordinator: str) -> Iterator[httpx.Client]:
-    with client_of(server, coordinator, "far") as made:
+    with closing(client_of(server, coordinator, "far")) as made:
         yield made
 
 
@@ -243,7 +243,8 @@ class TestPlantOnANode:
         with psycopg.connect(coordinator) as connection:
             place_of_far = citus.node_of(connection, "far")
         (node,) = (each for each in cluster if place(each) == place_of_far)
-        with client_of(server, coordinator, "near") as near, under_load(server, client, coordinator, "killed"):
+        near = client_of(server, coordinator, "near")
+        with closing(near), under_load(server, client, coordinator, "killed"):
             kill(node)
             refused = client.post(
                 "/api/v1/readings", json={"characteristic": "shaft", "measured": 40.001, "key": "away"}
