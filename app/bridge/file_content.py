@@ -23,8 +23,8 @@ from app.bridge.links import Received
 from app.core.ring import INCH
 from app.files.formats import aqdef, aqdef_values, delimited
 from app.files.formats.aqdef_context import context_of
-from app.files.formats.aqdef_times import WallClock
-from app.files.formats.cell_values import UNITS, Unreadable, moment, number, unit_in, zone_named
+from app.files.formats.aqdef_times import WallClock, day_order, slashed
+from app.files.formats.cell_values import Unreadable, moment, number, zone_named
 
 FIELDS: Final = ("characteristic", "measured", "measured_at", "machined_at", "part", "correction_in_effect", "key")
 """What a column, or a named group of a regular expression, may be."""
@@ -297,9 +297,7 @@ class _Reader:
         source = aqdef.Source.at(self.path, self.settings.encoding)
         description = aqdef.describe(source)
         clock = None if self.zone is None else WallClock(self.zone)
-        order: Literal["month_first", "day_first"] | None = {True: "day_first", False: "month_first", None: None}[
-            self.settings.day_first
-        ]
+        order = day_order(self.settings.day_first)
         for item in aqdef_values.values(source, description):
             if isinstance(item, aqdef.Remark):
                 self._remark(item)
@@ -313,7 +311,7 @@ class _Reader:
                 self.content.skipped += 1
                 self.content.remarks.append(f"line {item.line}: {name} counts parts, it measures nothing; passed over")
                 continue
-            if order is None and aqdef_values.has_doubtful_date(item):
+            if order is None and slashed(item.fields.get("K0004", "")) is not None:
                 self._fault(item.line, "K0004", "could be day/month or month/day: set day_first to true or false.")
                 continue
             value = aqdef_values.read_value(item, order)
@@ -335,11 +333,12 @@ class _Reader:
         clock: WallClock | None,
     ) -> None:
         unit = description.characteristics[item.characteristic].fields.get("K2142", "")
-        said = unit_in(f"[{unit}]") if unit else None
+        said = aqdef.length_unit(unit)
         if unit and said is None:
-            self._fault(item.line, "K2142", f"{unit!r} is no unit of length that is known; known are mm, µm and inch.")
+            reason = f"{unit!r} is no unit of length that is known; known are mm, µm, inch, cm, m and nm."
+            self._fault(item.line, "K2142", reason)
             return
-        scale = self.scale if said is None else UNITS[said]
+        scale = self.scale if said is None else aqdef.LENGTHS[said]
         body: dict[str, Any] = {"characteristic": key, "measured": round(value.measured * scale, 9)}
         if part := value.part or value.batch:
             body["part"] = part[:128]

@@ -29,11 +29,12 @@ def is_aqdef(file: Path) -> bool:
     return file.suffix.lower() in ENDINGS
 
 
-def wishes_for(zone: ZoneInfo, unit: str | None, encoding: str | None, *, day_first: bool) -> "Wishes":
+def wishes_for(zone: ZoneInfo, unit: str | None, encoding: str | None, *, day_first: bool | None) -> "Wishes":
     """The choices that options say."""
+    from app.files.formats.aqdef_times import day_order
     from app.loop.readings.importing.aqdef.content import Wishes
 
-    return Wishes(zone, "day_first" if day_first else None, unit, encoding)
+    return Wishes(zone, day_order(day_first), unit, encoding)
 
 
 def import_file(

@@ -112,8 +112,14 @@ def import_file(
         str | None, typer.Option(envvar="INBAND_MACHINE", help="Of AQDEF: on which machine it is set up.")
     ] = None,
     day_first: Annotated[
-        bool, typer.Option("--day-first", envvar="INBAND_DAY_FIRST", help="Of AQDEF: dates with / begin with the day.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--day-first/--month-first",
+            envvar="INBAND_DAY_FIRST",
+            help="Of AQDEF: dates with / begin with the day, or the month.",
+            show_default="dates that could be either are refused",
+        ),
+    ] = None,
     live: Annotated[
         bool, typer.Option("--live", envvar="INBAND_LIVE", help="Decide as if they came in now: corrections, alarms.")
     ] = False,

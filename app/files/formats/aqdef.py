@@ -16,18 +16,40 @@ from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from app.files.formats import delimited
+from app.files.formats.cell_values import UNITS
 from app.files.formats.delimited import Unusable
 from app.language.i18n import _
 
 ENDINGS = {".dfq", ".dfd", ".dfx"}
-COUNTING_KINDS = {1, 5, 6}
+OF_CHARACTERISTIC = "\x0f"
+"""Parts what belongs to one characteristic and to the next: values in a line, and fields without an index that describe all."""
+MOST_CHARACTERISTICS = 10_000
+COUNTING_KINDS = {"1", "5", "6"}
 """K2004: attribute, kind of fault, list of faults."""
 MOST_REMARKS = 200
-LINE = re.compile(r"[Kk](\d{4,5})(?:/(\d*)(?:/(\d*))?)?(?:[ \t]+(.*))?", re.DOTALL)
+LINE = re.compile(r"[Kk](\d{4,5})(?:/(\d{0,9})(?:/(\d{0,9}))?)?(?:[ \t]+(.*))?", re.DOTALL | re.ASCII)
+_OF_VALUE = re.compile(r"[Kk](00\d\d)/(\d{1,9})/(\d{1,9})(?:[ \t]+(.*))?", re.DOTALL | re.ASCII)
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
+_UNIT_WORDS = {
+    "mm": "mm", "millimeter": "mm", "millimetre": "mm", "µm": "um", "μm": "um", "um": "um", "mikrometer": "um",
+    "micrometer": "um", "micrometre": "um", "мм": "mm", "мкм": "um", "毫米": "mm", "in": "inch", "inch": "inch", "inches": "inch", "zoll": "inch", '"': "inch",
+    "дюйм": "inch", "cm": "cm", "см": "cm", "m": "m", "м": "m", "meter": "m", "nm": "nm", "micron": "um", "microns": "um", "mikron": "um", "mkm": "um",
+}  # fmt: skip
+LENGTHS = UNITS | {"cm": 10.0, "m": 1000.0, "nm": 1e-6}
+"""Millimetres in each unit."""
 _WHO = {"K1001", "K2001", "K2002"}
 _FAMILIES = set("1234580")
 HIERARCHY = {"K5102", "K5103", "K5111", "K5112"}
 """The file's tree by the numbers of nodes: characteristics and nodes below one, the part and the characteristic that it is."""
+
+
+def length_unit(word: str) -> str | None:
+    """The unit of length that K2142 names, one of `LENGTHS`; None where it names another or nothing.
+
+    >>> length_unit("[MM]"), length_unit("µm"), length_unit("°")
+    ('mm', 'um', None)
+    """
+    return _UNIT_WORDS.get(word.strip(" []()").casefold())
 
 
 class Remark(NamedTuple):
@@ -65,13 +87,15 @@ class Characteristic:
     @property
     def counts(self) -> bool:
         """Tell if parts are counted (K2004), not measured."""
-        kind = self.fields.get("K2004", "")
-        return kind.isdigit() and int(kind) in COUNTING_KINDS
+        return self.fields.get("K2004", "").lstrip("0") in COUNTING_KINDS
 
 
 @dataclass
 class Description:
-    """The lines of a file that describe: parts, characteristics, catalogues."""
+    """The lines of a file that describe: parts, characteristics, catalogues.
+
+    of_values: line and fields by characteristic and number of the value (K0014/1/7), which may stand anywhere; 0 is all.
+    """
 
     encoding: str = "utf-8"
     declared: int | None = None  # K0100
@@ -79,6 +103,7 @@ class Description:
     characteristics: dict[int, Characteristic] = field(default_factory=dict)
     catalogues: dict[str, dict[int, str]] = field(default_factory=dict)
     others: dict[tuple[str, int], str] = field(default_factory=dict)
+    of_values: dict[tuple[int, int], tuple[int, dict[str, str]]] = field(default_factory=dict)
     remarks: list[Remark] = field(default_factory=list)
 
     def part_of(self, characteristic: Characteristic) -> Mapping[str, str]:
@@ -165,6 +190,15 @@ def _several_files(key: str, value: str, before: str, line: int, of: str = "{nam
     )
 
 
+def _count(text: str) -> int | None:
+    """A number of things; None where the text is something else."""
+    return int(text) if len(text) <= 9 and text.isascii() and text.isdigit() else None
+
+
+def _too_many(line: int) -> Unusable:
+    return Unusable(_("A file holds at most {most} characteristics; part it.").format(most=MOST_CHARACTERISTICS), line)
+
+
 class _Describing:
     """Takes the lines that describe, and passes over the values."""
 
@@ -184,13 +218,17 @@ class _Describing:
             return
         if line[1:3] == "00":
             self._values_came = self._any = True
+            if line[5:6] == "/" and (own := _OF_VALUE.fullmatch(line)):
+                _line, fields = self.found.of_values.setdefault((int(own[2]), int(own[3])), (number, {}))
+                fields[f"K{own[1]}"] = (own[4] or "").strip()
             return
         match = LINE.fullmatch(line)
         if match is None:
             self._remark(number, "", line[:40], _("is too short or no K field; it is passed over"))
             return
         self._any = True
-        key, index, value = f"K{match[1]}", int(match[2] or 1), (match[4] or "").strip()
+        key, index, text = f"K{match[1]}", int(match[2] or 1), (match[4] or "").strip()
+        value = text if text.isprintable() else _CONTROL.sub(" ", text).strip()
         if match[3] is not None:
             self._remark(
                 number, key, value, _("has the number of a value, which only values have; that is passed over")
@@ -198,15 +236,20 @@ class _Describing:
         family = match[1][0] if len(match[1]) == 4 else ""
         if family == "1":
             self._of_part(number, key, index, value, indexed=bool(match[2]))
+        elif family in {"2", "3", "8"} and OF_CHARACTERISTIC in text and not match[2]:
+            for place, each in enumerate(text.split(OF_CHARACTERISTIC), 1):
+                self._of_characteristic(number, key, place, _CONTROL.sub(" ", each).strip())
         elif family in {"2", "3", "8"}:
             self._of_characteristic(number, key, index, value)
         elif family == "4":
             self.found.catalogues.setdefault(key, {})[index] = value
         elif key in HIERARCHY:
-            if value.isascii() and value.isdigit():
-                self._nodes.setdefault(key, {}).setdefault(index, []).append(int(value))
+            if (node := _count(value)) is not None:
+                self._nodes.setdefault(key, {}).setdefault(index, []).append(node)
         elif key == "K0100":
-            self.found.declared = int(value) if value.isascii() and value.isdigit() else None
+            self.found.declared = _count(value)
+            if (self.found.declared or 0) > MOST_CHARACTERISTICS:
+                raise _too_many(number)
         else:
             if family not in _FAMILIES:
                 self._remark(number, key, value[:40], _("is no field that is known here; it is kept and not used"))
@@ -235,6 +278,8 @@ class _Describing:
                 f"{key}/{index}", self._name_of(self._part), self._name_of(known.part), line, _("of the part {name}")
             )
         if known is None:
+            if len(self.found.characteristics) >= MOST_CHARACTERISTICS:
+                raise _too_many(line)
             known = self.found.characteristics[index] = Characteristic(index, self._part)
         self._put(line, key, index, value, known.fields)
 
@@ -290,7 +335,7 @@ class _Describing:
         found = self.found
         if not self._any:
             raise Unusable(_("This is no AQDEF file: no line begins with a K field such as K0100."))
-        for index in range(1, min(found.declared or 0, 100_000) + 1):
+        for index in range(1, (found.declared or 0) + 1):
             if index not in found.characteristics:
                 found.characteristics[index] = Characteristic(index, self._part)
         found.characteristics = dict(sorted(found.characteristics.items()))

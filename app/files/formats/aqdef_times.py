@@ -2,6 +2,7 @@
 
 import re
 from datetime import UTC, datetime, timedelta, timezone
+from enum import Enum
 from functools import lru_cache
 from typing import Literal, cast
 from zoneinfo import ZoneInfo
@@ -18,6 +19,8 @@ _DATE = re.compile(
     re.ASCII,
 )
 _CENTURY = 70  # two digits from here on are of the last century
+_YEARS = range(1900, 2200)
+_DIGITS, _MONTHS = 2, 12
 
 
 @lru_cache(maxsize=4096)
@@ -37,6 +40,8 @@ def time_of(text: str, order: DayOrder | None = None) -> datetime:
         raise Unreadable(_("is not a time; AQDEF writes it as 23.11.2026/06:05:00"))
     first, sign, second, third, hour, minute, seconds, fraction, half, offset = match.groups()
     year, month, day = _in_order(first, sign, second, third, order)
+    if year not in _YEARS:
+        raise Unreadable(_("is not a time: nothing was measured in the year {year}").format(year=year))
     hours = int(hour or 0)
     if half:
         hours = hours % 12 + (12 if half in "pP" else 0)
@@ -60,7 +65,7 @@ def _in_order(first: str, sign: str, second: str, third: str, order: DayOrder | 
     if len(first) > 2 or (sign == "-" and len(third) <= 2):
         return _year(first), int(second), int(third)
     if sign == "/" and order != "day_first":
-        if order is None and int(first) > 12:
+        if order is None and int(first) > _MONTHS:
             raise Unreadable(
                 _(
                     "has no month {month}: dates with / are read as month/day/year; say it if the day comes first"
@@ -86,9 +91,36 @@ def _zone(offset: str | None) -> timezone | None:
     return timezone(timedelta(minutes=-minutes if offset[0] == "-" else minutes))
 
 
-def is_slashed(text: str) -> bool:
-    """Tell if day and month of a date could be exchanged."""
-    return "/" in text[:5] and not text[:4].isdigit()
+def day_order(day_first: bool | None) -> DayOrder | None:
+    """The order that somebody says."""
+    return None if day_first is None else "day_first" if day_first else "month_first"
+
+
+class Slashed(Enum):
+    """Which comes first in a date with strokes, as far as the date itself tells."""
+
+    MONTH_FIRST = 1
+    DAY_FIRST = 2
+    EITHER = 3
+    SAME = 4  # whichever comes first
+
+
+@lru_cache(maxsize=4096)
+def slashed(text: str) -> Slashed | None:
+    """How a date with strokes can be read; None for other dates.
+
+    >>> slashed("3/14/2026 7:08"), slashed("3/4/2026 7:08"), slashed("3.4.2026/7:08")
+    (<Slashed.MONTH_FIRST: 1>, <Slashed.EITHER: 3>, None)
+    """
+    match = _DATE.fullmatch(text.strip())
+    if match is None or match[2] != "/" or len(match[1]) > _DIGITS:
+        return None
+    first, second = int(match[1]), int(match[3])
+    if first > _MONTHS:
+        return Slashed.DAY_FIRST
+    if second > _MONTHS:
+        return Slashed.MONTH_FIRST
+    return Slashed.SAME if first == second else Slashed.EITHER
 
 
 class WallClock:

@@ -9,13 +9,14 @@ from datetime import datetime
 from typing import NamedTuple
 
 from app.core.number_text import NotANumber, read_number
+from app.files.formats import aqdef
 from app.files.formats.aqdef import LINE, Description, Remark, Source, encoding_of, open_text
-from app.files.formats.aqdef_times import DayOrder, is_slashed, time_of
+from app.files.formats.aqdef_times import DayOrder, time_of
 from app.files.formats.cell_values import Unreadable
 from app.files.formats.delimited import Unusable
 from app.language.i18n import _
 
-OF_CHARACTERISTIC, OF_FIELD = "\x0f", "\x14"
+OF_CHARACTERISTIC, OF_FIELD = aqdef.OF_CHARACTERISTIC, "\x14"
 SHOWN_CHARACTERISTIC, SHOWN_FIELD = "¤☼", "¶"
 """The signs by which manuals and editors show these two; a file that went through one has them in their place."""
 FIELDS = ("K0001", "K0002", "K0004", "K0005", "K0006", "K0007", "K0008", "K0010", "K0011", "K0012")
@@ -41,6 +42,8 @@ NO_VALUE = {255, 256}
 """K0002: missing, deleted. Any other than 0: there, but not to be evaluated."""
 
 
+_LIKE_A_VALUE = re.compile(r"[+-]?[.,]?\d")
+_CLOCK = re.compile(r"\d:\d")
 _PARAMETER = r"(\d{1,9})/([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)(?=$|[,;\s])"
 _ONE_PARAMETER = re.compile(_PARAMETER, re.ASCII)
 _PROCESS = re.compile(f"{_PARAMETER}(?:[,;\\s]+{_PARAMETER})*", re.ASCII)
@@ -80,12 +83,16 @@ def values(source: Source, description: Description) -> Iterator[Value | Remark]
     path = source.values or source.description
     encoding = source.encoding or (encoding_of(path) if source.values else description.encoding)
     reading = _Reading(description)
+    line, number = "\n", 0
     try:
         with open_text(path, encoding) as file:
             for number, line in enumerate(file, 1):
                 yield from reading.take(number, line)
     except UnicodeError:
         raise Unusable(_("This is not {encoding} text.").format(encoding=encoding.upper())) from None
+    if not line.endswith("\n") and reading.is_cut(number):
+        reason = _("is shorter than what stands above and has no end: the file is cut off here; take the whole one")
+        yield Remark(number, "", line.replace(OF_FIELD, "|").replace(OF_CHARACTERISTIC, "||")[-40:], reason, wrong=True)
     yield from reading.end()
 
 
@@ -94,8 +101,13 @@ class _Reading:
 
     def __init__(self, description: Description) -> None:
         self._characteristics = description.characteristics
+        self._of_values = description.of_values
         self._open: dict[int, Value] = {}
-        self._counted: dict[tuple[int, int], Value] = {}  # with a number of their own: their fields stand anywhere
+        self._begun: dict[int, int] = {}  # values of each characteristic
+        self._rows = 0
+        self._portions: list[str] = []  # of the last line
+        self._before: list[str] = []  # of the one above
+        self._timed: set[int] = set()  # characteristics whose values have a time of their own
         self._for_all: dict[str, str] = {}
         self._closed = False  # by a field for all: what comes next is another row
         self._held: dict[str, str] = {}
@@ -112,23 +124,70 @@ class _Reading:
         line = _with_separators(line)
         if OF_FIELD in line or OF_CHARACTERISTIC in line or _is_number(line):
             yield from self._row(number, line)
+        elif _LIKE_A_VALUE.match(line) and (self._rows or _CLOCK.search(line)):
+            reason = _(
+                "is no value: the characters 15 and 20 that part values are missing, as editors and mail leave them out; "
+                "take the file as the machine wrote it"
+            )
+            yield Remark(number, "", line[:40], reason, wrong=True)
         else:
             yield Remark(number, "", line[:40], _("is neither a K field nor a value; it is passed over"))
 
-    def end(self) -> Iterator[Value]:
+    def end(self) -> Iterator[Value | Remark]:
         yield from self._all_open()
-        yield from self._counted.values()
+        for (index, count), (line, fields) in self._of_values.items():
+            if not index or count <= self._begun.get(index, 0):
+                continue
+            if index not in self._characteristics:
+                yield self._nobody(line, index, fields.get("K0001", ""))
+            elif fields.keys().isdisjoint({"K0001", "K0002", "K0020"}):
+                name, value = next(iter(fields.items()))
+                reason = _("belongs to value {count}, but the file has {most}").format(
+                    count=count, most=self._begun.get(index, 0)
+                )
+                yield Remark(line, f"{name}/{index}/{count}", value[:40], reason)
+            else:
+                yield Value(index, line, self._with_own(index, count, {}))
+
+    def is_cut(self, number: int) -> bool:
+        """Tell if a last line without an end holds less than those before it."""
+        last = max(self._open.values(), key=lambda value: value.line, default=None)
+        if last is None:
+            return False
+        if not self._rows:
+            return last.characteristic in self._timed and "K0004" not in last.fields
+        at = len(self._portions) - 1
+        return (
+            last.line == number and at < len(self._before) and _extent(self._portions[at]) < _extent(self._before[at])
+        )
 
     def _all_open(self) -> Iterator[Value]:
-        yield from sorted(self._open.values(), key=lambda value: value.line)
+        for value in sorted(self._open.values(), key=lambda value: value.line):
+            yield self._done(value)
         self._open.clear()
         self._closed = False
+
+    def _done(self, value: Value) -> Value:
+        if "K0004" in value.fields:
+            self._timed.add(value.characteristic)
+        return value
+
+    def _with_own(self, index: int, count: int, fields: dict[str, str]) -> dict[str, str]:
+        """The fields of value `count` of a characteristic, with those that the file gives by its number."""
+        if not self._of_values:
+            return fields
+        nothing: tuple[int, dict[str, str]] = (0, {})
+        of_all, of_row, own = (self._of_values.get(at, nothing)[1] for at in ((index, 0), (0, count), (index, count)))
+        return of_all | fields | of_row | own
 
     def _row(self, number: int, line: str) -> Iterator[Value | Remark]:
         """Read a line that holds a value of each characteristic, in the order of their indices."""
         yield from self._all_open()
         self._for_all.clear()
-        for index, portion in enumerate(line.split(OF_CHARACTERISTIC), 1):
+        self._rows += 1
+        portions = line.split(OF_CHARACTERISTIC)
+        self._before, self._portions = self._portions, portions
+        for index, portion in enumerate(portions, 1):
             if not portion.strip():
                 continue
             characteristic = self._characteristics.get(index)
@@ -150,7 +209,8 @@ class _Reading:
             if "K0006" in fields:
                 fields["K0006"] = fields["K0006"].removeprefix("#")
             self._held |= {name: cell for name, cell in fields.items() if name in HELD}
-            self._open[index] = Value(index, number, self._held | fields)
+            self._begun[index] = self._rows
+            self._open[index] = Value(index, number, self._with_own(index, self._rows, self._held | fields))
 
     def _nobody(self, number: int, index: int, value: str) -> Remark:
         most = len(self._characteristics)
@@ -160,8 +220,12 @@ class _Reading:
     def _field(self, number: int, line: str) -> Iterator[Value | Remark]:
         match = LINE.fullmatch(line)
         if match is None or len(match[1]) != 4:
-            yield Remark(number, "", line[:40], _("is too short or no K field; it is passed over"))
+            wrong = match is None and line[1:5].isdigit()  # the field of a value whose index is none
+            reason = _("has no index that can be read") if wrong else _("is too short or no K field; it is passed over")
+            yield Remark(number, line[:5] if wrong else "", line[5 * wrong :][:40], reason, wrong)
             return
+        if match[3]:
+            return  # by the number of a value: the description has it
         key, index, value = f"K{match[1]}", int(match[2] or 1), (match[4] or "").strip()
         if key not in VALUE_FIELDS:
             yield Remark(number, key, value[:40], _("is no field that is known here; it is kept and not used"))
@@ -176,9 +240,6 @@ class _Reading:
             return
         if index not in self._characteristics:
             yield self._nobody(number, index, value)
-        elif match[3]:
-            each = self._counted.setdefault((index, int(match[3])), Value(index, number, {}))
-            each.fields[key] = value
         else:
             yield from self._of_one(number, key, index, value)
 
@@ -190,7 +251,7 @@ class _Reading:
             if self._closed:
                 yield from self._all_open()
             else:
-                yield self._open.pop(index)
+                yield self._done(self._open.pop(index))
             self._for_all = {}
             current = None
         elif current is not None and self._closed and key in {first, self._begins}:
@@ -199,7 +260,8 @@ class _Reading:
         elif current is None and self._closed:
             yield from self._all_open()
         if current is None:
-            self._open[index] = Value(index, number, dict(self._for_all) | {key: value})
+            count = self._begun[index] = self._begun.get(index, 0) + 1
+            self._open[index] = Value(index, number, self._with_own(index, count, self._for_all | {key: value}))
             return
         if current.fields.get(key, value) != value:
             yield Remark(number, f"{key}/{index}", value[:40], _("is written twice for one value; the last one counts"))
@@ -251,12 +313,10 @@ def process_of(text: str) -> dict[int, float] | None:
     """
     if not _PROCESS.fullmatch(text.strip()):
         return None
-    return {int(number): number_of(value) for number, value in _ONE_PARAMETER.findall(text)}
-
-
-def has_doubtful_date(value: Value) -> bool:
-    """Tell if day and month of its time could be exchanged."""
-    return is_slashed(value.fields.get("K0004", ""))
+    try:
+        return {int(number): number_of(value) for number, value in _ONE_PARAMETER.findall(text)}
+    except Unreadable:  # too large for a number
+        return None
 
 
 def number_of(text: str) -> float:
@@ -270,6 +330,11 @@ def number_of(text: str) -> float:
     except NotANumber:
         reason = _("is empty") if not text.strip() else _("is not a number")
         raise Unreadable(reason) from None
+
+
+def _extent(portion: str) -> tuple[int, int]:
+    """Fields of a value, and the colons of the last one, by which a time is as long as another."""
+    return portion.count(OF_FIELD), portion.rpartition(OF_FIELD)[2].count(":")
 
 
 def _with_separators(line: str) -> str:

@@ -230,14 +230,14 @@ class _Header(_Texts):
             taken: set[str] = set()
             for index, described in enumerate(characteristics, 1):
                 if described.part == number - 1:
-                    yield from self._characteristic(index, described, taken)
+                    yield from self._characteristic(index, described, taken, catalogues)
         yield from self._catalogue("K4060", "machines", ("K4062", "K4063"), catalogues.machines.entries)
         yield from self._catalogue("K4070", "gauges", ("K4072", "K4073"), catalogues.gauges.entries)
         yield from self._catalogue("K4090", "operators", ("K4092", "K4093"), catalogues.operators.entries)
         yield from self._catalogue("K4220", "events", ("K4222", "K4223"), catalogues.events.entries)
         yield from self._catalogue("K4240", "process parameters", ("K4242", "K4243"), catalogues.process.entries)
 
-    def _characteristic(self, index: int, described: Described, taken: set[str]) -> Iterator[str]:
+    def _characteristic(self, index: int, described: Described, taken: set[str], catalogues: _Used) -> Iterator[str]:
         number = self.fit("K2001", described.number)
         for other in range(2, len(taken) + 3):  # two that were cut to the same
             if number not in taken:
@@ -250,6 +250,10 @@ class _Header(_Texts):
         if described.importance is not None:
             yield f"K2005/{index} {described.importance}"
         yield f"K2022/{index} {described.decimals}"
+        if catalogues.events.entries:
+            yield f"K2060/{index} 1"
+        if catalogues.process.entries:
+            yield f"K2061/{index} 1"
         for key, value in (("K2101", described.nominal), ("K2110", described.lower), ("K2111", described.upper)):
             if value is not None:
                 yield f"{key}/{index} {plain_number(value)}"

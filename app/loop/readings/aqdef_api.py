@@ -12,6 +12,7 @@ from app.db.engine import Database
 from app.errors import Invalid
 from app.files.formats import cell_values
 from app.files.formats.aqdef import Source
+from app.files.formats.aqdef_times import day_order
 from app.files.formats.cell_values import Unreadable
 from app.language.i18n import _
 from app.language.times import plant_zone
@@ -101,7 +102,14 @@ class AqdefIn(Body):
     unit: Annotated[
         Literal["mm", "um", "inch"] | None, Field(description="Of lengths for which the file names none.")
     ] = None
-    day_first: Annotated[bool, Field(strict=True, description="Dates with / begin with the day.")] = False
+    day_first: Annotated[
+        bool | None,
+        Field(
+            strict=True,
+            description="Dates with / begin with the day (true) or the month (false); if left out, dates that could be either "
+            "are refused.",
+        ),
+    ] = None
     dry_run: Annotated[bool, Field(strict=True, description="Say what would happen and store nothing.")] = False
 
 
@@ -173,7 +181,7 @@ def _wishes(given: AqdefIn) -> Wishes:
         zone = cell_values.zone_named(given.timezone) if given.timezone else plant_zone()
     except Unreadable as error:
         raise Invalid.at("timezone", str(error)) from None
-    return Wishes(zone, "day_first" if given.day_first else None, given.unit)
+    return Wishes(zone, day_order(given.day_first), given.unit)
 
 
 def _written(folder: Path, given: AqdefIn) -> Source:

@@ -9,6 +9,7 @@ import pytest
 
 from app.files.formats import aqdef, aqdef_values
 from app.files.formats.aqdef import Remark, Source
+from app.files.formats.aqdef_context import context_of
 from app.files.formats.aqdef_times import WallClock, time_of
 from app.files.formats.aqdef_values import Measured, Value
 from app.files.formats.cell_values import Unreadable
@@ -118,6 +119,77 @@ def test_values_with_numbers_of_their_own(tmp_path: Path) -> None:
         ("5", "A"),
         ("6", "B"),
     ]
+
+
+def test_fields_by_the_number_of_a_value_belong_to_it_wherever_they_stand(tmp_path: Path) -> None:
+    rows = ["K0014/1/2 B", f"1{F}0{C}5{F}0", f"2{F}0{C}6{F}0", "K0014/0/1 A", "K0053/2/0 P7", "K0014/1/9 Z"]
+    _description, found = parsed(tmp_path, HEAD + rows)
+    values = [each for each in found if isinstance(each, Value)]
+    assert [
+        (each.characteristic, each.fields["K0001"], each.fields.get("K0014"), each.fields.get("K0053"))
+        for each in values
+    ] == [(1, "1", "A", None), (2, "5", "A", "P7"), (1, "2", "B", None), (2, "6", None, "P7")]
+    assert [str(each) for each in found if isinstance(each, Remark)] == [
+        "line 12, K0014/1/9: 'Z' belongs to value 9, but the file has 2"
+    ]
+
+
+def test_a_field_without_an_index_may_describe_all_characteristics(tmp_path: Path) -> None:
+    lines = ["K0100 2", "K1001 P", f"K2001 D40{C}L12", f"K2002 Seat{C} Length", "K2142/0 mm"]
+    description, _found = parsed(tmp_path, lines)
+    assert [(each.number, each.name) for each in description.characteristics.values()] == [
+        ("D40", "Seat"),
+        ("L12", "Length"),
+    ]
+
+
+def test_values_whose_separators_are_gone_are_refused_by_line(tmp_path: Path) -> None:
+    lost = ["6.00100000000000E+0000006.09.2002/12:41:27#0000", "57.96205.7.2006/10:48:726.05105.7.2006/10:48:7"]
+    _description, found = parsed(tmp_path, [*HEAD, *lost, f"1{F}0", "1 2", "what"])
+    said = [(each.line, each.wrong) for each in found if isinstance(each, Remark)]
+    assert said == [(7, True), (8, True), (10, True), (11, False)]
+    assert "the characters 15 and 20 that part values are missing" in str(found[0])
+
+
+@pytest.mark.parametrize(
+    ("rows", "cut"),
+    [
+        ([f"1{F}0{F}2.3.2026/6:00:00{C}5{F}0", f"2{F}0{F}2.3.2026/6:01:00{C}6"], True),
+        ([f"1{F}0{F}2.3.2026/6:00:00", f"2{F}0{F}2.3.2026/6:0"], True),
+        ([f"1{F}0{F}2.3.2026/6:00:00{C}5{F}0", f"2{F}0{F}2.3.2026/6:01:00"], False),  # what comes last may be left out
+        (["K0001/1 1", "K0004/1 2.3.2026/6:00", "K0001/1 39.9"], True),
+        (["K0001/1 1", "K0001/1 39.9"], False),
+    ],
+)
+def test_a_file_that_is_cut_off_is_refused(tmp_path: Path, rows: list[str], *, cut: bool) -> None:
+    path = tmp_path / "file.dfq"
+    for end, wrong in (("", cut), ("\r\n", False)):
+        path.write_bytes(("\r\n".join([*HEAD, *rows]) + end).encode())
+        source = Source.at(path)
+        found = list(aqdef_values.values(source, aqdef.describe(source)))
+        assert any(isinstance(each, Remark) and each.wrong for each in found) is wrong
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["K2004/1 ²", "K0100 " + "9" * 5000, "K5111/1 " + "9" * 5000, "K0004/1 01.01.0001/00:00:00",
+     "K0004/1 31.12.9999/23:59:59", "K0011/1 1/1e999", "K2001/" + "9" * 5000 + " x", "K0001/1/" + "9" * 5000 + " 5",
+     "K2003/1 a\0b"],
+)  # fmt: skip
+def test_numbers_and_signs_of_no_sense_are_said_or_passed_over(tmp_path: Path, line: str) -> None:
+    description, found = parsed(tmp_path, [*HEAD, "K0001/1 1", line])
+    assert "\0" not in description.characteristics[1].fields.get("K2003", "")
+    clock = WallClock(ZoneInfo("Europe/Berlin"))
+    for each in found:
+        if isinstance(each, Value) and isinstance(read := aqdef_values.read_value(each), Measured):
+            context_of(each, read, description, lambda _remark: None)
+            assert read.at is None or clock.moment(read.at)
+
+
+def test_more_characteristics_than_a_file_may_have_are_refused(tmp_path: Path) -> None:
+    for lines in (["K0100 10001"], [f"K2001/{number} x" for number in range(1, 10_002)]):
+        with pytest.raises(Unusable, match="at most 10000 characteristics"):
+            parsed(tmp_path, lines)
 
 
 def test_parts_with_values_after_each_and_without_indices(tmp_path: Path) -> None:

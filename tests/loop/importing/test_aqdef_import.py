@@ -108,6 +108,38 @@ def test_the_same_file_again_and_a_longer_one_store_nothing_twice(plant: Databas
     assert (longer.stored, longer.repeated, scalar(plant, "SELECT count(*) FROM exclusion")) == (1, 3, 1)
 
 
+def test_a_value_that_another_program_writes_in_another_way_is_the_same(plant: Database, tmp_path: Path) -> None:
+    head = [*HEAD[:3], "K2001/1 shaft-d40", "K2002/1 Seat", "K2142/1 mm"]
+    first = run(plant, written(tmp_path / "a.dfq", [*head, f"39.991{F}0{F}02.03.2026/06:00:00{F}{F}#7"]))
+    other = [*head, "K0001/1 3.99910000000000E+0001", "K0004/1 2026-03-02 6:00", "K0006/1 7"]
+    again = run(plant, written(tmp_path / "b.dfq", other))
+    assert (first.stored, again.stored, again.repeated) == (1, 0, 1)
+
+
+def test_dates_that_may_be_either_are_asked_about(plant: Database, tmp_path: Path) -> None:
+    def lines(*dates: str) -> Path:
+        fields = [field for date in dates for field in ("K0001/1 39.991", f"K0004/1 {date}")]
+        return written(tmp_path / "a.dfq", ["K0100 1", "K2001/1 shaft-d40", "K2142/1 mm", *fields])
+
+    with pytest.raises(Flawed) as refusal:
+        run(plant, lines("3/4/2026 6:00", "4/4/2026 6:00"))
+    assert [str(flaw) for flaw in refusal.value.flaws] == [
+        "line 4, K0004/1: '3/4/2026 6:00' could be day/month or month/day: say which comes first"
+    ]
+    told = run(plant, lines("3/4/2026 6:00", "3/14/2026 6:00"), dry_run=True)
+    assert "Dates with / are read as month/day/year, as '3/14/2026 6:00' says." in told.remarks
+    run(plant, lines("3/4/2026 6:00"), wishes=Wishes(BERLIN.zone, "day_first"))
+    assert stored(plant)[0]["measured_at"].isoformat() == "2026-04-03T04:00:00+00:00"
+
+
+def test_names_however_long_and_with_whatever_signs_are_remembered(plant: Database, tmp_path: Path) -> None:
+    name = "".join(chr(33 + number * 7 % 90) for number in range(5000))
+    lines = ["K0100 1", f"K1001 {name}\0", f"K2001/1 {name}", f"K2002/1 {name}\1", "K2142/1 mm", "K0001/1 39.991"]
+    path = written(tmp_path / "a.dfq", [*lines, "K0004/1 2.3.2026/6:00", "K0014/1 SN"])
+    assert run(plant, path, {1: "shaft-d40"}).stored == 1
+    assert run(plant, path).repeated == 1
+
+
 def test_what_was_chosen_once_is_remembered(plant: Database, tmp_path: Path) -> None:
     run(plant, written(tmp_path / "a.dfq", HEAD + ROWS), {1: "shaft-d41"})
     again = run(plant, written(tmp_path / "b.dfq", [*HEAD, *ROWS, row(2, "39.993")]))

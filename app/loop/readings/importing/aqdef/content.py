@@ -18,7 +18,7 @@ from app.errors import Invalid
 from app.files.formats import aqdef_values
 from app.files.formats.aqdef import Description, Remark, Source
 from app.files.formats.aqdef_context import context_of
-from app.files.formats.aqdef_times import DayOrder, WallClock
+from app.files.formats.aqdef_times import DayOrder, Slashed, WallClock, slashed
 from app.files.formats.aqdef_values import Value
 from app.language.i18n import _, ngettext
 from app.loop.readings.importing.aqdef.matching import Content
@@ -27,7 +27,7 @@ from app.loop.readings.importing.lines import Flaw, Line, fingerprint
 from app.loop.readings.schemas import reading_of
 
 AT_ONCE = 20_000  # readings in memory before they are put down
-_WHO = ("K0001", "K0004", "K0014", "K0006", "K0053", "K0007")
+_WHO = ("K0014", "K0006", "K0053", "K0007")
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Readings:
     excluded: dict[int, dict[int, list[str]]] = field(default_factory=dict)
     missing: Counter[int] = field(default_factory=Counter)
     without_time: int = 0
-    doubtful_dates: int = 0
+    month_first: str = ""  # a date with strokes that can only be read so
     flaws: list[Flaw] = field(default_factory=list)
     flaw_count: int = 0
     remarks: list[Remark] = field(default_factory=list)
@@ -102,8 +102,10 @@ class Readings:
                 )
                 % {"num": self.without_time}
             )
-        if self.doubtful_dates:
-            texts.append(_("Dates with / are read as month/day/year. Say it if the day comes first."))
+        if self.month_first:
+            texts.append(
+                _("Dates with / are read as month/day/year, as {date} says.").format(date=repr(self.month_first))
+            )
         if missing := sum(self.missing.values()):
             texts.append(
                 ngettext(
@@ -144,7 +146,9 @@ class _Sorter:
         self._wishes = wishes
         self._mark = mark
         self._clocks = {index: WallClock(wishes.zone) for index in wanted}
-        self._same: dict[int, tuple[str, Counter[str]]] = {}
+        self._same: dict[int, tuple[datetime | None, Counter[str]]] = {}
+        self._doubtful: list[Flaw] = []  # dates that may be either
+        self._doubtful_count = 0
         self._waiting: dict[int, list[bytes]] = {}
         self._encode = msgspec.json.Encoder().encode
 
@@ -161,6 +165,21 @@ class _Sorter:
                     self._write()
                     waiting = 0
         self._write()
+        if self._doubtful and not readings.month_first:
+            readings.flaws += self._doubtful[: MOST_FLAWS - len(readings.flaws)]
+            readings.flaw_count += self._doubtful_count
+
+    def _look_at_date(self, value: Value) -> None:
+        """Note a date of which nobody has said whether the day or the month comes first."""
+        text = value.fields.get("K0004", "")
+        match slashed(text):
+            case Slashed.MONTH_FIRST:
+                self._readings.month_first = self._readings.month_first or text
+            case Slashed.EITHER:
+                self._doubtful_count += 1
+                if len(self._doubtful) < MOST_FLAWS:
+                    reason = _("could be day/month or month/day: say which comes first")
+                    self._doubtful.append(Flaw(value.line, f"K0004/{value.characteristic}", text[:40], reason))
 
     def _write(self) -> None:
         for index, lines in self._waiting.items():
@@ -186,27 +205,31 @@ class _Sorter:
         if read is None:
             readings.missing[index] += 1
             return None
-        key = self._key(value, content)
+        measured = read.measured if content.scale == 1.0 else round(read.measured * content.scale, 9)
+        key = self._key(value, measured, read.at, content)
         at = self._clocks[index].moment(read.at) if read.at is not None else None
         readings.counted[index] += 1
         readings.without_time += at is None
-        readings.doubtful_dates += self._wishes.order is None and aqdef_values.has_doubtful_date(value)
+        if self._wishes.order is None:
+            self._look_at_date(value)
         if read.attribute:
             readings.excluded.setdefault(index, {}).setdefault(read.attribute, []).append(key)
-        measured = read.measured if content.scale == 1.0 else round(read.measured * content.scale, 9)
         context = context_of(value, read, readings.description, self._remark)
         return _Kept(value.line, measured, at, (read.part or read.batch)[:128], key, context or None)
 
-    def _key(self, value: Value, content: Content) -> str:
-        """The same value of the same part has the same key, in whatever file it comes; without a time it is the file's line."""
-        time = value.fields.get("K0004", "")
-        if not time:
+    def _key(self, value: Value, measured: float, at: datetime | None, content: Content) -> str:
+        """The same value of the same part has the same key, in whatever file and however written it comes.
+
+        Without a time it is the file's line.
+        """
+        if at is None:
             return f"file:{self._mark}:{value.line}"
-        text = "|".join([*content.identity, *(value.fields.get(name, "") for name in _WHO)])
+        who = (value.fields.get(name, "") for name in _WHO)
+        text = "|".join([*content.identity, repr(measured), at.isoformat(), *who])
         name = hashlib.blake2b(text.encode(), digest_size=10).hexdigest()
-        then, same = self._same.get(value.characteristic, ("", Counter[str]()))
-        if then != time:
+        then, same = self._same.get(value.characteristic, (None, Counter[str]()))
+        if then != at:
             same = Counter()
-            self._same[value.characteristic] = (time, same)
+            self._same[value.characteristic] = (at, same)
         same[name] += 1
         return f"aqdef:{name}:{same[name]}"

@@ -135,8 +135,8 @@ def _wishes(said: Mapping[str, str]) -> Wishes:
         raise wrong("timezone", str(error)) from None
     unit = said.get("unit", "")
     dates = said.get("dates", "")
-    order: DayOrder | None = "day_first" if dates == "day_first" else None
-    return Wishes(zone, order, unit if unit in cell_values.UNITS else None)
+    orders: dict[str, DayOrder] = {"day_first": "day_first", "month_first": "month_first"}
+    return Wishes(zone, orders.get(dates), unit if unit in cell_values.UNITS else None)
 
 
 def _has_choice(said: Mapping[str, str]) -> bool:

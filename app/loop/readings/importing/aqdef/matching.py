@@ -7,24 +7,18 @@ from typing import Any
 
 from app.core.parameters import Parameters, default_averaging_limit
 from app.core.plausibility import INCH, inch_warnings, looks_like_inches
-from app.files.formats.aqdef import Characteristic, Description
+from app.files.formats.aqdef import LENGTHS, Characteristic, Description, length_unit
 from app.files.formats.aqdef_values import number_of
-from app.files.formats.cell_values import UNITS, Unreadable, folded
+from app.files.formats.cell_values import Unreadable, folded
 from app.language.i18n import _
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.warnings.wording import sentence
 
-WORDS = {
-    "mm": "mm", "millimeter": "mm", "millimetre": "mm", "µm": "um", "μm": "um", "um": "um", "mikrometer": "um",
-    "micrometer": "um", "micrometre": "um", "мм": "mm", "мкм": "um", "毫米": "mm", "in": "inch", "inch": "inch", "inches": "inch", "zoll": "inch", '"': "inch",
-    "дюйм": "inch", "cm": "cm", "см": "cm", "m": "m", "м": "m", "nm": "nm",
-}  # fmt: skip
-LENGTHS = UNITS | {"cm": 10.0, "m": 1000.0, "nm": 1e-6}
-"""Millimetres in each unit."""
 NEW = "+"
 """Chosen for a characteristic that is to be set up."""
 SLACK = 5e-7  # mm; limits that differ by less are the same
 NATURAL = "2"
+LONGEST = 200  # characters of a name that is remembered
 
 
 @dataclass(frozen=True)
@@ -62,7 +56,7 @@ class Content:
     @property
     def identity(self) -> tuple[str, str, str]:
         """By which it is remembered: part, number, name."""
-        return (self.part or self.part_name, self.number, self.name)
+        return ((self.part or self.part_name)[:LONGEST], self.number[:LONGEST], self.name[:LONGEST])
 
     @property
     def target(self) -> float | None:
@@ -114,7 +108,7 @@ def _only(entries: Mapping[int, str]) -> str:
 def _unit(word: str, said_unit: str | None, said: _Said) -> tuple[str, str]:
     """Return the unit and why it cannot be used. Only what the file does not say is taken from elsewhere."""
     if word.strip():
-        known = WORDS.get(word.strip(" []()").casefold())
+        known = length_unit(word)
         if known is None:
             return "mm", _("is not a length: its unit is {unit} (K2142)").format(unit=repr(word))
         if known not in {"mm", "um"}:
@@ -144,6 +138,10 @@ def _limits(fields: Mapping[str, str], scale: float, said: _Said) -> tuple[float
     found: list[float | None] = []
     for limit, deviation, kind in (("K2110", "K2112", "K2120"), ("K2111", "K2113", "K2121")):
         value, off = length(limit), length(deviation)
+        if value is None and off is not None and nominal is None:
+            said.remarks.append(
+                _("{deviation} is an offset from a nominal size (K2101), which is missing").format(deviation=deviation)
+            )
         if value is None and off is not None and nominal is not None:
             value = round(nominal + off, 9)
         elif value is not None and off is not None and nominal is not None and abs(nominal + off - value) > SLACK:
