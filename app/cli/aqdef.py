@@ -109,7 +109,7 @@ def _tell(found: "list[Content]", chosen: dict[int, str], encoding: str) -> None
             say(_("{title}: left out: {reason}.").format(title=each.title, reason=each.obstacle), style="yellow")
             continue
         if key is None:
-            reason = each.not_new or _("nothing here has its number or name; --map or --create-missing")
+            reason = each.not_new or _("nothing of its part here has its number or name; --map or --create-missing")
             say(_("{title}: left out: {reason}.").format(title=each.title, reason=reason), style="yellow")
             continue
         say(f"{each.title} → {_('to be set up') if key == NEW else key}")

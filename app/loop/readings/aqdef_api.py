@@ -210,7 +210,11 @@ def _result(content: Content, result: Result | None) -> AqdefCharacteristic:
         notes=list(content.remarks),
     )
     if result is None:
-        made.left_out = content.obstacle or _("nothing here has its number or name; name it under characteristics")
+        made.left_out = (
+            content.obstacle
+            or content.not_new
+            or _("nothing of its part here has its number or name; name it under characteristics")
+        )
         return made
     made.characteristic, made.created, made.excluded = result.key, result.created, result.excluded
     made.notes += result.doubts

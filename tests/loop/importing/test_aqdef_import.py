@@ -132,6 +132,37 @@ def test_dates_that_may_be_either_are_asked_about(plant: Database, tmp_path: Pat
     assert stored(plant)[0]["measured_at"].isoformat() == "2026-04-03T04:00:00+00:00"
 
 
+def test_a_characteristic_of_another_part_is_not_taken_for_it(plant: Database, tmp_path: Path) -> None:
+    head = [
+        "K0100 1",
+        "K1001 P1",
+        "K1002 Shaft",
+        "K2001/1 7",
+        "K2002/1 Seat",
+        "K2110/1 39.9",
+        "K2111/1 40.1",
+        "K2142/1 mm",
+    ]
+    values = ["K0001/1 39.991", "K0004/1 2.3.2026/6:00"]
+    path = written(tmp_path / "a.dfq", head + values)
+    assert run(plant, path, {1: NEW}).results[0].key == "p1-7-seat"
+    other = written(tmp_path / "b.dfq", [head[0], "K1001 P2", *head[2:], *values])
+    with plant.begin() as session:
+        found = matching.contents(actions.describe(Source.at(other)))
+        assert actions.guess(session, found) == {}
+    assert run(plant, other, {1: NEW}).results[0].key == "p2-7-seat"
+    assert run(plant, path).repeated == 1
+
+
+def test_readings_that_came_in_another_way_are_questioned(plant: Database, tmp_path: Path) -> None:
+    head = ["K0100 1", "K1001 P1", "K2001/1 shaft-d40", "K2142/1 mm"]
+    values = ["K0001/1 39.991", "K0004/1 2.3.2026/6:00", "K0001/1 39.992", "K0004/1 2.3.2026/6:01"]
+    assert run(plant, written(tmp_path / "a.dfq", head + values)).results[0].doubts == ()
+    renamed = written(tmp_path / "b.dfq", [head[0], "K1001 P1 (new)", *head[2:], *values, "K0014/1 SN-2"])
+    doubts = run(plant, renamed, dry_run=True).results[0].doubts
+    assert [each[:40] for each in doubts] == ["1 has time, size and part of a reading t"]
+
+
 def test_names_however_long_and_with_whatever_signs_are_remembered(plant: Database, tmp_path: Path) -> None:
     name = "".join(chr(33 + number * 7 % 90) for number in range(5000))
     lines = ["K0100 1", f"K1001 {name}\0", f"K2001/1 {name}", f"K2002/1 {name}\1", "K2142/1 mm", "K0001/1 39.991"]
@@ -179,6 +210,16 @@ def test_what_cannot_be_chosen_is_refused(
         run(plant, written(tmp_path / "a.dfq", HEAD + ROWS), chosen, machine=machine)
 
 
+def test_where_nothing_is_chosen_it_is_said_why(plant: Database, tmp_path: Path) -> None:
+    lines = ["K0100 2", "K2001/1 L1", "K2101/1 40", "K2142/1 mm", "K2001/2 W1", "K2142/2 °", "K0001/1 40"]
+    with pytest.raises(Invalid) as refusal:
+        run(plant, written(tmp_path / "a.dfq", lines))
+    assert [each.message for each in refusal.value.errors][1:] == [
+        "L1: it has no tolerance: K2111 is missing",
+        "W1: is not a length: its unit is '°' (K2142)",
+    ]
+
+
 def test_without_a_tolerance_nothing_is_set_up() -> None:
     def reason(**fields: str) -> str:
         from app.files.formats.aqdef import Characteristic, Description
@@ -212,7 +253,10 @@ def test_the_command_says_what_becomes_of_each(plant: Database, tmp_path: Path) 
     done = inband("import", path, "--timezone", "Europe/Berlin", database=plant, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "shaft-d40 Seat → shaft-d40" in done.stderr
-    assert "17 Roundness Ø40: left out: nothing here has its number or name; --map or --create-missing." in done.stderr
+    assert (
+        "17 Roundness Ø40: left out: nothing of its part here has its number or name; --map or --create-missing."
+        in done.stderr
+    )
     assert "W1 Angle: left out: is not a length: its unit is '°' (K2142)." in done.stderr
     assert "3 readings of shaft-d40, measured 2026-03-02 06:00 – 2026-03-02 06:01." in done.stderr
     assert "1 are excluded" in done.stderr

@@ -9,12 +9,12 @@ from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.orm import Session
 
 from app.db.engine import Database
-from app.errors import InbandError, Invalid
+from app.errors import FieldError, InbandError, Invalid
 from app.files.formats import aqdef
 from app.files.formats.aqdef import Description, Source
 from app.files.formats.cell_values import folded
 from app.files.formats.delimited import Unusable
-from app.language.i18n import _
+from app.language.i18n import _, ngettext
 from app.loop.characteristics import actions as characteristics
 from app.loop.characteristics import queries as characteristic_queries
 from app.loop.machines import queries as machines
@@ -23,7 +23,7 @@ from app.loop.readings.actions import exclude_all
 from app.loop.readings.importing.aqdef import matching
 from app.loop.readings.importing.aqdef.content import Readings, Wishes, put_down
 from app.loop.readings.importing.aqdef.matching import NEW, Content
-from app.loop.readings.importing.aqdef.queries import remembered
+from app.loop.readings.importing.aqdef.queries import count_alike, remembered
 from app.loop.readings.importing.history import Flawed, Summary, store_history
 from app.loop.readings.importing.lines import Flaw
 from app.loop.readings.records import Entry
@@ -158,7 +158,14 @@ def import_aqdef(
 
 def _refuse(chosen: Mapping[int, str], found: Mapping[int, Content]) -> None:
     if not chosen:
-        raise Invalid.at("characteristics", _("None of the file's characteristics is chosen; say which is which"))
+        reasons = [f"{each.title}: {each.obstacle or each.not_new}" for each in found.values()]
+        raise Invalid(
+            _("None of the file's characteristics is chosen; say which is which."),
+            errors=[
+                FieldError("characteristics", _("none is chosen")),
+                *(FieldError("file", reason) for reason in reasons[:20] if not reason.endswith(": ")),
+            ],
+        )
     keys = [key for key in chosen.values() if key != NEW]
     for index, key in chosen.items():
         content = found.get(index)
@@ -181,9 +188,13 @@ def _store_all(
     name: str,
 ) -> list[Result]:
     entries: list[tuple[Entry, Content, bool]] = []
+    taken: set[str] = set()
+    if NEW in chosen.values():
+        taken = {each.characteristic.key for each in characteristic_queries.characteristics(session, limit=100_000)}
     for index, content in wanted.items():
         created = chosen[index] == NEW
-        key = _set_up(session, content, machine, actor) if created else chosen[index]
+        key = _set_up(session, content, machine, actor, taken) if created else chosen[index]
+        taken.add(key)
         key = characteristic_queries.characteristic_named(session, key).characteristic.key
         entry = queries.entry_of(session, key)
         assert entry is not None
@@ -210,15 +221,23 @@ def _store(
         except InbandError as trouble:
             part.rollback()
             return Result(content, entry.characteristic, created, doubts=doubts, trouble=trouble)
+    if alike := count_alike(session, entry, summary):
+        doubts += (
+            ngettext(
+                "%(num)d has time, size and part of a reading that is here already, which came in another way: is it the same?",
+                "%(num)d have time, size and part of readings that are here already, which came in another way: are they the same?",
+                alike,
+            )
+            % {"num": alike},
+        )
     return Result(content, entry.characteristic, created, summary, excluded, doubts)
 
 
-def _set_up(session: Session, content: Content, machine: str | None, actor: str) -> str:
+def _set_up(session: Session, content: Content, machine: str | None, actor: str, taken: set[str]) -> str:
     if machine is None:
         raise Invalid.at("machine", _("say on which machine new characteristics are set up"))
-    known = characteristic_queries.characteristics(session, limit=100_000)
     given = characteristics.CharacteristicIn(
-        key=matching.key_for(content, (each.characteristic.key for each in known)),
+        key=matching.key_for(content, taken),
         name=(content.name or content.title)[:200],
         machine=machine,
         part=(content.part or content.part_name)[:200] or None,

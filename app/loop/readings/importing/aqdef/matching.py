@@ -212,7 +212,7 @@ def guessed(
     known: Sequence[CurrentCharacteristic],
     remembered: Mapping[tuple[str, str, str], str],
 ) -> dict[int, str]:
-    """The key of the characteristic that each is here: as remembered, else the one with its number or name."""
+    """The key of the characteristic that each is here: as remembered, else the one of its part with its number or name."""
     names: dict[str, list[CurrentCharacteristic]] = {}
     for current in known:
         for name in {current.characteristic.key, current.characteristic.name}:
@@ -227,12 +227,18 @@ def guessed(
     return chosen
 
 
+def _is_of(current: CurrentCharacteristic, parts: set[str]) -> bool:
+    """Tell if it may be of one of these parts: two parts have a D40 each. Nothing said is no contradiction."""
+    own = current.characteristic.part
+    return not own or not parts or folded(own) in parts
+
+
 def _by_name(content: Content, names: Mapping[str, Sequence[CurrentCharacteristic]]) -> str | None:
     for word in filter(None, (content.number, content.name)):
-        fitting = names.get(folded(word), [])
+        parts = {folded(each) for each in (content.part, content.part_name) if each}
+        fitting = [each for each in names.get(folded(word), []) if _is_of(each, parts)]
         if len(fitting) > 1:
-            parts = {folded(each) for each in (content.part, content.part_name) if each}
-            fitting = [each for each in fitting if folded(each.characteristic.part or "") in parts]
+            fitting = [each for each in fitting if each.characteristic.part]
         if len(fitting) == 1:
             return fitting[0].characteristic.key
     return None
