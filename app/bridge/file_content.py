@@ -23,6 +23,7 @@ from app.bridge.links import Received
 from app.core.ring import INCH
 from app.files.formats import aqdef, aqdef_values, delimited
 from app.files.formats.aqdef_context import context_of
+from app.files.formats.aqdef_keys import Keys
 from app.files.formats.aqdef_times import WallClock, day_order, slashed
 from app.files.formats.cell_values import Unreadable, moment, number, zone_named
 
@@ -296,7 +297,8 @@ class _Reader:
     def _aqdef(self) -> None:
         source = aqdef.Source.at(self.path, self.settings.encoding)
         description = aqdef.describe(source)
-        clock = None if self.zone is None else WallClock(self.zone)
+        zone, keys = self.zone, Keys()
+        clocks = {} if zone is None else {index: WallClock(zone) for index in description.characteristics}
         order = day_order(self.settings.day_first)
         for item in aqdef_values.values(source, description):
             if isinstance(item, aqdef.Remark):
@@ -317,11 +319,17 @@ class _Reader:
             value = aqdef_values.read_value(item, order)
             if isinstance(value, aqdef.Remark):
                 self._remark(value)
-            elif value is None or value.attribute:
+                continue
+            alone = None
+            if value is not None and value.at is not None:
+                unit = aqdef.length_unit(characteristic.fields.get("K2142", ""))
+                measured = value.measured * (self.scale if unit is None else aqdef.LENGTHS[unit])
+                alone = keys.of(item, description.identity(characteristic), measured, value.at)
+            if value is None or value.attribute:
                 self.content.skipped += 1
                 self.content.remarks.append(f"line {item.line}: {name} is marked as not valid (K0002); passed over")
             else:
-                self._measured(item, key, name, value, description, clock)
+                self._measured(item, key, name, value, description, clocks.get(item.characteristic), alone)
 
     def _measured(
         self,
@@ -331,6 +339,7 @@ class _Reader:
         value: aqdef_values.Measured,
         description: aqdef.Description,
         clock: WallClock | None,
+        alone: str | None,
     ) -> None:
         unit = description.characteristics[item.characteristic].fields.get("K2142", "")
         said = aqdef.length_unit(unit)
@@ -349,7 +358,7 @@ class _Reader:
                 self._fault(item.line, "K0004", "does not say its time zone: set zone, such as Europe/Belgrade.")
                 return
             body["measured_at"] = (clock.moment(value.at) if clock else value.at).isoformat()
-        self._add(item.line, f"{name}/{item.characteristic}", body, item.fields, None)
+        self._add(item.line, f"{name}/{item.characteristic}", body, item.fields, None, alone)
 
     def _key_of(self, part: str, characteristic: aqdef.Characteristic) -> tuple[str | None, str]:
         """The key of a characteristic by part and number or name, number, or name; and its name for sentences."""
@@ -407,7 +416,19 @@ class _Reader:
             raise Unreadable("is longer than 128 characters" if text else "is empty")
         return text
 
-    def _add(self, line: int, name: str, body: dict[str, Any], raw: Mapping[str, Any], own: str | None) -> None:
+    def _add(
+        self,
+        line: int,
+        name: str,
+        body: dict[str, Any],
+        raw: Mapping[str, Any],
+        own: str | None,
+        alone: str | None = None,
+    ) -> None:
+        """Add a reading. own: the key that its line gives. alone: one that tells it from all others, in whatever file."""
+        if alone is not None:
+            self.content.entries.append(Entry(line, name, body, alone))
+            return
         if own is not None:
             told = [own, name]
         else:

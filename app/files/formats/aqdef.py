@@ -24,6 +24,7 @@ ENDINGS = {".dfq", ".dfd", ".dfx"}
 OF_CHARACTERISTIC = "\x0f"
 """Parts what belongs to one characteristic and to the next: values in a line, and fields without an index that describe all."""
 MOST_CHARACTERISTICS = 10_000
+LONGEST = 200  # characters of a name by which something is known again
 COUNTING_KINDS = {"1", "5", "6"}
 """K2004: attribute, kind of fault, list of faults."""
 MOST_REMARKS = 200
@@ -109,6 +110,12 @@ class Description:
     def part_of(self, characteristic: Characteristic) -> Mapping[str, str]:
         """The fields of its part."""
         return self.parts.get(characteristic.part, {})
+
+    def identity(self, characteristic: Characteristic) -> tuple[str, str, str]:
+        """Part, number and name, by which it is known again in another file."""
+        part = self.part_of(characteristic)
+        words = (part.get("K1001", "") or part.get("K1002", ""), characteristic.number, characteristic.name)
+        return words[0][:LONGEST], words[1][:LONGEST], words[2][:LONGEST]
 
     def named(self, entry: int | str, *catalogues: str) -> str:
         """The text of an entry (3, "K4093", "K4092") in the first of these catalogues that has it, else the entry as it is."""

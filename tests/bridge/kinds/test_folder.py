@@ -119,7 +119,10 @@ DESCRIPTION = "K0100 2\nK1001 4711\nK2001/1 10\nK2002/1 D40\nK2142/1 mm\nK2001/2
 VALUES = "40.0123\x140\x1423.11.2026/06:05:00\x0f20020\x140\x1423.11.2026/06:05:00\n40.0130\x14256\x1423.11.2026/06:06:00\x0f20021\x140\n"
 
 
-@pytest.mark.parametrize("names", [{"10": "shaft-1", "D20": "bore-1"}, {"4711/10": "shaft-1", "4711/D20": "bore-1"}])
+AQDEF_NAMES = {"10": "shaft-1", "D20": "bore-1"}
+
+
+@pytest.mark.parametrize("names", [AQDEF_NAMES, {"4711/10": "shaft-1", "4711/D20": "bore-1"}])
 def test_aqdef_is_read_by_number_or_name_with_or_without_the_part(tmp_path: Path, names: dict[str, str]) -> None:
     content = read(tmp_path, DESCRIPTION + VALUES, "a.dfq", format="aqdef", names=names)
     assert content.faults == []
@@ -152,6 +155,14 @@ def test_what_is_wrong_is_said_with_line_and_field(tmp_path: Path, text: str, se
     assert words in entry.fault
 
 
+def test_the_hour_that_is_there_twice_goes_by_the_order_of_each_characteristic(tmp_path: Path) -> None:
+    times = [f"K0001/{at} {size}\nK0004/{at} 25.10.2026/02:{minute}:00\n" for at, size, minute in
+             ((1, 40.01, 10), (1, 40.02, 50), (2, 20010, 10), (2, 20020, 50), (2, 20030, 20))]  # fmt: skip
+    content = read(tmp_path, DESCRIPTION + "".join(times), "a.dfq", format="aqdef", names=AQDEF_NAMES)
+    offsets = [each.body["measured_at"][11:] for each in content.entries if each.body["characteristic"] == "bore-1"]
+    assert offsets == ["02:10:00+02:00", "02:50:00+02:00", "02:20:00+01:00"]
+
+
 def test_doubtful_dates_of_aqdef_are_not_guessed(tmp_path: Path) -> None:
     text = DESCRIPTION + "40.01\x140\x1403/04/2026/06:05:00\n"
     names = {"D40": "shaft-1", "D20": "bore-1"}
@@ -172,6 +183,14 @@ def test_keys_stay_when_a_file_grows_or_changes_its_line_ends(tmp_path: Path) ->
     assert keys[0] == first.entries[0].key
     assert len(set(keys)) == 2
     assert all(len(key) <= 128 for key in keys)
+
+
+def test_keys_of_aqdef_stay_whatever_the_head_of_the_file_becomes(tmp_path: Path) -> None:
+    first = read(tmp_path, DESCRIPTION + VALUES, "a.dfq", format="aqdef", names=AQDEF_NAMES)
+    other = DESCRIPTION.replace("K2142/1 mm", "K1205 24.11.2026\nK2142/1 mm") + VALUES.replace("20020", "2.0020E+0004")
+    again = read(tmp_path, other, "b.dfq", format="aqdef", names=AQDEF_NAMES)
+    assert [each.key for each in again.entries] == [each.key for each in first.entries]
+    assert len({each.key for each in first.entries}) == 3
 
 
 def test_readings_without_time_and_part_are_told_apart_by_the_file(tmp_path: Path) -> None:

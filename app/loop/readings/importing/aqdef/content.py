@@ -1,6 +1,5 @@
 """The values of an AQDEF file as readings of each characteristic: read once, put down beside, however long the file is."""
 
-import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ from app.errors import Invalid
 from app.files.formats import aqdef_values
 from app.files.formats.aqdef import Description, Remark, Source
 from app.files.formats.aqdef_context import context_of
+from app.files.formats.aqdef_keys import Keys
 from app.files.formats.aqdef_times import DayOrder, Slashed, WallClock, slashed
 from app.files.formats.aqdef_values import Value
 from app.language.i18n import _, ngettext
@@ -27,7 +27,6 @@ from app.loop.readings.importing.lines import Flaw, Line, fingerprint
 from app.loop.readings.schemas import reading_of
 
 AT_ONCE = 20_000  # readings in memory before they are put down
-_WHO = ("K0014", "K0006", "K0053", "K0007")
 
 
 @dataclass(frozen=True)
@@ -146,7 +145,7 @@ class _Sorter:
         self._wishes = wishes
         self._mark = mark
         self._clocks = {index: WallClock(wishes.zone) for index in wanted}
-        self._same: dict[int, tuple[datetime | None, Counter[str]]] = {}
+        self._keys = Keys()
         self._doubtful: list[Flaw] = []  # dates that may be either
         self._doubtful_count = 0
         self._waiting: dict[int, list[bytes]] = {}
@@ -206,7 +205,10 @@ class _Sorter:
             readings.missing[index] += 1
             return None
         measured = read.measured if content.scale == 1.0 else round(read.measured * content.scale, 9)
-        key = self._key(value, measured, read.at, content)
+        if read.at is None:
+            key = f"file:{self._mark}:{value.line}"
+        else:
+            key = self._keys.of(value, content.identity, measured, read.at)
         at = self._clocks[index].moment(read.at) if read.at is not None else None
         readings.counted[index] += 1
         readings.without_time += at is None
@@ -216,20 +218,3 @@ class _Sorter:
             readings.excluded.setdefault(index, {}).setdefault(read.attribute, []).append(key)
         context = context_of(value, read, readings.description, self._remark)
         return _Kept(value.line, measured, at, (read.part or read.batch)[:128], key, context or None)
-
-    def _key(self, value: Value, measured: float, at: datetime | None, content: Content) -> str:
-        """The same value of the same part has the same key, in whatever file and however written it comes.
-
-        Without a time it is the file's line.
-        """
-        if at is None:
-            return f"file:{self._mark}:{value.line}"
-        who = (value.fields.get(name, "") for name in _WHO)
-        text = "|".join([*content.identity, repr(measured), at.isoformat(), *who])
-        name = hashlib.blake2b(text.encode(), digest_size=10).hexdigest()
-        then, same = self._same.get(value.characteristic, (None, Counter[str]()))
-        if then != at:
-            same = Counter()
-            self._same[value.characteristic] = (at, same)
-        same[name] += 1
-        return f"aqdef:{name}:{same[name]}"

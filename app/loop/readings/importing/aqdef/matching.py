@@ -7,7 +7,7 @@ from typing import Any
 
 from app.core.parameters import Parameters, default_averaging_limit
 from app.core.plausibility import INCH, inch_warnings, looks_like_inches
-from app.files.formats.aqdef import LENGTHS, Characteristic, Description, length_unit
+from app.files.formats.aqdef import LENGTHS, LONGEST, Characteristic, Description, length_unit
 from app.files.formats.aqdef_values import number_of
 from app.files.formats.cell_values import Unreadable, folded
 from app.language.i18n import _
@@ -18,7 +18,6 @@ NEW = "+"
 """Chosen for a characteristic that is to be set up."""
 SLACK = 5e-7  # mm; limits that differ by less are the same
 NATURAL = "2"
-LONGEST = 200  # characters of a name that is remembered
 
 
 @dataclass(frozen=True)

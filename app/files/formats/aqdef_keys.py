@@ -1,0 +1,28 @@
+"""Keys of the values of AQDEF files: the same value has the same one, in whatever file and however written it comes."""
+
+import hashlib
+from collections import Counter
+from datetime import datetime
+
+from app.files.formats.aqdef_values import Value
+
+_WHO = ("K0014", "K0006", "K0053", "K0007")
+
+
+class Keys:
+    """The keys of one file. Values that are alike in everything are counted, in the order of the file."""
+
+    def __init__(self) -> None:
+        self._same: dict[int, tuple[datetime, Counter[str]]] = {}
+
+    def of(self, value: Value, identity: tuple[str, str, str], measured: float, at: datetime) -> str:
+        """The key of a value. identity: part, number and name of its characteristic. measured: mm. at: as the file has it."""
+        who = (value.fields.get(name, "") for name in _WHO)
+        text = "|".join([*identity, repr(round(measured, 9)), at.isoformat(), *who])
+        name = hashlib.blake2b(text.encode(), digest_size=10).hexdigest()
+        then, same = self._same.get(value.characteristic, (None, Counter[str]()))
+        if then != at:
+            same = Counter()
+            self._same[value.characteristic] = (at, same)
+        same[name] += 1
+        return f"aqdef:{name}:{same[name]}"
