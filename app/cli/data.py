@@ -81,6 +81,15 @@ Sheet = Annotated[
     str | None, typer.Option(envvar="INBAND_SHEET", help="Sheet of a workbook.", show_default="the first with cells")
 ]
 Characteristic = Annotated[str, typer.Option(envvar="INBAND_CHARACTERISTIC", help="The key of the characteristic.")]
+DayFirst = Annotated[
+    bool | None,
+    typer.Option(
+        "--day-first/--month-first",
+        envvar="INBAND_DAY_FIRST",
+        help="Of AQDEF: dates with / begin with the day, or the month.",
+        show_default="dates that could be either are refused",
+    ),
+]
 
 
 @cli.command("import")
@@ -111,15 +120,7 @@ def import_file(
     machine: Annotated[
         str | None, typer.Option(envvar="INBAND_MACHINE", help="Of AQDEF: on which machine it is set up.")
     ] = None,
-    day_first: Annotated[
-        bool | None,
-        typer.Option(
-            "--day-first/--month-first",
-            envvar="INBAND_DAY_FIRST",
-            help="Of AQDEF: dates with / begin with the day, or the month.",
-            show_default="dates that could be either are refused",
-        ),
-    ] = None,
+    day_first: DayFirst = None,
     live: Annotated[
         bool, typer.Option("--live", envvar="INBAND_LIVE", help="Decide as if they came in now: corrections, alarms.")
     ] = False,

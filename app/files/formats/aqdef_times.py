@@ -97,7 +97,7 @@ def day_order(day_first: bool | None) -> DayOrder | None:
 
 
 class Slashed(Enum):
-    """Which comes first in a date with strokes, as far as the date itself tells."""
+    """The readings that a date with strokes allows."""
 
     MONTH_FIRST = 1
     DAY_FIRST = 2
@@ -107,7 +107,7 @@ class Slashed(Enum):
 
 @lru_cache(maxsize=4096)
 def slashed(text: str) -> Slashed | None:
-    """How a date with strokes can be read; None for other dates.
+    """The readings that a date allows; None where it has no strokes.
 
     >>> slashed("3/14/2026 7:08"), slashed("3/4/2026 7:08"), slashed("3.4.2026/7:08")
     (<Slashed.MONTH_FIRST: 1>, <Slashed.EITHER: 3>, None)

@@ -28,7 +28,7 @@ def remembered(session: Session) -> dict[tuple[str, str, str], str]:
 
 
 def count_alike(session: Session, entry: Entry, summary: Summary) -> int:
-    """How many of the readings just stored have second, size and part of one that was here before."""
+    """The number of readings just stored that have second, size and part of one that was here before."""
     if summary.first_at is None or summary.last_at is None or not summary.stored:
         return 0
     new, old = aliased(Reading), aliased(Reading)
