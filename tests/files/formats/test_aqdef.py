@@ -250,7 +250,7 @@ def test_a_field_written_twice_for_a_value(tmp_path: Path) -> None:
     assert [each.fields.get("K0014") for each in found if isinstance(each, Value)] == ["B", None]
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252", "utf-16", "utf-16-le", "utf-16-be"])
 def test_letters(tmp_path: Path, encoding: str) -> None:
     description, _found = parsed(
         tmp_path, ["K0100 1", "K2002/1 Länge Ø", *["K2092/1 ascii"] * 70_000], encoding=encoding
