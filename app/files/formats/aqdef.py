@@ -171,8 +171,9 @@ def encoding_of(path: Path) -> str:
         start = file.read(4)
         if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
             return "utf-16"
-        if 0 in start[:2] and any(start[:2]):  # without a mark: every other byte of plain letters is 0
-            return "utf-16-le" if start[1:2] == b"\0" else "utf-16-be"
+        for marked, name in ((start[:2], "utf-16-le"), (start[1::-1], "utf-16-be")):
+            if marked[:1].isalnum() and marked[1:] == b"\0":  # no mark, but every other byte is 0
+                return name
         file.seek(0)
         try:
             while block := file.read(1 << 20):
