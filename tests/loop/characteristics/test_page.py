@@ -50,6 +50,17 @@ class TestWithoutScripts:
         first = viewer.open(path(shop)).split('class="card charts"')[0]
         assert f'href="/alarms/{shop.alarms()[0]["id"]}">Set the part aside</a>' in first
 
+    def test_the_panel_tells_part_and_context(self, shop: Shop, viewer: Person) -> None:
+        shop.read(0.4, part=XSS, context={"order": "A-77", "nest": 2})
+        panel = viewer.open(path(shop, "/readings/1/panel"))
+        assert "<dd>A-77</dd>" in panel
+        assert "<dd>2</dd>" in panel
+        of_part = re.search(r'<dt>Part</dt><dd><a href="([^"]+)">', panel)
+        assert of_part is not None
+        for text in (viewer.open(path(shop, "/readings/1")), viewer.open(path(shop))):
+            assert of_part[0] in text
+        assert f"{path(shop)}/readings/1" in viewer.open(of_part[1])
+
     def test_pages_of_decisions(self, shop: Shop, viewer: Person) -> None:
         batch = [{"characteristic": shop.characteristic, "measured": 40.0} for _ in range(30)]
         assert shop.admin.post("/api/v1/readings/batch", json=batch).status_code == 201

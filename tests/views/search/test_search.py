@@ -67,6 +67,9 @@ def test_the_page_of_a_part(shop: Shop, viewer: Person) -> None:
     assert "Pending" in text or "Superseded" in text, "the page says what became of the correction"
     for path in readings:
         viewer.open(path)
+    number = shop.correction(1)["number"]
+    shop.correction(number, "applied", offset_after=-0.006)
+    assert "offset then −0.0060 mm" in viewer.open(item["path"])
     answer = shop.admin.get("/api/v1/search", params={"q": ODD})
     assert "Nothing was measured" not in viewer.open(answer.json()["items"][0]["path"])
     assert viewer.open("/parts/Serial-0001") == text or "Serial-0001" in viewer.open("/parts/Serial-0001")
