@@ -16,7 +16,10 @@ import "./theme-switch.js";
 import "./times.js";
 
 // What only some pages have is loaded where it stands: with the page, or with a live part that brings it.
-const SOMETIMES = [["plotly-chart", "./plotly-chart.js"], ["period-presets", "./period-presets.js"], ["table[data-sortable]", "./table-tools.js"]];
+const SOMETIMES = [
+  ["plotly-chart", "./plotly-chart.js"], ["period-presets", "./period-presets.js"], ["table[data-sortable]", "./table-tools.js"],
+  [".picker, .period-picker", "./pickers.js"],
+];
 function load() {
   for (const [selector, module] of SOMETIMES) if (document.querySelector(selector)) import(module);
 }

@@ -1,6 +1,5 @@
 // <period-presets hidden><button data-from="2026-11-23T06:00" data-to="">This shift</button> …</period-presets>
 // Usual periods beside the fields from and to of a form: a button fills them in, and empties the number of last readings.
-// A period picker (<details class="period-picker">) is closed by Escape and by a click beside it.
 
 class PeriodPresets extends HTMLElement {
   connectedCallback() {
@@ -18,16 +17,3 @@ class PeriodPresets extends HTMLElement {
 }
 
 customElements.define("period-presets", PeriodPresets);
-
-const opened = () => document.querySelector("details.period-picker[open]");
-
-document.addEventListener("keydown", (event) => {
-  const picker = event.key === "Escape" && opened();
-  if (!picker) return;
-  picker.open = false;
-  picker.querySelector("summary").focus();
-});
-document.addEventListener("pointerdown", ({ target }) => {
-  const picker = opened();
-  if (picker && !picker.contains(target)) picker.open = false;
-});
