@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from math import inf
+from typing import Literal
 
 from app.charts import Axis, Bars, Chart, Dots, Note, Panel, Pen, Role, Rule, Series
 from app.language.i18n import _
@@ -24,7 +25,6 @@ NOTE = "note"
 LETTER = (
     6.5  # pixels that a letter of an event takes, about: words that would run into each other are left to the shapes
 )
-RIGHT_ROOM = 200  # pixels that a word may reach out beside the readings
 UPPER, LOWER = 0.5, -0.5  # rows of the events
 APART = 16  # pixels between two marks; what lies closer is one
 MOST_NAMED = 8  # of the events of one mark, when it is pointed at
@@ -47,6 +47,7 @@ TONES: dict[str, Role] = {
     "probe_fault": "stop",
     "tool_worn": "wear",
 }
+_Side = Literal["left", "right"] | None  # of a mark, on which its word is written
 SET_UP = (NOTE, PARAMETERS, CALIBRATION, MANUAL_EDIT, TOOL_CHANGE)  # from what matters least, below the alarms
 
 
@@ -134,37 +135,42 @@ def _marks(events: Sequence[Event], span: tuple[float, float], pixels: float) ->
     return [(_Mark(together), place) for together, place in marks]
 
 
-def _rows(marks: Sequence[tuple[_Mark, float]], pixels: float) -> list[tuple[_Mark, float, bool]]:
-    """Each mark with its row and whether its word is written: two rows, and a word gives way to the next mark's shape."""
-    places: list[tuple[_Mark, float, bool]] = []
+def _rows(marks: Sequence[tuple[_Mark, float]], most: float) -> list[tuple[_Mark, float, _Side]]:
+    """Each mark with its row and the side on which its word is written: two rows, and a word gives way to the next mark's shape.
+
+    most: pixels from the left that a word may reach; beside a mark near the end it stands on the left, if there is room.
+    """
+    places: list[tuple[_Mark, float, _Side]] = []
     latest = {UPPER: -1, LOWER: -1}  # index of the last mark in the row
     end = {UPPER: -inf, LOWER: -inf}  # where its word ends, px
     for mark, place in marks:
-        start = place - 8
+        word = LETTER * len(mark.text)
+        side: _Side = "right" if place + 12 + word < most else "left"
+        start = place - 8 if side == "right" else place - 12 - word
         row = UPPER if end[UPPER] <= start else min(end, key=lambda row: end[row])
-        if end[row] > start:
-            before, _row, _written = places[latest[row]]
-            places[latest[row]] = (before, row, False)
-        stop = start + 20 + LETTER * len(mark.text)
-        shown = stop < pixels + RIGHT_ROOM
-        latest[row], end[row] = len(places), stop if shown else start + 18
-        places.append((mark, row, shown))
+        if end[row] > start and side == "left":
+            side = None
+        if end[row] > place - 8:
+            before, _row, _side = places[latest[row]]
+            places[latest[row]] = (before, row, None)
+        latest[row], end[row] = len(places), place + 12 + word if side == "right" else place + 10
+        places.append((mark, row, side))
     return places
 
 
 def event_lane(
-    events: Sequence[Event], span: tuple[float, float], pixels: float, *, lines: bool = True
+    events: Sequence[Event], span: tuple[float, float], pixels: float, beside: float, *, lines: bool = True
 ) -> list[Series | Rule | Note]:
     """Marks and words of the events within the span, and in the legend what their shapes mean.
 
-    span: of the axis; moments as seconds (Unix time). lines: upward through the chart, at what somebody changed. A word is
-    left out where it would not fit.
+    span: of the axis, so many pixels wide; moments as seconds (Unix time). beside: pixels that words may reach out at its
+    right. lines: upward through the chart, at what somebody changed. A word is left out where it would not fit.
     """
     within = [event for event in events if span[0] <= _number(event.at) <= span[1]]
-    places = _rows(_marks(within, span, pixels), pixels)
+    places = _rows(_marks(within, span, pixels), pixels + beside)
     if not places:
         return []
-    main = [mark.main for mark, _row, _written in places]
+    main = [mark.main for mark, _row, _side in places]
     colours = [event.tone for event in main]
     changed = [event for event in main if not event.is_alarm and event.kind != NOTE]
     return [
@@ -173,11 +179,11 @@ def event_lane(
             for event in (changed if lines and len(changed) <= MOST_LINES else [])
         ),
         Series(
-            [mark.events[0].at for mark, _row, _written in places],
-            [row for _mark, row, _written in places],
+            [mark.events[0].at for mark, _row, _side in places],
+            [row for _mark, row, _side in places],
             dots=Dots([event.shape for event in main], 12, colours, edge=colours),
             meta="events",
-            hover=[mark.hover for mark, _row, _written in places],
+            hover=[mark.hover for mark, _row, _side in places],
             links=[event.link for event in main],
         ),
         *_legend(within),
@@ -186,12 +192,12 @@ def event_lane(
                 f"<b>{mark.text}</b>" if mark.main.active else mark.text,
                 mark.events[0].at,
                 row,
-                "left",
-                shift=(9, 0),
+                "left" if side == "right" else "right",  # the end of the words that lies at the mark
+                shift=(9 if side == "right" else -9, 0),
                 colour=mark.main.tone,
             )
-            for mark, row, shown in places
-            if shown
+            for mark, row, side in places
+            if side
         ),
     ]
 
@@ -241,7 +247,8 @@ def with_lane(chart: Chart, events: Sequence[Event], width: int, *, lines: bool 
     span = span_of(chart)
     if span is None:
         return chart
-    lane = event_lane(events, span, max(width - chart.room.left - chart.room.right, 200), lines=lines)
+    pixels = max(width - chart.room.left - chart.room.right, 200)
+    lane = event_lane(events, span, pixels, chart.room.right, lines=lines)
     if not lane:
         return chart
     hidden = Axis(reach=(-1, 1), grid=False, line=False, labelled=False, fixed=True)

@@ -67,6 +67,18 @@ class TestTheLane:
         pixels = (width - chart.room.left - chart.room.right) / 5001
         assert min(after - before for before, after in itertools.pairwise(x)) * pixels >= 15
 
+    def test_no_word_reaches_beyond_the_chart(self) -> None:
+        def side(*at: int) -> dict[str, str]:
+            events = [Event(n, TOOL_CHANGE, f"T3 changed at {n}") for n in at]
+            notes = to_plotly(with_lane(readings(1000), events, 600))["layout"]["annotations"]
+            return {note["text"]: note["xanchor"] for note in notes}
+
+        assert side(100) == {"T3 changed at 100": "left"}, "its left end lies at the mark"
+        assert side(990) == {"T3 changed at 990": "right"}, "no room on the right"
+        assert side(930, 965, 999) == {"T3 changed at 930": "right", "T3 changed at 965": "right"}, (
+            "two rows, then none"
+        )
+
     def test_a_chart_without_events_stays_as_it_is(self) -> None:
         chart = readings(10)
         assert with_lane(chart, [Event(99, TOOL_CHANGE, "later")], 1200) is chart
