@@ -2,7 +2,7 @@
 
 A page is answered with `page(request, "plant.html", machines=…)`. The templates find in every context what the layers
 around the route have put into `request.state`: `person` (name, role; None if nobody is signed in), `csrf` (the token
-for forms), `to_do` (how many things wait for a person, or None if not known).
+for forms), `to_do` (how many things wait for a person, or None if not known). `chosen_machine` is carried through the doors.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from app.errors import InbandError
 from app.language import i18n, numbers, times
 from app.web import period, states, theme
 from app.web.assets import Assets
-from app.web.doors import door_of, search_words
+from app.web.doors import door_of, machine_of, search_words, way_to
 from app.web.paging import address
 from app.web.request_log import note_reason
 
@@ -66,6 +66,7 @@ def environment() -> Environment:
     env.globals.update(
         address=address,
         door_of=door_of,
+        way_to=way_to,
         search_words=search_words,
         asset=assets().url,
         assets=assets(),
@@ -113,6 +114,7 @@ def render(request: Request, template: str | Template, **context: Any) -> str:
                     "person": getattr(state, "person", None),
                     "csrf": getattr(state, "csrf", ""),
                     "to_do": None,
+                    "chosen_machine": None,
                     "plant": _plant(request),
                     "plant_root": request.scope.get("root_path", ""),
                     "replica_lag": _replica_lag(request),
@@ -136,6 +138,9 @@ def page(
         for refusal in context.values():
             if isinstance(refusal, InbandError):
                 note_reason(request.scope, refusal)
+    else:
+        named = request.query_params.get("machine")
+        context = {"chosen_machine": machine_of(request.url.path, named), **context}
     return HTMLResponse(
         render(request, template, **context), status, headers={"Cache-Control": "no-store", **(headers or {})}
     )

@@ -16,6 +16,7 @@ from app.language.i18n import _
 from app.language.numbers import short
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
+from app.loop.machines import queries as machines
 from app.loop.summaries import queries as summaries
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
@@ -156,19 +157,26 @@ def proposals_page(
     request: Request,
     session: SessionDep,
     status: Annotated[str | None, Query(max_length=20)] = None,
+    machine: Word = None,
     q: Sought = "",
     before: Before = None,
 ) -> Response:
-    """Proposals, newest first: those that wait, or all."""
+    """Proposals, newest first: those that wait, or all; of one machine."""
+    of_machine = machines.machine_named(session, machine) if machine else None
     chosen = status if status in proposals.STATUSES else "all" if status == "all" else "open"
     wanted = None if chosen == "all" else chosen
-    rows = proposals.proposals(session, status=wanted, holding=q, before=before, limit=ON_PAGE + 1)
-    link = partial(address, "/proposals", status=chosen, q=q or None)
+    machine_id = of_machine.id if of_machine else None
+    rows = proposals.proposals(
+        session, machine_id=machine_id, status=wanted, holding=q, before=before, limit=ON_PAGE + 1
+    )
+    link = partial(address, "/proposals", status=chosen, machine=machine or None, q=q or None)
     return page(
         request,
         "what_if/proposals.html",
         part=part_of(rows, ON_PAGE, before, lambda row: row.proposal.id, link),
         q=q,
+        machine=of_machine,
+        machines=machines.machines(session),
         chosen=chosen,
         statuses=[*proposals.STATUSES, "all"],
         wording=wording,
