@@ -11,6 +11,7 @@ from app.language.i18n import _
 from app.loop.machines import queries as machines
 from app.views.characteristic import state_queries
 from app.views.plant import geometry_queries
+from app.views.to_do import queries as to_do
 from app.web.deps import SessionDep, Sought
 from app.web.paging import address, holds, slice_of
 from app.web.templates import page
@@ -37,7 +38,7 @@ def machines_page(
     groups = state_queries.plant(session, trends=False)
     groups = [group for group in groups if holds(q, group.machine.name, group.machine.key, group.machine.control)]
     part = slice_of(groups, ON_PAGE, after, partial(address, "/machines", q=q or None))
-    return page(request, "machines/list.html", part=part, q=q, last=_last)
+    return page(request, "machines/list.html", part=part, q=q, last=_last, to_do_at=to_do.count_by_machine(session))
 
 
 def _last(group: state_queries.Group) -> object:

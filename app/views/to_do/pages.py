@@ -33,13 +33,19 @@ def to_do_page(
     done, late: the verb of what was decided here about correction ``n`` at machine ``at``, or was decided before.
     """
     chosen = machines.machine_named(session, machine) if machine else None
+    every, by_machine = machines.machines(session), queries.count_by_machine(session)
+    waiting = queries.tasks(session, chosen)
+    own = [task for task in waiting if caller.may(task.role)]
     return page(
         request,
         "to_do/to_do.html",
-        tasks=queries.tasks(session, chosen, caller if mine else None),
+        tasks=own if mine else waiting,
+        number=len(waiting),
+        number_of_own=len(own),
         total=queries.count(session),
         machine=chosen,
-        machines=machines.machines(session),
+        machines=every,
+        by_machine={one.key: by_machine[one.id] for one in every if one.id in by_machine},
         mine=mine,
         offered=confirmation.offered,
         done=confirmation.done(done, n) if done and n else None,

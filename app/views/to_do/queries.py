@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from datetime import datetime
 from typing import Literal, NamedTuple
 
-from sqlalchemy import ColumnElement, Select, any_, func, select
+from sqlalchemy import ColumnElement, Select, any_, func, select, union_all
 from sqlalchemy.orm import Session
 
 from app.access.callers import Caller, Role
@@ -76,6 +76,17 @@ COUNT: Select[int] = select(
 def count(session: Session) -> int:
     """Number of things that wait for a person, in the whole plant."""
     return session.scalar(COUNT) or 0
+
+
+def count_by_machine(session: Session) -> dict[int, int]:
+    """Number of things that wait at each machine, by its id; background jobs belong to none."""
+    waiting = union_all(
+        select(Alarm.machine_id).where(Alarm.acknowledged_at.is_(None)),
+        select(Correction.machine_id).where(_TO_DECIDE),
+        select(ParameterProposal.machine_id).where(ParameterProposal.status == "open"),
+    ).subquery()
+    query = select(waiting.c.machine_id, func.count()).group_by(waiting.c.machine_id)
+    return dict(session.execute(query).tuples().all())
 
 
 def tasks(session: Session, machine: Machine | None = None, caller: Caller | None = None) -> list[Task]:

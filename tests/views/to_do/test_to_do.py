@@ -49,6 +49,40 @@ def test_by_machine_and_by_role(shop: Shop, server: Server, operator: Person, en
     assert len(kinds(engineer.open("/todo?mine=true"))) == 3
     assert kinds(viewer.open("/todo?mine=true")) == []
     operator.open("/todo?machine=nowhere", 404)
+    assert re.findall(r">(All|Mine) (\d+)</a>", operator.open("/todo")) == [("All", "3"), ("Mine", "2")]
+
+
+def test_machines_and_pickers_have_the_same_count(shop: Shop, server: Server, operator: Person) -> None:
+    Shop(server)  # a picker stands where there is something to pick
+    link = re.escape(f'href="/todo?machine={shop.machine}"') + "[^>]*>"
+    assert re.search(link + r"\s*<svg.*?</svg>\s*3</a>", operator.open("/machines"), re.DOTALL)
+    assert re.search(link + r'[^<]*<span class="tab-count">3</span>', operator.open("/todo"))
+
+
+def test_the_chosen_machine_is_carried_along(shop: Shop, operator: Person) -> None:
+    def links(text: str) -> list[str]:
+        return re.findall(r'<li>\s*<a href="([^"]*)"', text.split('aria-label="Main"')[1])[:5]
+
+    key = shop.machine
+    whole = ["/", "/todo", "/overview", "/machines", "/setup"]
+    chosen = [
+        "/",
+        f"/todo?machine={key}",
+        f"/overview?machine={key}",
+        f"/machines/{key}",
+        f"/setup/characteristics?machine={key}",
+    ]
+    assert links(operator.open("/alarms")) == whole
+    for path in ("/alarms", "/gauges", "/proposals"):
+        assert links(operator.open(f"{path}?machine={key}")) == chosen
+    assert links(operator.open(f"/machines/{key}/tools")) == [*chosen[:3], "/machines", chosen[4]], "back to the list"
+    assert links(operator.open("/machines/nowhere", 404)) == whole
+    assert f'href="/gauges?machine={key}"' in operator.open(f"/overview?machine={key}")
+    proposals = operator.open(f"/proposals?machine={key}")
+    assert "Fewer corrections" in proposals
+    assert f'href="/todo?machine={key}"' in proposals
+    for path in chosen:
+        operator.open(path)
 
 
 def test_each_leads_to_its_next_action(shop: Shop, engineer: Person) -> None:
@@ -84,6 +118,33 @@ def test_the_count_in_the_bar_follows_proposals(page: Page, shop: Shop, engineer
     expect(count).to_have_attribute("data-to-do", str(before + 1))
     shop.call("POST", f"/proposals/{proposal['id']}/reject", reason="Too wide")
     expect(count).to_have_attribute("data-to-do", str(before))
+    page.goto("/todo")
+    expect(page.locator("live-status")).to_have_attribute("state", "live")
+    expect(page.get_by_role("link", name=f"All {before}")).to_be_visible()
+    again = shop.call("POST", f"/characteristics/{shop.characteristic}/proposals", 201, zero_range=0.003, reason="Few")
+    expect(page.get_by_role("link", name=f"All {before + 1}")).to_be_visible()
+    page.goto("/")
+    expect(page.locator("live-status")).to_have_attribute("state", "live")
+    expect(page.locator("#plant-summary a")).to_have_attribute("data-count", str(before + 1))
+    shop.call("POST", f"/proposals/{again['id']}/reject", reason="Too wide")
+    expect(page.locator("#plant-summary a")).to_have_attribute("data-count", str(before))
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("picker", [".picker", ".period-picker"])
+def test_a_picker_is_closed_by_escape_and_by_a_click_beside_it(
+    picker: str, page: Page, shop: Shop, server: Server, viewer: Person
+) -> None:
+    Shop(server)
+    viewer.sign_in(page)
+    page.goto(f"/characteristics/{shop.characteristic}" if picker == ".period-picker" else "/alarms")
+    opened = page.locator(f"details{picker}[open]")
+    expect(page.locator("live-status")).to_have_attribute("state", "live")
+    for close in (lambda: page.keyboard.press("Escape"), lambda: page.locator("h1").click()):
+        page.locator(f"{picker} > summary").click()
+        expect(opened).to_have_count(1)
+        close()
+        expect(opened).to_have_count(0)
 
 
 def test_old_addresses_lead_on(shop: Shop, operator: Person) -> None:
