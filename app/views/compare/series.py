@@ -1,6 +1,6 @@
 """The series that are compared: a characteristic and a run of its readings each. Never writes."""
 
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from app.errors import Invalid
 from app.language.i18n import _
-from app.language.times import MINUTES, written
+from app.language.times import MINUTES, local, written
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
@@ -18,9 +18,11 @@ from app.loop.tables.characteristics import ParametersVersion
 from app.loop.tables.readings import Reading
 from app.loop.tools.lives_queries import Life, lives
 from app.web.choice import Choice
+from app.web.fields import EARLIEST
 
 MOST = 12  # series on a page
 MOST_EACH = 4  # versions or tools of one characteristic
+INSTANT = timedelta(microseconds=1)  # a reading at the beginning of a period does not belong to the one before
 
 
 class SeriesBy(StrEnum):
@@ -114,12 +116,21 @@ def _life(life: Life) -> str:
     return _("tool of {since}").format(since=written(life.began_at, MINUTES))
 
 
+def begin_before(start: datetime, end: datetime) -> datetime:
+    """The beginning of the period before; by the clock of the plant, so that before a day lies a day when the clocks change."""
+    try:
+        return local(start) - (local(end) - local(start))
+    except OverflowError:  # the calendar does not go so far, and readings go less far
+        return EARLIEST
+
+
 def _by_period(session: Session, current: CurrentCharacteristic, choice: Choice) -> list[Compared]:
     """The period and the one before it: as long by the clock, or as many readings."""
     now = statistics.window_of(session, current.characteristic, **choice._asdict())
     if choice.start is not None:
         start, end = choice.start, choice.end or datetime.now(UTC)
-        before = statistics.window_of(session, current.characteristic, start=start - (end - start), end=start)
+        begin, until = begin_before(start, end), max(start, EARLIEST) - INSTANT
+        before = statistics.window_of(session, current.characteristic, start=begin, end=until)
     else:
         through = now.first - 1
         before = Window(max(1, through - now.count + 1), through, now.newest)

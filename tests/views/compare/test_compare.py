@@ -1,12 +1,19 @@
 """Compared series: over the API and on the page."""
 
+from datetime import UTC, datetime, timedelta
 from html import unescape
 from typing import Any
+from urllib.parse import urlencode
+from zoneinfo import ZoneInfo
 
 import pytest
 
+from app.language.times import in_zone
+from app.views.compare.series import begin_before
 from tests.shop import Shop
 from tests.views.set_up.test_setup_pages import PASSWORD, Browser
+
+BERLIN = ZoneInfo("Europe/Berlin")
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +48,25 @@ def test_characteristics_versions_tools_and_periods(shop: Shop) -> None:
     assert figure["yaxis"]["range"] == figure["yaxis2"]["range"], "one scale"
     shop.call("GET", "/compare/figure?of=nobody", 404)
     shop.call("GET", f"/compare/figure?of={one}&by=size", 422)
+
+
+def test_the_period_before_is_as_long_by_the_clock(server: Any, shop: Shop) -> None:
+    def at(day: int) -> datetime:
+        return datetime(2026, 10, day, tzinfo=BERLIN).astimezone(UTC)
+
+    with in_zone(BERLIN):  # the clocks go back on the 25th
+        assert begin_before(at(25), at(26)) == at(24)
+        assert begin_before(at(26), at(27)) == at(25)
+    key = f"{shop.characteristic}-c"
+    shop.add(key)
+    begin = datetime(2026, 6, 2, 6, tzinfo=UTC)
+    for deviation, moment in ((1.0, begin - timedelta(hours=3)), (2.0, begin), (3.0, begin + timedelta(hours=3))):
+        shop.read(deviation, key, measured_at=moment.isoformat())
+    until = begin + timedelta(hours=6)
+    assert series(shop, urlencode({"of": key, "by": "period", "from": begin, "to": until})) == [[1], [2, 3]]
+    viewer = Browser(server, "Vera")
+    viewer.get(f"/compare?of={key}&by=period&from=0001-01-01T00:00&to=9999-12-31T23:59")
+    viewer.get(f"/compare?of={key}&by=period&from=0002-01-01T00:00")
 
 
 def test_the_statistics_of_each_stand_below(server: Any, shop: Shop) -> None:
