@@ -24,7 +24,7 @@ from app.charts import (
     time_axis,
 )
 from app.language.i18n import _
-from app.language.numbers import um
+from app.language.numbers import um, um_limit
 
 LOOKS: tuple[tuple[Colour, str], ...] = (
     ("steady", "circle"),
@@ -34,6 +34,7 @@ LOOKS: tuple[tuple[Colour, str], ...] = (
     ("mended", "cross"),
     ("ink", "star"),
 )
+ROOM = Room(84, 72)  # at the right for the tolerance
 BETWEEN = 0.05  # of the height, above each panel, for its name
 
 
@@ -74,13 +75,15 @@ def compare_figure(
             mark for number, course in enumerate(courses) for mark in _marks(course, number, of_tolerance, named=True)
         ]
         limits = {course.half for course in courses}
-        tolerance = _tolerance(courses[0], of_tolerance) if of_tolerance or len(limits) == 1 else []
-        return Chart([Panel([*tolerance, *marks], _axis(reach, of_tolerance))], axis, Room(84, 24))
+        common = len(limits) == 1
+        words = um_limit(courses[0].half) if common else _("tolerance")
+        tolerance = _tolerance(courses[0], of_tolerance, words) if of_tolerance or common else []
+        return Chart([Panel([*tolerance, *marks], _axis(reach, of_tolerance))], axis, ROOM)
     height = 1 / len(courses)
     panels = [
         Panel(
             [
-                *_tolerance(course, of_tolerance),
+                *_tolerance(course, of_tolerance, um_limit(course.half)),
                 *_marks(course, 0, of_tolerance, named=False),
                 Note(f"<b>{course.name}</b>", Share(0.0), Share(1, inside=True), "left", "bottom", (0, 3)),
                 *([] if course.x else [empty(_("No readings here"))]),
@@ -90,7 +93,7 @@ def compare_figure(
         )
         for number, course in enumerate(courses)
     ]
-    return Chart(panels, axis, Room(84, 24))
+    return Chart(panels, axis, ROOM)
 
 
 def _value(deviation: float, course: Course, of_tolerance: bool) -> float:
@@ -109,11 +112,10 @@ def _axis(reach: tuple[float, float] | None, of_tolerance: bool, *, brief: bool 
     return Axis(title, reach=reach, format="+.4~g", ticks=5, zero="faint")
 
 
-def _tolerance(course: Course, of_tolerance: bool) -> list[Mark]:
-    return [
-        Rule(Pen("quiet", 1.5), _value(side * course.half, course, of_tolerance), words=um(side * course.half), on=True)
-        for side in (-1, 1)
-    ]
+def _tolerance(course: Course, of_tolerance: bool, words: str) -> list[Mark]:
+    """The limits, with words beside the upper one: those of both would meet where the scale is that of a wider tolerance."""
+    upper, lower = (_value(side * course.half, course, of_tolerance) for side in (1, -1))
+    return [Rule(Pen("quiet", 1.5), upper, words=words), Rule(Pen("quiet", 1.5), lower)]
 
 
 def _marks(course: Course, number: int, of_tolerance: bool, *, named: bool) -> list[Mark]:

@@ -37,6 +37,10 @@ def series(shop: Shop, query: str) -> list[list[float]]:
     return [[round(y, 3) for y in trace["y"]] for trace in figure["data"] if trace.get("meta") == "readings"]
 
 
+def words(shop: Shop, query: str) -> set[str]:
+    return {note["text"] for note in shop.call("GET", f"/compare/figure?{query}")["layout"]["annotations"]}
+
+
 def test_characteristics_versions_tools_and_periods(shop: Shop) -> None:
     one, two = shop.characteristic, f"{shop.characteristic}-b"
     assert series(shop, f"of={one}&of={two}") == [[1, 2, 3, -1, -2], [8]]
@@ -46,6 +50,9 @@ def test_characteristics_versions_tools_and_periods(shop: Shop) -> None:
     assert series(shop, f"of={one}&by=period&last=2") == [[2, 3], [-1, -2]]
     figure = shop.call("GET", f"/compare/figure?of={one}&of={two}")["layout"]
     assert figure["yaxis"]["range"] == figure["yaxis2"]["range"], "one scale"
+    assert words(shop, f"of={one}&of={two}") >= {"±8\xa0µm", "±16\xa0µm"}
+    assert not words(shop, f"of={one}&of={two}&overlaid=true") & {"±8\xa0µm", "tolerance"}, "no limit of all"
+    assert "tolerance" in words(shop, f"of={one}&of={two}&overlaid=true&of_tolerance=true")
     shop.call("GET", "/compare/figure?of=nobody", 404)
     shop.call("GET", f"/compare/figure?of={one}&by=size", 422)
 
