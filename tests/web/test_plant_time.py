@@ -75,6 +75,7 @@ def test_reports_in_all_renderings(shop: Shop, server: Server) -> None:
     assert "times are those of Europe/Berlin" in page
     assert len(re.findall(r"report\.(?:pdf|xlsx|csv|json)\?[^\"]*timezone=Europe%2FBerlin", page)) >= 3
     rows = list(csv.DictReader(io.StringIO(shop.admin.get(path(shop, "/report.csv")).text.removeprefix("\ufeff"))))
+    assert [row["text"] for row in rows if row["key"] == "timezone"] == ["Europe/Berlin"]
     measured = [row["value"] for row in rows if (row["section"], row["key"]) == ("decisions", "measured_at")]
     assert measured == ["2026-10-25T03:30:00+01:00", "2026-10-25T02:30:00+01:00", "2026-10-25T02:30:00+02:00"]
     book = openpyxl.load_workbook(io.BytesIO(shop.admin.get(path(shop, "/report.xlsx")).content))

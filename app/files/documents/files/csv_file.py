@@ -35,6 +35,7 @@ def csv_of(report: Report) -> bytes:
         line("head", "", fact.key, fact.name, fact.value)
     sentence("head", "name", 1, report.name)
     sentence("head", "period", 1, report.period)
+    sentence("head", "timezone", 1, report.zone)
     line("head", "", "made_at", "", report.made_at)
     for section in report.sections:
         for number, text in enumerate(section.sentences, start=1):
