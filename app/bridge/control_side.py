@@ -62,6 +62,7 @@ async def _connected(unit: Unit) -> None:
             await guided_test.advance(unit)
         if time.monotonic() >= full_at:
             full, full_at = await store.is_full(), time.monotonic() + FULL_EVERY
+            await unit.look_if_held()  # the server's side does not come to it while the server is away
         if full:
             raise StoreError(
                 f"The store holds {store.largest / 1e6:g} MB, its largest size: nothing is fetched until the server has"
@@ -83,7 +84,7 @@ async def _connected(unit: Unit) -> None:
                     unit.to_tell = True
                     unit.news.set()
                 answered = outcome.number
-            await link.offer(() if unit.test is not None and unit.test.holds else unit.orders)
+            await link.offer(unit.offered)
         if time.monotonic() >= offsets_at:
             async with asyncio.timeout(machine.patience):
                 offsets = await link.offsets()

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import logging
+import math
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from datetime import UTC, datetime
@@ -174,13 +175,10 @@ async def _ask(unit: Unit, client: AsyncClient) -> None:
     pending = await client.pending(machine.key)
     told = {intent.order.number: intent for intent in await store.intents(machine.key, "told")} if pending else {}
     known = await store.known(machine.key)
-    unit.held = (
-        unit.hold_all
-        or await store.fact("", "hold_all") is not None
-        or await store.fact(machine.key, "hold") is not None
-    )
+    await unit.look_if_held()
     orders: list[Order] = []
     waiting: list[str] = []
+    until = math.inf
     now = datetime.now(UTC)
     for correction in pending:
         if correction.offset_expected is None:
@@ -190,8 +188,11 @@ async def _ask(unit: Unit, client: AsyncClient) -> None:
         if earlier := told.get(correction.number):
             await _tell_again(unit, client, order, earlier)
             continue
-        verdict = against(order, correction.created_at or now, now, machine, known, unit.held)
+        issued = correction.created_at or now
+        verdict = against(order, issued, now, machine, known, unit.held)
         if verdict is None:
+            if not orders:
+                until = time.monotonic() + machine.largest_age - (now - issued).total_seconds()
             orders.append(order)
         elif verdict.final:
             await client.reject(machine.key, order.number, verdict.reason)
@@ -199,10 +200,10 @@ async def _ask(unit: Unit, client: AsyncClient) -> None:
             waiting.append(verdict.reason)
             break  # the order of corrections is theirs: what stands behind waits too
     unit.held_back = tuple(waiting)
-    await _intend(unit, orders)
+    await _intend(unit, orders, until)
 
 
-async def _intend(unit: Unit, orders: Sequence[Order]) -> None:
+async def _intend(unit: Unit, orders: Sequence[Order], until: float = math.inf) -> None:
     """Note what is offered before the control hears of it, and what is taken back."""
     key = unit.machine.key
     wanted = {order.number for order in orders}
@@ -212,7 +213,7 @@ async def _intend(unit: Unit, orders: Sequence[Order]) -> None:
     for order in orders[:1]:
         location = next(place for place in unit.machine.location if place.tool_memory == order.tool_memory)
         await unit.store.intend(key, order, unit.machine.mapping_hash(location))
-    unit.orders = tuple(orders[:1])
+    unit.orders, unit.orders_until = tuple(orders[:1]), until
 
 
 async def _tell_again(unit: Unit, client: AsyncClient, order: Order, earlier: Intent) -> None:

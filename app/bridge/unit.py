@@ -2,6 +2,8 @@
 
 import asyncio
 import logging
+import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -51,8 +53,9 @@ class Unit:
     """One machine.
 
     hold_all: by the configuration; held: by that or by command. orders: corrections that passed the guards; the control side
-    offers them. news: something waits for the server; to_tell: an answer of the control is among it. state and detail: the control's side, as the heartbeat tells it. held_back: sentences why corrections wait. trouble: the server's
-    side, None while it answers. context: what an MTConnect agent tells of the machine. test: the touch test that is open; no
+    offers them, until orders_until (of the monotonic clock), when the oldest is too old. news: something waits for the server;
+    to_tell: an answer of the control is among it. state and detail: the control's side, as the heartbeat tells it. held_back:
+    sentences why corrections wait. trouble: the server's side, None while it answers. context: what an MTConnect agent tells of the machine. test: the touch test that is open; no
     correction is offered meanwhile; test_open: there is one. beat_now: the heartbeat waits no longer.
     """
 
@@ -63,6 +66,7 @@ class Unit:
     held: bool = False
     identity: str | None = None
     orders: Sequence[Order] = ()
+    orders_until: float = math.inf
     news: asyncio.Event = field(default_factory=asyncio.Event)
     to_tell: bool = False
     state: str = "starting"
@@ -75,6 +79,17 @@ class Unit:
     test: Guided | None = None
     test_open: asyncio.Event = field(default_factory=asyncio.Event)
     beat_now: asyncio.Event = field(default_factory=asyncio.Event)
+
+    @property
+    def offered(self) -> Sequence[Order]:
+        """The corrections that the control may have now; without a server too a hold and an age count."""
+        waits = self.held or (self.test is not None and self.test.holds) or time.monotonic() > self.orders_until
+        return () if waits else self.orders
+
+    async def look_if_held(self) -> None:
+        """Look whether corrections are on hold, by the configuration or by command. Raises `StoreError`."""
+        facts = [await self.store.fact("", "hold_all"), await self.store.fact(self.machine.key, "hold")]
+        self.held = self.hold_all or any(fact is not None for fact in facts)
 
     def say(self, state: str, detail: str = "") -> None:
         """Note how the control's side is doing; a change is logged."""

@@ -1,0 +1,58 @@
+"""The control's side alone: the server is away, and what keeps a correction from the control counts all the same."""
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.bridge import control_side
+from app.bridge.links import Order
+from app.bridge.simulators.model import Feature, Model
+from app.bridge.unit import Unit, ended
+from app.core.ring import Register
+from tests.bridge.plant import store_in, unit_of, until
+from tests.loops import run
+
+M = "lathe-1"
+
+
+async def held_by_command(unit: Unit) -> None:
+    await unit.store.note("", "hold_all", "by the command line")
+
+
+async def held_for_one_machine(unit: Unit) -> None:
+    await unit.store.note(M, "hold", "by the command line")
+
+
+async def too_old(unit: Unit) -> None:
+    unit.orders_until = time.monotonic()
+
+
+@pytest.mark.parametrize("event", [held_by_command, held_for_one_machine, too_old])
+def test_an_offered_correction_is_withdrawn_while_the_server_is_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, event: Callable[[Unit], Awaitable[Any]]
+) -> None:
+    monkeypatch.setattr(control_side, "FULL_EVERY", 0.05)
+    model = Model((Feature(bias=0.0, wear=0.0, noise=0.0),))
+    for _ in model.part():
+        pass
+
+    async def story() -> None:
+        unit = unit_of(model, store_in(tmp_path))
+        order = Order(1, 3, 0.0, -0.01)
+        await unit.store.intend(M, order, "hash")
+        unit.orders = (order,)
+        task = asyncio.create_task(control_side.run(unit))
+        await until(lambda: model.registers[Register.MAIL_NUMBER] == 1, "the correction in the mailbox")
+        await event(unit)
+        await until(lambda: model.registers[Register.MAIL_NUMBER] == 0, "the correction taken back")
+        await ended([task])
+        unit.store.close()
+
+    run(story())
+    for _ in model.part():  # the NC program finds nothing to apply
+        pass
+    assert list(model.offsets.values()) == [0.0]
