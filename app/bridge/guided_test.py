@@ -16,8 +16,9 @@ from typing import Any, Final
 import msgspec
 
 from app.bridge import offset_change
-from app.bridge.links import LinkError
+from app.bridge.links import LinkError, Misconfigured
 from app.bridge.offset_change import FACT, Change
+from app.bridge.store import StoreError
 from app.bridge.unit import Guided, Unit
 from inband_client import AsyncClient, Conflict, Invalid, NotFound, ProblemError
 
@@ -50,8 +51,13 @@ async def hear(unit: Unit, told: dict[str, Any] | None) -> None:
 
 async def _against(unit: Unit, told: dict[str, Any]) -> tuple[str, str] | None:
     machine, memory = unit.machine, told["tool_memory"]
-    if told["state"] != "asked":
+    if told["state"] == "read":
         return "cancelled", "The bridge was started anew during the touch test. Nothing was written."
+    if told["state"] != "asked":  # a note of it would be in the store from which it was written
+        return "failed", (
+            "The bridge was started anew, and its store knows nothing of this touch test. Look whether the control shows the"
+            " number of before; if not, set that by hand."
+        )
     if not machine.touch_tests_by_page:
         return "failed", (
             "This bridge makes no touch tests by the page. Set touch_tests_by_page = true in"
@@ -101,8 +107,7 @@ async def advance(unit: Unit) -> None:
         if test.ending is not None:
             await _take_back(unit, test, test.ending)
         elif test.reached == "asked":
-            change = await offset_change.planned(unit.link, unit.machine, test.tool_memory, test.amount, test.number)
-            _reached(test, "read", change)
+            await _read(unit, test)
         elif test.reached == "read" and test.heard == "go":
             await _write(unit, test)
 
@@ -120,10 +125,20 @@ def _decide(test: Guided) -> None:
         test.ending = ("cancelled", f"No answer came for {LIMIT / 60:g} minutes, from a person or from the server.")
 
 
+async def _read(unit: Unit, test: Guided) -> None:
+    try:
+        change = await offset_change.planned(unit.link, unit.machine, test.tool_memory, test.amount, test.number)
+    except Misconfigured as error:  # it comes again, and would hold up the readings
+        test.ending = ("failed", str(error))
+        return
+    if test.end is None:  # the other task may have ended it meanwhile
+        _reached(test, "read", change)
+
+
 async def _write(unit: Unit, test: Guided) -> None:
     change = test.change
     assert change is not None  # it is read
-    if test.age > GO_LIMIT:
+    if time.monotonic() - test.since > GO_LIMIT:
         test.ending = ("cancelled", "The answer came too late to the bridge. Nothing was written.")
     elif reason := await offset_change.changed_since(unit.link, unit.machine, change):
         test.ending = ("failed", reason)
@@ -131,10 +146,10 @@ async def _write(unit: Unit, test: Guided) -> None:
         return
     test.changed = True
     test.ending = ("failed", "The control did not answer when the offset was written.")  # until it has
-    await offset_change.note(unit.store, unit.machine.key, change)
     try:
+        await offset_change.note(unit.store, unit.machine.key, change)
         reason = await offset_change.write(unit.link, unit.machine, change)
-    except LinkError as error:
+    except (LinkError, StoreError) as error:
         test.ending = ("failed", str(error))
         return
     test.ending = ("not_proved", reason) if reason else None
@@ -150,12 +165,17 @@ async def _take_back(unit: Unit, test: Guided, ending: tuple[str, str]) -> None:
     state, words = ending
     if test.changed:
         assert test.change is not None  # it was noted
-        back = await offset_change.take_back(unit.link, unit.machine, test.change)
+        try:
+            back = await offset_change.take_back(unit.link, unit.machine, test.change)
+        except LinkError as error:
+            words = f"The touch test of tool memory {test.tool_memory} is not taken back yet: {error}"
+            raise type(error)(f"{words} {test.change.by_hand} Or wait: it is tried again.") from error
         words = f"{words} {back.words}".strip()
         if not back.kept:
             state = "failed"
         elif state == "proved" and not back.untouched:
-            state, words = "failed", f"Somebody has set the offset back before the bridge did. {words}"
+            why = "The offset was back before: set by hand, or by an attempt whose answer was lost."
+            state, words = "failed", f"{why} It proves nothing; make the test again. {words}"
     await _conclude(unit, test, state, words)
 
 
@@ -204,6 +224,7 @@ async def _talk(unit: Unit, client: AsyncClient) -> None:
     end, reached = test.end, test.reached
     if test.number is not None:
         path = f"/machines/{unit.machine.key}/touch-tests/{test.number}"
+        asked_at = time.monotonic()
         try:
             if reached != test.told:
                 answer = await client.post(f"{path}/report", _report(test, reached), repeat=True)
@@ -214,16 +235,17 @@ async def _talk(unit: Unit, client: AsyncClient) -> None:
             log.warning("%s: touch test %d: %s", unit.machine.key, test.number, error)
             test.ending = test.ending or ("cancelled", "The server knows of this touch test no longer.")
         else:
-            _heard(test, answer)
+            _heard(test, answer, asked_at)
     if end is not None:
         await _forget(unit)
 
 
-def _heard(test: Guided, answer: dict[str, Any]) -> None:
-    state, test.age, test.refused = answer["state"], answer["state_age"], answer["refused"]
+def _heard(test: Guided, answer: dict[str, Any], asked_at: float) -> None:
+    state, since, test.refused = answer["state"], asked_at - answer["state_age"], answer["refused"]
     if state != test.heard:
         test.until = time.monotonic() + LIMIT
-    test.heard = state
+        test.since = since
+    test.heard, test.since = state, min(test.since, since)
     if test.ending is None and (state == "stopping" or answer["ended_at"] is not None):
         test.ending = ("cancelled", "Stopped by a person.")
 

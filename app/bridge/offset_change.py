@@ -89,7 +89,7 @@ async def planned(link: Link, machine: Machine, tool_memory: int, amount: float,
 async def noted(store: Store, machine: str) -> Change | None:
     """The change that is noted in the store: its offset may be at the control."""
     found = await store.fact(machine, FACT)
-    return None if found is None else msgspec.json.decode(found, type=Change)
+    return None if found is None else change_of(found)
 
 
 async def note(store: Store, machine: str, change: Change | None) -> None:
@@ -100,6 +100,11 @@ async def note(store: Store, machine: str, change: Change | None) -> None:
 def text_of(change: Change) -> str:
     """A change as the store keeps it."""
     return msgspec.json.encode(change).decode()
+
+
+def change_of(text: str) -> Change:
+    """A change from the store."""
+    return msgspec.json.decode(text, type=Change)
 
 
 async def changed_since(link: Link, machine: Machine, change: Change) -> str | None:
@@ -152,7 +157,7 @@ async def take_back(link: Link, machine: Machine, change: Change) -> Back:
     if _near(held, change.before, machine, change):
         return Back(True, untouched, f"Taken back: {change.shown_before:.4f} {change.unit} in {change.place}.")
     if _near(held, change.after, machine, change):
-        raise ControlAway(f"The touch test is not taken back yet. {change.by_hand} Or wait: it is tried again.")
+        raise ControlAway("The control still holds the offset of the test after the one of before was written.")
     found = _shown(held, machine, change)
     return Back(
         False,

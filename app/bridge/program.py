@@ -7,7 +7,7 @@ import ssl
 from pathlib import Path
 
 from app import memory
-from app.bridge import control_side, guided_test, server_side
+from app.bridge import control_side, guided_test, offset_change, server_side
 from app.bridge.configuration import Configuration, Machine
 from app.bridge.kinds import kind_named
 from app.bridge.kinds.mtconnect import Context
@@ -57,6 +57,7 @@ async def run(configuration: Configuration, store: Store) -> None:
                 tasks.append(asyncio.create_task(work, name=f"{machine.key} {name}"))
         tasks.append(asyncio.create_task(memory.give_back_free_memory(), name="memory"))
         tasks.append(asyncio.create_task(_tidy(store, configuration.store.keep * 3600), name="tidy"))
+        await _tell_what_is_left(configuration, store)
         log.info("%d machines, server %s", len(configuration.machines), configuration.server.url)
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_EXCEPTION)  # cancelled, the tasks go on
@@ -67,6 +68,18 @@ async def run(configuration: Configuration, store: Store) -> None:
                 await guided_test.end_all(units)
             finally:
                 await ended(tasks)
+
+
+async def _tell_what_is_left(configuration: Configuration, store: Store) -> None:
+    """Say which offsets of a touch test nobody takes back: those of machines that the configuration does not name any more."""
+    named = {machine.key for machine in configuration.machines}
+    for key, text in (await store.facts(offset_change.FACT)).items():
+        change = offset_change.change_of(text)
+        if key not in named and change.end is None:
+            log.error(
+                "%s: a touch test was cut off, and the configuration has no [machine.%s] any more. %s",
+                key, key, change.by_hand,
+            )  # fmt: skip
 
 
 async def _tidy(store: Store, keep: float) -> None:

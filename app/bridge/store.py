@@ -11,9 +11,9 @@ import queue
 import sqlite3
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
@@ -115,6 +115,22 @@ class Store:
         self._jobs.put(None)
         self._thread.join()
         self._database.close()
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keep every other program from the controls while it lasts; a killed one keeps nobody. Raises `StoreError`."""
+        file = self.file.with_name(f"{self.file.name}.running")
+        with closing(sqlite3.connect(file, isolation_level=None, check_same_thread=False, timeout=0)) as lock:
+            try:
+                lock.execute("BEGIN EXCLUSIVE")
+            except sqlite3.OperationalError as error:
+                if "locked" not in str(error):
+                    raise _in_words(error, file, "opened") from error
+                raise StoreError(
+                    f"Another program works with the controls of {self.file}: a bridge, or a touch test. End it first (as a"
+                    " service: systemctl stop); one store has one bridge."
+                ) from error
+            yield
 
     # --- readings
 
@@ -389,6 +405,13 @@ class Store:
             ).fetchone()
         )
         return row[0] if row else None
+
+    async def facts(self, name: str) -> dict[str, str]:
+        """A fact of every machine that has it, also of one that the configuration does not name any more."""
+        rows = await self._run(
+            lambda database: database.execute("SELECT machine, value FROM fact WHERE name = ?", (name,)).fetchall()
+        )
+        return dict(rows)
 
     async def note(self, machine: str, name: str, value: str | None) -> None:
         """Note a fact; None forgets it."""

@@ -21,7 +21,8 @@ log = logging.getLogger(__name__)
 class Guided:
     """A touch test that a person guides at the page.
 
-    number: at the server, None for one of the command that was cut off. heard: its state at the server; age: of that state, s.
+    number: at the server, None for one of the command that was cut off. heard: its state at the server; since: when it began at
+    the latest, by the bridge's own clock, for a server may be away and its clock may be set.
     refused: the question that was answered with no. reached: the state that the bridge has brought it to; told: the one of these
     that the server knows. change: once it is read. changed: the control may hold its offset. ending: the state and the words
     that it ends with as soon as the offset is taken back; end: these, when it is. until: when the bridge waits no longer for a
@@ -33,7 +34,7 @@ class Guided:
     amount: float
     until: float
     heard: str = "asked"
-    age: float = 0.0
+    since: float = 0.0
     refused: str | None = None
     reached: str = "asked"
     told: str = "asked"

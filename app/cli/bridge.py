@@ -40,8 +40,10 @@ def _configuration(file: Path) -> "Configuration":
         ) from error
 
 
-def _with_store(file: Path, work: "Callable[[Configuration, Store], Coroutine[Any, Any, None]]") -> None:
-    """Do something with the configuration and its store."""
+def _with_store(
+    file: Path, work: "Callable[[Configuration, Store], Coroutine[Any, Any, None]]", *, alone: bool = False
+) -> None:
+    """Do something with the configuration and its store. alone: no other program may work with the controls meanwhile."""
     from app.bridge.program import store_of
     from app.bridge.store import StoreError
 
@@ -49,7 +51,8 @@ def _with_store(file: Path, work: "Callable[[Configuration, Store], Coroutine[An
     try:
         store = store_of(configuration)
         try:
-            asyncio.run(work(configuration, store))
+            with store.alone() if alone else contextlib.nullcontext():
+                asyncio.run(work(configuration, store))
         finally:
             store.close()
     except StoreError as error:
@@ -74,7 +77,7 @@ def run_bridge(context: typer.Context, config: ConfigFile = PLANT) -> None:
         with contextlib.suppress(asyncio.CancelledError):
             await running
 
-    _with_store(config, work)
+    _with_store(config, work, alone=True)
 
 
 @bridge.command("check")
@@ -343,7 +346,7 @@ def touch_test(
         if not await run_test(chosen, tool_memory, amount, store, say, typer.confirm):
             raise typer.Exit(1)
 
-    _with_store(config, work)
+    _with_store(config, work, alone=True)
 
 
 def _known(configuration: "Configuration", machine: str | None) -> str:

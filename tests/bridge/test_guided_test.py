@@ -1,23 +1,27 @@
 """The touch test that a person guides at the page: server, bridge, control, and a browser."""
 
 import asyncio
+import math
 import threading
+import time
 from collections.abc import Callable, Coroutine
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import psycopg
 import pytest
 from playwright.sync_api import Page, expect
 
 from app.bridge import control_side, guided_test, offset_change
-from app.bridge.configuration import Machine
+from app.bridge.configuration import Location, Machine
 from app.bridge.kinds import opcua
 from app.bridge.offset_change import noted
 from app.bridge.simulators.model import Feature, Model
 from app.bridge.simulators.opcua import serve
 from app.bridge.store import Store
-from app.bridge.unit import Unit, ended
+from app.bridge.unit import Guided, Unit, ended
+from app.loop.connections.touch_tests.pages import TOO_SOON
 from tests.bridge.kinds.test_opcua import machine as opcua_machine
 from tests.bridge.plant import ModelRegisters, bridge, store_in, unit_of, until
 from tests.conftest import Server
@@ -145,11 +149,17 @@ def test_a_location_is_proved_at_the_page(shop: Shop, server: Server, model: Mod
         expect(part.locator(".readout.big")).to_contain_text("0.0000mm")
         expect(part).to_contain_text("wear_length_1 of tool 3, edge 1")
         assert model.offsets[PLACE] == BEFORE
+        page.wait_for_timeout(TOO_SOON * 1000)
         part.get_by_role("button", name="Yes, change it").click()
         expect(part.locator(".readout.big")).to_contain_text("0.0100mm")
         assert model.offsets[PLACE] == pytest.approx(AFTER)
+        page.wait_for_timeout(TOO_SOON * 1000)
         part.get_by_role("button", name="Yes").click()
         expect(part).to_contain_text("10 µm larger in size")
+        part.get_by_role("button", name="Yes").click()  # a second click
+        expect(page.get_by_text("this did not count")).to_be_visible()
+        expect(part).to_contain_text("Step 3 of 3")
+        page.wait_for_timeout(TOO_SOON * 1000)
         part.get_by_role("button", name="Yes").click()
         expect(part).to_contain_text("Proved")
         expect(part).to_contain_text("Taken back: 0.0000 mm")
@@ -378,6 +388,121 @@ def test_the_bridge_refuses_by_itself(
         assert one.test.end is not None
         assert one.test.end[0] == "failed"
         assert said in one.test.end[1]
+        one.store.close()
+
+    scenario(work)
+
+
+@pytest.mark.parametrize(
+    ("state", "ends", "said"),
+    [
+        ("read", "cancelled", "Nothing was written"),
+        ("go", "failed", "knows nothing"),
+        ("written", "failed", "knows nothing"),
+    ],
+)
+def test_a_test_that_the_store_knows_nothing_of_says_nothing_that_may_be_false(
+    shop: Shop, model: Model, tmp_path: Path, state: str, ends: str, said: str
+) -> None:
+    """The computer of the bridge was exchanged, and its store with it: the offset may be at the control."""
+
+    async def work() -> None:
+        one = unit(shop, model, store_in(tmp_path))
+        one.state = "online"
+        await guided_test.hear(one, {"id": 1, "tool_memory": 3, "amount": 0.01, "state": state})
+        assert one.test is not None
+        assert one.test.end is not None
+        assert one.test.end[0] == ends
+        assert said in one.test.end[1]
+        one.store.close()
+
+    scenario(work)
+
+
+def test_a_go_that_is_old_writes_nothing(shop: Shop, model: Model, tmp_path: Path) -> None:
+    """Control and server were away together after the yes; and the server's clock was set back meanwhile."""
+
+    async def work() -> None:
+        one = unit(shop, model, store_in(tmp_path))
+        test = one.test = Guided(1, 3, 0.01, math.inf)
+        await one.link.connect()
+        await guided_test.advance(one)
+        assert test.reached == "read"
+        said = {"state": "go", "refused": None, "ended_at": None}
+        now = time.monotonic()
+        guided_test._heard(test, said | {"state_age": 2.0}, now - 29.0)
+        guided_test._heard(test, said | {"state_age": 0.0}, now)
+        for _ in range(2):
+            await guided_test.advance(one)
+        assert test.end == ("cancelled", "The answer came too late to the bridge. Nothing was written.")
+        assert model.offsets[PLACE] == BEFORE
+        one.store.close()
+
+    scenario(work)
+
+
+class Unreadable(ModelRegisters):
+    async def read_offset(self, location: Location) -> float | None:
+        return None
+
+
+def test_an_offset_that_cannot_be_read_ends_the_test_and_holds_up_no_reading(
+    shop: Shop, model: Model, tmp_path: Path
+) -> None:
+    async def work() -> None:
+        one = unit(shop, model, store_in(tmp_path), Unreadable(model))
+        async with running(shop, one) as guide:
+            await guide.ask()
+            over = await guide.reaches("failed")
+            assert "cannot be read" in over["detail"]
+            assert one.state == "online"
+        one.store.close()
+
+    scenario(work)
+
+
+def test_a_program_that_runs_again_is_named_while_the_offset_is_not_taken_back(
+    shop: Shop, model: Model, tmp_path: Path
+) -> None:
+    async def work() -> None:
+        registers = ModelRegisters(model)
+        one = unit(shop, model, store_in(tmp_path), registers)
+        async with running(shop, one) as guide:
+            await guide.ask()
+            await guide.comes_to("written")
+            registers.may_write = "Tool 3 is in use by a program that has not ended."
+            await guide.call("POST", f"/{guide.number}/stop")
+            await until(lambda: "is not taken back yet: Tool 3 is in use" in one.detail, "the sentence")
+            assert "Set 0.0000 mm in wear_length_1 of tool 3, edge 1 by hand." in one.detail
+            registers.may_write = None
+            await guide.reaches("cancelled")
+            assert model.offsets[PLACE] == pytest.approx(BEFORE)
+        one.store.close()
+
+    scenario(work)
+
+
+def test_the_page_says_what_to_set_by_hand_while_the_bridge_is_waited_for(
+    shop: Shop, server: Server, model: Model, tmp_path: Path
+) -> None:
+    async def work() -> None:
+        one = unit(shop, model, store_in(tmp_path))
+        async with running(shop, one) as guide:
+            await guide.ask()
+            await guide.comes_to("written")
+        # the computer of the bridge is off
+        await guide.says("after")
+        await guide.says("size")
+        person = Person(server, "operator")
+        path = f"/machines/{shop.machine}/touch-tests/{guide.number}"
+        assert "set that by hand" not in await asyncio.to_thread(person.open, path)
+        with psycopg.connect(shop.server.database.dsn) as connection:
+            connection.execute(
+                "UPDATE touch_test SET state_at = state_at - interval '1 minute' WHERE id = %s", [guide.number]
+            )
+        page = await asyncio.to_thread(person.open, path)
+        assert "the screen showed 0.0000 mm in wear_length_1 of tool 3, edge 1" in page
+        assert "set that by hand" in page
         one.store.close()
 
     scenario(work)

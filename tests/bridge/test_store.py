@@ -198,6 +198,16 @@ def test_a_full_store_is_seen_and_room_that_was_freed_counts(tmp_path: Path) -> 
     run(story())
 
 
+def test_one_program_at_a_time_works_with_the_controls(tmp_path: Path) -> None:
+    store, other = Store(tmp_path / "store.sqlite3"), Store(tmp_path / "store.sqlite3")
+    with store.alone():
+        with pytest.raises(StoreError, match="Another program works with the controls"), other.alone():
+            pass
+        run(other.note(M, "hold", "x"))  # commands go on
+    with other.alone():
+        pass
+
+
 WRITER = """
 import asyncio, sys
 from pathlib import Path

@@ -1,12 +1,14 @@
 """Pages: one touch test, step by step."""
 
 from datetime import timedelta
+from typing import Final
 
 from fastapi import APIRouter, Request, Response
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Operator, Viewer
 from app.errors import Conflict
+from app.loop.connections.queries import find_connection
 from app.loop.connections.touch_tests import actions, queries, wording
 from app.loop.connections.touch_tests.schemas import QUESTIONS, TouchTestAnswer, TouchTestIn
 from app.loop.machines.queries import machine_named
@@ -17,6 +19,10 @@ from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 TESTS = "/machines/{machine}/touch-tests"
+TOO_SOON: Final = 1.0
+"""s: nobody has looked at the control since the question stands there; a second click, or another browser, came in between."""
+LATE: Final = 15.0
+"""s within which a bridge writes or takes back."""
 
 
 @router.post(TESTS)
@@ -37,6 +43,9 @@ def touch_test_page(
 ) -> Response:
     """One touch test: what to compare now, or what came of it. late: the question was answered or stopped before."""
     row = queries.touch_test(session, machine_named(session, machine), number)
+    settings: Settings = request.app.state.settings
+    connection = find_connection(session, row.machine.id)
+    silent = connection is None or connection.silent(timedelta(seconds=settings.bridge_silent_after))
     return page(
         request,
         "connections/touch_test.html",
@@ -44,6 +53,8 @@ def touch_test_page(
         test=row.test,
         question=QUESTIONS.get(row.test.state),
         late=bool(late),
+        awaited=wording.awaited(row, LATE, silent=silent),
+        said=None if connection is None or silent else connection.connection.detail,
         wording=wording,
     )
 
@@ -53,6 +64,9 @@ def answer(session: SessionDep, caller: Operator, machine: str, number: int, for
     """Answer the question. Sent late, it changes nothing and says so."""
     yes = {"yes": True, "no": False}.get(form.get("answer", ""))
     given = parsed(TouchTestAnswer, {"question": form.get("question"), "yes": yes})
+    row = queries.touch_test(session, machine_named(session, machine), number)
+    if given.yes and row.test.ended_at is None and row.state_age < TOO_SOON:
+        return _to(machine, number, late=True)
     try:
         actions.answer(session, machine, number, given, caller)
     except Conflict:

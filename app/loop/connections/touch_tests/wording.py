@@ -1,6 +1,7 @@
 """Touch tests in words: states, questions, and what a person has to do."""
 
 from app.language.i18n import _
+from app.loop.connections.touch_tests.queries import TouchTestRow
 from app.loop.tables.touch_tests import TouchTest
 from app.web.states import State, show
 
@@ -34,6 +35,13 @@ def explained(state: str) -> str:
         "failed": _("it failed"),
         "cancelled": _("it was stopped"),
     }[state]
+
+
+def awaited(row: TouchTestRow, late: float, *, silent: bool) -> bool:
+    """Tell if a bridge that may have changed the offset is waited for in vain; late: s."""
+    state = row.test.state
+    overdue = state in {"go", "answered", "stopping"} and row.state_age > late
+    return overdue or (silent and row.test.ended_at is None and state not in {"asked", "read"})
 
 
 def how_to_allow(machine: str) -> str:
