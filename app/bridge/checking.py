@@ -8,7 +8,8 @@ from app.bridge.configuration import Configuration, Machine
 from app.bridge.kinds.mtconnect import AgentError, Context
 from app.bridge.links import LinkError, Position, look_who_answers, silence
 from app.bridge.program import link_of
-from inband_client import AsyncClient, Forbidden, NotFound, ProblemError, Unauthorized, Unavailable
+from app.bridge.server_side import TRUST
+from inband_client import AsyncClient, Forbidden, NotFound, ProblemError, Unauthorized, Unavailable, Untrusted
 
 
 class Finding(NamedTuple):
@@ -61,6 +62,8 @@ async def _server(configuration: Configuration, machine: Machine) -> AsyncIterat
                     )
         except (Unauthorized, Forbidden) as error:
             yield Finding(machine.key, f"the server refuses the key: {error.detail} Make a new one in Set-up.", False)
+        except Untrusted as error:
+            yield Finding(machine.key, f"{error.detail} {TRUST}", False)
         except Unavailable as error:
             words = f"the server {url} does not answer ({error.detail}) Does it run, and is the address right?"
             yield Finding(machine.key, words, False)

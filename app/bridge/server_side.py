@@ -30,12 +30,14 @@ from inband_client import (
     TooLarge,
     Unauthorized,
     Unavailable,
+    Untrusted,
 )
 
 log = logging.getLogger(__name__)
 REFUSED = (Conflict, Invalid, NotFound, TooLarge)
 SHORTEST_PAUSE, LONGEST_PAUSE = 1.0, 30.0  # s
-AWAY = (Unauthorized, Forbidden, Unavailable)
+AWAY = (Unauthorized, Forbidden, Unavailable, Untrusted)
+TRUST = "Look at server.url; if it is right, name the authority that signed the certificate in server.ca."
 TOGETHER = 100  # readings of a backlog in one request
 MOST_DETAIL = 1000  # characters
 NOTICED = 0.0005  # mm: what an offset may differ by without being told
@@ -80,6 +82,8 @@ def _sentence(unit: Unit, error: Exception) -> tuple[float, str]:
             return LONGEST_PAUSE, (
                 f"The server refuses the key of {unit.machine.key}: {error.detail} Make a new key in Set-up, Machines."
             )
+        case Untrusted():
+            return LONGEST_PAUSE, f"{error.detail} {TRUST}"
         case Unavailable():
             waits = min(max(error.retry_after or SHORTEST_PAUSE, SHORTEST_PAUSE), LONGEST_PAUSE)
             return waits, f"The server does not answer ({error.detail}) Does it run, and is server.url right?"
@@ -153,12 +157,15 @@ async def _tell_one(unit: Unit, client: AsyncClient, intent: Intent) -> None:
         if outcome.applied:
             await client.confirm(key, order.number, offset_after=held, mapping=intent.mapping)
             return
-    except Conflict as error:  # it was superseded while the control took it
-        log.warning("%s: correction %d is in the offset, but %s", key, order.number, error)
-    else:
         if not outcome.differs:
             await client.reject(key, order.number, outcome.reason)
             return
+    except (
+        Conflict,
+        NotFound,
+    ) as error:  # superseded while the control took it, told before, or forgotten by a restored server
+        said = "is in the offset" if outcome.applied else "was refused by the control"
+        log.warning("%s: correction %d %s, but %s", key, order.number, said, error)
     if held is not None:
         await client.report_offset(key, order.tool_memory, held, none_applied=True)
 

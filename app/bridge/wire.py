@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 import httpx
-from httptools import HttpParserError, HttpResponseParser
+from httptools import HttpParserError, HttpParserUpgrade, HttpResponseParser
 
 KEPT: Final = 4.0
 """s: a connection that was idle for longer is not used again; servers close theirs after 5 s or more."""
@@ -22,7 +22,7 @@ Origin = tuple[bytes, bytes, int | None]
 class Wire(httpx.AsyncBaseTransport):
     """Requests over HTTP/1.1, each over a connection of its own while it lasts; connections are kept for the next.
 
-    Answers are read whole: it is not for live events. trusted: whom to trust with https.
+    Answers are read whole: it is neither for live events nor for HEAD. trusted: whom to trust with https.
     """
 
     def __init__(self, trusted: ssl.SSLContext) -> None:
@@ -111,6 +111,7 @@ class _Connection(asyncio.Protocol):
         self.idle_since = 0.0
         self._transport: asyncio.Transport | None = None
         self._waits: asyncio.Future[httpx.Response] | None = None
+        self._until_end = False  # the answer ends with the connection
         self._parser: Any = None
 
     def ask(self, request: bytes) -> "asyncio.Future[httpx.Response]":
@@ -119,6 +120,7 @@ class _Connection(asyncio.Protocol):
             raise httpx.WriteError("the connection was closed")
         self._headers: list[tuple[bytes, bytes]] = []
         self._body: list[bytes] = []
+        self._until_end = False
         self._parser = HttpResponseParser(self)
         self._waits = asyncio.get_running_loop().create_future()
         self._transport.write(request)
@@ -144,7 +146,7 @@ class _Connection(asyncio.Protocol):
             return
         try:
             self._parser.feed_data(data)
-        except HttpParserError as error:
+        except (HttpParserError, HttpParserUpgrade) as error:
             self._failed(httpx.RemoteProtocolError(str(error)))
             self.close()
 
@@ -153,6 +155,8 @@ class _Connection(asyncio.Protocol):
         self.usable = False
         if error is not None:
             self._failed(httpx.ReadError(str(error)))
+        elif self._until_end:
+            self._answered()
         else:
             self._failed(httpx.RemoteProtocolError("the server closed the connection without a whole answer"))
 
@@ -162,9 +166,17 @@ class _Connection(asyncio.Protocol):
 
     # --- what the parser calls
 
+    def on_message_begin(self) -> None:
+        """See whether an answer was asked for; what follows one unasked would be taken for the next."""
+        self.usable = self.usable and self._waits is not None and not self._waits.done()
+
     def on_header(self, name: bytes, value: bytes) -> None:
         """Take a header."""
         self._headers.append((name, value))
+
+    def on_headers_complete(self) -> None:
+        """See where the content ends."""
+        self._until_end = not {name.lower() for name, _ in self._headers} & {b"content-length", b"transfer-encoding"}
 
     def on_body(self, body: bytes) -> None:
         """Take a part of the content."""
@@ -172,10 +184,14 @@ class _Connection(asyncio.Protocol):
 
     def on_message_complete(self) -> None:
         """Hand the answer over; one that only says to go on waiting (1xx) is passed over."""
-        status = self._parser.get_status_code()
-        if status < 200:
+        if self._parser.get_status_code() < 200:
             self._headers.clear()
             return
         self.usable = self.usable and self._parser.should_keep_alive()
+        self._answered()
+
+    def _answered(self) -> None:
+        self._until_end = False
         if self._waits is not None and not self._waits.done():
+            status = self._parser.get_status_code()
             self._waits.set_result(httpx.Response(status, headers=self._headers, content=b"".join(self._body)))

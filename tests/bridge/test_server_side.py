@@ -13,7 +13,7 @@ from app.bridge.links import Order, Outcome, Position, Received
 from app.bridge.simulators.model import Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit
-from inband_client import AsyncClient, Batch, Conflict, Correction, Decision, Invalid, Reason
+from inband_client import AsyncClient, Batch, Conflict, Correction, Decision, Invalid, NotFound, Reason
 from tests.bridge.plant import store_in, unit_of
 from tests.loops import run
 
@@ -39,6 +39,7 @@ class Scripted:
         self.heard: list[tuple[Any, ...]] = []
         self.refuses: Callable[[dict[str, Any]], Exception | None] = lambda _reading: None
         self.confirming: Exception | None = None
+        self.rejecting: Exception | None = None
         self.decision = Decision(
             characteristic="shaft-1",
             sequence=1,
@@ -71,6 +72,8 @@ class Scripted:
         self.heard.append(("confirm", number, said["offset_after"]))
 
     async def reject(self, machine: str, number: int, reason: str) -> None:
+        if self.rejecting is not None:
+            raise self.rejecting
         self.heard.append(("reject", number, reason))
 
     async def report_offset(self, machine: str, tool: int, offset: float, *, none_applied: bool) -> None:
@@ -138,6 +141,30 @@ def test_a_correction_that_was_superseded_while_the_control_took_it_is_reported(
     server.confirming = Conflict("POST applied", "superseded", status=409)
     story(tmp_path, server, answered(Outcome(18, applied=True, offset=-0.01), ORDER, told=False))
     assert server.heard == [("report", 3, -0.01)]
+
+
+@pytest.mark.parametrize(
+    "error",
+    [Conflict("POST rejected", "rejected already", status=409), NotFound("POST rejected", "no such", status=404)],
+)
+def test_a_refusal_that_the_server_has_heard_or_forgotten_holds_up_no_later_answer(
+    tmp_path: Path, error: Exception
+) -> None:
+    """The line was cut after the first rejection, or the server was restored from a backup of before."""
+    server = Scripted()
+    server.rejecting = error
+
+    async def before(store: Store) -> None:
+        for number, outcome in (
+            (18, Outcome(18, applied=False, offset=0.0, reason="no tool")),
+            (19, Outcome(19, applied=True, offset=-0.01)),
+        ):
+            await store.intend(M, Order(number, 3, 0.0, -0.01), "hash")
+            await store.answered(M, outcome)
+
+    unit = story(tmp_path, server, before)
+    assert server.heard == [("report", 3, 0.0), ("confirm", 19, -0.01)]
+    assert run(unit.store.intents(M, "answered")) == []
 
 
 def test_what_a_server_has_forgotten_is_confirmed_again(tmp_path: Path) -> None:

@@ -6,16 +6,30 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+import httpx
 import pytest
 
+from app.bridge import server_side
 from app.bridge.certificates import new_pair
+from app.bridge.checking import check
+from app.bridge.configuration import configuration_from
+from app.bridge.simulators.model import Model
 from app.bridge.unit import ended
 from app.bridge.wire import Wire
 from inband_client import AsyncClient, Unavailable, Untrusted
-from tests.bridge.plant import until
+from tests.bridge.plant import store_in, unit_of, until
 from tests.loops import run
 
+FOLDER = {
+    "kind": "folder",
+    "unit": "mm",
+    "secret": "key",
+    "corrections": "none",
+    "characteristics": {"1": "bore"},
+    "folder": {"path": ".", "format": "csv"},
+}
 ANSWER = b"HTTP/1.1 200 OK\r\nContent-Length: 12\r\n\r\n" + b'{"items":[]}'
+TO_THE_END = b'HTTP/1.0 200 OK\r\nConnection: close\r\n\r\n{"items":[]}'
 CHUNKED = b'HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n5\r\n{"ite\r\n7\r\nms":[]}\r\n0\r\n\r\n'
 
 
@@ -126,8 +140,57 @@ def test_a_connection_that_the_server_has_closed_is_not_used_again() -> None:
 
 
 @pytest.mark.parametrize(
+    "answer",
+    [
+        TO_THE_END,
+        b"HTTP/1.1 100 Continue\r\n\r\n" + ANSWER,
+        b"HTTP/1.1 103 Early Hints\r\nLink: </a>\r\n\r\n" + CHUNKED,
+    ],
+    ids=["ends with the connection", "100", "103"],
+)
+def test_answers_of_proxies_are_read_whole(answer: bytes) -> None:
+    async def story() -> None:
+        wire = trusting()
+        async with server(answer, ANSWER) as there:
+            each = client(there.port, wire)
+            assert await each.get("/a") == await each.get("/b") == {"items": []}
+            wire.close()
+
+    run(story())
+
+
+@pytest.mark.parametrize("empty", [b"204 No Content", b"304 Not Modified"])
+def test_an_answer_without_content_leaves_the_connection_usable(empty: bytes) -> None:
+    async def story() -> None:
+        wire = trusting()
+        async with server(b"HTTP/1.1 %b\r\n\r\n" % empty, ANSWER) as there, httpx.AsyncClient(transport=wire) as each:
+            for status, content in ((int(empty[:3]), b""), (200, b'{"items":[]}')):
+                answer = await each.get(f"http://127.0.0.1:{there.port}/a")
+                assert (answer.status_code, answer.content) == (status, content)
+            assert there.connections == 1
+            wire.close()
+
+    run(story())
+
+
+def test_an_answer_that_nobody_asked_for_is_not_taken_for_the_next() -> None:
+    async def story() -> None:
+        wire = trusting()
+        foreign = ANSWER.replace(b"items", b"other")
+        async with server(ANSWER + foreign, ANSWER) as there:
+            each = client(there.port, wire)
+            assert await each.get("/a") == await each.get("/b") == {"items": []}
+            assert there.connections == 2
+            wire.close()
+
+    run(story())
+
+
+@pytest.mark.parametrize(
     ("answer", "words"),
     [
+        (b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: x\r\nConnection: Upgrade\r\n\r\n", "No answer"),
+        (CHUNKED[:-9], "without a whole answer"),
         (None, "no answer in time"),
         (ANSWER[:-3], "without a whole answer"),
         (b"SSH-2.0-OpenSSH\r\n", "HTTP"),
@@ -156,17 +219,27 @@ def test_an_address_where_nobody_listens_is_told() -> None:
     run(story())
 
 
-def test_a_certificate_that_nobody_has_signed_is_refused(tmp_path: Path) -> None:
+def signed_by_nobody(folder: Path) -> ssl.SSLContext:
     pair = new_pair("server", "127.0.0.1", "urn:inband:test")
-    (tmp_path / "key.pem").write_bytes(pair.key)
-    (tmp_path / "public.pem").write_text(ssl.DER_cert_to_PEM_cert(pair.certificate), encoding="ascii")
+    (folder / "key.pem").write_bytes(pair.key)
+    (folder / "public.pem").write_text(ssl.DER_cert_to_PEM_cert(pair.certificate), encoding="ascii")
     secure = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    secure.load_cert_chain(tmp_path / "public.pem", tmp_path / "key.pem")
+    secure.load_cert_chain(folder / "public.pem", folder / "key.pem")
+    return secure
 
+
+def test_a_certificate_that_nobody_has_signed_is_refused(tmp_path: Path) -> None:
     async def story() -> None:
-        async with server(ANSWER, secure=secure) as there:
-            with pytest.raises(Untrusted, match="is not trusted"):
-                await client(there.port, trusting(), "https").get("/a")
+        async with server(ANSWER, secure=signed_by_nobody(tmp_path)) as there:
+            each = client(there.port, trusting(), "https")
+            with pytest.raises(Untrusted, match="is not trusted") as refused:
+                await each.get("/a")
+            _, words = server_side._sentence(unit_of(Model(), store_in(tmp_path)), refused.value)
+            assert "if it is right, name the authority that signed the certificate in server.ca." in words
+            content = {"server": {"url": f"https://127.0.0.1:{there.port}"}, "machine": {"mill-2": FOLDER}}
+            found = await check(configuration_from(content, tmp_path))
+            assert any(str(each).startswith("✗ mill-2: The certificate of 127.0.0.1") for each in found)
+            assert any("in server.ca" in each.words for each in found)
 
     run(story())
 
