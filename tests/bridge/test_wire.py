@@ -26,7 +26,7 @@ FOLDER = {
     "secret": "key",
     "corrections": "none",
     "characteristics": {"1": "bore"},
-    "folder": {"path": ".", "format": "csv"},
+    "folder": {"path": "/", "format": "csv"},
 }
 ANSWER = b"HTTP/1.1 200 OK\r\nContent-Length: 12\r\n\r\n" + b'{"items":[]}'
 TO_THE_END = b'HTTP/1.0 200 OK\r\nConnection: close\r\n\r\n{"items":[]}'
