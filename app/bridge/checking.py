@@ -47,10 +47,13 @@ async def _server(configuration: Configuration, machine: Machine) -> AsyncIterat
             for number, key in machine.characteristics.items():
                 try:
                     found = await client.get(f"/characteristics/{key}")
+                except Forbidden:  # the key is right: the machine was found with it
+                    yield Finding(machine.key, f"characteristic {number} = {key!r} belongs to another machine", False)
+                    continue
                 except NotFound:
                     yield Finding(machine.key, f"characteristic {number} = {key!r} does not exist at the server", False)
                     continue
-                if found["machine"] != machine.key:
+                if found["machine"] != machine.key:  # the key is a person's or a program's
                     words = f"characteristic {number} = {key!r} belongs to {found['machine']}"
                     yield Finding(machine.key, words, False)
                 elif machine.corrections != "none" and found["parameters"]["tool_memory"] not in {
@@ -65,7 +68,7 @@ async def _server(configuration: Configuration, machine: Machine) -> AsyncIterat
         except Untrusted as error:
             yield Finding(machine.key, f"{error.detail} {TRUST}", False)
         except Unavailable as error:
-            words = f"the server {url} does not answer ({error.detail}) Does it run, and is the address right?"
+            words = f"the server {url} does not answer ({error.detail}) Does it run, and is the address right, http or https too?"
             yield Finding(machine.key, words, False)
         except ProblemError as error:
             yield Finding(machine.key, f"the server {url}: {error}", False)

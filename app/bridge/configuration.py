@@ -20,6 +20,13 @@ KEY = re.compile(r"[a-z0-9][a-z0-9._-]{0,63}")
 Positive = Annotated[float, Meta(gt=0)]
 Number = Annotated[int, Meta(ge=1)]
 T = TypeVar("T")
+MISSING = {
+    "unit": ': "mm" or "inch", what the control works in',
+    "url": ": the address, such as https://inband.plant.example or opc.tcp://192.168.214.1:4840",
+    "address": ": name or number of the control in the network",
+    "holds": ': what the register holds, "diameter", "radius" or "length"',
+    "register": ": the kind's word for the offset, such as wear_length_1 or wear_diameter",
+}
 
 
 class ConfigurationError(ValueError):
@@ -296,5 +303,5 @@ def _sentence(words: str, place: str) -> str:
         path = f"{place}{where.rstrip('`')}.{unknown[1]}"
         return f"{path} is not known: look for a typing error."
     if missing := re.search(r"missing required field `(\w+)`", message):
-        return f"{place}{where.rstrip('`')}.{missing[1]} is missing."
+        return f"{place}{where.rstrip('`')}.{missing[1]} is missing{MISSING.get(missing[1], '')}."
     return f"{place}{where.rstrip('`')}: {message}."

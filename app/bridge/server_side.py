@@ -116,7 +116,7 @@ async def _push_all(unit: Unit, client: AsyncClient, rows: Sequence[Waiting]) ->
     if len(rows) > 1:
         try:
             batch = await client.push_many([row.body | {"key": row.key} for row in rows])
-        except REFUSED:
+        except (*REFUSED, Forbidden):
             pass  # one of them: each by itself, below
         else:
             await unit.store.sent(unit.machine.key, [row.id for row in rows])
@@ -128,11 +128,27 @@ async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | Non
     try:
         decision = await client.push(row.body | {"key": row.key})
     except REFUSED as error:
-        await unit.store.refuse(unit.machine.key, row.id, str(error))
-        log.warning("%s: reading %s is in the quarantine: %s", unit.machine.key, row.key, error)
-        return None
-    await unit.store.sent(unit.machine.key, [row.id])
-    return decision
+        reason = str(error)
+    except Forbidden:
+        if not await _key_is_right(unit, client):
+            raise
+        named = f"machine.{unit.machine.key}.characteristics"
+        reason = f"Characteristic {row.body.get('characteristic')!r} is another machine's: correct it in {named}."
+    else:
+        await unit.store.sent(unit.machine.key, [row.id])
+        return decision
+    await unit.store.refuse(unit.machine.key, row.id, reason)
+    log.warning("%s: reading %s is in the quarantine: %s", unit.machine.key, row.key, reason)
+    return None
+
+
+async def _key_is_right(unit: Unit, client: AsyncClient) -> bool:
+    """Tell if the server takes the key for this machine, so that what it has forbidden is about something else."""
+    try:
+        await client.get(f"/machines/{unit.machine.key}")
+    except (Unauthorized, Forbidden):
+        return False
+    return True
 
 
 # --- corrections

@@ -8,6 +8,7 @@ from app.bridge.configuration import configuration_from
 from app.core.printed_line import Printed, line_of
 from app.core.ring import Slot, Unit
 from tests.loops import run
+from tests.shop import Shop
 
 SERVER = {"url": "http://127.0.0.1:9"}
 
@@ -41,10 +42,26 @@ def test_readings_for_the_quarantine_and_remarks_are_told(tmp_path: Path) -> Non
     assert [each for each in said if each.startswith("✗ lathe-1: Missing readings: 3.")]
 
 
+def test_a_characteristic_of_another_machine_is_told_as_that(shop: Shop, tmp_path: Path) -> None:
+    other = Shop(shop.server)
+    file = tmp_path / "printed.txt"
+    file.write_text("", encoding="ascii")
+    machine = table("dprnt", file=str(file)) | {"characteristics": {"1": other.characteristic}}
+    machine["secret"] = shop.machine_client.headers["Authorization"].split()[1]
+    content = {"server": {"url": shop.server.url}, "machine": {shop.machine: machine}}
+    said = [str(each) for each in run(check(configuration_from(content, tmp_path)))]
+    assert f"✗ {shop.machine}: characteristic 1 = {other.characteristic!r} belongs to another machine" in said
+    assert not [each for each in said if "refuses the key" in each]
+
+
 def test_a_machine_or_a_server_that_is_silent_or_another_is_told_with_what_to_do(tmp_path: Path) -> None:
     folder = table("folder", path=str(tmp_path), format="csv") | {"identity": "cmm-7"}
     said = findings(tmp_path, folder)
-    assert [each for each in said if "does not answer (" in each and "Does it run, and is the address right?" in each]
+    assert [
+        each
+        for each in said
+        if "does not answer (" in each and "Does it run, and is the address right, http or" in each
+    ]
     assert [each for each in said if "answers, not 'cmm-7': look at address and network" in each]
     with socket.create_server(("127.0.0.1", 0)) as silent:
         haas = table("haas", address="127.0.0.1", port=silent.getsockname()[1]) | {"patience": 0.3}

@@ -13,7 +13,7 @@ from app.bridge.links import Order, Outcome, Position, Received
 from app.bridge.simulators.model import Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit
-from inband_client import AsyncClient, Batch, Conflict, Correction, Decision, Invalid, NotFound, Reason
+from inband_client import AsyncClient, Batch, Conflict, Correction, Decision, Forbidden, Invalid, NotFound, Reason
 from tests.bridge.plant import store_in, unit_of
 from tests.loops import run
 
@@ -36,6 +36,7 @@ class Scripted:
 
     def __init__(self, *pending: Correction) -> None:
         self.waiting = list(pending)
+        self.own = True
         self.heard: list[tuple[Any, ...]] = []
         self.refuses: Callable[[dict[str, Any]], Exception | None] = lambda _reading: None
         self.confirming: Exception | None = None
@@ -52,6 +53,10 @@ class Scripted:
 
     async def pending(self, machine: str) -> list[Correction]:
         return self.waiting
+
+    async def get(self, path: str) -> None:
+        if not self.own:
+            raise Forbidden(f"GET {path}", "another machine's key", status=403)
 
     async def push(self, reading: dict[str, Any]) -> Decision:
         if error := self.refuses(reading):
@@ -235,6 +240,33 @@ def test_a_reading_that_is_refused_holds_up_no_other(tmp_path: Path) -> None:
     [refused] = run(unit.store.quarantine(M))
     assert refused.key == "k2"
     assert "not a size" in refused.reason
+
+
+@pytest.mark.parametrize("together", [1, 2])
+def test_a_characteristic_of_another_machine_holds_up_no_other(tmp_path: Path, together: int) -> None:
+    """The server answers as to a wrong key: 403."""
+    server = Scripted()
+    server.refuses = lambda reading: (
+        Forbidden("POST /readings", "not yours", status=403) if reading["characteristic"] == "foreign" else None
+    )
+    names = ("foreign", "shaft-1")[:together]
+
+    async def before(store: Store) -> None:
+        rows = [Received(f"k{n}", {"characteristic": name}, Position(7, n)) for n, name in enumerate(names, 1)]
+        await store.add(M, rows)
+
+    unit = story(tmp_path, server, before)
+    assert server.heard == [("push", f"k{n}") for n in range(2, together + 1)]
+    [refused] = run(unit.store.quarantine(M))
+    assert (
+        refused.reason
+        == "Characteristic 'foreign' is another machine's: correct it in machine.lathe-1.characteristics."
+    )
+    server.own = False
+    run(unit.store.release(M, None, drop=False))
+    with pytest.raises(Forbidden):  # the key itself is another machine's: nothing is at fault but that
+        run(server_side._forward(unit, cast("AsyncClient", server)))
+    assert run(unit.store.quarantine(M)) == []
 
 
 @pytest.mark.parametrize(

@@ -47,6 +47,7 @@ FIELDS: Final = {
 LONGEST_KEY: Final = 128
 LARGEST: Final = 65_536  # bytes of a message
 IN_FLIGHT: Final = 200  # messages that the broker may send before the first is acknowledged
+AT_ONCE: Final = 50  # readings of a poll: a broker that is slow has to answer for all of them before a call is given up
 AT_LEAST_ONCE: Final = 1
 REFUSED: Final = 0x80  # from here on a reason of MQTT is a failure
 BAD_LOGIN, NOT_ALLOWED, TAKEN_OVER = 0x86, 0x87, 0x8E
@@ -286,10 +287,10 @@ class MqttLink:
     # --- readings
 
     async def fetch(self, stored: Position) -> Sequence[Received]:
-        """Readings that came since the last call."""
+        """Readings that came, some at a time: what is acknowledged stays so, though a later call is given up."""
         del stored
         self._there()
-        messages, self._readings = self._readings, []
+        messages, self._readings = self._readings[:AT_ONCE], self._readings[AT_ONCE:]
         return [self._received(message) for message in messages]
 
     def _received(self, message: aiomqtt.Message) -> Received:

@@ -139,7 +139,8 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
                 except OSError as error:
                     problems.append(f"{place}.{name}: {folder / file} cannot be read: {error.strerror}.")
                 except ValueError:
-                    problems.append(f"{place}.{name}: {folder / file} is not what it should be.")
+                    what = "no certificate" if name.endswith("certificate") else "no text in UTF-8"
+                    problems.append(f"{place}.{name}: {folder / file} holds {what}.")
         return msgspec.structs.replace(self, password=password, password_env=None, **files)
 
 

@@ -361,6 +361,41 @@ def test_every_reading_once_while_broker_and_bridge_are_killed(tmp_path: Path) -
     run(work())
 
 
+def test_a_backlog_comes_through_a_broker_that_is_slow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It answers for some messages before a call is given up, never for all that it has sent."""
+    count, one_by_one, publish = 150, asyncio.Lock(), MqttLink._publish
+
+    async def slow(there: MqttLink, topic: str, content: object, **other: Any) -> None:
+        async with one_by_one:
+            await asyncio.sleep(0.01)
+            await publish(there, topic, content, **other)
+
+    monkeypatch.setattr(MqttLink, "_publish", slow)
+
+    async def work() -> None:
+        store = store_in(tmp_path)
+        async with Broker(tmp_path) as broker:
+            chosen = msgspec.structs.replace(machine(broker.port), patience=1.2)
+            async with connected(chosen):
+                pass  # the session is there: the broker keeps messages for it
+            await say(broker.port, "readings", *(READING | {"key": f"k{number}"} for number in range(count)))
+            told: set[str] = set()
+            async with aiomqtt.Client("127.0.0.1", broker.port) as client, fetching(chosen, store):
+                await client.subscribe(f"{TOPIC}/stored", qos=1)
+                async with asyncio.timeout(30):
+                    async for message in client.messages:
+                        told.add(json.loads(bytes(message.payload))["key"])
+                        if len(told) == count:
+                            break
+                await asyncio.sleep(0.5)  # the last are acknowledged to the broker
+            async with connected(chosen) as there:  # nothing is left at the broker
+                await asyncio.sleep(0.3)
+                assert await there.fetch(Position()) == []
+        store.close()
+
+    run(work())
+
+
 async def _part(model: Model) -> None:
     for _ in model.part():
         await asyncio.sleep(0.005)
