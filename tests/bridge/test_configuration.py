@@ -79,7 +79,7 @@ def test_a_good_one() -> None:
         ('secret = "one"', 'secret = "two words"', "machine.lathe-1.secret holds no key"),
         ('secret = "one"', 'secret_env = "INBAND_NOT_SET"', "the variable INBAND_NOT_SET is not set"),
         ('secret = "one"', 'secret_file = "nowhere"', "/plant/nowhere cannot be read"),
-        ('url = "https://inband.example"', "", "server.url is missing."),
+        ('url = "https://inband.example"', "", "server.url is missing: the address"),
         ('"https://inband.example"', '"inband.example"', "is not an address such as"),
         ("[machine.lathe-1]", "[machine.Lathe_1]", "'Lathe_1' is not the key of a machine"),
         ("tool = 3", "tool = 0", "machine.lathe-1.location[0].tool: Expected `int` >= 1."),
