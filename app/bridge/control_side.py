@@ -95,5 +95,6 @@ async def _connected(unit: Unit) -> None:
             offsets_at = time.monotonic() + machine.offsets_every
         unit.polls += 1
         remark = getattr(link, "remark", "")  # of kinds that see gaps in what a control prints
-        unit.say("held" if unit.held else "online", " ".join(filter(None, (*unit.held_back, remark))))
+        waits = unit.test.waits if unit.test is not None else ""
+        unit.say("held" if unit.held else "online", " ".join(filter(None, (waits, *unit.held_back, remark))))
         await asyncio.sleep(_until_next(machine.interval))

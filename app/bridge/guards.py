@@ -45,9 +45,10 @@ def against(
     here = known.get(order.tool_memory, Known())
     mapping = machine.mapping_hash(location)
     if machine.proof_needed and here.proved != mapping:
+        by_page = ", or make it at the page of the connection" if machine.touch_tests_by_page else ""
         return Verdict(
             f"{named} waits: the mapping {mapping} of tool memory {order.tool_memory} has not been proved by a touch"
-            f" test. Run “inband bridge touch-test {machine.key} {order.tool_memory}”.",
+            f" test. End the bridge and run “inband bridge touch-test {machine.key} {order.tool_memory}”{by_page}.",
             final=False,
         )
     step = abs(order.after - order.before)

@@ -18,6 +18,10 @@ class ControlAway(LinkError):
     """No connection, or no answer; tried again by itself."""
 
 
+class NotNow(ControlAway):
+    """The control is there, but an offset must not be written at this moment: a program runs, or the tool is in use."""
+
+
 class WrongMachine(LinkError):
     """Another machine answers at this address."""
 
@@ -146,4 +150,4 @@ class OffsetAccess(Protocol):
         """The offset, mm."""
 
     async def write_offset(self, tool_memory: int, offset: float) -> None:
-        """Set the offset, mm."""
+        """Set the offset, mm. Raises `NotNow` too."""

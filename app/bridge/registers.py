@@ -14,6 +14,7 @@ from app.bridge.links import (
     ControlAway,
     CountersLost,
     Misconfigured,
+    NotNow,
     Order,
     Outcome,
     Position,
@@ -42,8 +43,10 @@ from app.core.ring import (
 
 HEADS = tuple(range(FIRST_SLOT))
 WHOLE = range(SIZE)
-WATCHED = (Register.WRITTEN, Register.ANSWERED, Register.ANSWER, Register.EPOCH)
+WATCHED = (Register.WRITTEN, Register.ANSWERED, Register.EPOCH)
 """What a poll looks at where registers are read one by one; the other heads change only with these, or by the bridge."""
+WATCHED_WITH_MAIL = (Register.WRITTEN, Register.ANSWERED, Register.ANSWER, Register.EPOCH)
+"""The same while a correction waits: the NC may say of it that its check sum is wrong without having answered it."""
 HEADS_EVERY = 10.0  # s: all heads are read again at the latest
 SLOTS_AT_ONCE = 4  # where registers are read one by one, so that a call does not take too long
 FRESH = 2.0  # polls: a reading that was not there so long ago was measured just now
@@ -191,8 +194,10 @@ class RegisterLink:
     async def _look(self) -> None:
         """The heads as they are now: all of them only if one has changed, the bridge has written, or it was long ago."""
         if self._heads and time.monotonic() < self._heads_at + HEADS_EVERY:
-            now = await self.registers.read(WATCHED)
-            if all(value == self._heads[place] for place, value in zip(WATCHED[1:], now[1:], strict=True)):
+            waits = self._heads[Register.MAIL_NUMBER] != self._heads[Register.ANSWERED]
+            watched = WATCHED_WITH_MAIL if waits else WATCHED
+            now = await self.registers.read(watched)
+            if all(value == self._heads[place] for place, value in zip(watched[1:], now[1:], strict=True)):
                 self._heads[Register.WRITTEN] = now[0]
                 return
         self._heads = await self.registers.read(HEADS)
@@ -322,10 +327,10 @@ class RegisterLink:
         return location.from_control(await self._offset_of(location), self.machine.unit)
 
     async def write_offset(self, tool_memory: int, offset: float) -> None:
-        """Set the offset of one location, mm. Raises `ControlAway` where it must not be written now."""
+        """Set the offset of one location, mm. Raises `NotNow` where it must not be written now."""
         location = self._location(tool_memory)
         if reason := await self.registers.against_writing(location):
-            raise ControlAway(reason)
+            raise NotNow(reason)
         await self.registers.write_offset(location, round(location.to_control(offset, self.machine.unit), 6))
 
     def _location(self, tool_memory: int) -> Location:
@@ -357,14 +362,12 @@ class RegisterLink:
                 self._heads[place] = float(value)
         for place, value in content:
             await self.registers.shown(place, float(value))
-        for _ in range(1 if self.registers.whole else 2):
-            held = await self.registers.read([place for place, _ in content])
-            for (place, value), found in zip(content, held, strict=True):
-                if not abs(found - value) <= max(
-                    2e-6, 2e-7 * abs(value)
-                ):  # eight digits, six decimals; or not a number
-                    self._heads = []
-                    raise ControlAway(
-                        f"Register +{int(place)} ({place.name.lower()}) holds {found:g} after {value:g} was written: may"
-                        " the bridge write it, and does another program?"
-                    )
+        twice = [*content] if self.registers.whole else [*content, *content]
+        held = await self.registers.read([place for place, _ in twice])
+        for (place, value), found in zip(twice, held, strict=True):
+            if not abs(found - value) <= max(2e-6, 2e-7 * abs(value)):  # eight digits, six decimals; or not a number
+                self._heads = []
+                raise ControlAway(
+                    f"Register +{int(place)} ({place.name.lower()}) holds {found:g} after {value:g} was written: may the"
+                    " bridge write it, and does another program?"
+                )

@@ -270,7 +270,7 @@ async def beat(unit: Unit, client: AsyncClient, server: Server) -> None:
             answer = await client.heartbeat(unit.machine.key, **await heartbeat(unit))
             await _look_back(unit, answer.get("server") or {})
             await guided_test.hear(unit, answer.get("touch_test"))
-        except ProblemError as error:
+        except (ProblemError, StoreError) as error:  # the control's and the server's side say it
             log.debug("%s: heartbeat: %s", unit.machine.key, error)
         except Exception:
             log.exception("%s: heartbeat", unit.machine.key)

@@ -24,7 +24,8 @@ class Guided:
     number: at the server, None for one of the command that was cut off. heard: its state at the server; since: when it began at
     the latest, by the bridge's own clock, for a server may be away and its clock may be set.
     refused: the question that was answered with no. reached: the state that the bridge has brought it to; told: the one of these
-    that the server knows. change: once it is read. changed: the control may hold its offset. ending: the state and the words
+    that the server knows. change: once it is read. changed: the control may hold its offset. waits: why that is not
+    taken back yet, where the control itself answers. ending: the state and the words
     that it ends with as soon as the offset is taken back; end: these, when it is. until: when the bridge waits no longer for a
     person, by its own clock.
     """
@@ -40,6 +41,7 @@ class Guided:
     told: str = "asked"
     change: Change | None = None
     changed: bool = False
+    waits: str = ""
     ending: tuple[str, str] | None = None
     end: tuple[str, str] | None = None
 

@@ -23,7 +23,7 @@ from app.bridge.store import Store
 from app.bridge.unit import Guided, Unit, ended
 from app.loop.connections.touch_tests.pages import TOO_SOON
 from tests.bridge.kinds.test_opcua import machine as opcua_machine
-from tests.bridge.plant import ModelRegisters, bridge, store_in, unit_of, until
+from tests.bridge.plant import ModelRegisters, bridge, parts, store_in, unit_of, until
 from tests.conftest import Server
 from tests.loops import run
 from tests.shop import Person, Shop
@@ -474,6 +474,8 @@ def test_a_program_that_runs_again_is_named_while_the_offset_is_not_taken_back(
             await guide.call("POST", f"/{guide.number}/stop")
             await until(lambda: "is not taken back yet: Tool 3 is in use" in one.detail, "the sentence")
             assert "Set 0.0000 mm in wear_length_1 of tool 3, edge 1 by hand." in one.detail
+            await parts(model, 10)  # the program waits for its readings to be fetched, or would never end
+            assert one.state == "online"
             registers.may_write = None
             await guide.reaches("cancelled")
             assert model.offsets[PLACE] == pytest.approx(BEFORE)

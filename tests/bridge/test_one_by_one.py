@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import pytest
 
 from app.bridge.links import ControlAway, Order, Position, Received
-from app.bridge.registers import HEADS, SLOTS_AT_ONCE, WATCHED, RegisterLink
+from app.bridge.registers import HEADS, SLOTS_AT_ONCE, WATCHED, WATCHED_WITH_MAIL, RegisterLink
 from app.bridge.simulators.model import Model
-from app.core.ring import SLOT_SIZE, Register
+from app.core.ring import SLOT_SIZE, Answer, Register
 from tests.bridge.plant import ModelRegisters, machine
 from tests.loops import run
 
@@ -78,7 +78,30 @@ def test_an_answer_in_the_mailbox_is_seen() -> None:
         await link.fetch(position)
         [outcome] = await link.outcomes()
         assert (outcome.number, outcome.applied, outcome.offset) == (7, True, 0.01)
-        assert registers.since() == len(WATCHED) + len(HEADS) + SLOT_SIZE
+        assert registers.since() == len(WATCHED_WITH_MAIL) + len(HEADS) + SLOT_SIZE
+
+    run(work())
+
+
+def test_a_mailbox_that_the_nc_could_not_read_is_filled_again() -> None:
+    """It says so without an answer: the number stays open."""
+
+    async def work() -> None:
+        model = Model()
+        registers, link = plant(model)
+        make(model, 1)
+        await link.connect()
+        _, position = await stored(link, Position())
+        order = Order(7, 3, 0.0, 0.01)
+        await link.offer([order])
+        model.registers[Register.MAIL_VALUE] = 9.0
+        model.registers[Register.ANSWER] = float(Answer.CHECK_WRONG)
+        registers.writes.clear()
+        for _ in range(2):  # taken back, then filled
+            await link.fetch(position)
+            await link.offer([order])
+        assert model.registers[Register.MAIL_VALUE] == 0.01
+        assert registers.writes[-1] == (Register.MAIL_NUMBER, 7.0)
 
     run(work())
 

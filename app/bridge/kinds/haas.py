@@ -11,6 +11,7 @@ import asyncio
 import math
 import random
 import re
+import time
 from collections.abc import Sequence
 from typing import Annotated, Final
 
@@ -26,8 +27,10 @@ NUMBERED = True
 PARAMETERS: Final = {"wear_length": 2200, "wear_diameter": 2600, "wear_x": 2700, "wear_z": 2800}
 """Registers of a tool: that of tool T is variable #[number + T]. A mill has the first two, a lathe the others."""
 TOOLS: Final = {"wear_length": 200, "wear_diameter": 200, "wear_x": 50, "wear_z": 50}
-ROW: Final = 4
-"""Values of a row: few, so that a busy collector leaves room for a whole one."""
+ROW: Final = 10
+SHORT_ROW: Final = 4
+"""Values of a row; few after a foreign answer, so that a busy collector leaves room for a whole one."""
+ALONE_AFTER: Final = 60.0  # s without a foreign answer
 ATTEMPTS: Final = 12
 FIRST_ANSWER: Final = 0.5
 """s: the first query of a connection may stay without an answer."""
@@ -99,6 +102,7 @@ class HaasRegisters:
         self._lines = Lines()
         self._marker = NO_NUMBER
         self._asked = self._fenced = False
+        self._mixed_at = -ALONE_AFTER
 
     @property
     def _place(self) -> str:
@@ -205,7 +209,8 @@ class HaasRegisters:
     async def variables(self, numbers: Sequence[int]) -> list[float]:
         """Variables by their numbers; one that is empty is not a number."""
         values: list[float] = []
-        row, attempts = ROW, ATTEMPTS
+        alone = time.monotonic() >= self._mixed_at + ALONE_AFTER
+        row, attempts = ROW if alone else SHORT_ROW, ATTEMPTS
         while len(values) < len(numbers):
             wanted = numbers[len(values) : len(values) + row]
             try:
@@ -214,8 +219,8 @@ class HaasRegisters:
             except TimeoutError as error:
                 raise self._silent(f"?Q600 {wanted[0]}") from error
             except Mixed as error:
-                self._marker = NO_NUMBER
-                row, attempts = max(row // 2, 1), attempts - 1
+                self._marker, self._mixed_at = NO_NUMBER, time.monotonic()
+                row, attempts = SHORT_ROW if row > SHORT_ROW else max(row // 2, 1), attempts - 1
                 if not attempts:
                     raise ControlAway(
                         f"Another program asks at {self._place} so often that its answers and the bridge's mix: let it ask"
