@@ -376,7 +376,20 @@ class Campaign:
             tool = self.call("GET", f"/machines/{self.machine}/tools/{TOOL}")
             return bool(abs(tool["offset"] - control.offset) < TOLERANCE or control.offset != held)
 
-        self._until(noticed, f"the edit to {held} is noticed", NOTICED)
+        try:
+            self._until(noticed, f"the edit to {held} is noticed", NOTICED)
+        except AssertionError as error:
+            error.add_note(f"The control holds {control.offset}. The server: {self._known()}")
+            raise
+
+    def _known(self) -> str:
+        """What the server says of the tool, and what asks for a person."""
+        try:
+            tool = self.call("GET", f"/machines/{self.machine}/tools/{TOOL}")
+            alarms = self.call("GET", f"/alarms?state=active&machine={self.machine}")["items"]
+        except httpx.HTTPError as error:
+            return repr(error)
+        return f"{tool}, alarms {[alarm['kind'] for alarm in alarms]}"
 
     def _acknowledge(self) -> None:
         """An operator looks at the alarms, so that corrections go on."""
@@ -560,7 +573,7 @@ def main() -> None:
                 found = Campaign(Server(), call, own, kind, chosen.seed).run(count)
             except AssertionError as error:
                 lost.append(kind)
-                print(f"\n{kind}: {error}", flush=True)
+                print("\n".join([f"\n{kind}: {error}", *getattr(error, "__notes__", ())]), flush=True)
                 continue
             print(
                 f"\n{kind}: {count} faults in {time.monotonic() - began:.0f} s, nothing lost, doubled or overwritten:"
