@@ -94,7 +94,8 @@ HOLE_J: dict[int, tuple[int, ...]] = {
     7: (4, 6, 8, 10, 12, 14, 18, 22, 26, 30, 36, 39, 43),
     8: (6, 10, 12, 15, 20, 24, 28, 34, 41, 47, 55, 60, 66),
 }
-_TEXT = re.compile(r"\s*[ØøΦφ⌀]?\s*([\d.,]{1,20})\s*([A-Za-z]{1,2})\s*(\d{1,2})\s*", re.ASCII)
+_TEXT = re.compile(r"\s*[ØøΦφ⌀]?\s*([0-9.,]{1,20})\s*([A-Za-z]{1,2})\s*([1-9][0-9]?)\s*")
+"""IT0 and IT01 are grades of their own, so a leading zero is refused. Texts copied from documents have blanks of several kinds."""
 
 
 class Fit(NamedTuple):
@@ -118,7 +119,7 @@ def fit_of(text: str) -> Fit | None:
     if match is None or nominal is None or not 0 < nominal <= RANGES[-1]:
         return None
     letter, grade = match[2], int(match[3])
-    if grade not in GRADES:
+    if grade not in GRADES or (nominal <= 1 and _only_above_1(letter, grade)):
         return None
     width = _at(GRADES[grade], nominal)
     upper = width / 2 if letter.lower() == "js" else _shaft(letter, grade, nominal) if letter.islower() else None
@@ -141,6 +142,11 @@ def with_fit(given: Mapping[str, Any]) -> dict[str, Any]:
         return dict(given)
     others = {raw: value for raw, value in given.items() if names.get(raw.upper(), raw) not in Fit._fields}
     return fit._asdict() | others
+
+
+def _only_above_1(letter: str, grade: int) -> bool:
+    """Tell if the standard has this class for sizes above 1 mm only."""
+    return grade >= 14 or letter in "aAbB" or (letter == "N" and grade > 8)
 
 
 def _at(values: tuple[float, ...], nominal: float) -> float:

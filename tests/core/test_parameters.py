@@ -49,9 +49,12 @@ def test_a_tolerance_class_stands_in_place_of_nominal_and_deviations() -> None:
             {key: value for key, value in others.items() if key != "nominal"} | {name: "Ø40 h6"}
         )
         assert (parameters.nominal, parameters.upper_deviation, parameters.lower_deviation) == (40, 0, -0.016)
+    assert fit_of("⌀\N{NO-BREAK SPACE}40\N{NARROW NO-BREAK SPACE}h6") == fit_of("40h6")  # as documents have it
     # With deviations of its own, or a class that is not in the tables, nothing is guessed.
     assert problems(SHAFT | {"nominal": "40 g6"}) == {"nominal": "not_a_number"}
-    for text in ("40 q6", "40 h19", "501 h6", "40h", "h6", "40 H7/h6", "0 h6", "40 j8"):
+    wrong = ("40 q6", "40 h19", "501 h6", "40h", "h6", "40 H7/h6", "0 h6", "40 j8", "40 z99", "600 h6")
+    # IT01 is not IT1; some classes are for sizes above 1 mm.
+    for text in (*wrong, "40 h01", "0.5 H14", "1 b11", "1 N9"):
         assert problems(others | {"nominal": text})["nominal"] == "not_a_number"
 
 
