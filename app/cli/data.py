@@ -4,6 +4,7 @@ import getpass
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TextIO
@@ -72,10 +73,23 @@ Zone = Annotated[
 ]
 TimeFormat = Annotated[
     str | None,
-    typer.Option(envvar="INBAND_TIME_FORMAT", help="How times are written, as for strptime: '%d/%m/%Y %H:%M'."),
+    typer.Option(
+        envvar="INBAND_TIME_FORMAT",
+        help="How times are written, as for strptime: '%d/%m/%Y %H:%M'; or days since 1899-12-30.",
+    ),
 ]
 Encoding = Annotated[
     str | None, typer.Option(envvar="INBAND_ENCODING", help="utf-8, utf-16, cp1250, cp1251 …", show_default="automatic")
+]
+HeaderLine = Annotated[
+    int | None,
+    typer.Option(envvar="INBAND_HEADER_LINE", min=1, help="Line of the column names.", show_default="automatic"),
+]
+FirstLine = Annotated[
+    int | None,
+    typer.Option(
+        envvar="INBAND_FIRST_LINE", min=2, help="First line of readings.", show_default="below the column names"
+    ),
 ]
 Sheet = Annotated[
     str | None, typer.Option(envvar="INBAND_SHEET", help="Sheet of a workbook.", show_default="the first with cells")
@@ -113,6 +127,8 @@ def import_file(
     timezone: Zone = None,
     time_format: TimeFormat = None,
     encoding: Encoding = None,
+    header_line: HeaderLine = None,
+    first_line: FirstLine = None,
     create_missing: Annotated[
         bool,
         typer.Option("--create-missing", envvar="INBAND_CREATE_MISSING", help="Of AQDEF: set up what is not here yet."),
@@ -149,7 +165,11 @@ def import_file(
         )
     if columns and live:
         raise typer.BadParameter(_("A wide sheet is imported as history only."), param_hint="--live")
-    wishes = wishes_of(mapping, delimiter, decimal, unit, timezone, time_format, encoding)
+    wishes = replace(
+        wishes_of(mapping, delimiter, decimal, unit, timezone, time_format, encoding),
+        header_line=header_line,
+        first_line=first_line,
+    )
     actor = f"command line ({getpass.getuser()})"
     with (
         readable(file, sheet) as path,

@@ -16,6 +16,9 @@ _DAY_FIRST = re.compile(
 _ISO = re.compile(
     r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)?(?:\s?(?:[Zz]|[+-]\d{2}(?::?\d{2})?))?"
 )
+_COUNT = re.compile(
+    r"(days|seconds) since (1899-12-30|1904-01-01|1970-01-01)"
+)  # spreadsheets, old ones of the Mac, Unix
 UNITS = {"mm": 1.0, "um": 0.001, "inch": 25.4}
 """Millimetres in each unit that a file may hold."""
 
@@ -97,10 +100,23 @@ def moment(
 
 
 def _by_pattern(text: str, pattern: str) -> datetime:
+    if count := _COUNT.fullmatch(pattern):
+        return _counted(text, pattern, count)
     try:
         return datetime.strptime(text, pattern)  # noqa: DTZ007 - the zone is seen to by the caller
     except ValueError:
         raise Unreadable(_("does not have the form {pattern}").format(pattern=pattern)) from None
+
+
+def _counted(text: str, pattern: str, count: re.Match[str]) -> datetime:
+    """A time as so many days of the calendar, or seconds of UTC, since a date."""
+    unit = timedelta(days=1) if count[1] == "days" else timedelta(seconds=1)
+    try:
+        milliseconds = round(float(text.replace(",", ".")) * (unit / timedelta(milliseconds=1)))
+        read = datetime.fromisoformat(count[2]) + timedelta(milliseconds=milliseconds)
+    except (ValueError, OverflowError):
+        raise Unreadable(_("does not have the form {pattern}").format(pattern=pattern)) from None
+    return read.replace(tzinfo=UTC) if count[1] == "seconds" else read
 
 
 def _by_shape(text: str) -> datetime:
@@ -114,7 +130,10 @@ def _by_shape(text: str) -> datetime:
         raise Unreadable(_("is not a time: {error}").format(error=error)) from None
     if re.fullmatch(r"[0-9.,]+", text):
         raise Unreadable(
-            _("is a count of days or seconds and could mean several times; write it as 2026-11-21T08:15:02+01:00")
+            _(
+                "is a count of days or seconds and could mean several times; say which by a form of times: days since 1899-12-30 for "
+                "those of spreadsheets, or seconds since 1970-01-01"
+            )
         )
     if "/" in text:
         raise Unreadable(_("could be day/month or month/day; say which by a form of times such as %d/%m/%Y %H:%M:%S"))

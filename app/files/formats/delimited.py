@@ -10,7 +10,18 @@ from typing import NamedTuple, TextIO
 from app.language.i18n import _
 
 DELIMITERS = (";", "\t", ",", "|")
-ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "cp1250", "cp1251", "cp1252", "iso-8859-2", "iso-8859-5")
+ENCODINGS = (
+    "utf-8",
+    "utf-8-sig",
+    "utf-16",
+    "utf-16-le",
+    "utf-16-be",
+    "cp1250",
+    "cp1251",
+    "cp1252",
+    "iso-8859-2",
+    "iso-8859-5",
+)
 SAMPLE = 64 * 1024
 LOOKED_AT = 1_000_000  # bytes from which an encoding is guessed
 _SIGNS_OF_ALL = "°±µ²³×·–—„“”‚‘’…€§«»\N{NO-BREAK SPACE}"
@@ -53,6 +64,8 @@ def encoding_of(path: Path) -> str:
     for mark, name in _MARKS:
         if start.startswith(mark):
             return name
+    if b"\0" in start:  # UTF-16 without its mark: of plain letters each has a zero before or behind it
+        return "utf-16-be" if start[0::2].count(0) > start[1::2].count(0) else "utf-16-le"
     try:
         codecs.getincrementaldecoder("utf-8")().decode(start)
     except UnicodeDecodeError:
@@ -94,10 +107,12 @@ def delimiter_of(path: Path, encoding: str) -> str:
     lines = ([line for line in lines if not line.lstrip().startswith("#")] or lines)[:30]
     if len(sample) == SAMPLE and len(lines) > 1:
         lines = lines[:-1]  # cut off in the middle, perhaps
-    evenness = {sign: min(line.count(sign) for line in lines) if lines else 0 for sign in DELIMITERS}
-    best = max(DELIMITERS, key=lambda sign: evenness[sign])
-    if not evenness[best] and lines:
-        best = max(DELIMITERS, key=lines[0].count)
+    for first in range(len(lines)):  # titles above the table have none of them
+        evenness = {sign: min(line.count(sign) for line in lines[first:]) for sign in DELIMITERS}
+        best = max(DELIMITERS, key=lambda sign: evenness[sign])
+        if evenness[best]:
+            return best
+    best = max(DELIMITERS, key=lines[0].count) if lines else ","
     return best if lines and best in lines[0] else ","
 
 
@@ -119,6 +134,11 @@ def rows(path: Path, encoding: str, delimiter: str) -> Iterator[Row]:
     if comment is not None:
         yield comment
     yield from every
+
+
+def is_value(cell: str) -> bool:
+    """Tell if a cell holds a number, a date or a time, as the cells below a header do."""
+    return _is_number(cell) or re.match(r"\s*(\d{1,4}[-./]\s?\d{1,2}[-./]\s?\d{1,4}|\d{1,2}:\d{2})", cell) is not None
 
 
 def _is_header(first: Row, below: Row) -> bool:

@@ -184,3 +184,53 @@ def test_a_file_of_very_many_columns_is_refused_before_each_is_looked_at(tmp_pat
     for columns in (MOST_COLUMNS + 1, 50_000):
         with pytest.raises(Invalid, match=rf"{columns} columns; at most {MOST_COLUMNS}"):
             look(file(columns), Wishes())
+
+
+HEADS = {
+    "a title": ("Messprotokoll Halle 3\n\nTeil;D35;D40\nA1;35,001;40\n", 3, ("Teil", "D35", "D40")),
+    "a title as wide as the table": ("Messprotokoll;;\nTeil;D35;D40\nA1;35,001;40\n", 2, ("Teil", "D35", "D40")),
+    "two lines, merged": (
+        "Teil;Dreh 1;;Dreh 2\n;D35;D40;D35\nA1;35,001;40;35\n",
+        2,
+        ("Teil", "Dreh 1 D35", "D40", "Dreh 2 D35"),
+    ),
+    "a column without a name": (";D35;D40\nA1;35,001;40\n", 1, ("", "D35", "D40")),
+    "numbers as names": ("Teil;1;2\nA1;35,001;40\n", 1, ("Teil", "1", "2")),
+    "nothing but words": ("Teil;D35\nA1;broken\n", 1, ("Teil", "D35")),
+}
+
+
+@pytest.mark.parametrize("what", HEADS)
+def test_the_line_of_the_column_names_is_found(tmp_path: Path, what: str) -> None:
+    content, line, header = HEADS[what]
+    layout = look(write(tmp_path, content), Wishes(), complete=False)
+    assert (layout.header_line, layout.header) == (line, header)
+
+
+def test_the_lines_of_names_and_of_readings_can_be_said(tmp_path: Path) -> None:
+    path = write(tmp_path, "shift;35\nTeil;Messwert\nSoll;40\nA1;40,001\n")
+    assert look(path, Wishes(), complete=False).header == ("shift", "35")
+    assert good(path, header_line=2) == [(40.0, "Soll"), (40.001, "A1")]
+    assert good(path, header_line=2, first_line=4) == [(40.001, "A1")]
+    with pytest.raises(Invalid, match="Line 9 is empty"):
+        read(path, header_line=9)
+
+
+def test_utf_16_is_known_without_its_mark(tmp_path: Path) -> None:
+    for encoding in ("utf-16-le", "utf-16-be"):
+        path = write(tmp_path, "measured;part\n39.998;Žižek Ø\n", encoding)
+        assert good(path) == [(39.998, "Žižek Ø")]
+
+
+def test_times_as_counts_are_read_where_somebody_says_of_what(tmp_path: Path) -> None:
+    path = write(tmp_path, "measured;time\n39.998;46347.34375\n")
+    (flaw,) = read(path, timezone="Europe/Berlin")
+    assert isinstance(flaw, Flaw)
+    assert "days since 1899-12-30" in flaw.reason
+    (line,) = read(path, timezone="Europe/Berlin", time_format="days since 1899-12-30")
+    assert isinstance(line, Line)
+    assert line.reading.measured_at == datetime(2026, 11, 21, 7, 15, tzinfo=UTC)
+    path = write(tmp_path, "measured;time\n39.998;1795245300\n")
+    (line,) = read(path, time_format="seconds since 1970-01-01")
+    assert isinstance(line, Line)
+    assert line.reading.measured_at == datetime.fromtimestamp(1795245300, UTC)

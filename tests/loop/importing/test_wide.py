@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from datetime import datetime
+from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +87,34 @@ def test_a_wide_workbook_on_the_page(server: Server, page: Page, tmp_path: Path)
     expect(page.get_by_role("heading", name="5 readings imported")).to_be_visible()
     assert readings(shop, one) == [(40.001, "A1", "2026-11-20T08:00"), (40.003, "A3", "2026-11-20T08:02")]
     assert [part for _value, part, _at in readings(shop, two)] == ["A1", "A2", "A3"]
+
+
+def test_a_workbook_with_merged_heads_dates_and_formulas(server: Server, client: httpx.Client, tmp_path: Path) -> None:
+    shop = Shop(server)
+    one, two = shop.characteristic, f"{shop.characteristic}-b"
+    shop.add(two)
+    rows: list[list[Any]] = [
+        ["Shift report"],
+        [],
+        ["Date", "Time", "Part", "Sizes", None],
+        [None, None, None, one, f"Seat {two}", "", "no name"],
+        [date(2026, 11, 20), time(8, 15), 17, 40.001, "=D5-0.002"],
+        [date(2026, 11, 20), time(8, 16), 18, 40.002, 39.999],
+    ]
+    path = workbook(tmp_path / "report.xlsx", [], rows)
+    address = send(client, path)
+    shown = client.get(address).text
+    assert "line 6, Seat" in shown.replace("&#39;", "'")  # the first line of this workbook is empty
+    assert "is a formula without a result in the file" in shown
+    assert "Shift report" in shown
+    csrf = re.search(r'name="csrf" value="([^"]+)"', shown)
+    assert csrf
+    form = {"csrf": csrf[1], "to_4": one, "to_5": two}
+    assert client.post(address, data=form).status_code == 422
+    assert readings(shop, one) == readings(shop, two) == []
+    assert client.post(address, data=form | {"first_line": "7"}).status_code == 303
+    assert readings(shop, one) == [(40.002, "18", "2026-11-20T08:16")]
+    assert readings(shop, two) == [(39.999, "18", "2026-11-20T08:16")]
 
 
 def test_one_wrong_column_stores_nothing_of_the_others(server: Server, client: httpx.Client, tmp_path: Path) -> None:

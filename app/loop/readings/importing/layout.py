@@ -1,15 +1,16 @@
 """Meanings of the columns of a file: by the names that people give them in English, German, Serbian, Slovene and Russian."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import accumulate, chain, islice
 from pathlib import Path
 from typing import Any
 from zoneinfo import ZoneInfo
 
 from app.errors import FieldError, Invalid
 from app.files.formats import cell_values, delimited, spreadsheet
-from app.files.formats.delimited import Unusable
+from app.files.formats.delimited import Row, Unusable
 from app.language.i18n import _
 
 # Folded: lower case, no accents, no unit. The first of a line is the field's own name.
@@ -42,6 +43,7 @@ NAMES: dict[str, tuple[str, ...]] = {
     "context": ("context",),
 }  # fmt: skip
 MOST_COLUMNS = 500
+TOP = 50  # rows in which the header is looked for
 DATES = {"date", "datum", "дата", "датум"}
 TIMES = {"time", "zeit", "uhrzeit", "vreme", "cas", "время", "време"}
 
@@ -57,6 +59,8 @@ class Wishes:
     timezone: str | None = None
     time_format: str | None = None
     encoding: str | None = None
+    header_line: int | None = None
+    first_line: int | None = None  # of readings
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,8 @@ class Layout:
     unit: str = "mm"
     zone: ZoneInfo | None = None
     time_format: str | None = None
+    header_line: int = 1
+    first_line: int = 2  # from here on lines are readings
     skips_blank: bool = False  # a row without the measured value says nothing: another column of a wide sheet has one
 
     @property
@@ -159,16 +165,18 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     encoding = wishes.encoding or delimited.encoding_of(path)
     delimiter = wishes.delimiter or delimited.delimiter_of(path, encoding)
     rows = delimited.rows(path, encoding, delimiter)
-    first = next(rows, None)
-    if first is None:
+    top = list(islice(rows, TOP))
+    if not top:
         raise wrong("file", _("The file is empty."))
-    _refuse_wide(len(first.cells))
-    header = tuple(cell.strip().removeprefix("\ufeff") for cell in first.cells)
+    head, header = _head(top, wishes.header_line, ragged=kind == "sheet")
+    _refuse_wide(len(header))
+    first_line = max(head + 1, wishes.first_line or 0)
     columns = _columns(header, wishes.mapping)
     place = columns.get("measured", (0,))[0]
     # Where no column is the measured one, it may be any of them, or several.
     only = slice(place, place + 1) if "measured" in columns else slice(None)
-    sample = [cell for row, _count in zip(rows, range(200), strict=False) for cell in row.cells[only]]
+    below = (row for row in chain(top, islice(rows, 200)) if row.line >= first_line)
+    sample = [cell for row in below for cell in row.cells[only]]
     return Layout(
         kind=kind,
         header=header,
@@ -179,7 +187,67 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         unit=wishes.unit or ("measured" in columns and cell_values.unit_in(header[place])) or "mm",
         zone=zone,
         time_format=wishes.time_format,
+        header_line=head,
+        first_line=first_line,
     )
+
+
+def rows_of(path: Path, layout: Layout) -> Iterator[Row]:
+    """The rows of readings, each as wide as the header where the file is a workbook."""
+    width = len(layout.header)
+    for row in delimited.rows(path, layout.encoding, layout.delimiter):
+        if row.line >= layout.first_line:
+            yield _as_wide(row, width) if layout.kind == "sheet" else row
+
+
+def _as_wide(row: Row, width: int) -> Row:
+    return row._replace(cells=row.cells[:width] + [""] * (width - len(row.cells)))
+
+
+def _head(top: Sequence[Row], said: int | None, *, ragged: bool) -> tuple[int, tuple[str, ...]]:
+    """The line of the header, and the names of the columns.
+
+    A name that is missing in this line is taken from the lines above, as cells that are merged downwards have it. Where names
+    stand there twice, the group above them is said too, as cells that are merged across have it. ragged: rows may be shorter
+    than the table is wide.
+    """
+    last = _last_head(top) if said is None else next((at for at, row in enumerate(top) if row.line == said), None)
+    if last is None:
+        raise wrong(
+            "header_line", _("Line {n} is empty, or too far below to be the header of the columns.").format(n=said)
+        )
+    width = max(len(row.cells) for row in top) if ragged else len(top[last].cells)
+    names, *above = ([cell.strip() for cell in _as_wide(row, width).cells] for row in reversed(top[: last + 1]))
+    groups = [cells for cells in above if len(list(filter(None, cells))) > 1]  # a single cell is a title
+    for cells in groups:
+        names = [name or upper for name, upper in zip(names, cells, strict=True)]
+    if groups:
+        across = accumulate(groups[0], _or_before)
+        names = [
+            f"{group} {name}".strip() if name and names.count(name) > 1 else name
+            for group, name in zip(across, names, strict=True)
+        ]
+    return top[last].line, tuple(name.removeprefix("\ufeff") for name in names)
+
+
+def _or_before(before: str, cell: str) -> str:
+    return cell or before
+
+
+def _last_head(top: Sequence[Row]) -> int:
+    """The place of the header among the first rows: the first one, unless columns below it are named only further down."""
+    body = next((at for at, row in enumerate(top) if any(map(delimited.is_value, row.cells))), 0)
+    wanted, named = _filled(top[body]), set[int]()
+    best, most = 0, 0
+    for at, row in enumerate(top[:body]):
+        named |= _filled(row)
+        if len(wanted & named) > most:
+            best, most = at, len(wanted & named)
+    return best
+
+
+def _filled(row: Row) -> set[int]:
+    return {place for place, cell in enumerate(row.cells) if cell.strip()}
 
 
 def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: bool) -> Layout:

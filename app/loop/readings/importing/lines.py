@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from app.errors import Invalid
-from app.files.formats import cell_values, delimited
+from app.files.formats import cell_values, spreadsheet
 from app.files.formats.cell_values import UNITS, Unreadable
 from app.files.formats.delimited import Unusable
 from app.language.i18n import _
-from app.loop.readings.importing.layout import Layout
+from app.loop.readings.importing.layout import Layout, rows_of
 from app.loop.readings.schemas import ReadingIn, reading_of
 
 SHOWN = 60  # characters of a wrong value
@@ -79,10 +79,8 @@ Found = Iterator[tuple[int, "dict[str, Any] | Flaw"]]
 def _csv(path: Path, layout: Layout) -> Found:
     readers = _readers(layout)
     width = len(layout.header)
-    rows = delimited.rows(path, layout.encoding, layout.delimiter)
     try:
-        next(rows)
-        for row in rows:
+        for row in rows_of(path, layout):
             if len(row.cells) < width or any(cell.strip() for cell in row.cells[width:]):
                 yield row.line, Flaw(row.line, "", "", _width(len(row.cells), width, layout.delimiter))
                 continue
@@ -93,6 +91,8 @@ def _csv(path: Path, layout: Layout) -> Found:
             for name, places, read in readers:
                 text = " ".join(row.cells[place] for place in places).strip()
                 try:
+                    if layout.kind == "sheet":
+                        _refuse_error(text)
                     values[name] = read(text)
                 except Unreadable as error:
                     flaws.append(Flaw(row.line, layout.named(name), _shown(text), str(error)))
@@ -102,6 +102,16 @@ def _csv(path: Path, layout: Layout) -> Found:
                 yield row.line, values
     except Unusable as error:
         yield error.line or 0, Flaw(error.line or 0, "", "", str(error))
+
+
+def _refuse_error(text: str) -> None:
+    """Raises `Unreadable` for a cell of a workbook that has no result."""
+    if text == spreadsheet.NO_RESULT:
+        raise Unreadable(
+            _("is a formula without a result in the file; open the workbook in a spreadsheet program and save it")
+        )
+    if text in spreadsheet.ERRORS:
+        raise Unreadable(_("is an error of the workbook; correct or clear the cell"))
 
 
 def _width(cells: int, width: int, delimiter: str) -> str:

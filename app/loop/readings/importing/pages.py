@@ -30,7 +30,7 @@ from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 Token = Annotated[str, Path(max_length=64)]
-HOW = ("timezone", "unit", "decimal", "delimiter", "encoding", "time_format", "sheet")
+HOW = ("timezone", "unit", "decimal", "delimiter", "encoding", "header_line", "first_line", "time_format", "sheet")
 SIGNS = {"tab": "\t", "comma": ",", "semicolon": ";", "bar": "|"}
 
 
@@ -235,7 +235,14 @@ def _wishes(said: Mapping[str, str]) -> Wishes:
         timezone=said.get("timezone", "").strip() or plant_zone().key,
         time_format=said.get("time_format", "").strip() or None,
         encoding=said.get("encoding") or None,
+        header_line=_line(said.get("header_line", "")),
+        first_line=_line(said.get("first_line", "")),
     )
+
+
+def _line(text: str) -> int | None:
+    """The number of a line; None for what is none."""
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 7 else None
 
 
 def _fields(layout: Layout, *, wide: bool = False) -> list[dict[str, Any]]:

@@ -84,8 +84,9 @@ def _shown(path: Path, layout: Layout, characteristic: str) -> Iterator[PreviewL
 def _cells(path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:
     try:
         if layout.is_table:
-            for row in islice(delimited.rows(path, layout.encoding, layout.delimiter), 1, None):
-                yield row.line, [_short(cell) for cell in row.cells]
+            for row in delimited.rows(path, layout.encoding, layout.delimiter):
+                if row.line != layout.header_line:  # lines above it too, so that people see which line is the header
+                    yield row.line, [_short(cell) for cell in row.cells]
         else:
             for number, value in objects(path, layout.kind):
                 known = value if isinstance(value, dict) else {}
