@@ -26,6 +26,8 @@ Sought = Annotated[str, Query(max_length=200), AfterValidator(lambda typed: type
 SESSION_COOKIE = "inband_session"
 STATION_COOKIE = "inband_station"
 """Of a device that is bound to a machine; sent to the pages below /station only."""
+MOST_FIELDS = 3_000
+"""Of a form of whoever is signed in: lists of characteristics to choose from are long. It is read once, where its token is checked."""
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 WRITTEN_COOKIE = "inband_written"
 """Place in the log of the database at which the last change of this browser ends; see `app.web.own_changes`."""

@@ -51,7 +51,7 @@ async def send_request(request: Request, session: SessionDep, caller: Viewer) ->
     """Ask for reports."""
     from starlette.concurrency import run_in_threadpool
 
-    form = await request.form(max_files=0, max_fields=3_000)
+    form = await request.form()
     return await run_in_threadpool(_send, request, session, caller, form)
 
 

@@ -126,7 +126,10 @@ def _typed_like(session: Session, like: str) -> dict[str, str]:
     number, key = many_actions.next_number(
         source.key, [machine.key for machine in queries.machines(session, limit=100_000)]
     )
-    there = [current.characteristic.key for current in characteristics.characteristics(session, machine_id=source.id)]
+    there = [
+        current.characteristic.key
+        for current in characteristics.characteristics(session, machine_id=source.id, limit=100_000)
+    ]
     lines = [f"{each} = {many_actions.key_like(each, source.key, key, number)}" for each in there]
     settings = {name: _shown(getattr(source, name)) for name in ("control", "type", *COUNTS)}
     return settings | {"key": key, "like": source.key, "characteristics": "\n".join(lines)}

@@ -1,9 +1,11 @@
 """Set-up page: one parameter of many characteristics, with a preview of each change."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Engineer
@@ -16,7 +18,7 @@ from app.loop.characteristics.wording import explanation, label
 from app.loop.machines import queries as machines
 from app.views.set_up import parameter_form
 from app.views.set_up.frame import setup_page
-from app.web.deps import FormDep, SessionDep
+from app.web.deps import SessionDep, texts
 from app.web.paging import address
 
 router = APIRouter()
@@ -40,7 +42,17 @@ def choose(
 
 
 @router.post("/setup/parameters")
-def change(request: Request, session: SessionDep, caller: Engineer, form: FormDep) -> Response:
+async def send(request: Request, session: SessionDep, caller: Engineer) -> Response:
+    """Show what the change comes to, or make what the preview showed. Posted: an address has no room for two thousand keys."""
+    form = await request.form()
+    said = texts(form)
+    if "versions" in said:
+        return await run_in_threadpool(_change, request, session, caller, said)
+    chosen = {key for key in form.getlist("on") if isinstance(key, str)}
+    return await run_in_threadpool(_page, request, session, caller, said, chosen, asked=True)
+
+
+def _change(request: Request, session: Session, caller: Caller, form: Mapping[str, str]) -> Response:
     """Make the changes that the preview showed, all of them or none."""
     try:
         versions = _versions(form.get("versions", ""))

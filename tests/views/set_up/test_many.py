@@ -23,9 +23,7 @@ def parameters(shop: Shop, key: str | None = None) -> dict[str, Any]:
 
 def preview(editor: Browser, shops: list[Shop], **said: str) -> tuple[str, str]:
     """The page with the preview, and the versions that its form sends."""
-    chosen = "".join(f"&on={shop.characteristic}" for shop in shops)
-    asked = "&".join(f"{name}={value}" for name, value in said.items())
-    text = editor.get(f"/setup/parameters?{asked}{chosen}")
+    text = editor.post("/setup/parameters", 200, **said, on=[shop.characteristic for shop in shops]).text
     versions = re.search(r'name="versions" value="([^"]*)"', text)
     return unescape(text), versions[1] if versions else ""
 
@@ -43,6 +41,13 @@ def test_many_get_a_new_version_each_with_one_reason(server: Any, editor: Browse
         assert (parameters(shop)["zero_range"], parameters(shop)["version"]) == (0.0016, 2)
         entry = shop.call("GET", f"/audit?subject=characteristic/{shop.characteristic}")["items"][0]
         assert entry["why"] == "probe repeats within 1 µm"
+
+
+def test_more_can_be_chosen_than_an_address_holds(server: Any, editor: Browser) -> None:
+    shop = Shop(server)
+    keys = [*(f"{shop.characteristic}-{'x' * 40}-{n}" for n in range(2000)), shop.characteristic]
+    text = editor.post("/setup/parameters", 200, parameter="zero_range", value="0.002", on=keys).text
+    assert f'name="versions" value="{shop.characteristic}:1"' in text
 
 
 def test_one_that_cannot_be_changed_or_was_changed_meanwhile_stops_all(server: Any, editor: Browser) -> None:

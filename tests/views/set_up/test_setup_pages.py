@@ -47,7 +47,7 @@ class Browser:
         assert answer.status_code == status, f"{path}: {answer.status_code}"
         return answer.text
 
-    def post(self, path: str, status: int = 303, /, **form: str) -> httpx.Response:
+    def post(self, path: str, status: int = 303, /, **form: str | list[str]) -> httpx.Response:
         csrf = re.search(r'name="csrf" value="([^"]+)"', self.get("/account"))
         assert csrf
         answer = self.client.post(path, data={"csrf": csrf[1], **form})
