@@ -277,7 +277,7 @@ def trend_sentence(drift: Drift) -> str:
     """Rate of change of a value, and if that is more than scatter."""
     if drift.trend is None and len(drift.points) >= FEWEST:
         return _(
-            "No trend can be told: these runs do not scatter (their resolution is too coarse), or are of one time."
+            "No trend can be determined: these runs do not vary (their resolution is too coarse), or were made at the same time."
         )
     if drift.trend is None:
         return _("Three runs at different times are needed for a trend.")

@@ -154,7 +154,7 @@ def unsteady(study: Study) -> str | None:
         return None
     assert not isinstance(study.in_time, Refused)
     return _(
-        "The model in time answers another question: by ISO 22514 (model {model}) mean or scatter are not constant, so Cp and Cpk are not quoted."
+        "The model in time answers another question: by ISO 22514 (model {model}) mean or scatter are not constant, so Cp and Cpk are not reported."
     ).format(model=study.in_time.model.value)
 
 
@@ -192,7 +192,7 @@ def location(in_time: InTime) -> str:
         Location.CONSTANT: _("the mean stays"),
         Location.RANDOM: _("the mean wanders at random"),
         Location.SYSTEMATIC: _("the mean is driven: it follows a line or a course"),
-        Location.BOTH: _("the mean is driven, and wanders beside it"),
+        Location.BOTH: _("the mean is driven and also wanders at random"),
     }[in_time.location]
 
 
@@ -230,7 +230,7 @@ def model_means(study: Study) -> str:
             return _("Cp and Cpk may be reported, and describe future parts too: 6 sigma hold 99.73 % of the parts.")
         case Model.A1 | Model.A2 if study.quote == "ppk":
             return _(
-                "Quote {index}: the process is steady, yet its scatter from part to part is not known well enough."
+                "Report {index}: the process is steady, yet its scatter from part to part is not known well enough."
             ).format(index=index)
         case Model.A1 | Model.A2:
             return _(
@@ -324,8 +324,8 @@ def cautions(study: Study) -> list[str]:
     if study.far and study.furthest is not None:
         sentences.append(
             ngettext(
-                "Reading %(which)s lies far from all others (%(furthest)s µm), and makes the numbers. Look at it: if the part was not so, exclude it with a reason.",
-                "Readings %(which)s lie far from all others (up to %(furthest)s µm), and make the numbers. Look at them: if a part was not so, exclude it with a reason.",
+                "Reading %(which)s lies far from all others (%(furthest)s µm), and decides these figures. Check it: if it is no size of the part, exclude it with a reason.",
+                "Readings %(which)s lie far from all others (up to %(furthest)s µm), and decide these figures. Check them: if they are no sizes of the parts, exclude them with a reason.",
                 len(study.far),
             )
             % {"which": named(study.far), "furthest": signed(study.furthest * 1000, 1)}

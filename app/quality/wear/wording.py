@@ -78,7 +78,7 @@ def definition(towards: Towards, *, corrects: bool) -> str:
     if towards is Towards.WEAR:
         return _("a part would deviate by R37 without corrections since tool change")
     if towards is Towards.OFFSET:
-        return _("the corrections of this tool come to their largest sum, if they follow the wear")
+        return _("the sum of corrections of this tool reaches its limit, if they follow the wear")
     if corrects:
         return _("a part would be out of tolerance, if nothing were corrected from now on")
     return _("a part is out of tolerance; nothing is corrected here")
@@ -238,7 +238,7 @@ def remedy_sentence(data: Mapping[str, Any], settings: Mapping[str, Any]) -> str
     # The remedy is worked out for scatter alone. A loop that corrects less lets wear and warming up pass as well.
     return f"{text} " + _(
         "These numbers do not show whether it is worth it: a loop that corrects less also lets more wear and warming up pass. "
-        "The map of what if simulates the parts with every setting: choose by it."
+        "The map on the what-if page simulates these parts with every setting."
     )
 
 

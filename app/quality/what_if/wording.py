@@ -149,8 +149,8 @@ def cautions(past: ToolHistory) -> list[str]:
     if past.baseline is not None:
         cautions.append(
             _(
-                "Whether a process is in control is judged here by limits of the readings of each column, simulated ones too; "
-                "the page of capability judges by the frozen baseline {version}. So Cpk may be quoted there and Ppk here, or the other way round."
+                "Two pages, two questions: here each column is judged by control limits of its own readings; the capability page judges by "
+                "the frozen baseline {version}. So Cpk may be reported there and Ppk here, or the other way round."
             ).format(version=past.baseline)
         )
     return cautions

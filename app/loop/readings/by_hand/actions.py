@@ -48,7 +48,7 @@ def measure(
         wrong = _("say the size in mm, the verdict, or both")
         raise Invalid(
             _("A measurement by hand says a size or a verdict."),
-            _("Enter the size that was found, or whether the part is good."),
+            _("Enter the measured size, or whether the part is good."),
             errors=[FieldError(size, wrong), FieldError(verdict, wrong)],
         )
     target = characteristics.parameters_of(
