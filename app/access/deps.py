@@ -25,7 +25,7 @@ from app.access.queries import SignedIn, signed_in
 from app.db.engine import Database, database_of
 from app.errors import NotAllowed, NotSignedIn
 from app.language.i18n import _
-from app.web.deps import SAFE_METHODS, SESSION_COOKIE, STATION_COOKIE, SessionDep
+from app.web.deps import MOST_FIELDS, SAFE_METHODS, SESSION_COOKIE, STATION_COOKIE, SessionDep
 
 __all__ = [
     "Admin",
@@ -123,7 +123,7 @@ async def recognise(request: Request) -> None:
 async def _check_token(request: Request, expected: str) -> None:
     token = request.headers.get("x-csrf-token")
     if token is None and _is_form(request):
-        field = (await request.form()).get("csrf")
+        field = (await request.form(max_fields=MOST_FIELDS)).get("csrf")
         token = field if isinstance(field, str) else None
     if token is None or not secrets.compare_digest(_unmasked(token), expected.encode()):
         raise NotAllowed(
@@ -193,7 +193,8 @@ class AtStation(NamedTuple):
 async def get_at_station(request: Request, session: SessionDep, machine: str) -> AtStation:
     """Return the device of this machine, or whoever is signed in. A device is nobody: no other route knows its cookie.
 
-    Raises what `get_caller` raises, and `NotAllowed` for the device of another machine.
+    Raises what `get_caller` raises; `NotSignedIn` for a device that is not bound any more, `NotAllowed` for that of another
+    machine.
     """
     token = request.cookies.get(STATION_COOKIE)
     device = await run_in_threadpool(device_of, session, token) if token else None
@@ -207,6 +208,10 @@ async def get_at_station(request: Request, session: SessionDep, machine: str) ->
             _("This device is bound to machine {machine}.").format(machine=device.machine),
             _("Open /station/{machine}, or have it bound again: Set-up, Stations.").format(machine=device.machine),
         )
+    if token and device is None and SESSION_COOKIE not in request.cookies:
+        ended = NotSignedIn(_("This device is not bound to a machine any more."))
+        ended.page = "/station"
+        raise ended
     caller = await get_caller(request, session)
     caller.must("viewer")
     return AtStation(caller, None)

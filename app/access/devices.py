@@ -5,7 +5,7 @@ acts there identifies themselves for that one action (`app.access.identification
 """
 
 import secrets
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
@@ -143,6 +143,12 @@ def devices(session: Session) -> list[DeviceRow]:
         DeviceRow(number, name, machine, bound, used, None if bound else created + CODE_LASTS)
         for number, name, machine, bound, used, created in rows
     ]
+
+
+def names_of(session: Session, numbers: Collection[int]) -> dict[int, str]:
+    """Return what devices are called, those too that were revoked."""
+    found = session.execute(select(StationDevice.id, StationDevice.name).where(StationDevice.id.in_(numbers)))
+    return {row.id: row.name for row in found}
 
 
 def people_at(session: Session, device_id: int) -> Sequence[str]:

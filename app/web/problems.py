@@ -69,7 +69,7 @@ def answer(request: Request, error: InbandError, cause: BaseException | None = N
     if is_for_programs(request.url.path):
         return JSONResponse(error.as_problem(), error.status, error.headers, media_type=PROBLEM_JSON)
     if isinstance(error, NotSignedIn):
-        return _to_sign_in(request)
+        return _to_sign_in(request) if error.page == NotSignedIn.page else RedirectResponse(error.page, 303)
     return problem_page(request, error.as_problem(), error.headers)
 
 

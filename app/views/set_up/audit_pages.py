@@ -6,6 +6,7 @@ from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
+from app.access import devices
 from app.access.audit import queries
 from app.access.deps import Engineer
 from app.views.set_up.frame import setup_page
@@ -43,6 +44,7 @@ def audit_page(
         caller,
         "audit",
         entries=[(entry, changes(entry.before, entry.after)) for entry in part.rows],
+        devices=devices.names_of(session, {entry.device_id for entry in part.rows if entry.device_id}),
         subject=subject,
         actor=actor,
         q=text,

@@ -60,7 +60,7 @@ def bind_page(request: Request, session: SessionDep, code: Annotated[str, Query(
     device = devices.device_of(session, token) if token and not code else None
     if device is not None:
         return RedirectResponse(f"/station/{device.machine}", 303)
-    return page(request, "station/bind.html", code=code, errors={})
+    return page(request, "station/bind.html", code=code, errors={}, ended=bool(token) and not code)
 
 
 @router.post("", dependencies=[Depends(from_this_site)])
@@ -69,9 +69,8 @@ def bind(request: Request, session: SessionDep, settings: SettingsDep, form: For
     try:
         device, token = devices.bind(session, form.get("code", ""))
     except Invalid as error:
-        return page(
-            request, "station/bind.html", status=error.status, code=form.get("code", ""), errors=by_field(error)
-        )
+        code, errors = form.get("code", ""), by_field(error)
+        return page(request, "station/bind.html", status=error.status, code=code, errors=errors, ended=False)
     answer = RedirectResponse(f"/station/{device.machine}", 303)
     _keep(answer, token, settings)
     signed_in = request.cookies.get(SESSION_COOKIE)
@@ -134,7 +133,12 @@ def station_page(
         offered=confirmation.offered,
         now=datetime.now(UTC),
         state_word=state_word,
-        band=lambda row: band_picture(row.stream.last_deviation, row.parameters, None, row.average),
+        band=lambda row: band_picture(
+            row.stream.last_deviation,
+            row.parameters,
+            None,
+            None if row.stream.last_deviation is None else row.average,  # a mark on the target would pass for a reading
+        ),
         next_event=lambda row: next_event(row.outlook),
         wording=alarm_wording,
         outcomes=outcomes,

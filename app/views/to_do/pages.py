@@ -42,7 +42,7 @@ def to_do_page(
         tasks=own if mine else waiting,
         number=len(waiting),
         number_of_own=len(own),
-        total=queries.count(session),
+        total=max(queries.count(session), len(waiting)),  # one more may have come in between
         machine=chosen,
         machines=every,
         by_machine={one.key: by_machine[one.id] for one in every if one.id in by_machine},

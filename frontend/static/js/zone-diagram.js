@@ -1,4 +1,4 @@
-// <zone-diagram data-sentences='[{"field","text"} × 4]' data-not-a-number="…">: the zone diagram beside the parameter form.
+// <zone-diagram data-sentences='[{"field","text"} × 4]' data-not-a-number="…" data-not-a-size="…">: the zone diagram beside the parameter form.
 //
 // The server has drawn it; bands are equally tall, so what follows the typing is words alone. With every key it
 //   – writes deviation and size at each limit, target and width (L75), and the µm beside each length ([data-um]);
@@ -108,7 +108,10 @@ customElements.define("zone-diagram", class extends HTMLElement {
     const said = new Map();
     const size = this.form.elements.nominal.value;
     const typing = /[a-z]/i.test(size) && size !== this.unknown; // a class, until the server has looked at it
-    for (const name of NAMES) if (Number.isNaN(values[name]) && !(typing && name === "nominal")) said.set(name, this.dataset.notANumber);
+    for (const name of NAMES) {
+      if (!Number.isNaN(values[name]) || (typing && name === "nominal")) continue;
+      said.set(name, name === "nominal" ? this.dataset.notASize : this.dataset.notANumber);
+    }
     const wrong = new Set();
     ORDER.slice(1).forEach((outer, index) => {
       const [smaller, larger] = [limits[ORDER[index]], limits[outer]];

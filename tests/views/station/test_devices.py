@@ -125,7 +125,8 @@ class TestBinding:
         assert revoke is not None
         tablet.open()
         assert "is revoked" in admin.send(revoke[0])
-        assert tablet.browser.get(tablet.here).status_code == 303
+        assert tablet.browser.get(tablet.here).headers["location"] == "/station"
+        assert "not bound to a machine any more" in tablet.browser.get("/station").text
         assert tablet.here not in admin.open("/setup/stations")
 
 
@@ -166,7 +167,7 @@ class TestWhatItMay:
 
 class TestWhoActs:
     @pytest.mark.parametrize("how", ["PIN", "badge"])
-    def test_it_is_done_in_that_persons_name(self, tablet: Tablet, milica: Person, how: str) -> None:
+    def test_it_is_done_in_that_persons_name(self, tablet: Tablet, admin: Person, milica: Person, how: str) -> None:
         tablet.shop.read(12.0)
         who = {"other_name": milica.name, "pin": PIN} if how == "PIN" else {"badge": BADGE}
         tablet.acknowledge(303, **who)
@@ -174,7 +175,8 @@ class TestWhoActs:
         entry = _last_entry(tablet.shop, "alarm acknowledged")
         assert entry["actor"] == milica.name
         assert entry["person_id"] is not None
-        assert entry["device_id"] is not None
+        at_device = f"Tablet at the door (station device {entry['device_id']})"
+        assert at_device in admin.open("/setup/audit?q=alarm+acknowledged")
         assert f'value="{milica.name}"' in tablet.open("/tools/3/change")  # to be chosen by one touch from now on
 
     def test_a_correction_is_approved_by_who_shows_a_badge(self, tablet: Tablet, milica: Person) -> None:
@@ -209,6 +211,15 @@ class TestWhoActs:
         tablet.shop.call("PATCH", f"/people/{number}", disabled=True)
         tablet.shop.read(12.0)
         tablet.acknowledge(401, other_name=gone.name, pin="8351")
+
+    def test_the_next_one_finds_no_name_filled_in(self, tablet: Tablet, milica: Person) -> None:
+        tablet.send("/note", text="Chips", who=milica.name, pin=PIN)
+        refused = tablet.send("/note", 401, text="Chips again", other_name="Nobody", pin=PIN)
+        assert "Chips again" in refused, "what was written stays"
+        who = refused[refused.index("Who are you?") :]
+        assert milica.name in who, "the names of this device are offered"
+        assert "Nobody" not in who
+        assert "checked" not in who
 
     def test_no_name_is_told_from_another(self, tablet: Tablet, milica: Person) -> None:
         tablet.shop.read(12.0)
