@@ -106,19 +106,20 @@ DayFirst = Annotated[
 ]
 
 
+Columns = Annotated[
+    str,
+    typer.Option(
+        envvar="INBAND_COLUMNS",
+        help="In place of --characteristic, for a wide sheet: D35=shaft-d35,D40=shaft-d40, a column for each.",
+    ),
+]
+
+
 @cli.command("import")
 def import_file(
     file: File,
-    characteristic: Annotated[
-        str, typer.Option(envvar="INBAND_CHARACTERISTIC", help="The key of the characteristic.")
-    ] = "",
-    columns: Annotated[
-        str,
-        typer.Option(
-            envvar="INBAND_COLUMNS",
-            help="In place of --characteristic, for a wide sheet: D35=shaft-d35,D40=shaft-d40, a column for each.",
-        ),
-    ] = "",
+    characteristic: Characteristic = "",
+    columns: Columns = "",
     sheet: Sheet = None,
     mapping: Mapping = "",
     delimiter: Delimiter = None,

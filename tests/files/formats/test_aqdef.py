@@ -183,7 +183,7 @@ def test_numbers_and_signs_of_no_sense_are_said_or_passed_over(tmp_path: Path, l
     for each in found:
         if isinstance(each, Value) and isinstance(read := aqdef_values.read_value(each), Measured):
             context_of(each, read, description, lambda _remark: None)
-            assert read.at is None or clock.moment(read.at)
+            assert read.at is None or isinstance(clock.moment(read.at), datetime)
 
 
 def test_more_characteristics_than_a_file_may_have_are_refused(tmp_path: Path) -> None:
