@@ -38,20 +38,24 @@ class PlotlyChart extends HTMLElement {
     this.onTheme = () => this.refresh();
     document.addEventListener("themechange", this.onTheme);
     this.stop = subscribe(this.getAttribute("on"), () => this.refresh());
-    this.size = new ResizeObserver(() => this.drawn && Math.abs(this.clientWidth - this.width) > 40 && this.refresh());
-    this.size.observe(this);
+    this.size = new ResizeObserver(() => this.drawn && this.fit());
+    for (const box of [this, this.plot]) this.size.observe(box);
     this.refresh();
   }
 
   disconnectedCallback() {
     this.stop?.();
     this.size?.disconnect();
-    this.view.disconnect();
-    this.cursor.disconnect();
+    for (const part of [this.view, this.cursor]) part.disconnect();
     document.removeEventListener("themechange", this.onTheme);
     this.trouble.end();
     if (this.drawn) window.Plotly.purge(this.plot);
     this.drawn = false;
+  }
+
+  fit() { // another width is another figure; drawn for another height, as before the strip came, the strip would cover its axis
+    if (Math.abs(this.clientWidth - this.width) > 40) this.refresh();
+    else if (!this.plot.layout.height && Math.abs(this.plot.clientHeight - this.plot._fullLayout.height) > 2) window.Plotly.Plots.resize(this.plot);
   }
 
   attributeChangedCallback() {

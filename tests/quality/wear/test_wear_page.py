@@ -56,16 +56,22 @@ def test_what_comes_soon_stands_out_on_the_plant_page(server: Server, shop: Shop
     assert "data-near" in text
 
 
+ABOVE_ITS_STRIP = """(chart) => chart.querySelector(".main-svg").getBoundingClientRect().bottom
+  <= chart.querySelector(".chart-strip").getBoundingClientRect().top + 1"""
+
+
 def test_in_the_browser_the_curve_is_drawn_and_goes_on(server: Server, shop: Shop, page: Page) -> None:
-    shift(shop, 40, wear=0.6, scatter=0.3)
+    shift(shop, 60, wear=0.6, scatter=0.3)
     Person(server, "viewer").sign_in(page)
     page.goto(f"/characteristics/{shop.characteristic}")
     curve = page.locator("plotly-chart.wear")
     curve.scroll_into_view_if_needed()
     expect(curve.locator(".main-svg").first).to_be_visible(timeout=30_000)
     expect(curve).to_contain_text("per part")
+    expect(curve.locator(".chart-strip")).to_be_visible()  # the chart gives it room: it would lie over the axis
+    page.wait_for_function(ABOVE_ITS_STRIP, arg=curve.element_handle())
     page.get_by_role("navigation", name="Readings of the wear curve").get_by_role("link", name="All").click()
     page.wait_for_url("**edge=all**")
-    expect(page.locator("#wear")).to_contain_text("over the last 40 readings")
+    expect(page.locator("#wear")).to_contain_text("over the last 60 readings")
     shop.read(1.0)
-    expect(page.locator("#wear")).to_contain_text("over the last 41 readings", timeout=30_000)
+    expect(page.locator("#wear")).to_contain_text("over the last 61 readings", timeout=30_000)
