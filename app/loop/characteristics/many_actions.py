@@ -167,7 +167,7 @@ def key_like(key: str, machine: str, new_machine: str, number: int) -> str:
 
 
 def copied_keys(text: str) -> dict[str, str]:
-    """The lines `key there = key here`. Raises `Invalid` for a line that is none, and for a key that stands twice.
+    """The lines `key at the copied machine = new key`. Raises `Invalid` for a line that is none, and for a key that stands twice.
 
     >>> copied_keys("shaft-d40 = shaft-d40-2")
     {'shaft-d40': 'shaft-d40-2'}
@@ -176,7 +176,7 @@ def copied_keys(text: str) -> dict[str, str]:
     for number, line in enumerate(text.splitlines(), start=1):
         there, _sign, here = (part.strip() for part in line.partition("="))
         if (there or here) and not (there and here):
-            raise Invalid.at("characteristics", _("line {n} must be: key there = key here").format(n=number))
+            raise Invalid.at("characteristics", _("line {n} must be: key at the copied machine = new key").format(n=number))
         if there in keys:
             raise Invalid.at("characteristics", _("line {n} names {key} again").format(n=number, key=there))
         if there:

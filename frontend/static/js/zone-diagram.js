@@ -108,10 +108,8 @@ customElements.define("zone-diagram", class extends HTMLElement {
     const said = new Map();
     const size = this.form.elements.nominal.value;
     const typing = /[a-z]/i.test(size) && size !== this.unknown; // a class, until the server has looked at it
-    for (const name of NAMES) {
-      if (!Number.isNaN(values[name]) || (typing && name === "nominal")) continue;
-      said.set(name, name === "nominal" ? this.dataset.notASize : this.dataset.notANumber);
-    }
+    const isWrong = (name) => Number.isNaN(values[name]) && !(typing && name === "nominal");
+    for (const name of NAMES.filter(isWrong)) said.set(name, name === "nominal" ? this.dataset.notASize : this.dataset.notANumber);
     const wrong = new Set();
     ORDER.slice(1).forEach((outer, index) => {
       const [smaller, larger] = [limits[ORDER[index]], limits[outer]];

@@ -85,7 +85,7 @@ def test_a_machine_is_copied_with_its_characteristics(server: Any, editor: Brows
         (f"{shop.characteristic} = {shop.characteristic}", "is taken"),
         (f"{shop.characteristic} = Bad Key", "Bad Key"),
         ("nobody-d1 = x", "is not on"),
-        (shop.characteristic, "key there = key here"),
+        (shop.characteristic, "key at the copied machine = new key"),
     ):
         refused = unescape(
             editor.post("/setup/machines/new", 422, **said, like=shop.machine, characteristics=wrong).text
