@@ -176,7 +176,9 @@ def copied_keys(text: str) -> dict[str, str]:
     for number, line in enumerate(text.splitlines(), start=1):
         there, _sign, here = (part.strip() for part in line.partition("="))
         if (there or here) and not (there and here):
-            raise Invalid.at("characteristics", _("line {n} must be: key at the copied machine = new key").format(n=number))
+            raise Invalid.at(
+                "characteristics", _("line {n} must be: key at the copied machine = new key").format(n=number)
+            )
         if there in keys:
             raise Invalid.at("characteristics", _("line {n} names {key} again").format(n=number, key=there))
         if there:
