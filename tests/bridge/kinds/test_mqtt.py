@@ -363,7 +363,7 @@ def test_every_reading_once_while_broker_and_bridge_are_killed(tmp_path: Path) -
 
 def test_a_backlog_comes_through_a_broker_that_is_slow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It answers for some messages before a call is given up, never for all that it has sent."""
-    count, one_by_one, publish = 150, asyncio.Lock(), MqttLink._publish
+    count, one_by_one, publish = 300, asyncio.Lock(), MqttLink._publish
 
     async def slow(there: MqttLink, topic: str, content: object, **other: Any) -> None:
         async with one_by_one:
@@ -375,7 +375,7 @@ def test_a_backlog_comes_through_a_broker_that_is_slow(tmp_path: Path, monkeypat
     async def work() -> None:
         store = store_in(tmp_path)
         async with Broker(tmp_path) as broker:
-            chosen = msgspec.structs.replace(machine(broker.port), patience=1.2)
+            chosen = msgspec.structs.replace(machine(broker.port), patience=2.5)
             async with connected(chosen):
                 pass  # the session is there: the broker keeps messages for it
             await say(broker.port, "readings", *(READING | {"key": f"k{number}"} for number in range(count)))
@@ -387,7 +387,7 @@ def test_a_backlog_comes_through_a_broker_that_is_slow(tmp_path: Path, monkeypat
                         told.add(json.loads(bytes(message.payload))["key"])
                         if len(told) == count:
                             break
-                await asyncio.sleep(0.5)  # the last are acknowledged to the broker
+                await asyncio.sleep(1.5)  # the last are acknowledged to the broker
             async with connected(chosen) as there:  # nothing is left at the broker
                 await asyncio.sleep(0.3)
                 assert await there.fetch(Position()) == []

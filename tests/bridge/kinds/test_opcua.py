@@ -426,7 +426,12 @@ def test_mistakes_of_the_table_are_all_said(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError) as failed:
         configuration_from({"server": {"url": "http://127.0.0.1:1"}, "machine": {"lathe-1": table}}, tmp_path)
     words = str(failed.value)
-    for each in ("password_env", "both certificate and key", "missing.der cannot be read", "text.der is not"):
+    for each in (
+        "password_env",
+        "both certificate and key",
+        "missing.der cannot be read",
+        "text.der holds no certificate",
+    ):
         assert each in words
 
 

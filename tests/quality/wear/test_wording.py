@@ -71,7 +71,7 @@ def test_the_remedy_in_words(remedy: Remedy, said: str) -> None:
     text = remedy_sentence({"state": "hunting", "remedy": remedy._asdict()}, SETTINGS)
     assert said in text.replace("\xa0", " ")
     # What is worked out for scatter alone is no advice yet: wear and warming up are in the replay only.
-    assert ("what if" in text) == ("No setting" not in text)
+    assert ("what-if page" in text) == ("No setting" not in text)
 
 
 def test_swinging_is_sent_elsewhere() -> None:
