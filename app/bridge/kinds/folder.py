@@ -51,8 +51,11 @@ class Seen(NamedTuple):
 
 
 class _Known(NamedTuple):
+    """A file that is watched. since: it has been the same; first: it was there. By the bridge's clock, s."""
+
     seen: Seen
     since: float
+    first: float
 
 
 class Folder:
@@ -146,19 +149,20 @@ class Folder:
         now = time.monotonic()
         before = self._known
         self._known = {}
-        ready: list[tuple[Seen, float]] = []
         for seen in self._files():
             known = before.get(seen.name)
-            same = known is not None and known.seen == seen
-            since = known.since if known is not None and same else now
-            self._known[seen.name] = _Known(seen, since)
-            if same and now - since >= SAME_FOR * self.settings.every and seen.name not in self._stored:
-                ready.append((seen, now - since))
+            since = known.since if known is not None and known.seen == seen else now
+            self._known[seen.name] = _Known(seen, since, known.first if known is not None else now)
         for name in self._locked.keys() - self._known.keys():
             del self._locked[name]
-        for seen, unchanged in sorted(ready, key=lambda each: (each[0].modified, each[0].name)):
-            content = self._read(seen, unchanged)
+        for seen, since, first in sorted(self._known.values(), key=lambda each: (each.seen.modified, each.seen.name)):
+            if seen.name in self._stored:
+                continue
+            unchanged = now - since
+            content = self._read(seen, unchanged) if unchanged >= SAME_FOR * self.settings.every else None
             if content is None:
+                if now - first < self.settings.settle:
+                    break  # it is being written: later ones come after it
                 continue
             if content.entries or content.faults:
                 self._taken[seen.name] = (seen, content)

@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -297,6 +298,40 @@ def test_a_file_that_is_being_written_is_waited_for(tmp_path: Path) -> None:
         write(path, whole)
         received = await fetched(link)
         assert [each.body["measured"] for each in received] == [40.0123]
+        await link.close()
+
+    run(work())
+
+
+def test_later_files_wait_for_one_that_is_being_written(tmp_path: Path) -> None:
+    """Readings come in the order in which they were measured; a file that is never whole holds nothing up for long."""
+
+    async def work() -> None:
+        link = Folder(machine(tmp_path, settle=1.0))
+        write(tmp_path / "a.csv", HEAD + LINE[:-4])
+        write(tmp_path / "b.csv", HEAD + LINE.replace("P1", "P2"))
+        os.utime(tmp_path / "b.csv", (time.time() + 1, time.time() + 1))
+        await link.connect()
+        for _ in range(4):
+            assert await link.fetch(Position()) == []
+            await asyncio.sleep(0.06)
+        write(tmp_path / "a.csv", HEAD + LINE)
+        os.utime(tmp_path / "a.csv", (time.time() - 1, time.time() - 1))
+        parts = []
+        for _ in range(2):
+            received = await fetched(link)
+            parts += [each.body["part"] for each in received]
+            await link.acknowledge(received)
+        assert parts == ["P1", "P2"]
+        for number in range(40):  # a file that grows all the time, with an old time of modification
+            write(tmp_path / "log.csv", HEAD + LINE[:-4] + "0" * number)
+            os.utime(tmp_path / "log.csv", (1, 1))
+            if number == 1:
+                write(tmp_path / "d.csv", HEAD + LINE.replace("P1", "P3"))
+            if found := await link.fetch(Position()):
+                break
+            await asyncio.sleep(0.06)
+        assert [each.body["part"] for each in found] == ["P3"]
         await link.close()
 
     run(work())
