@@ -80,9 +80,9 @@ class InbandError(Exception):
 
 
 class NotSignedIn(InbandError):
-    """No key or session came with the request, or one that is not known (any more). page: where people are led."""
+    """No key or session came with the request, or one that is not known (any more)."""
 
-    page = "/sign-in"
+    page = "/sign-in"  # where people are led
     status = 401
     kind = "not-signed-in"
     title = "Not signed in"
