@@ -7,6 +7,7 @@ from typing import NamedTuple
 from app.bridge.configuration import Configuration, Machine
 from app.bridge.kinds.mtconnect import AgentError, Context
 from app.bridge.links import LinkError, Position, look_who_answers, silence
+from app.bridge.moments import wrong_date
 from app.bridge.program import link_of
 from app.bridge.server_side import TRUST
 from inband_client import AsyncClient, Forbidden, NotFound, ProblemError, Unauthorized, Unavailable, Untrusted
@@ -82,9 +83,13 @@ async def _control(machine: Machine) -> AsyncIterator[Finding]:
         look_who_answers(identity, machine.identity)
         named = "" if machine.identity else f"; put identity = {identity!r} into the configuration"
         yield Finding(machine.key, f"the control answers as {identity!r}{named}", True)
+        if by_date := wrong_date(link.clock):
+            yield Finding(machine.key, by_date, False)
         async with asyncio.timeout(machine.patience):
             received = await link.fetch(Position())
             yield Finding(machine.key, f"{len(received)} readings can be fetched now", True)
+            if not by_date and (by_readings := wrong_date(link.clock)):
+                yield Finding(machine.key, by_readings, False)
             if faults := [each.fault for each in received if each.fault]:
                 words = f"{len(faults)} of them would go to the quarantine, the first because: {faults[0]}"
                 yield Finding(machine.key, words, False)

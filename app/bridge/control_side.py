@@ -6,6 +6,7 @@ import time
 
 from app.bridge import guided_test
 from app.bridge.links import LinkError, look_who_answers, silence
+from app.bridge.moments import wrong_date
 from app.bridge.store import StoreError
 from app.bridge.unit import Unit
 
@@ -96,5 +97,8 @@ async def _connected(unit: Unit) -> None:
         unit.polls += 1
         remark = getattr(link, "remark", "")  # of kinds that see gaps in what a control prints
         waits = unit.test.waits if unit.test is not None else ""
-        unit.say("held" if unit.held else "online", " ".join(filter(None, (waits, *unit.held_back, remark))))
+        unit.say(
+            "held" if unit.held else "online",
+            " ".join(filter(None, (waits, *unit.held_back, remark, wrong_date(link.clock)))),
+        )
         await asyncio.sleep(_until_next(machine.interval))

@@ -111,9 +111,10 @@ class Outcome:
 
 @dataclass(slots=True)
 class Clock:
-    """The control's clock minus the bridge's, seconds; None until it is known."""
+    """The control's clock minus the bridge's. offset: s, None until it is known. days: whole days of it, by the control's date."""
 
     offset: float | None = None
+    days: int = 0
 
 
 class Link(Protocol):

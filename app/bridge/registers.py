@@ -20,7 +20,7 @@ from app.bridge.links import (
     Position,
     Received,
 )
-from app.bridge.moments import learn, measured_at
+from app.bridge.moments import learn, learn_date, measured_at
 from app.bridge.slots import reading_of
 from app.core.ring import (
     FIRST_SLOT,
@@ -43,10 +43,10 @@ from app.core.ring import (
 
 HEADS = tuple(range(FIRST_SLOT))
 WHOLE = range(SIZE)
-WATCHED = (Register.WRITTEN, Register.ANSWERED, Register.EPOCH)
-"""What a poll looks at where registers are read one by one; the other heads change only with these, or by the bridge."""
-WATCHED_WITH_MAIL = (Register.WRITTEN, Register.ANSWERED, Register.ANSWER, Register.EPOCH)
-"""The same while a correction waits: the NC may say of it that its check sum is wrong without having answered it."""
+WATCHED = (Register.WRITTEN,)
+"""What a poll looks at where registers are read one by one; beside the epoch; the other heads change only with these, or by the bridge."""
+WATCHED_WITH_MAIL = (Register.ANSWERED, Register.ANSWER)
+"""And while a correction waits: the NC may say of it that its check sum is wrong without having answered it."""
 HEADS_EVERY = 10.0  # s: all heads are read again at the latest
 SLOTS_AT_ONCE = 4  # where registers are read one by one, so that a call does not take too long
 FRESH = 2.0  # polls: a reading that was not there so long ago was measured just now
@@ -68,6 +68,9 @@ class Registers(Protocol):
 
     async def close(self) -> None:
         """Disconnect; never raises."""
+
+    async def shown_time(self) -> datetime | None:
+        """The date and the local time that the control shows; None where it does not say."""
 
     async def read(self, places: Sequence[int]) -> list[float]:
         """Registers of the block, in the order of the places."""
@@ -101,13 +104,17 @@ class RegisterLink:
         self._direct: list[Outcome] = []
         self._heads: list[float] = []
         self._heads_at = 0.0
+        self._acknowledged = False  # since the last poll
 
     async def connect(self) -> str:
         """Connect, and answer the control's identity."""
         self._block = self._polled = None
         self._direct = []
         self._heads = []
-        return await self.registers.connect()
+        identity = await self.registers.connect()
+        if shown := await self.registers.shown_time():
+            learn_date(self.clock, shown, datetime.now().astimezone())
+        return identity
 
     async def close(self) -> None:
         """Disconnect."""
@@ -141,15 +148,15 @@ class RegisterLink:
         return received
 
     async def acknowledge(self, received: Sequence[Received]) -> None:
-        """Write the highest stored sequence where the NC waits for it, and read it back.
+        """Write the highest stored sequence where the NC waits for it.
 
-        The next poll reads it back where it reads the whole block; if it is not there, `fetch` writes it again.
+        The next poll reads it back; if it is not there, `fetch` writes it again.
         """
         if received and (last := received[-1].position):
-            if self.registers.whole:
-                await self.registers.write(Register.ACK, float(last.sequence))
-            else:
-                await self._write(Register.ACK, last.sequence)
+            await self.registers.write(Register.ACK, float(last.sequence))
+            if self._heads:
+                self._heads[Register.ACK] = float(last.sequence)
+                self._acknowledged = True
 
     async def _read(self, stored: int | None) -> Block:
         """The block; from a control that is read number by number only the heads and the slots that matter.
@@ -195,13 +202,16 @@ class RegisterLink:
         """The heads as they are now: all of them only if one has changed, the bridge has written, or it was long ago."""
         if self._heads and time.monotonic() < self._heads_at + HEADS_EVERY:
             waits = self._heads[Register.MAIL_NUMBER] != self._heads[Register.ANSWERED]
-            watched = WATCHED_WITH_MAIL if waits else WATCHED
+            acknowledged = (Register.ACK,) if self._acknowledged else ()
+            watched = (*WATCHED, *acknowledged, *(WATCHED_WITH_MAIL if waits else ()), Register.EPOCH)
             now = await self.registers.read(watched)
             if all(value == self._heads[place] for place, value in zip(watched[1:], now[1:], strict=True)):
                 self._heads[Register.WRITTEN] = now[0]
+                self._acknowledged = False
                 return
         self._heads = await self.registers.read(HEADS)
         self._heads_at = time.monotonic()
+        self._acknowledged = False
 
     def _received(self, slot: Slot, stored: Position, now: datetime, *, fresh: bool) -> Received:
         if slot.time is not None and fresh:

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,9 @@ class ModelRegisters:
 
     async def close(self) -> None:
         pass
+
+    async def shown_time(self) -> datetime | None:
+        return self.model.clock()
 
     async def read(self, places: Sequence[int]) -> list[float]:
         self._there()

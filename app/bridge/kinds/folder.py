@@ -21,6 +21,7 @@ from typing import Final, NamedTuple, TypeVar
 from app.bridge.configuration import Machine
 from app.bridge.file_content import NAMES, NOT_ALONE, Content, Fault, Settings, read_content
 from app.bridge.links import Clock, ControlAway, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.moments import learn_ahead
 
 __all__ = ["Folder", "Settings", "link"]
 log = logging.getLogger(__name__)
@@ -109,6 +110,8 @@ class Folder:
             await asyncio.sleep(min(self.settings.every, self.machine.patience / 2))
             received = await self._in_thread(self._look)
         self._looked = 0.001 if received else time.monotonic()  # there may be more: look again at once
+        if received:
+            learn_ahead(self.clock, received, datetime.now().astimezone())
         return received
 
     async def acknowledge(self, received: Sequence[Received]) -> None:

@@ -13,6 +13,7 @@ import random
 import re
 import time
 from collections.abc import Sequence
+from datetime import datetime
 from typing import Annotated, Final
 
 import msgspec
@@ -34,6 +35,8 @@ ALONE_AFTER: Final = 60.0  # s without a foreign answer
 ATTEMPTS: Final = 12
 FIRST_ANSWER: Final = 0.5
 """s: the first query of a connection may stay without an answer."""
+DATE: Final = 3011  # as 20261124
+TIME_OF_DAY: Final = 3012  # as 201500
 NO_NUMBER: Final = math.nan
 MACRO = re.compile(r"MACRO\s*,?(.*)", re.IGNORECASE)
 SERIAL = re.compile(r"SERIAL\s*NUMBER\s*,\s*(\S+)", re.IGNORECASE)
@@ -140,6 +143,15 @@ class HaasRegisters:
         if self._transport is not None:
             self._transport.close()
             self._transport = None
+
+    async def shown_time(self) -> datetime | None:
+        """Date (#3011) and time (#3012) of the control."""
+        date, time_of_day, later = await self.variables([DATE, TIME_OF_DAY, DATE])
+        try:
+            shown = datetime.strptime(f"{date:08.0f} {time_of_day:06.0f}", "%Y%m%d %H%M%S")  # noqa: DTZ007 - it has no zone
+        except ValueError:
+            return None
+        return shown if date == later else None  # it is midnight
 
     # --- the block
 

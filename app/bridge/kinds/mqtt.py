@@ -28,6 +28,7 @@ from paho.mqtt.properties import Properties
 
 from app.bridge.configuration import Location, Machine, Number, Positive
 from app.bridge.links import Clock, ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.moments import learn_ahead
 from app.core.ring import INCH
 
 log = logging.getLogger(__name__)
@@ -291,7 +292,10 @@ class MqttLink:
         del stored
         self._there()
         messages, self._readings = self._readings[:AT_ONCE], self._readings[AT_ONCE:]
-        return [self._received(message) for message in messages]
+        received = [self._received(message) for message in messages]
+        if received:
+            learn_ahead(self.clock, received, datetime.now().astimezone())
+        return received
 
     def _received(self, message: aiomqtt.Message) -> Received:
         payload = bytes(message.payload)

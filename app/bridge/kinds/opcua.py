@@ -268,6 +268,12 @@ class SinumerikRegisters:
             raise Misconfigured(f"The control answers no serial number at {wanted or SERIAL}: name another identifier.")
         return serial
 
+    async def shown_time(self) -> datetime | None:
+        """The time of the server in the control, as local time of the bridge's computer."""
+        [found] = await self._ask([ua.NodeId(ua.Int32(ua.ObjectIds.Server_ServerStatus_CurrentTime))])
+        shown = found.Value.Value if found.Value is not None else None
+        return shown.replace(tzinfo=UTC).astimezone().replace(tzinfo=None) if isinstance(shown, datetime) else None
+
     async def _size_of_edge(self) -> int:
         """The number of parameters of an edge: 25 on old software, 34 or more on newer; read, never assumed."""
         size = _number(await self._value(EDGE_SIZE), EDGE_SIZE)

@@ -8,7 +8,7 @@ import asyncio
 import contextlib
 import re
 
-from app.bridge.kinds.haas import PARAMETERS
+from app.bridge.kinds.haas import DATE, PARAMETERS, TIME_OF_DAY
 from app.bridge.simulators.model import Feature, Model
 from app.core.ring import SIZE, Unit
 
@@ -130,6 +130,8 @@ class HaasSimulator:
     def _read(self, number: int) -> float | None:
         if 0 <= number - self.first < SIZE:
             return self.model.registers[number - self.first]
+        if number in {DATE, TIME_OF_DAY}:
+            return float(self.model.clock().strftime("%Y%m%d" if number == DATE else "%H%M%S"))
         place = self._offset(number)
         return self.variables.get(number) if place is None else self.model.offsets[place]
 

@@ -9,7 +9,7 @@ import asyncio
 import random
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Final, NamedTuple
 
 from app.core.ring import (
@@ -207,10 +207,13 @@ class Model:
         error = feature.bias + feature.wear * self.parts + self.chance.gauss(0.0, feature.noise)
         return feature.nominal / scale + error / scale + offset
 
+    def clock(self) -> datetime:
+        """The date and the local time that the control shows."""
+        return datetime.now() + timedelta(seconds=self.clock_ahead)  # noqa: DTZ005 - a control knows no zone
+
     def _time_of_day(self) -> float:
-        now = datetime.now()  # noqa: DTZ005 - a control knows no zone
-        seconds = now.hour * 3600 + now.minute * 60 + now.second
-        return float(round(seconds + self.clock_ahead) % 86_400)
+        now = self.clock()
+        return float(now.hour * 3600 + now.minute * 60 + now.second)
 
     # --- what happens to a machine
 

@@ -58,6 +58,7 @@ INDEX: Final = re.compile(r"((?P<unit>u\d+)(, ?|$))?((?P<column>c\d+)(, ?|$))?((
 WORDS: Final = {number: word for word, number in PARAMETERS.items()}
 OLD_EDGE_DATA: Final = "/Tool/Compensation/cuttEdgeParam"
 STANDARD: Final[dict[ua.NodeId, NodeData]] = {}
+CURRENT_TIME: Final = ua.NodeId(ua.Int32(ua.ObjectIds.Server_ServerStatus_CurrentTime))
 ANYBODY: Final = User(role=UserRole.Anonymous)
 Codes = ua.StatusCodes
 
@@ -278,6 +279,10 @@ class Session(InternalSession):
             return await super().read(params)
         found = []
         for each in params.NodesToRead:
+            if each.NodeId == CURRENT_TIME:
+                ahead = timedelta(seconds=self.iserver.nc.model.clock_ahead)
+                found.append(ua.DataValue(ua.Variant(datetime.now(UTC) + ahead, ua.VariantType.DateTime)))
+                continue
             if not _of_nc(each.NodeId) or each.AttributeId != ua.AttributeIds.Value:
                 rest = replace(params, NodesToRead=[each])
                 found += await super().read(rest)
