@@ -339,7 +339,7 @@ def test_a_file_on_the_page(server: Server, page: Page, tmp_path: Path) -> None:
     page.get_by_role("button", name="Preview").click()
     rows = page.locator("tbody tr")
     expect(rows).to_have_count(4)
-    expect(rows.nth(0).locator("select")).to_have_value(shop.characteristic)
+    expect(rows.nth(0).locator("input")).to_have_value(shop.characteristic)
     expect(rows.nth(0)).to_contain_text("1 is excluded, as the file marks it.")
     expect(rows.nth(3)).to_contain_text("is not a length: its unit is '°'")
     page.select_option("select[name=machine]", shop.machine)
