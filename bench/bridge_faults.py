@@ -379,8 +379,17 @@ class Campaign:
         try:
             self._until(noticed, f"the edit to {held} is noticed", NOTICED)
         except AssertionError as error:
-            error.add_note(f"The control holds {control.offset}. The server: {self._known()}")
+            error.add_note(
+                f"The control holds {control.offset}. The server: {self._known()}. The bridge: {self._noted()}"
+            )
             raise
+
+    def _noted(self) -> str:
+        """What the bridge has noted: the offset that the control holds, the one that it has told, and what is under way."""
+        with contextlib.closing(sqlite3.connect(self.folder / "inband-bridge.sqlite3")) as store:
+            places = store.execute("SELECT held, told FROM location").fetchall()
+            intents = store.execute("SELECT number, state FROM intent WHERE state IN ('open', 'answered')").fetchall()
+        return f"held and told {places}, under way {intents}"
 
     def _known(self) -> str:
         """What the server says of the tool, and what asks for a person."""

@@ -52,7 +52,7 @@ async def run(unit: Unit, client: AsyncClient, server: Server) -> None:
     while True:
         unit.news.clear()
         pause, trouble, away = server.ask, None, False
-        in_full = unit.to_tell or time.monotonic() >= ask_at
+        in_full = due = unit.to_tell or time.monotonic() >= ask_at
         unit.to_tell = False
         for step in STEPS:
             if step is not _forward and not in_full:
@@ -64,7 +64,7 @@ async def run(unit: Unit, client: AsyncClient, server: Server) -> None:
                 pause, ask_at = max(pause, waits), 0.0
                 if away := isinstance(error, AWAY):
                     break
-        if in_full and trouble is None:
+        if due and trouble is None:  # corrections that readings ask for do not put off what else has to be told
             ask_at = time.monotonic() + server.ask
         unit.complain(trouble)
         if away:

@@ -1,20 +1,23 @@
 """The server's side of one machine, against a server that is scripted: what is told, what is refused, what is told again."""
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 from typing import Any, cast
 
 import pytest
 
 from app.bridge import server_side
+from app.bridge.configuration import Server
 from app.bridge.links import Order, Outcome, Position, Received
 from app.bridge.simulators.model import Model
 from app.bridge.store import Store
-from app.bridge.unit import Unit
+from app.bridge.unit import Unit, ended
 from inband_client import AsyncClient, Batch, Conflict, Correction, Decision, Forbidden, Invalid, NotFound, Reason
-from tests.bridge.plant import store_in, unit_of
+from tests.bridge.plant import store_in, unit_of, until
 from tests.loops import run
 
 M = "lathe-1"
@@ -307,5 +310,34 @@ def test_corrections_are_asked_for_when_a_decision_concerns_them(
         await unit.store.add(M, [Received("k1", {"measured": 40.0}, Position(7, 1))])
         assert await server_side._forward(unit, cast("AsyncClient", server)) is asks
         assert server.heard == [("push", "k1")]
+
+    run(story())
+
+
+def test_an_edit_is_told_though_each_reading_asks_for_corrections(tmp_path: Path) -> None:
+    """A tool whose corrections are held: every reading concerns them, one comes after the other."""
+
+    async def story() -> None:
+        server = Scripted()
+        server.decision = replace(server.decision, action="correct")
+        unit = unit_of(Model(), store_in(tmp_path))
+
+        async def readings() -> None:
+            for number in count():
+                await unit.store.add(M, [Received(f"k{number}", {"measured": 40.0}, Position(7, number))])
+                unit.news.set()
+                await asyncio.sleep(0.02)
+
+        client = cast("AsyncClient", server)
+        tasks = [
+            asyncio.create_task(server_side.run(unit, client, Server(url="", ask=0.2))),
+            asyncio.create_task(readings()),
+        ]
+        try:
+            await until(lambda: ("push", "k9") in server.heard, "some readings")
+            await unit.store.held(M, {3: -0.004})
+            await until(lambda: ("report", 3, -0.004) in server.heard, "the edit is told")
+        finally:
+            await ended(tasks)
 
     run(story())
