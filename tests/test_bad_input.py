@@ -17,7 +17,7 @@ import pytest
 from app.main import create_plant
 from app.settings import Settings
 from app.web.openapi import example_of
-from tests.conftest import Server
+from tests.conftest import RunServer, Server
 from tests.geometry.rotary_axes.bench import axis
 from tests.loop.readings.record import counts
 from tests.quality.control_charts.line import Line
@@ -557,6 +557,15 @@ class Place:
             content=content,
             headers={"Content-Type": "application/json"} | headers,
         )
+
+
+@pytest.fixture(scope="module")
+def server(run_server: RunServer) -> Iterator[Server]:
+    """A server to which no bridge becomes silent meanwhile: its alarm would be counted as stored."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("INBAND_BRIDGE_SILENT_AFTER", "86400")
+        with run_server(workers=1) as running:
+            yield running
 
 
 @pytest.fixture(scope="module")
