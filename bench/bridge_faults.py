@@ -401,8 +401,13 @@ class Campaign:
         return f"{tool}, alarms {[alarm['kind'] for alarm in alarms]}"
 
     def _acknowledge(self) -> None:
-        """An operator looks at the alarms, so that corrections go on."""
+        """An operator looks at the alarms and releases what is held, so that corrections go on."""
         with contextlib.suppress(httpx.HTTPError):
+            for held in self.call("GET", f"/machines/{self.machine}/corrections?status=held")["items"]:
+                with contextlib.suppress(httpx.HTTPStatusError):
+                    self.call(
+                        "POST", f"/corrections/{self.machine}/{held['number']}/release", reason="The edge is good"
+                    )
             for alarm in self.call("GET", f"/alarms?state=active&machine={self.machine}")["items"]:
                 with contextlib.suppress(httpx.HTTPStatusError):
                     self.call("POST", f"/alarms/{alarm['id']}/acknowledge", action="noted", comment="seen")
@@ -435,6 +440,7 @@ class Campaign:
             "interval": 0.05,
             "offsets_every": 1.0,
             "patience": 5.0,
+            "largest_step": 5.0,
             "largest_distance": 5.0,
             "proof_needed": False,
             self.kind: settings,
