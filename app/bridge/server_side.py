@@ -203,13 +203,19 @@ async def _ask(unit: Unit, client: AsyncClient) -> None:
     waiting: list[str] = []
     until = math.inf
     now = datetime.now(UTC)
+    answered: set[int] = set()  # tool memories whose later corrections lead to another offset now
     for correction in pending:
+        if correction.tool_memory in answered:
+            unit.to_tell = True  # asked again at once
+            unit.news.set()
+            break
         if correction.offset_expected is None:
             waiting.append(f"Correction {correction.number} waits: the server does not say which offset it leads to.")
             break
         order = _order(correction, correction.offset_expected)
         if earlier := told.get(correction.number):
             await _tell_again(unit, client, order, earlier)
+            answered.add(order.tool_memory)
             continue
         issued = correction.created_at or now
         verdict = against(order, issued, now, machine, known, unit.held)
@@ -219,6 +225,7 @@ async def _ask(unit: Unit, client: AsyncClient) -> None:
             orders.append(order)
         elif verdict.final:
             await client.reject(machine.key, order.number, verdict.reason)
+            answered.add(order.tool_memory)
         else:
             waiting.append(verdict.reason)
             break  # the order of corrections is theirs: what stands behind waits too

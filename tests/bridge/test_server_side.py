@@ -13,14 +13,15 @@ import pytest
 from app.bridge import server_side
 from app.bridge.configuration import Server
 from app.bridge.links import Order, Outcome, Position, Received
-from app.bridge.simulators.model import Model
+from app.bridge.simulators.model import Feature, Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit, ended
 from inband_client import AsyncClient, Batch, Conflict, Correction, Decision, Forbidden, Invalid, NotFound, Reason
-from tests.bridge.plant import store_in, unit_of, until
+from tests.bridge.plant import location, store_in, unit_of, until
 from tests.loops import run
 
 M = "lathe-1"
+PLACES = (location(Feature()), location(Feature(tool=4), 4))
 
 
 def correction(number: int, after: float | None = -0.01, amount: float = -0.01, tool: int = 3) -> Correction:
@@ -83,17 +84,20 @@ class Scripted:
         if self.rejecting is not None:
             raise self.rejecting
         self.heard.append(("reject", number, reason))
+        self.waiting = [each for each in self.waiting if each.number != number]
 
     async def report_offset(self, machine: str, tool: int, offset: float, *, none_applied: bool) -> None:
         self.heard.append(("report", tool, offset))
 
 
-def story(tmp_path: Path, server: Scripted, before: Callable[[Store], Any] | None = None) -> Unit:
+def story(
+    tmp_path: Path, server: Scripted, before: Callable[[Store], Any] | None = None, fields: dict[str, Any] | None = None
+) -> Unit:
     """One round of the server's side, after something has happened."""
 
     async def work() -> Unit:
         store = store_in(tmp_path)
-        unit = unit_of(Model(), store)
+        unit = unit_of(Model(), store, **fields or {})
         if before is not None:
             await before(store)
         for step in (server_side._tell, server_side._forward, server_side._ask):
@@ -211,12 +215,25 @@ def test_what_stands_behind_a_correction_that_waits_waits_too(tmp_path: Path) ->
 
 
 def test_a_step_beyond_the_limit_is_rejected_with_its_reason(tmp_path: Path) -> None:
-    server = Scripted(correction(18, after=-0.2, amount=-0.2), correction(19))
-    unit = story(tmp_path, server)
+    server = Scripted(correction(18, after=-0.2, amount=-0.2, tool=4), correction(19))
+    unit = story(tmp_path, server, fields={"location": PLACES})
     [(what, number, reason)] = server.heard
     assert (what, number) == ("reject", 18)
     assert "larger than 0.1 mm" in reason
     assert [order.number for order in unit.orders] == [19]
+
+
+def test_what_stands_behind_a_rejected_correction_of_its_tool_is_asked_for_anew(tmp_path: Path) -> None:
+    """It was to follow the one that is rejected: the control will hold another offset before it, and lead to another."""
+    server = Scripted(correction(18, after=-0.2, amount=-0.2), correction(19, after=-0.21))
+    unit = story(tmp_path, server)
+    assert [(what, number) for what, number, _ in server.heard] == [("reject", 18)]
+    assert unit.orders == ()
+    assert unit.to_tell
+    assert unit.news.is_set()
+    server.waiting = [correction(19, after=-0.01)]
+    run(server_side._ask(unit, cast("AsyncClient", server)))
+    assert unit.orders == (Order(19, 3, 0.0, -0.01),)
 
 
 def test_a_hold_by_command_is_seen_and_released(tmp_path: Path) -> None:
