@@ -240,14 +240,16 @@ class RegisterLink:
             return
         if block.answered == wanted.number:
             return
-        if open_number == wanted.number and block.answer != Answer.CHECK_WRONG:
+        content = mail_registers(self._mail(wanted))
+        # one that lies there from before a restart may have been converted by another mapping
+        there = all(_same(self._numbers[place], value) for place, value in content)
+        if open_number == wanted.number and there and block.answer != Answer.CHECK_WRONG:
             return
         if (
             open_number
         ):  # a newer one waits for the next poll: first the old one is taken back, and its answer looked for
             await self._write(Register.MAIL_NUMBER, block.answered)
             return
-        content = mail_registers(self._mail(wanted))
         await self._write_all(content[:-1])
         await self._write_all(content[-1:])  # the number last, when all else is read back
 
@@ -375,9 +377,14 @@ class RegisterLink:
         twice = [*content] if self.registers.whole else [*content, *content]
         held = await self.registers.read([place for place, _ in twice])
         for (place, value), found in zip(twice, held, strict=True):
-            if not abs(found - value) <= max(2e-6, 2e-7 * abs(value)):  # eight digits, six decimals; or not a number
+            if not _same(found, value):
                 self._heads = []
                 raise ControlAway(
                     f"Register +{int(place)} ({place.name.lower()}) holds {found:g} after {value:g} was written: may the"
                     " bridge write it, and does another program?"
                 )
+
+
+def _same(found: float, written: float) -> bool:
+    """Tell if a register holds what was written: eight digits, six decimals. What is not a number is not the same."""
+    return abs(found - written) <= max(2e-6, 2e-7 * abs(written))

@@ -232,6 +232,31 @@ def test_an_order_that_is_no_longer_wanted_is_taken_back() -> None:
     run(story())
 
 
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_correction_that_lies_there_by_another_mapping_is_taken_back_first(*, whole: bool) -> None:
+    """The bridge was ended, the sign corrected, and the bridge started again before the NC had looked."""
+    model = Model()
+    made(model)
+    order = Order(18, 3, 0.0, 0.010)
+
+    async def story() -> None:
+        wrong, _ = link_of(model, whole=whole, location=(location(Feature(sign=-1)),))
+        await wrong.fetch(Position())
+        await wrong.offer([order])
+        assert model.registers[Register.MAIL_VALUE] == -0.010
+        right, _ = link_of(model, whole=whole)
+        await right.fetch(Position())
+        await right.offer([order])
+        assert model.registers[Register.MAIL_NUMBER] == 0
+        for _ in range(3):
+            await right.fetch(Position())
+            await right.offer([order])
+        made(model)
+        assert model.offsets[PLACE] == pytest.approx(0.010)
+
+    run(story())
+
+
 def test_a_mailbox_that_was_read_half_written_is_written_again() -> None:
     model = Model()
     made(model)
