@@ -241,9 +241,9 @@ class RegisterLink:
         if block.answered == wanted.number:
             return
         content = mail_registers(self._mail(wanted))
-        # one that lies there from before a restart may have been converted by another mapping
-        there = all(_same(self._numbers[place], value) for place, value in content)
-        if open_number == wanted.number and there and block.answer != Answer.CHECK_WRONG:
+        # by its content: one from before a restart may have been converted by another mapping. “Check sum wrong” stays the
+        # answer until the NC looks again: it says nothing of what lies there now
+        if all(_same(self._numbers[place], value) for place, value in content):
             return
         if (
             open_number

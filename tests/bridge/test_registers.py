@@ -274,6 +274,10 @@ def test_a_mailbox_that_was_read_half_written_is_written_again() -> None:
             await link.fetch(Position())
             assert await link.outcomes() == []
             await link.offer([order])
+        for _ in range(3):
+            await link.fetch(Position())
+            await link.offer([order])
+            assert model.registers[Register.MAIL_NUMBER] == 18, "it stays until the NC looks"
         made(model)
         assert [each.after for each in model.applied] == [0.01]
 
