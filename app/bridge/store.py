@@ -278,13 +278,19 @@ class Store:
     # --- corrections
 
     async def intend(self, machine: str, order: Order, mapping: str) -> None:
-        """Note a correction before the control hears of it. One that was withdrawn may be offered again."""
+        """Note a correction before the control hears of it. One that the control has answered stays as it is.
+
+        One that was withdrawn may be offered again, and one that is open may be about something else by now: by another
+        mapping, or at a server that gives the number anew.
+        """
         await self._run(
             lambda database: database.execute(
                 "INSERT INTO intent (machine, number, tool_memory, before, after, mapping, state, at)"
-                " VALUES (?, ?, ?, ?, ?, ?, 'open', ?) ON CONFLICT (machine, number) DO UPDATE"
-                " SET state = 'open', before = excluded.before, after = excluded.after, mapping = excluded.mapping"
-                " WHERE state = 'withdrawn'",
+                " VALUES (?, ?, ?, ?, ?, ?, 'open', ?) ON CONFLICT (machine, number) DO UPDATE SET state = 'open',"
+                " tool_memory = excluded.tool_memory, before = excluded.before, after = excluded.after,"
+                " mapping = excluded.mapping WHERE state = 'withdrawn' OR (state = 'open' AND"
+                " (tool_memory, before, after, mapping)"
+                " IS NOT (excluded.tool_memory, excluded.before, excluded.after, excluded.mapping))",
                 (machine, order.number, order.tool_memory, order.before, order.after, mapping, time.time()),
             )
         )

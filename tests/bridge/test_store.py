@@ -99,6 +99,23 @@ def test_an_answer_counts_once_and_makes_the_offset_known(store: Store) -> None:
     run(story())
 
 
+@pytest.mark.parametrize("withdrawn", [True, False])
+def test_a_correction_that_is_offered_again_is_what_it_is_now(store: Store, *, withdrawn: bool) -> None:
+    """A restored server gives its number anew, for another tool; or the mapping was changed while the bridge was ended."""
+
+    async def story() -> None:
+        await store.intend(M, Order(18, 3, 0.02, 0.014), "abc")
+        if withdrawn:
+            await store.set_intent(M, 18, "withdrawn")
+        order = Order(18, 4, 0.0, 0.01)
+        await store.intend(M, order, "def")
+        assert [(each.order, each.mapping) for each in await store.intents(M, "open")] == [(order, "def")]
+        await store.answered(M, Outcome(18, True, 0.01))
+        assert {memory: known.offset for memory, known in (await store.known(M)).items()} == {4: 0.01}
+
+    run(story())
+
+
 def test_an_offset_is_told_once_and_not_while_a_correction_is_open(store: Store) -> None:
     async def story() -> None:
         await store.held(M, {3: 0.02})
