@@ -85,6 +85,8 @@ async def _connected(unit: Unit) -> None:
                     unit.to_tell = True
                     unit.news.set()
                 answered = outcome.number
+                # not once more, however long the server is away: somebody may have set the offset of before by hand
+                unit.orders = tuple(order for order in unit.orders if order.number != outcome.number)
             await link.offer(unit.offered)
         if time.monotonic() >= offsets_at:
             async with asyncio.timeout(machine.patience):

@@ -240,10 +240,12 @@ async def _intend(unit: Unit, orders: Sequence[Order], until: float = math.inf) 
     for intent in await unit.store.intents(key, "open"):
         if intent.order.number not in wanted:
             await unit.store.set_intent(key, intent.order.number, "withdrawn")
+    offered: list[Order] = []
     for order in orders[:1]:
         location = next(place for place in unit.machine.location if place.tool_memory == order.tool_memory)
-        await unit.store.intend(key, order, unit.machine.mapping_hash(location))
-    unit.orders, unit.orders_until = tuple(orders[:1]), until
+        if await unit.store.intend(key, order, unit.machine.mapping_hash(location)):
+            offered.append(order)
+    unit.orders, unit.orders_until = tuple(offered), until
 
 
 async def _tell_again(unit: Unit, client: AsyncClient, order: Order, earlier: Intent) -> None:

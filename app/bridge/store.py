@@ -277,14 +277,15 @@ class Store:
 
     # --- corrections
 
-    async def intend(self, machine: str, order: Order, mapping: str) -> None:
-        """Note a correction before the control hears of it. One that the control has answered stays as it is.
+    async def intend(self, machine: str, order: Order, mapping: str) -> bool:
+        """Note a correction before the control hears of it; whether it may: not when the control has answered it.
 
         One that was withdrawn may be offered again, and one that is open may be about something else by now: by another
         mapping, or at a server that gives the number anew.
         """
-        await self._run(
-            lambda database: database.execute(
+
+        def write(database: sqlite3.Connection) -> bool:
+            database.execute(
                 "INSERT INTO intent (machine, number, tool_memory, before, after, mapping, state, at)"
                 " VALUES (?, ?, ?, ?, ?, ?, 'open', ?) ON CONFLICT (machine, number) DO UPDATE SET state = 'open',"
                 " tool_memory = excluded.tool_memory, before = excluded.before, after = excluded.after,"
@@ -293,7 +294,12 @@ class Store:
                 " IS NOT (excluded.tool_memory, excluded.before, excluded.after, excluded.mapping))",
                 (machine, order.number, order.tool_memory, order.before, order.after, mapping, time.time()),
             )
-        )
+            [state] = database.execute(
+                "SELECT state FROM intent WHERE machine = ? AND number = ?", (machine, order.number)
+            ).fetchone()
+            return bool(state == "open")
+
+        return await self._run(write)
 
     async def answered(self, machine: str, outcome: Outcome) -> bool:
         """Note the control's answer; whether it is a new one. What it holds now is known from here on."""

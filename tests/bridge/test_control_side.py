@@ -13,7 +13,7 @@ from app.bridge.links import Order
 from app.bridge.simulators.model import Feature, Model
 from app.bridge.unit import Unit, ended
 from app.core.ring import Register
-from tests.bridge.plant import store_in, unit_of, until
+from tests.bridge.plant import ModelRegisters, store_in, unit_of, until
 from tests.loops import run
 
 M = "lathe-1"
@@ -56,3 +56,35 @@ def test_an_offered_correction_is_withdrawn_while_the_server_is_away(
     for _ in model.part():  # the NC program finds nothing to apply
         pass
     assert list(model.offsets.values()) == [0.0]
+
+
+def test_a_correction_that_was_answered_is_not_written_again_while_the_server_is_away(tmp_path: Path) -> None:
+    """It was set, then an operator has set the offset of before again, then the line to the control was cut."""
+    model = Model((Feature(bias=0.0, wear=0.0, noise=0.0),))
+    for _ in model.part():
+        pass
+    [place] = model.offsets
+
+    async def story() -> None:
+        registers = ModelRegisters(model)
+        unit = unit_of(model, store_in(tmp_path), registers, corrections="direct")
+        order = Order(1, 3, 0.0, -0.01)
+        await unit.store.intend(M, order, "hash")
+        unit.orders = (order,)
+        task = asyncio.create_task(control_side.run(unit))
+
+        async def answered() -> bool:
+            return bool(await unit.store.intents(M, "answered"))
+
+        await until(answered, "the correction is set")
+        model.edit(place, 0.0)
+        registers.away = True
+        await until(lambda: unit.state == "control_away", "the line is cut")
+        registers.away = False
+        seen = unit.polls
+        await until(lambda: unit.polls > seen + 3, "the line is back")
+        await ended([task])
+        unit.store.close()
+
+    run(story())
+    assert model.offsets[place] == 0.0

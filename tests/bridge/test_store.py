@@ -92,8 +92,9 @@ def test_an_answer_counts_once_and_makes_the_offset_known(store: Store) -> None:
         assert intent.outcome is not None
         assert intent.outcome.applied
         assert (await store.known(M))[3].offset == 0.014
+        assert not await store.intend(M, order, "abc")
         await store.set_intent(M, 18, "told")
-        await store.intend(M, order, "abc")
+        assert not await store.intend(M, order, "abc")
         assert await store.intents(M, "open") == [], "what was answered is not offered again"
 
     run(story())
