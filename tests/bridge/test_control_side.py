@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from app.bridge import control_side
-from app.bridge.links import Order
+from app.bridge.links import Order, Outcome, Position
 from app.bridge.simulators.model import Feature, Model
 from app.bridge.unit import Unit, ended
 from app.core.ring import Register
@@ -88,3 +88,32 @@ def test_a_correction_that_was_answered_is_not_written_again_while_the_server_is
 
     run(story())
     assert model.offsets[place] == 0.0
+
+
+def test_an_answer_counts_that_the_bridge_sees_before_it_knows_the_correction(tmp_path: Path) -> None:
+    """The computer of the bridge was exchanged, and its store with it: the control has answered what the server offers again."""
+    model = Model((Feature(bias=0.0, wear=0.0, noise=0.0),))
+    for _ in model.part():
+        pass
+
+    async def story() -> None:
+        unit = unit_of(model, store_in(tmp_path))
+        order = Order(1, 3, 0.0, -0.01)
+        await unit.link.connect()
+        await unit.link.fetch(Position())
+        await unit.link.offer([order])
+        for _ in model.part():
+            pass
+        task = asyncio.create_task(control_side.run(unit))
+        await until(lambda: unit.polls > 1, "the answer is seen")
+        await unit.store.intend(M, order, "hash")
+        unit.orders = (order,)
+
+        async def answered() -> bool:
+            return [each.outcome for each in await unit.store.intents(M, "answered")] == [Outcome(1, True, -0.01)]
+
+        await until(answered, "the answer counts")
+        await ended([task])
+        unit.store.close()
+
+    run(story())
