@@ -128,6 +128,8 @@ async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | Non
     try:
         decision = await client.push(row.body | {"key": row.key})
     except REFUSED as error:
+        if _is_elsewheres(error):
+            raise
         reason = str(error)
     except Forbidden:
         if not await _key_is_right(unit, client):
@@ -140,6 +142,11 @@ async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | Non
     await unit.store.refuse(unit.machine.key, row.id, reason)
     log.warning("%s: reading %s is in the quarantine: %s", unit.machine.key, row.key, reason)
     return None
+
+
+def _is_elsewheres(error: ProblemError) -> bool:
+    """Tell if it is not Inband's: a proxy without a server behind it may answer 404, which says nothing of what was sent."""
+    return not error.kind
 
 
 async def _key_is_right(unit: Unit, client: AsyncClient) -> bool:
@@ -180,6 +187,8 @@ async def _tell_one(unit: Unit, client: AsyncClient, intent: Intent) -> None:
         Conflict,
         NotFound,
     ) as error:  # superseded while the control took it, told before, or forgotten by a restored server
+        if _is_elsewheres(error):
+            raise
         said = "is in the offset" if outcome.applied else "was refused by the control"
         log.warning("%s: correction %d %s, but %s", key, order.number, said, error)
     if held is not None:

@@ -35,6 +35,11 @@ def correction(number: int, after: float | None = -0.01, amount: float = -0.01, 
     )
 
 
+def said(kind: str) -> dict[str, Any]:
+    """What makes an error one of Inband's."""
+    return {"document": {"type": f"urn:inband:problem:{kind}"}}
+
+
 class Scripted:
     """A server: what waits, what it refuses, and what it has heard."""
 
@@ -150,14 +155,17 @@ def test_each_answer_is_told_once(tmp_path: Path, outcome: Outcome, heard: list[
 
 def test_a_correction_that_was_superseded_while_the_control_took_it_is_reported(tmp_path: Path) -> None:
     server = Scripted()
-    server.confirming = Conflict("POST applied", "superseded", status=409)
+    server.confirming = Conflict("POST applied", "superseded", status=409, **said("conflict"))
     story(tmp_path, server, answered(Outcome(18, applied=True, offset=-0.01), ORDER, told=False))
     assert server.heard == [("report", 3, -0.01)]
 
 
 @pytest.mark.parametrize(
     "error",
-    [Conflict("POST rejected", "rejected already", status=409), NotFound("POST rejected", "no such", status=404)],
+    [
+        Conflict("POST rejected", "rejected already", status=409, **said("conflict")),
+        NotFound("POST rejected", "no such", status=404, **said("not-found")),
+    ],
 )
 def test_a_refusal_that_the_server_has_heard_or_forgotten_holds_up_no_later_answer(
     tmp_path: Path, error: Exception
@@ -247,7 +255,7 @@ def test_a_hold_by_command_is_seen_and_released(tmp_path: Path) -> None:
 def test_a_reading_that_is_refused_holds_up_no_other(tmp_path: Path) -> None:
     server = Scripted()
     server.refuses = lambda reading: (
-        Invalid("POST /readings", "not a size", status=422) if reading["measured"] > 90 else None
+        Invalid("POST /readings", "not a size", status=422, **said("invalid")) if reading["measured"] > 90 else None
     )
 
     async def before(store: Store) -> None:
@@ -260,6 +268,27 @@ def test_a_reading_that_is_refused_holds_up_no_other(tmp_path: Path) -> None:
     [refused] = run(unit.store.quarantine(M))
     assert refused.key == "k2"
     assert "not a size" in refused.reason
+
+
+@pytest.mark.parametrize("together", [1, 2])
+def test_what_a_proxy_answers_puts_no_reading_into_the_quarantine(tmp_path: Path, together: int) -> None:
+    """While the server is started anew, some answer "404 page not found" in its place."""
+    server = Scripted()
+    server.refuses = lambda _reading: NotFound("POST /readings", "404 page not found", status=404)
+    server.confirming = NotFound("POST applied", "404 page not found", status=404)
+
+    async def before(store: Store) -> None:
+        await answered(Outcome(18, applied=True, offset=-0.01), ORDER, told=False)(store)
+        await store.add(M, [Received(f"k{n}", {"measured": 40.0}, Position(7, n)) for n in range(together)])
+
+    unit = unit_of(Model(), store_in(tmp_path))
+    run(before(unit.store))
+    for step in (server_side._tell, server_side._forward):
+        with pytest.raises(NotFound):
+            run(step(unit, cast("AsyncClient", server)))
+    assert run(unit.store.quarantine(M)) == []
+    assert len(run(unit.store.waiting(M))) == together
+    assert server.heard == [], "nor is the offset reported as that of an edit"
 
 
 @pytest.mark.parametrize("together", [1, 2])
