@@ -46,6 +46,11 @@ CREATE TABLE IF NOT EXISTS fact (machine TEXT NOT NULL, name TEXT NOT NULL, valu
 """
 NOTE: Final = "INSERT INTO fact (machine, name, value) VALUES (?, ?, ?) ON CONFLICT (machine, name) DO UPDATE SET value = excluded.value"
 PAGE_ROWS: Final = 200
+GIVE_UP: Final = (
+    "DELETE FROM reading WHERE id IN (SELECT id FROM reading WHERE state = 'sent' ORDER BY sent_at, id LIMIT ?)"
+)
+GIVEN_UP, MOST_GIVEN_UP = 500, 20_000
+"""Readings that the server has, deleted at a time while the store is full, and in one call: others wait for it."""
 ANSWERS_KEPT: Final = 90 * 86_400.0  # s
 
 
@@ -265,15 +270,24 @@ class Store:
         return await self._run(write)
 
     async def is_full(self) -> bool:
-        """True if the store has reached its largest size. Space that was freed counts as free."""
+        """True if the store has reached its largest size. Space that was freed counts as free.
 
-        def read(database: sqlite3.Connection) -> bool:
+        What the server has is given up first, the oldest before the others: no machine stands still for that.
+        """
+
+        def over(database: sqlite3.Connection) -> bool:
             [pages], [free], [size] = (
                 database.execute(f"PRAGMA {name}").fetchone() for name in ("page_count", "freelist_count", "page_size")
             )
             return bool((pages - free) * size >= self.largest)
 
-        return await self._run(read)
+        def look(database: sqlite3.Connection) -> bool:
+            for _ in range(MOST_GIVEN_UP // GIVEN_UP):
+                if not over(database) or not database.execute(GIVE_UP, (GIVEN_UP,)).rowcount:
+                    break
+            return over(database)
+
+        return await self._run(look)
 
     # --- corrections
 

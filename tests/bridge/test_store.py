@@ -216,6 +216,25 @@ def test_a_full_store_is_seen_and_room_that_was_freed_counts(tmp_path: Path) -> 
     run(story())
 
 
+def test_readings_that_the_server_has_do_not_make_a_store_full(tmp_path: Path) -> None:
+    """They are kept for a server that goes back in time, as far as there is room; the machine goes on."""
+    store = Store(tmp_path / "store.sqlite3", largest=0.2)
+
+    async def story() -> None:
+        await store.add(M, [received(sequence) for sequence in range(1, 3000)])
+        rows = await store.waiting(M, 2800)
+        await store.sent(M, [row.id for row in rows])
+        assert not await store.is_full()
+        kept = await store.send_again(M)
+        assert 0 < kept < 2800
+        waiting = await store.waiting(M, 5000)
+        assert [row.id for row in waiting] == list(range(2801 - kept, 3000)), (
+            "the oldest were given up, none that waits"
+        )
+
+    run(story())
+
+
 def test_one_program_at_a_time_works_with_the_controls(tmp_path: Path) -> None:
     store, other = Store(tmp_path / "store.sqlite3"), Store(tmp_path / "store.sqlite3")
     with store.alone():
