@@ -39,7 +39,9 @@ SHORTEST_PAUSE, LONGEST_PAUSE = 1.0, 30.0  # s
 AWAY = (Unauthorized, Forbidden, Unavailable, Untrusted)
 TRUST = "Look at server.url; if it is right, name the authority that signed the certificate in server.ca."
 TOGETHER = 100  # readings of a backlog in one request
-MOST_DETAIL = 1000  # characters
+MOST_DETAIL, MOST_REASON, MOST_NAME = 1000, 500, 200  # characters
+MOST_CLOCK = 1e9  # s: a control whose battery is empty may say 1980; the server takes no more
+MOST_OFFSET = 100_000.0  # mm: as much as the server takes; more is what a wrong register holds
 NOTICED = 0.0005  # mm: what an offset may differ by without being told
 
 
@@ -288,6 +290,8 @@ async def beat(unit: Unit, client: AsyncClient, server: Server) -> None:
             answer = await client.heartbeat(unit.machine.key, **await heartbeat(unit))
             await _look_back(unit, answer.get("server") or {})
             await guided_test.hear(unit, answer.get("touch_test"))
+        except Invalid as error:  # nobody else says it, and the server takes this bridge for silent
+            log.warning("%s: %s", unit.machine.key, error)
         except (ProblemError, StoreError) as error:  # the control's and the server's side say it
             log.debug("%s: heartbeat: %s", unit.machine.key, error)
         except Exception:
@@ -314,7 +318,7 @@ async def heartbeat(unit: Unit) -> dict[str, Any]:
                 "tool_memory": location.tool_memory,
                 "mapping": mapping,
                 "proved_at": _moment(here.proved_at) if here is not None and proved else None,
-                "offset": None if here is None else here.offset,
+                "offset": None if here is None else _sensible(here.offset),
                 "touch_test_by_page": machine.touch_tests_by_page and writes_offsets(unit.link),
             }
         )
@@ -322,27 +326,37 @@ async def heartbeat(unit: Unit) -> dict[str, Any]:
         "version": __version__,
         "kind": machine.kind,
         "state": unit.state,
-        "detail": (unit.detail or unit.trouble or (unit.context.summary() if unit.context else ""))[:MOST_DETAIL],
+        "detail": _line(unit.detail or unit.trouble or (unit.context.summary() if unit.context else ""), MOST_DETAIL),
         "sent_at": datetime.now(UTC),
         "waiting": counts.waiting,
         "oldest_waiting_at": _moment(counts.oldest),
         "quarantined": counts.quarantined,
         "quarantine": [
             {
-                "key": each.key,
-                "characteristic": each.body.get("characteristic"),
-                "reason": each.reason[:500],
+                "key": _line(each.key) or "?",
+                "characteristic": _line(each.body.get("characteristic")),
+                "reason": _line(each.reason, MOST_REASON) or "",
                 "at": _moment(each.at),
             }
             for each in quarantine
         ],
-        "clock_offset": unit.link.clock.offset,
+        "clock_offset": None if (ahead := unit.link.clock.offset) is None else max(-MOST_CLOCK, min(MOST_CLOCK, ahead)),
         "started_at": unit.started_at,
         "mapping": machine.mapping_hash(),
         "hold_all": unit.held,
-        "identity": unit.identity,
+        "identity": _line(unit.identity),
         "locations": locations,
     }
+
+
+def _line(text: object, most: int = MOST_NAME) -> str | None:
+    """Words as the server takes them, whatever a control or a file has sent: one line of signs that can be read, or None."""
+    seen = "".join(sign if sign.isprintable() else " " for sign in str("" if text is None else text))
+    return " ".join(seen.split())[:most].strip() or None
+
+
+def _sensible(offset: float | None) -> float | None:
+    return offset if offset is not None and abs(offset) <= MOST_OFFSET else None
 
 
 def _moment(seconds: float | None) -> datetime | None:

@@ -1,6 +1,7 @@
 """The server's side of one machine, against a server that is scripted: what is told, what is refused, what is told again."""
 
 import asyncio
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -16,7 +17,9 @@ from app.bridge.links import Order, Outcome, Position, Received
 from app.bridge.simulators.model import Feature, Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit, ended
+from app.loop.connections.schemas import HeartbeatIn
 from inband_client import AsyncClient, Batch, Conflict, Correction, Decision, Forbidden, Invalid, NotFound, Reason
+from inband_client.calls import plain
 from tests.bridge.plant import location, store_in, unit_of, until
 from tests.loops import run
 
@@ -356,6 +359,26 @@ def test_corrections_are_asked_for_when_a_decision_concerns_them(
         await unit.store.add(M, [Received("k1", {"measured": 40.0}, Position(7, 1))])
         assert await server_side._forward(unit, cast("AsyncClient", server)) is asks
         assert server.heard == [("push", "k1")]
+
+    run(story())
+
+
+def test_a_heartbeat_is_taken_whatever_a_control_has_sent(tmp_path: Path) -> None:
+    """One field that the server does not take would make the whole bridge silent."""
+
+    async def story() -> None:
+        unit = unit_of(Model(), store_in(tmp_path))
+        unit.identity = "  "
+        unit.detail = "The line has\x07 rung\u202e."
+        unit.link.clock.offset = -1.48e9  # the battery is empty: 1980
+        await unit.store.held(M, {3: 1e9})
+        names = ("x" * 300, "shaft\n1", "\x00", "", 5)
+        rows = [Received(f"k{n}\x01", {"characteristic": name}, fault="\x07") for n, name in enumerate(names)]
+        await unit.store.add(M, rows)
+        told = HeartbeatIn.model_validate_json(json.dumps(plain(await server_side.heartbeat(unit))))
+        assert (told.identity, told.detail, told.clock_offset) == (None, "The line has rung .", -1e9)
+        assert told.locations[0].offset is None
+        assert [each.characteristic for each in told.quarantine] == ["5", None, None, "shaft 1", "x" * 200]
 
     run(story())
 
