@@ -164,14 +164,25 @@ async def _key_is_right(unit: Unit, client: AsyncClient) -> bool:
 
 
 async def _tell(unit: Unit, client: AsyncClient) -> None:
-    """The control's answers, and offsets that somebody has changed at the control."""
+    """The control's answers, and offsets that somebody has changed at the control. One that is refused holds up no other."""
     key = unit.machine.key
+    refused: ProblemError | None = None
     for intent in await unit.store.intents(key, "answered"):
-        await _tell_one(unit, client, intent)
-        await unit.store.set_intent(key, intent.order.number, "told")
+        try:
+            await _tell_one(unit, client, intent)
+        except REFUSED as error:
+            refused = refused or error
+        else:
+            await unit.store.set_intent(key, intent.order.number, "told")
     for tool_memory, offset in (await unit.store.untold(key, NOTICED)).items():
-        await client.report_offset(key, tool_memory, round(offset, 6), none_applied=True)
-        await unit.store.told(key, tool_memory, offset)
+        try:
+            await client.report_offset(key, tool_memory, round(offset, 6), none_applied=True)
+        except REFUSED as error:
+            refused = refused or error
+        else:
+            await unit.store.told(key, tool_memory, offset)
+    if refused is not None:
+        raise refused
 
 
 async def _tell_one(unit: Unit, client: AsyncClient, intent: Intent) -> None:
@@ -183,7 +194,7 @@ async def _tell_one(unit: Unit, client: AsyncClient, intent: Intent) -> None:
             await client.confirm(key, order.number, offset_after=held, mapping=intent.mapping)
             return
         if not outcome.differs:
-            await client.reject(key, order.number, outcome.reason)
+            await client.reject(key, order.number, _line(outcome.reason, MOST_REASON) or "The control has refused it.")
             return
     except (
         Conflict,

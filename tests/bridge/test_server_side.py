@@ -18,6 +18,7 @@ from app.bridge.simulators.model import Feature, Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit, ended
 from app.loop.connections.schemas import HeartbeatIn
+from app.loop.tools.schemas import RejectionIn
 from inband_client import AsyncClient, Batch, Conflict, Correction, Decision, Forbidden, Invalid, NotFound, Reason
 from inband_client.calls import plain
 from tests.bridge.plant import location, store_in, unit_of, until
@@ -188,6 +189,32 @@ def test_a_refusal_that_the_server_has_heard_or_forgotten_holds_up_no_later_answ
     unit = story(tmp_path, server, before)
     assert server.heard == [("report", 3, 0.0), ("confirm", 19, -0.01)]
     assert run(unit.store.intents(M, "answered")) == []
+
+
+def test_a_report_that_is_refused_holds_up_no_other(tmp_path: Path) -> None:
+    """The configuration names a tool memory that the server does not have; a machine refuses without a reason."""
+
+    class Strict(Scripted):
+        async def report_offset(self, machine: str, tool: int, offset: float, *, none_applied: bool) -> None:
+            if tool == 2:
+                raise NotFound("POST reported", "no such tool memory", status=404, **said("not-found"))
+            await super().report_offset(machine, tool, offset, none_applied=none_applied)
+
+        async def reject(self, machine: str, number: int, reason: str) -> None:
+            RejectionIn(reason=reason, although_fetched=False)
+            await super().reject(machine, number, reason)
+
+    server = Strict()
+
+    async def story() -> None:
+        unit = unit_of(Model(), store_in(tmp_path))
+        await unit.store.held(M, {2: 0.001, 3: 0.002})
+        await answered(Outcome(18, applied=False, reason="\x07"), ORDER, told=False)(unit.store)
+        with pytest.raises(NotFound, match="no such tool memory"):
+            await server_side._tell(unit, cast("AsyncClient", server))
+
+    run(story())
+    assert server.heard == [("reject", 18, "The control has refused it."), ("report", 3, 0.002)]
 
 
 def test_what_a_server_has_forgotten_is_confirmed_again(tmp_path: Path) -> None:
