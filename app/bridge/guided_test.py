@@ -285,10 +285,9 @@ def _report(test: Guided, state: str) -> dict[str, Any]:
 
 async def end_all(units: Sequence[Unit]) -> None:
     """Take back what is at the controls, as long as that takes some seconds; the next start does what is left."""
-    for unit in units:
-        if unit.test is not None and unit.test.changed and unit.test.ending is None:
-            unit.test.ending = ("cancelled", "The bridge was ended during the touch test.")
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(LAST):
-            while any(unit.test is not None and unit.test.changed for unit in units):  # noqa: ASYNC110 - of several tasks
+            while changed := [unit.test for unit in units if unit.test is not None and unit.test.changed]:
+                for test in changed:  # each time: one whose offset is just being written has no end then
+                    test.ending = test.ending or ("cancelled", "The bridge was ended during the touch test.")
                 await asyncio.sleep(0.05)

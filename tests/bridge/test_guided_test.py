@@ -521,3 +521,24 @@ def test_the_end_of_the_program_takes_back(shop: Shop, model: Model, tmp_path: P
         one.store.close()
 
     scenario(work)
+
+
+def test_the_end_of_the_bridge_takes_back_what_is_just_being_written(
+    tmp_path: Path, model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guided_test, "LAST", 2.0)
+    monkeypatch.setattr(offset_change, "LEAST_PAUSE", 0.3)
+
+    async def work() -> None:
+        one = unit_of(model, store_in(tmp_path))
+        change = await offset_change.planned(one.link, one.machine, 3, 0.01, 1)
+        now = time.monotonic()
+        one.test = Guided(1, 3, 0.01, math.inf, heard="go", since=now, reached="read", change=change)
+        task = asyncio.create_task(control_side.run(one))
+        await until(lambda: model.offsets[PLACE] == pytest.approx(AFTER), "the write")
+        await guided_test.end_all([one])
+        await ended([task])
+        assert model.offsets[PLACE] == pytest.approx(BEFORE)
+        one.store.close()
+
+    run(work())
