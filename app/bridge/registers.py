@@ -48,6 +48,7 @@ WATCHED = (Register.WRITTEN,)
 WATCHED_WITH_MAIL = (Register.ANSWERED, Register.ANSWER)
 """And while a correction waits: the NC may say of it that its check sum is wrong without having answered it."""
 HEADS_EVERY = 10.0  # s: all heads are read again at the latest
+UNREADABLE_AFTER = 5.0  # s: no NC program writes that long at a slot which it has counted
 SLOTS_AT_ONCE = 4  # where registers are read one by one, so that a call does not take too long
 FRESH = 2.0  # polls: a reading that was not there so long ago was measured just now
 REFUSALS = {
@@ -105,6 +106,8 @@ class RegisterLink:
         self._heads: list[float] = []
         self._heads_at = 0.0
         self._acknowledged = False  # since the last poll
+        self.remark = ""
+        self._unreadable_since: float | None = None
 
     async def connect(self) -> str:
         """Connect, and answer the control's identity."""
@@ -135,6 +138,7 @@ class RegisterLink:
                 f"{reason} Look at the control, then run “inband bridge accept-counters {self.machine.key}”."
             )
         slots = to_fetch(block, stored.sequence)
+        self._look_at_next(stored.sequence + 1, waits=not slots and block.written > stored.sequence)
         fresh = (
             self._polled is not None
             and (now - self._polled[0]).total_seconds() < FRESH * self.machine.interval + 1
@@ -146,6 +150,21 @@ class RegisterLink:
         if accepted and not slots and block.ack != stored.sequence:
             await self._write(Register.ACK, stored.sequence)  # the acknowledgement was lost, or is of another epoch
         return received
+
+    def _look_at_next(self, sequence: int, *, waits: bool) -> None:
+        """Remark on a slot that is counted and stays unreadable: nothing behind it is fetched, and the NC waits in the end."""
+        now = time.monotonic()
+        if not waits:
+            self._unreadable_since = None
+        elif self._unreadable_since is None:
+            self._unreadable_since = now
+        self.remark = ""
+        if self._unreadable_since is not None and now > self._unreadable_since + UNREADABLE_AFTER:
+            first = FIRST_SLOT + SLOT_SIZE * slot_of(sequence)
+            self.remark = (
+                f"Reading {sequence} lies in the ring and cannot be read: its two numbers differ, or its check sum is wrong."
+                f" Does another program write registers +{first} to +{first + SLOT_SIZE - 1}? Nothing is fetched before it."
+            )
 
     async def acknowledge(self, received: Sequence[Received]) -> None:
         """Write the highest stored sequence where the NC waits for it.

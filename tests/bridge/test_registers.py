@@ -1,12 +1,14 @@
 """Ring, mailbox and direct writes against the model, with whatever may happen in between."""
 
 import random
+import re
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
+from app.bridge import registers as registers_module
 from app.bridge.configuration import Location
 from app.bridge.links import ControlAway, CountersLost, Misconfigured, Order, Outcome, Position
 from app.bridge.registers import RegisterLink
@@ -167,6 +169,29 @@ def test_a_reading_says_what_the_control_knows() -> None:
             pass
         [unknown] = await link.fetch(second.position or Position())
         assert "characteristic 77" in (unknown.fault or "")
+
+    run(story())
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_slot_that_stays_unreadable_is_remarked(monkeypatch: pytest.MonkeyPatch, *, whole: bool) -> None:
+    """Another program has written in the ring: without a word the NC would wait for a bridge that is online."""
+    monkeypatch.setattr(registers_module, "UNREADABLE_AFTER", 0.0)
+    model = Model()
+    made(model, 3)
+
+    async def story() -> None:
+        link, _ = link_of(model, whole=whole)
+        [first, *_] = await link.fetch(Position())
+        assert first.position is not None
+        right, model.registers[28] = model.registers[28], 99.0
+        for remark in ("", "Reading 2 lies in the ring and cannot be read: .* registers \\+26 to \\+35"):
+            assert await link.fetch(first.position) == []
+            assert bool(link.remark) is bool(remark)
+            assert re.match(remark, link.remark)
+        model.registers[28] = right
+        assert len(await link.fetch(first.position)) == 2
+        assert link.remark == ""
 
     run(story())
 
