@@ -298,7 +298,11 @@ class RegisterLink:
         if block is None or not block.answered or self.machine.corrections != "control":
             return []
         held = self._held_after(block)
-        if block.answer == Answer.APPLIED:
+        later = block.answer in {
+            Answer.CHECK_WRONG,
+            Answer.ON_HOLD,
+        }  # said of mail behind the one that was answered last
+        if block.answer == Answer.APPLIED or (later and block.applied == block.answered):
             return [Outcome(block.answered, applied=True, offset=held)]
         if block.answer not in set(REFUSALS):
             return []

@@ -221,6 +221,26 @@ def test_the_mailbox_brings_a_correction_and_its_answer() -> None:
     run(story())
 
 
+@pytest.mark.parametrize("answer", [Answer.CHECK_WRONG, Answer.ON_HOLD])
+def test_an_answer_counts_though_the_nc_has_looked_at_mail_behind_it(answer: Answer) -> None:
+    """It had applied the correction while the bridge took it back: the number of before with another check sum lay there."""
+    model = Model()
+    made(model)
+
+    async def story() -> None:
+        link, _ = link_of(model)
+        await link.fetch(Position())
+        await link.offer([Order(18, 3, 0.0, 0.010)])
+        await link.fetch(Position())
+        made(model)
+        await link.offer([])
+        model.registers[Register.ANSWER] = answer
+        await link.fetch(Position())
+        assert await link.outcomes() == [Outcome(18, applied=True)]
+
+    run(story())
+
+
 def test_an_offset_that_was_edited_is_not_overwritten() -> None:
     model = Model()
     made(model)
