@@ -313,7 +313,7 @@ def _correction(settings: RingSettings) -> Iterator[Step]:
     yield If("abs(block[APPLIED]-number)<0.5", "ISIN")
     yield If("abs(offset-value)<=near", "ISIN")
     yield Let("answer", "9", "ON HOLD HERE")
-    yield If("effect[0]>0.5", "REPLY")
+    yield If("effect[0]>0.5", "LATER")
     yield Let("answer", "4", "STEP TOO LARGE")
     yield If("abs(value-expected)>step+near", "REPLY")
     yield Let("answer", "1", "THE OFFSET IS NOT WHAT INBAND KNOWS: SOMEBODY CHANGED IT")
@@ -329,6 +329,10 @@ def _correction(settings: RingSettings) -> Iterator[Step]:
     yield Let("block[ANSWER]", "answer")
     yield Do.SYNC
     yield Let("block[ANSWERED]", "number", "LAST")
+    yield Goto("DONE")
+    yield Label("LATER")
+    yield Remark("NOT ANSWERED: IT IS LOOKED AT AGAIN THE NEXT TIME")
+    yield Let("block[ANSWER]", "answer")
     yield Label("DONE")
     yield Do.SYNC
     yield from _stops(("UNSET", Alarm.NOT_SET_UP), ("UNITS", Alarm.OTHER_UNIT), ("MIXED", Alarm.MIXED_UNIT))
@@ -351,8 +355,8 @@ def _mail_check() -> Iterator[Step]:
     yield Remark("A HALF IS ROUNDED UP HERE AND DOWN THERE: 1 IN EXPECTED, 11 IN VALUE")
     yield If("sum<1.5", "FITS")
     yield Let("answer", "2")
-    yield If("sum<9.5", "REPLY")
-    yield If("sum>12.5", "REPLY")
+    yield If("sum<9.5", "LATER")
+    yield If("sum>12.5", "LATER")
     yield Label("FITS")
 
 

@@ -57,8 +57,8 @@ class Machine:
         """One register of the block, as a bridge writes it."""
         raise NotImplementedError
 
-    def hold(self) -> None:
-        """The operator lets no correction in."""
+    def hold(self, on: float = 1) -> None:
+        """The operator lets no correction in, or with 0 lets them in again."""
         raise NotImplementedError
 
     def wear(self, tool: int) -> float:
@@ -161,8 +161,8 @@ class Sinumerik(Machine):
         first = self.settings.first_register
         return self.fields["R" if first else "INBAND"], first
 
-    def hold(self) -> None:
-        self.fields["INBAND_EFFECT"][0] = 1
+    def hold(self, on: float = 1) -> None:
+        self.fields["INBAND_EFFECT"][0] = on
 
     def wear(self, tool: int) -> float:
         return self.fields["TC_DP12"][tool, 1]
@@ -302,8 +302,8 @@ class Fanuc(Machine):
     def write(self, place: int, value: float) -> None:
         self.variables[self.settings.first_register + place] = self._digits(value)
 
-    def hold(self) -> None:
-        self.variables[self.settings.first_effect] = 1
+    def hold(self, on: float = 1) -> None:
+        self.variables[self.settings.first_effect] = on
 
     def wear(self, tool: int) -> float:
         return self.variables.get(self.settings.wears[0].parameter + tool) or 0.0

@@ -486,9 +486,13 @@ def test_mail_that_was_changed_on_its_way_is_refused(control: RingControl, place
     shift = by / 10_000 if place in {Register.MAIL_EXPECTED, Register.MAIL_VALUE} else by
     made.write(place, made.registers()[place] + shift)
     made.take()
-    assert block(made).answered == 4
-    assert block(made).answer != Answer.APPLIED
-    assert (made.wear(3), block(made).applied) == (0, 0)
+    changed = block(made)
+    assert changed.answer != Answer.APPLIED
+    assert changed.answered == (0 if changed.answer == Answer.CHECK_WRONG else 4)
+    assert (made.wear(3), changed.applied) == (0, 0)
+    bridge.post(mail(made, 4, 0.0, -0.01))  # it is written anew
+    made.take()
+    assert (made.wear(3) == -0.01) is (changed.answer == Answer.CHECK_WRONG)
 
 
 @every_control
@@ -497,7 +501,10 @@ def test_the_operator_can_keep_corrections_out(control: RingControl) -> None:
     made.hold()
     bridge.post(mail(made, 4, 0.0, -0.01))
     made.take()
-    assert (block(made).answer, block(made).answered, made.wear(3)) == (Answer.ON_HOLD, 4, 0)
+    assert (block(made).answer, block(made).answered, made.wear(3)) == (Answer.ON_HOLD, 0, 0)
+    made.hold(0)
+    made.take()
+    assert (block(made).answer, block(made).answered, made.wear(3)) == (Answer.APPLIED, 4, -0.01)
 
 
 @every_control
