@@ -246,8 +246,8 @@ async def _ask(unit: Unit, client: AsyncClient) -> None:
                 until = time.monotonic() + machine.largest_age - (now - issued).total_seconds()
             orders.append(order)
         elif verdict.final:
-            await client.reject(machine.key, order.number, verdict.reason)
             answered.add(order.tool_memory)
+            await _reject(unit, client, order.number, verdict.reason)
         else:
             waiting.append(verdict.reason)
             break  # the order of corrections is theirs: what stands behind waits too
@@ -281,7 +281,14 @@ async def _tell_again(unit: Unit, client: AsyncClient, order: Order, earlier: In
     reason = "The control has refused this correction; its offset was reported."
     if not same:
         reason = "The control has had another correction with this number, before the server went back in time."
-    await client.reject(unit.machine.key, order.number, reason)
+    await _reject(unit, client, order.number, reason)
+
+
+async def _reject(unit: Unit, client: AsyncClient, number: int, reason: str) -> None:
+    try:
+        await client.reject(unit.machine.key, number, reason)
+    except Conflict as error:  # somebody was quicker; what was offered before must not stay on offer for that
+        log.info("%s: correction %d: %s", unit.machine.key, number, error)
 
 
 def _order(correction: Correction, after: float) -> Order:

@@ -261,6 +261,15 @@ def test_a_step_beyond_the_limit_is_rejected_with_its_reason(tmp_path: Path) -> 
     assert [order.number for order in unit.orders] == [19]
 
 
+def test_a_rejection_that_somebody_was_quicker_with_leaves_nothing_on_offer(tmp_path: Path) -> None:
+    server = Scripted(correction(18, after=-0.2, amount=-0.2))
+    server.rejecting = Conflict("POST rejected", "superseded", status=409, **said("conflict"))
+    unit = unit_of(Model(), store_in(tmp_path))
+    unit.orders = (Order(17, 3, 0.0, -0.01),)  # superseded as well
+    run(server_side._ask(unit, cast("AsyncClient", server)))
+    assert unit.orders == ()
+
+
 def test_what_stands_behind_a_rejected_correction_of_its_tool_is_asked_for_anew(tmp_path: Path) -> None:
     """It was to follow the one that is rejected: the control will hold another offset before it, and lead to another."""
     server = Scripted(correction(18, after=-0.2, amount=-0.2), correction(19, after=-0.21))
