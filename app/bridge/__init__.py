@@ -7,6 +7,7 @@ the public API through ``inband_client`` and imports nothing of the server.
     links            what a kind of control has to do for the bridge, and how it says what failed
     registers        ring, mailbox and direct writes, for every control whose registers can be read and written
     moments          when something was measured, by a control's clock
+    json_text        JSON of others, without what cannot be sent on
     kinds            the protocols, one module each
     store            readings kept until the server has them, corrections on their way, the quarantine: SQLite
     guards           the bridge's own limits for a correction, whatever the server says

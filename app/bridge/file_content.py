@@ -19,6 +19,7 @@ from typing import Any, Final, Literal, NamedTuple
 from msgspec import Struct
 
 from app.bridge.configuration import Machine, Positive
+from app.bridge.json_text import read_json
 from app.bridge.links import Received
 from app.core.ring import INCH
 from app.files.formats import aqdef, aqdef_values, delimited
@@ -249,9 +250,12 @@ class _Reader:
             if not line.strip().lstrip("\ufeff"):
                 continue
             try:
-                content = json.loads(line.lstrip("\ufeff"))
-            except ValueError as error:
+                content = read_json(line.lstrip("\ufeff"))
+            except json.JSONDecodeError as error:
                 self._fault(number_, "", f"is no JSON ({error}): one object stands in each line.")
+                continue
+            except ValueError as error:
+                self._fault(number_, "", f"{error}.")
                 continue
             if isinstance(content, dict):
                 yield number_, content
@@ -403,7 +407,7 @@ class _Reader:
             if isinstance(value, bool) or not isinstance(value, int | float | str):
                 raise Unreadable("is not a number")
             size = value if isinstance(value, int | float) else number(text, self.settings.decimal)
-            if not isfinite(size):
+            if not isfinite(size * self.scale):
                 raise Unreadable("is not a number")
             return round(size * self.scale, 9)
         if field_ in {"measured_at", "machined_at"}:

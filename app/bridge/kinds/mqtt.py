@@ -27,6 +27,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from app.bridge.configuration import Location, Machine, Number, Positive
+from app.bridge.json_text import read_json
 from app.bridge.links import Clock, ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.moments import learn_ahead
 from app.core.ring import INCH
@@ -432,20 +433,16 @@ def _object(payload: bytes) -> dict[str, Any]:
     if len(payload) > LARGEST:
         raise ValueError(f"The message has {len(payload)} bytes, the most is {LARGEST}.")
     try:
-        content = json.loads(payload, parse_constant=_no_number)
+        content = read_json(payload)
     except UnicodeDecodeError:
         raise ValueError("The message is not UTF-8.") from None
     except json.JSONDecodeError as error:
         raise ValueError(f"The message is no JSON: {error}. Was it cut off?") from None
-    except RecursionError:
-        raise ValueError("The message is no reading: its JSON is nested too deep.") from None
+    except ValueError as error:
+        raise ValueError(f"The message {error}.") from None
     if not isinstance(content, dict):
         raise ValueError("The message is no JSON object {…}.")  # noqa: TRY004 - as above
     return content
-
-
-def _no_number(text: str) -> None:
-    raise ValueError(f"The message holds {text}, which is no number.")
 
 
 def _read(payload: bytes) -> tuple[dict[str, Any], str | None]:

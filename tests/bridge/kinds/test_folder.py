@@ -137,6 +137,22 @@ def test_aqdef_is_read_by_number_or_name_with_or_without_the_part(tmp_path: Path
 
 
 @pytest.mark.parametrize(
+    ("member", "words"),
+    [
+        ('"measured": 1' + 400 * "0", "line 1: holds 1000"),
+        ('"measured": 1e999', "line 1: holds 1e999, which is no number"),
+        ('"measured": 1, "part": "\\ud800"', "line 1: holds half a character"),
+        ('"measured": ' + 100_000 * "[", "line 1: is no reading: its JSON is nested too deep"),
+    ],
+    ids=["large", "infinite", "half a character", "deep"],
+)
+def test_json_that_could_not_be_sent_on_fails(tmp_path: Path, member: str, words: str) -> None:
+    text = f'{{"characteristic": "D40", {member}}}\n'
+    content = read(tmp_path, text, "a.ndjson", format="ndjson", unit="inch")
+    assert words in str(content.faults[0])
+
+
+@pytest.mark.parametrize(
     ("text", "settings", "words"),
     [
         (HEAD + LINE.replace("40,0123", "40.0123"), {}, "line 2, actual: '40.0123' has a point"),
