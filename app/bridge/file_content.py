@@ -133,7 +133,11 @@ class Entry(NamedTuple):
 
 @dataclass(slots=True)
 class Content:
-    """The content of a file. skipped: readings that were passed over. complete: its last line has an end."""
+    """The content of a file.
+
+    skipped: readings that were passed over. complete: its last line has an end. digest: a hash of the whole. stamp: the one
+    that is in the keys of readings that nothing else tells apart.
+    """
 
     entries: list[Entry] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
@@ -141,6 +145,7 @@ class Content:
     skipped: int = 0
     complete: bool = True
     digest: str = ""
+    stamp: str = ""
 
     def received(self, machine: str, named: str) -> list[Received]:
         """The readings for the store; of a file that cannot be taken one entry for the quarantine says why."""
@@ -151,12 +156,18 @@ class Content:
         return [Received(f"{machine}:file:{self.digest[:32]}", {"file": named}, fault=words, mark=named)]
 
 
-def read_content(machine: Machine, paths: tuple[Path, ...], stamp: str = "") -> Content:
-    """Read a file, or a pair of AQDEF. stamp: name and time of modification. Raises `OSError` only."""
+def read_content(
+    machine: Machine, paths: tuple[Path, ...], stamp: str = "", earlier: tuple[str, str] | None = None
+) -> Content:
+    """Read a file, or a pair of AQDEF. stamp: name and time of modification.
+
+    earlier: digest and stamp of what was stored of this file before: one that has only grown since keeps that stamp. Raises
+    `OSError` only.
+    """
     settings: Settings = machine.settings
-    content = Content()
+    content = Content(stamp=stamp)
     try:
-        _Reader(machine, settings, paths, stamp, content).read()
+        _Reader(machine, settings, paths, earlier, content).read()
     except delimited.Unusable as error:
         content.faults.append(Fault(error.line, "", str(error)))
     if not content.faults and not content.entries and not content.skipped:
@@ -180,11 +191,15 @@ def _nothing_found(settings: Settings) -> str:
 
 class _Reader:
     def __init__(
-        self, machine: Machine, settings: Settings, paths: tuple[Path, ...], stamp: str, content: Content
+        self,
+        machine: Machine,
+        settings: Settings,
+        paths: tuple[Path, ...],
+        earlier: tuple[str, str] | None,
+        content: Content,
     ) -> None:
         self.machine, self.settings, self.content = machine, settings, content
         self.path = next((path for path in paths if path.suffix.lower() != ".dfd"), paths[0])
-        self.stamp = stamp
         self.scale = INCH if machine.unit == "inch" else 1.0
         self.zone = None if settings.zone is None else zone_named(settings.zone)
         self.encoding = settings.encoding or (
@@ -195,6 +210,8 @@ class _Reader:
             if path != self.path:
                 seed.update(path.read_bytes())
         self._prefixes(seed)
+        if earlier is not None and earlier[0] in self.prefix:
+            content.stamp = earlier[1]
 
     def _prefixes(self, seed: Any) -> None:
         """A hash of the file up to each line, whatever its line ends are."""
@@ -438,7 +455,7 @@ class _Reader:
         else:
             told = [self.prefix[line], name, json.dumps(dict(raw), sort_keys=True, default=str)]
             if not body.keys() & {"measured_at", "machined_at", "part"}:
-                told.append(self.stamp)
+                told.append(self.content.stamp)
         digest = hashlib.sha256("\0".join(told).encode("utf-8", "replace")).hexdigest()[:32]
         place = "own" if own is not None else str(line)
         self.content.entries.append(Entry(line, name, body, f"{self.machine.key}:{place}:{digest}"))

@@ -71,6 +71,7 @@ class Folder:
         self._locked: dict[str, tuple[float, str]] = {}
         self._taken: dict[str, tuple[Seen, Content]] = {}  # read; moved when it is stored
         self._stored: dict[str, tuple[Seen, Content]] = {}  # stored; to be moved
+        self._grown: dict[str, tuple[str, str]] = {}  # digest and stamp of what is stored of files that changed since
         self._unmoved = ""
         self._looked = 0.0
         self._pool: ThreadPoolExecutor | None = None
@@ -227,7 +228,7 @@ class Folder:
                 copies = tuple(Path(shutil.copyfile(path, Path(folder, path.name))) for path in seen.paths)
                 if not self._is_as_seen(seen):
                     return None
-                content = read_content(self.machine, copies, f"{seen.name}\0{seen.state}")
+                content = read_content(self.machine, copies, f"{seen.name}\0{seen.state}", self._grown.get(seen.name))
         except FileNotFoundError:
             return None
         except OSError as error:
@@ -248,6 +249,7 @@ class Folder:
         for name, (seen, content) in list(self._stored.items()):
             try:
                 if not self._is_as_seen(seen):  # it has grown: read again; what is stored does not come twice
+                    self._grown[name] = (content.digest, content.stamp)
                     del self._stored[name]
                     continue
                 self._move(seen, content)
@@ -260,6 +262,7 @@ class Folder:
                 )
                 continue
             del self._stored[name]
+            self._grown.pop(name, None)
             self._known.pop(name, None)
 
     def _move(self, seen: Seen, content: Content) -> None:

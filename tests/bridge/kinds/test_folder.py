@@ -408,6 +408,35 @@ def test_a_file_that_has_grown_since_it_was_stored_is_not_moved_unread(tmp_path:
     run(work())
 
 
+def test_a_file_that_goes_on_growing_brings_its_new_lines_only(tmp_path: Path) -> None:
+    """Nothing tells its readings apart but the file, and the bridge has not moved it yet."""
+
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        columns = {"measured": "actual", "characteristic": "feature"}
+        link = Folder(machine(tmp_path, columns=columns))
+        text = "feature;actual\n"
+        await link.connect()
+        for size in ("40,01", "40,02", "40,02"):
+            text += f"D40;{size}\n"
+            path = write(tmp_path / "a.csv", text)
+            received = await fetched(link)
+            await store.add("cmm-1", received)
+            write(path, text + "D40;40,03\n")  # before it can be moved
+            await link.acknowledge(received)
+        again = await fetched(link)
+        await store.add("cmm-1", again)
+        await link.acknowledge(again)
+        assert await sizes(store) == [40.01, 40.02, 40.02, 40.03]
+        write(tmp_path / "a.csv", text)  # another file under the same name
+        await store.add("cmm-1", await fetched(link))
+        assert len(await sizes(store)) == 7
+        await link.close()
+        store.close()
+
+    run(work())
+
+
 def test_a_folder_that_is_away_is_told_and_comes_back(tmp_path: Path) -> None:
     async def work() -> None:
         store = store_in(tmp_path / "store")
