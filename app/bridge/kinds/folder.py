@@ -72,6 +72,7 @@ class Folder:
         self._taken: dict[str, tuple[Seen, Content]] = {}  # read; moved when it is stored
         self._stored: dict[str, tuple[Seen, Content]] = {}  # stored; to be moved
         self._grown: dict[str, tuple[str, str]] = {}  # digest and stamp of what is stored of files that changed since
+        self._reading = ""  # the file that is being read
         self._unmoved = ""
         self._looked = 0.0
         self._pool: ThreadPoolExecutor | None = None
@@ -136,6 +137,8 @@ class Folder:
     async def _in_thread(self, work: Callable[[], T]) -> T:
         """Do something that a share may hold up, one at a time."""
         if self._work is not None and not self._work.done():
+            if name := self._reading:
+                raise ControlAway(f"The file {name} is still being read: it is large, or the share is slow.")
             raise ControlAway(f"The folder {self.path} has not answered yet: look at the share and the network.")
         if self._pool is None:
             self._pool = ThreadPoolExecutor(1, "folder")
@@ -159,10 +162,14 @@ class Folder:
             self._known[seen.name] = _Known(seen, since, known.first if known is not None else now)
         for name in self._locked.keys() - self._known.keys():
             del self._locked[name]
+        self._taken = {name: taken for name, taken in self._taken.items() if name in self._known}
         for seen, since, first in sorted(self._known.values(), key=lambda each: (each.seen.modified, each.seen.name)):
             if seen.name in self._stored:
                 continue
             unchanged = now - since
+            read = self._taken.get(seen.name)
+            if read is not None and read[0] == seen:  # nobody waited any more for it: it took longer than a call may
+                return read[1].received(self.machine.key, seen.name)
             content = self._read(seen, unchanged) if unchanged >= SAME_FOR * self.settings.every else None
             if content is None:
                 if now - first < self.settings.settle:
@@ -228,6 +235,7 @@ class Folder:
                 copies = tuple(Path(shutil.copyfile(path, Path(folder, path.name))) for path in seen.paths)
                 if not self._is_as_seen(seen):
                     return None
+                self._reading = seen.name
                 content = read_content(self.machine, copies, f"{seen.name}\0{seen.state}", self._grown.get(seen.name))
         except FileNotFoundError:
             return None
@@ -235,6 +243,8 @@ class Folder:
             since, _ = self._locked.get(seen.name, (time.monotonic(), ""))
             self._locked[seen.name] = (since, error.strerror or str(error))
             return None
+        finally:
+            self._reading = ""
         self._locked.pop(seen.name, None)
         if (content.faults or not content.complete) and unchanged < self.settings.settle:
             return None

@@ -8,11 +8,13 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from app.bridge import control_side
 from app.bridge.configuration import ConfigurationError, Machine, configuration_from
 from app.bridge.file_content import Content, read_content
+from app.bridge.kinds import folder
 from app.bridge.kinds.folder import Folder
 from app.bridge.links import ControlAway, Misconfigured, Position, Received
 from app.bridge.simulators.folder import FolderSimulator
@@ -432,6 +434,29 @@ def test_a_file_that_goes_on_growing_brings_its_new_lines_only(tmp_path: Path) -
         await store.add("cmm-1", await fetched(link))
         assert len(await sizes(store)) == 7
         await link.close()
+        store.close()
+
+    run(work())
+
+
+def test_a_file_that_takes_longer_than_a_call_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read_in_time, began = folder.read_content, []
+
+    def slow(*given: Any) -> Content:
+        began.append(given)
+        time.sleep(1.5)
+        return read_in_time(*given)
+
+    monkeypatch.setattr(folder, "read_content", slow)
+
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        write(tmp_path / "a.csv", HEAD + LINE)
+        async with fetching(msgspec.structs.replace(machine(tmp_path), patience=0.3), store) as unit:
+            await until(lambda: "a.csv is still being read" in unit.detail, "the bridge says so")
+            await until((tmp_path / "done" / "a.csv").exists, "the file is done")
+        assert await sizes(store) == [40.0123]
+        assert len(began) == 1
         store.close()
 
     run(work())
