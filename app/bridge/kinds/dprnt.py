@@ -26,6 +26,7 @@ from app.core.printed_line import LineReader, Printed
 NUMBERED = True
 HELD = 256 * 1024  # bytes that may wait for the next poll; then the sender has to
 AT_ONCE = 1 << 20  # bytes of a file in one poll
+COMPARED = 512  # bytes in front of those that are new: another file has others there
 REMEMBERED = 64  # readings that a second print is compared with
 NAMED = 12  # sequences that a sentence names
 LONGEST_GAP = 1000  # sequences that are kept as missing
@@ -267,19 +268,23 @@ class Listener(Source):
 
 
 class Following(Source):
-    """A file that grows. One that shrinks or is replaced is read from its beginning: keys keep readings from coming twice."""
+    """A file that grows.
+
+    One that shrinks, is replaced or written anew is read from its beginning: keys keep readings from coming twice.
+    """
 
     def __init__(self, settings: Settings) -> None:
         self.path = Path(settings.file or "")
         self._lines = LineReader()
         self._at = 0
         self._known: int | None = None
+        self._before = b""  # what stands in front of `_at`
 
     async def open(self) -> str:
         """Look whether it is there."""
-        self._lines, self._at, self._known = LineReader(), 0, None
+        self._lines, self._at, self._known, self._before = LineReader(), 0, None, b""
         await asyncio.to_thread(self._read)
-        self._at, self._known = 0, None
+        self._at, self._known, self._before = 0, None, b""
         return str(self.path)
 
     async def take(self) -> list[Printed]:
@@ -290,8 +295,11 @@ class Following(Source):
         try:
             with self.path.open("rb") as file:
                 about = os.fstat(file.fileno())
-                if about.st_size < self._at or self._known not in {None, about.st_ino}:
-                    self._at = 0
+                file.seek(self._at - len(self._before))
+                same = about.st_size >= self._at and self._known in {None, about.st_ino}
+                # a file that was written anew has other lines there: each has its own number
+                if not same or file.read(len(self._before)) != self._before:
+                    self._at, self._before = 0, b""
                     self._lines = LineReader()
                 self._known = about.st_ino
                 file.seek(self._at)
@@ -301,6 +309,7 @@ class Following(Source):
                 f"{self.path} cannot be read: {error.strerror or error}. Does the control, or the DNC program, write there?"
             ) from error
         self._at += len(data)
+        self._before = (self._before + data)[-COMPARED:]
         return data
 
     def damaged(self) -> int:

@@ -162,10 +162,14 @@ def test_a_file_that_grows_shrinks_and_is_read_again_after_a_restart(tmp_path: P
             await stored("7:1", "7:2")
             file.write_bytes(lines(3))  # a new file under the old name
             await stored("7:1", "7:2", "7:3")
+            file.write_bytes(lines(5))  # as long as the one before
+            await stored("7:1", "7:2", "7:3", "7:5")
+            file.write_bytes(lines(6, 7))  # longer, and read no earlier
+            await stored("7:1", "7:2", "7:3", "7:5", "7:6", "7:7")
         async with controlled(one, store):
             with file.open("ab") as end:
-                end.write(lines(4))
-            await stored("7:1", "7:2", "7:3", "7:4")
+                end.write(lines(8))
+            await stored("7:1", "7:2", "7:3", "7:5", "7:6", "7:7", "7:8")
         store.close()
 
     run(work())
