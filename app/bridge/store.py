@@ -6,6 +6,7 @@ one commit: a thread of its own takes whatever waits, writes it in one transacti
 """
 
 import asyncio
+import hashlib
 import json
 import queue
 import sqlite3
@@ -44,6 +45,10 @@ CREATE TABLE IF NOT EXISTS location (
 );
 CREATE TABLE IF NOT EXISTS fact (machine TEXT NOT NULL, name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (machine, name));
 """
+ADD: Final = (
+    "INSERT INTO reading (machine, key, body, state, reason, at) VALUES (?, ?, ?, ?, ?, ?)"
+    " ON CONFLICT (machine, key) DO NOTHING"
+)
 NOTE: Final = "INSERT INTO fact (machine, name, value) VALUES (?, ?, ?) ON CONFLICT (machine, name) DO UPDATE SET value = excluded.value"
 PAGE_ROWS: Final = 200
 GIVE_UP: Final = (
@@ -51,6 +56,7 @@ GIVE_UP: Final = (
 )
 GIVEN_UP, MOST_GIVEN_UP = 500, 20_000
 """Readings that the server has, deleted at a time while the store is full, and in one call: others wait for it."""
+MOST_REASON: Final = 500  # characters
 ANSWERS_KEPT: Final = 90 * 86_400.0  # s
 
 
@@ -142,7 +148,8 @@ class Store:
     async def add(self, machine: str, received: Sequence[Received]) -> int:
         """Store readings of a machine and how far its ring is stored, durably; the number of new ones.
 
-        A key that is known stays as it is: nothing comes twice.
+        A key that is known stays as it is: nothing comes twice. Another size under it is another reading, which goes to the
+        quarantine, as the server would refuse it.
         """
         now = time.time()
 
@@ -152,12 +159,10 @@ class Store:
                 for each in received
             ]
             before = database.total_changes
-            database.executemany(
-                "INSERT INTO reading (machine, key, body, state, reason, at) VALUES (?, ?, ?, ?, ?, ?)"
-                " ON CONFLICT (machine, key) DO NOTHING",
-                rows,
-            )
+            database.executemany(ADD, rows)
             added = database.total_changes - before
+            if added < len(rows):
+                added += _contradictions(database, machine, received, now)
             if last := received[-1].position:
                 database.execute(
                     "INSERT INTO ring (machine, epoch, sequence, generation) VALUES (?, ?, ?, ?)"
@@ -498,6 +503,26 @@ class Store:
                 self._database.execute("ROLLBACK")
             raise
         return results
+
+
+def _contradictions(database: sqlite3.Connection, machine: str, received: Sequence[Received], now: float) -> int:
+    """Put readings into the quarantine whose key another size has; how many are new there."""
+    before = database.total_changes
+    for each in received:
+        [text] = database.execute(
+            "SELECT body FROM reading WHERE machine = ? AND key = ?", (machine, each.key)
+        ).fetchone()
+        known, size = (content.get("measured", content.get("touches")) for content in (json.loads(text), each.body))
+        if known == size:
+            continue
+        reason = (
+            f"Key {each.key} came with {known} before, and with {size} now: one of the two is wrong, or the machine counts"
+            " again what it had counted."
+        )
+        told = size if not isinstance(size, list) else hashlib.sha256(json.dumps(size).encode()).hexdigest()[:16]
+        row = (machine, f"{each.key}:{told}", json.dumps(each.body), "quarantined", reason[:MOST_REASON], now)
+        database.execute(ADD, row)
+    return database.total_changes - before
 
 
 def _settle(done: "Future[Any]", result: Any = None, error: BaseException | None = None) -> None:

@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,22 @@ def test_readings_wait_in_their_order_until_they_are_sent(store: Store) -> None:
         assert (counts.waiting, counts.quarantined) == (1, 2)
         assert counts.oldest == pytest.approx(time.time(), abs=60)
         assert [each.reason for each in await store.quarantine(M)] == ["no size", "409"]
+
+    run(story())
+
+
+def test_another_size_under_a_known_key_is_not_passed_over(store: Store) -> None:
+    """Such as where a control that prints got its variables back from an archive, and counts again."""
+
+    async def story() -> None:
+        await store.add(M, [received(1), received(2)])
+        other = replace(received(1), body={"characteristic": "c", "measured": 40.5})
+        assert await store.add(M, [other, received(2), received(3)]) == 2
+        assert await store.add(M, [other]) == 0
+        [kept] = await store.quarantine(M)
+        assert (kept.key, kept.body["measured"]) == (f"{M}:7:1:40.5", 40.5)
+        assert "came with 40.001 before, and with 40.5 now" in kept.reason
+        assert [row.body["measured"] for row in await store.waiting(M)] == [40.001, 40.002, 40.003]
 
     run(story())
 
