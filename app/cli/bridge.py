@@ -258,7 +258,14 @@ def accept_counters(machine: MachineName, config: ConfigFile = PLANT) -> None:
     """
 
     async def work(configuration: "Configuration", store: "Store") -> None:
-        await store.accept_counters(_known(configuration, machine))
+        key = _known(configuration, machine)
+        chosen = next(each for each in configuration.machines if each.key == key)
+        if chosen.kind == "heidenhain" or getattr(chosen.settings, "file", None) is not None:
+            raise InbandError(
+                f"{machine} prints into a file, which would be read again from its beginning under new keys: every reading in"
+                " it would come a second time. Nothing was changed. What the control counts twice is in the quarantine."
+            )
+        await store.accept_counters(key)
 
     _with_store(config, work)
     say(f"The bridge takes the counters of {machine} as they are. A bridge that runs connects again within seconds.")

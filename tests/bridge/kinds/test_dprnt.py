@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
 from app.bridge import control_side
 from app.bridge.configuration import Machine, configuration_from
@@ -18,8 +19,10 @@ from app.bridge.simulators.dprnt import PrintingSimulator, serve
 from app.bridge.simulators.model import Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit as Tasks
+from app.cli.bridge import bridge as commands
 from app.core.printed_line import LineReader, Printed, line_of
 from app.core.ring import Slot, Unit
+from app.errors import InbandError
 from tests.bridge.plant import bridge, machine, parts, store_in, until
 from tests.loops import run
 from tests.shop import Shop
@@ -275,6 +278,22 @@ def test_a_new_epoch_is_told() -> None:
         assert "The control began to count anew: epoch 7 became 9." in link.remark
 
     run(work())
+
+
+@pytest.mark.parametrize(("table", "refused"), [({"file": "print.txt"}, True), ({"connect": "127.0.0.1:1"}, False)])
+def test_counters_of_a_file_are_not_accepted_as_all_would_come_again(
+    tmp_path: Path, table: dict[str, str], *, refused: bool
+) -> None:
+    [(name, value)] = table.items()
+    plant = tmp_path / "plant.toml"
+    plant.write_text(
+        'server.url = "http://127.0.0.1:1"\n[machine.mill-1]\nkind = "dprnt"\nunit = "mm"\nsecret = "x"\ncorrections = "none"'
+        f'\n[machine.mill-1.dprnt]\n{name} = "{value}"\n',
+        encoding="utf-8",
+    )
+    said = CliRunner().invoke(commands, ["accept-counters", "mill-1", "--config", str(plant)])
+    assert isinstance(said.exception, InbandError) == refused
+    assert "would come a second time" in str(said.exception) or not refused
 
 
 def test_each_mistake_is_said(tmp_path: Path) -> None:
