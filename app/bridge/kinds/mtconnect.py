@@ -233,13 +233,15 @@ class Context:
         asked = datetime.now(UTC)
         answer = await self._ask(http, "current", {})
         self._refuse(answer)
-        if self._until is not None:
-            self._note_part(self._until, None)
+        before, until = self.values.get("part"), self._until
         self.unclear, self._items = [], {}
         for name in ELEMENTS:
             self._choose(name, answer.observations)
         self.values.clear()
         self._take(answer, asked)
+        same = not again and before is not None and before == self.values.get("part")
+        if until is not None and not (same and max(self._parts, key=lambda entry: entry[1])[0] <= until):
+            self._note_part(until, None)  # unknown until the next one, but for a part that has not changed since
         self._instance, self._next = answer.instance, answer.first if again else answer.next
         self._until = asked
 

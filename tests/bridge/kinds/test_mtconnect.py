@@ -187,6 +187,20 @@ def test_a_buffer_that_went_on_is_a_gap_and_no_error() -> None:
     run(work())
 
 
+def test_a_part_that_did_not_change_in_a_gap_stays_known() -> None:
+    async def work() -> None:
+        async with agent(buffer=8) as simulator, asking(simulator) as (context, http):
+            simulator.observe("count", "7")
+            await catch_up(context, http)
+            for place in range(30):
+                simulator.observe("x", str(place))
+            await catch_up(context, http)
+            assert context.gaps == 1
+            assert context.part_at(now()) == "7"
+
+    run(work())
+
+
 def test_what_an_agent_told_before_it_went_silent_is_not_taken_for_later_readings() -> None:
     async def work() -> None:
         async with agent() as simulator, asking(simulator) as (context, http):
