@@ -14,11 +14,17 @@ FAULTS = {
 }
 
 
-def reading_of(machine: Machine, slot: Slot, position: Position, at: datetime | None) -> Received:
-    """The reading in a slot. position: the slot's own, which names the reading for ever. at: when it was measured."""
+def reading_of(
+    machine: Machine, slot: Slot, position: Position, at: datetime | None, unit: str | None = None
+) -> Received:
+    """The reading in a slot.
+
+    position: the slot's own, which names the reading for ever. at: when it was measured. unit: of the size, the machine's if
+    nothing is said.
+    """
     again = f".{position.generation}" if position.generation else ""  # counters that went back name new readings
     key = f"{machine.key}:{position.epoch}{again}:{position.sequence}"
-    body = _body(machine, slot)
+    body = _body(machine, slot, unit or machine.unit)
     if at is not None:
         body["measured_at"] = at.isoformat()
     return Received(key, body, position, _fault(machine, slot))
@@ -33,7 +39,8 @@ def printed_reading(
     the same number before.
     """
     slot = printed.slot
-    received = reading_of(machine, slot, Position(printed.epoch, slot.sequence, highest.generation), at)
+    unit = "mm" if printed.unit is Unit.MM else "inch"  # its own: from the quarantine too no other size is sent
+    received = reading_of(machine, slot, Position(printed.epoch, slot.sequence, highest.generation), at, unit)
     key, fault = received.key, received.fault
     if known is not None:
         key = f"{key}:{slot.measured:g}"
@@ -41,16 +48,15 @@ def printed_reading(
             f"Reading {slot.sequence} of epoch {printed.epoch} was printed as {known:g} before, and as {slot.measured:g} now:"
             " one of the two is wrong."
         )
-    unit = "mm" if printed.unit is Unit.MM else "inch"
     if unit != machine.unit:
         fault = f"The line is in {unit}, the configuration says unit = {machine.unit!r}."
     return replace(received, key=key, fault=fault, position=highest)
 
 
-def _body(machine: Machine, slot: Slot) -> dict[str, object]:
+def _body(machine: Machine, slot: Slot, unit: str) -> dict[str, object]:
     body: dict[str, object] = {
         "characteristic": machine.characteristics.get(str(slot.characteristic)),
-        "measured": round(slot.measured * (INCH if machine.unit == "inch" else 1.0), 9),
+        "measured": round(slot.measured * (INCH if unit == "inch" else 1.0), 9),
         "correction_in_effect": slot.in_effect,
     }
     if slot.part:

@@ -265,6 +265,7 @@ def test_contradictions_and_wrong_units_go_to_the_quarantine() -> None:
         inch = canned(lines(1), unit="inch")
         [received] = await taken(inch)
         assert received.fault == "The line is in mm, the configuration says unit = 'inch'."
+        assert received.body["measured"] == 40.001, "it may be sent from the quarantine"
 
     run(work())
 
