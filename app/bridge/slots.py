@@ -5,6 +5,7 @@ from datetime import datetime
 
 from app.bridge.configuration import Machine
 from app.bridge.links import Position, Received
+from app.bridge.store import NUMBER
 from app.core.printed_line import Printed
 from app.core.ring import INCH, Slot, Status, Unit
 
@@ -54,11 +55,15 @@ def printed_reading(
 
 
 def _body(machine: Machine, slot: Slot, unit: str) -> dict[str, object]:
+    number = str(slot.characteristic)
+    named = machine.characteristics.get(number)
     body: dict[str, object] = {
-        "characteristic": machine.characteristics.get(str(slot.characteristic)),
+        "characteristic": named,
         "measured": round(slot.measured * (INCH if unit == "inch" else 1.0), 9),
         "correction_in_effect": slot.in_effect,
     }
+    if named is None:
+        body[NUMBER] = number  # by which it gets its name when it is sent from the quarantine
     if slot.part:
         body["part"] = str(slot.part)
     if slot.status == Status.FIRST_MOVE:

@@ -12,10 +12,11 @@ import queue
 import sqlite3
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple, TypeVar
 
 from app.bridge.guards import Known
@@ -56,6 +57,9 @@ GIVE_UP: Final = (
 )
 GIVEN_UP, MOST_GIVEN_UP = 500, 20_000
 """Readings that the server has, deleted at a time while the store is full, and in one call: others wait for it."""
+NUMBER: Final = "number"
+"""In the body of a reading whose characteristic has no name: the number by which the control knows it."""
+EMPTY: Final[Mapping[str, str]] = MappingProxyType({})
 MOST_REASON: Final = 500  # characters
 ANSWERS_KEPT: Final = 90 * 86_400.0  # s
 
@@ -222,16 +226,29 @@ class Store:
         )
         return [Quarantined(key, json.loads(body), reason, at) for key, body, reason, at in rows]
 
-    async def release(self, machine: str, key: str | None, *, drop: bool) -> int:
-        """Send one of the quarantine (all with None) again, or drop it. How many."""
+    async def release(self, machine: str, key: str | None, *, drop: bool, named: Mapping[str, str] = EMPTY) -> int:
+        """Send one of the quarantine (all with None) again, or drop it. How many.
+
+        named: characteristics by the control's numbers: a reading whose number had no name gets it now, or stays.
+        """
         chosen = "machine = ? AND state = 'quarantined'" + ("" if key is None else " AND key = ?")
         values = (machine,) if key is None else (machine, key)
-        statement = (
-            f"DELETE FROM reading WHERE {chosen}"  # noqa: S608 - chosen is one of two texts above
-            if drop
-            else f"UPDATE reading SET state = 'waiting', reason = NULL WHERE {chosen}"  # noqa: S608
-        )
-        return await self._run(lambda database: database.execute(statement, values).rowcount)
+
+        def write(database: sqlite3.Connection) -> int:
+            if drop:
+                return database.execute(f"DELETE FROM reading WHERE {chosen}", values).rowcount  # noqa: S608 - of two texts
+            found = database.execute(f"SELECT id, body FROM reading WHERE {chosen}", values).fetchall()  # noqa: S608
+            rows = []
+            for number, text in found:
+                body = json.loads(text)
+                if (nameless := body.pop(NUMBER, None)) is not None:
+                    body["characteristic"] = named.get(nameless)
+                if nameless is None or nameless in named:
+                    rows.append((json.dumps(body), number))
+            database.executemany("UPDATE reading SET state = 'waiting', reason = NULL, body = ? WHERE id = ?", rows)
+            return len(rows)
+
+        return await self._run(write)
 
     async def counts(self, machine: str) -> Counts:
         """Numbers of waiting and quarantined readings, and since when the oldest waits."""

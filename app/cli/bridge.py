@@ -286,7 +286,8 @@ def quarantine(
     async def work(configuration: "Configuration", store: "Store") -> None:
         named = _known(configuration, machine)
         if send or drop:
-            number = await store.release(named, key, drop=drop)
+            names = next(each.characteristics for each in configuration.machines if each.key == named)
+            number = await store.release(named, key, drop=drop, named=names)
             say(f"{number} readings {'dropped' if drop else 'wait to be sent again'}.")
             return
         for each in await store.quarantine(named, 1000):

@@ -13,7 +13,11 @@ from pathlib import Path
 import pytest
 
 from app.bridge.links import Order, Outcome, Position, Received
+from app.bridge.simulators.model import Model
+from app.bridge.slots import reading_of
 from app.bridge.store import Store, StoreError
+from app.core.ring import Slot
+from tests.bridge.plant import machine
 from tests.loops import run
 
 M = "lathe-1"
@@ -84,6 +88,19 @@ def test_the_quarantine_is_sent_again_or_dropped(store: Store) -> None:
         assert [row.key for row in await store.waiting(M)] == [f"{M}:7:2"]
         assert await store.release(M, None, drop=True) == 2
         assert await store.quarantine(M) == []
+
+    run(story())
+
+
+def test_a_reading_whose_number_had_no_name_is_sent_once_it_has_one(store: Store) -> None:
+    async def story() -> None:
+        slot = Slot(1, 9, 40.0, 0, 1, 3, 0)
+        await store.add(M, [reading_of(machine(Model()), slot, Position(7, 1), None), received(2, "a")])
+        assert await store.release(M, None, drop=False, named={"1": "shaft"}) == 1
+        assert [each.key for each in await store.quarantine(M)] == [f"{M}:7:1"]
+        assert await store.release(M, None, drop=False, named={"9": "bore"}) == 1
+        row = (await store.waiting(M))[0]
+        assert row.body == {"characteristic": "bore", "measured": 40.0, "correction_in_effect": 0, "part": "1"}
 
     run(story())
 
