@@ -369,6 +369,9 @@ class _Reader:
             self._fault(item.line, "K2142", reason)
             return
         scale = self.scale if said is None else aqdef.LENGTHS[said]
+        if not isfinite(value.measured * scale):
+            self._fault(item.line, "", f"{value.measured:g} is not a number.")
+            return
         body: dict[str, Any] = {"characteristic": key, "measured": round(value.measured * scale, 9)}
         if part := value.part or value.batch:
             body["part"] = part[:128]

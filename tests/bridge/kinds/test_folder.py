@@ -190,6 +190,16 @@ def test_doubtful_dates_of_aqdef_are_not_guessed(tmp_path: Path) -> None:
     assert content.entries[0].body["measured_at"].startswith("2026-04-03T06:05:00")
 
 
+def test_a_size_too_large_to_be_converted_fails(tmp_path: Path) -> None:
+    for unit, text in (
+        ("inch", DESCRIPTION.replace("K2142/1 mm\n", "")),
+        ("mm", DESCRIPTION.replace("1 mm", "1 inch")),
+    ):
+        values = "1E308\x140\x1423.11.2026/06:05:00\x0f20020\x140\x1423.11.2026/06:05:00\n"
+        content = read(tmp_path, text + values, "a.dfq", format="aqdef", names=AQDEF_NAMES, unit=unit)
+        assert "1e+308 is not a number" in str(content.faults[0])
+
+
 def test_others_are_passed_over_where_it_is_said(tmp_path: Path) -> None:
     content = read(tmp_path, HEAD + LINE + LINE.replace("D40", "D50"), others="skip")
     assert (len(content.entries), content.skipped, content.faults) == (1, 1, [])
