@@ -401,6 +401,21 @@ def test_a_file_by_the_api(server: Server) -> None:
     assert shop.call("POST", "/readings/aqdef", **body | pair)["stored"] == 1
 
 
+def test_signs_that_nobody_sees_are_in_no_name_that_is_set_up(plant: Database, tmp_path: Path) -> None:
+    unseen, turning = "\N{ZERO WIDTH SPACE}", "\N{RIGHT-TO-LEFT OVERRIDE}"
+    path = tmp_path / "a.dfq"
+    for part, name, set_up_as in (
+        (f"P{turning}1", f"{unseen}Seat{turning}", ("P1", "Seat")),
+        (unseen, unseen, (None, "aqdef 1")),
+    ):
+        lines = [f"K1001 {part}", f"K2001/1 {unseen}", f"K2002/1 {name}", "K2110/1 1", "K2111/1 2", row(1, "1.5")]
+        path.write_text("\n".join([*lines, ""]))
+        [result] = run(plant, path, {1: NEW}).results
+        with plant.begin() as session:
+            there = characteristic_queries.characteristic_named(session, result.key).characteristic
+        assert (there.part, there.name) == set_up_as
+
+
 @pytest.mark.parametrize(
     ("wrong", "field", "said"),
     [

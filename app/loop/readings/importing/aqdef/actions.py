@@ -1,5 +1,6 @@
 """Import of an AQDEF file: all of it or nothing, as history of each characteristic (decision 15)."""
 
+import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -30,6 +31,7 @@ from app.loop.readings.records import Entry
 from app.loop.tables.readings import ImportMapping, Reading
 
 MEANINGS = {129: "invalid", 290: "implausible"}
+_JOINERS = "\N{ZERO WIDTH NON-JOINER}\N{ZERO WIDTH JOINER}"
 
 
 @dataclass(frozen=True)
@@ -238,12 +240,17 @@ def _set_up(session: Session, content: Content, machine: str | None, actor: str,
         raise Invalid.at("machine", _("say on which machine new characteristics are set up"))
     given = characteristics.CharacteristicIn(
         key=matching.key_for(content, taken),
-        name=(content.name or content.title)[:200],
+        name=(_seen(content.name) or _seen(content.title) or f"aqdef {content.index}")[:200],
         machine=machine,
-        part=(content.part or content.part_name)[:200] or None,
+        part=(_seen(content.part) or _seen(content.part_name))[:200] or None,
         parameters=matching.parameters_of(content),
     )
     return characteristics.add_characteristic(session, given, actor).characteristic.key
+
+
+def _seen(text: str) -> str:
+    """The text without signs that nobody sees, which no name here may hold; joiners are part of some scripts."""
+    return "".join(each for each in text if unicodedata.category(each) != "Cf" or each in _JOINERS).strip()
 
 
 def _exclude(
