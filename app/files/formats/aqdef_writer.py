@@ -14,6 +14,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import NamedTuple
 
+from app.files.formats.aqdef import encoding_of
 from app.files.formats.aqdef_values import OF_CHARACTERISTIC, OF_FIELD
 from app.language.i18n import _
 
@@ -133,7 +134,8 @@ def write(
 ) -> Outcome:
     """Write a `.dfq` under a temporary name and rename it when it is complete.
 
-    values: of each characteristic in their order. They are written first, so that the catalogues know what they name. Windows-1252 where that has all letters, else UTF-8 with its mark.
+    values: of each characteristic in their order. They are written first, so that the catalogues know what they name.
+    Windows-1252 where that has all letters and is known again by them, else UTF-8 with its mark.
     """
     draft, body = path.with_name(f".{path.name}.part"), path.with_name(f".{path.name}.values")
     done = Outcome()
@@ -186,14 +188,21 @@ class _Used:
 
 
 def _settle_encoding(path: Path) -> None:
-    """Make Windows-1252 of the UTF-8 where it can be; else put the mark before it. Plain ASCII is both."""
+    """Make Windows-1252 of the UTF-8 where it can be, and is taken for that again; else put the mark before it.
+
+    Plain ASCII is both. An è in Windows-1252 is the č of Windows-1250: nothing in the file says which.
+    """
     content = path.read_bytes()
     if content.isascii():
         return
     try:
         path.write_bytes(content.decode().encode("cp1252"))
     except UnicodeEncodeError:
-        path.write_bytes(b"\xef\xbb\xbf" + content)
+        pass
+    else:
+        if encoding_of(path) == "cp1252":
+            return
+    path.write_bytes(b"\xef\xbb\xbf" + content)
 
 
 class _Texts:

@@ -113,6 +113,14 @@ def test_texts_are_made_to_fit_and_it_is_said(tmp_path: Path) -> None:
     assert any("has signs that K0014 cannot hold" in remark for remark in done.remarks)
 
 
+@pytest.mark.parametrize("name", ["Härte Ø40", "Diamètre", "façade", "Muñoz", "Lærke", "Đorđe Petrović", "Ã¼"])
+def test_letters_come_back_whatever_encodings_have_their_bytes(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "out.dfq"
+    write(path, [Part("1", name)], [SEAT], [Written(0, 40.0, BEGIN, part=name, operator=name)], Catalogues())
+    description, [(_at, measured)] = read(path)
+    assert description.parts[1]["K1002"] == measured.part == description.named(measured.operator, "K4092") == name
+
+
 def test_nothing_is_left_where_it_fails(tmp_path: Path) -> None:
     def failing() -> Any:
         yield values()[0]
