@@ -17,8 +17,10 @@ class Keys:
 
     def of(self, value: Value, identity: tuple[str, str, str], measured: float, at: datetime) -> str:
         """The key of a value. identity: part, number and name of its characteristic. measured: mm. at: as the file has it."""
-        who = (value.fields.get(name, "") for name in _WHO)
-        text = "|".join([*identity, repr(round(measured, 9)), at.isoformat(), *who])
+        fields = {name: value.fields.get(name, "") for name in _WHO}
+        if not fields["K0007"].strip("0"):  # some programs write every field, others none that says nothing
+            fields["K0007"] = ""
+        text = "|".join([*identity, repr(round(measured, 9)), at.isoformat(), *fields.values()])
         name = hashlib.blake2b(text.encode(), digest_size=10).hexdigest()
         then, same = self._same.get(value.characteristic, (None, Counter[str]()))
         if then != at:

@@ -114,6 +114,9 @@ def test_a_value_that_another_program_writes_in_another_way_is_the_same(plant: D
     other = [*head, "K0001/1 3.99910000000000E+0001", "K0004/1 2026-03-02 6:00", "K0006/1 7"]
     again = run(plant, written(tmp_path / "b.dfq", other))
     assert (first.stored, again.stored, again.repeated) == (1, 0, 1)
+    every_field = [*head, f"39.991{F}0{F}02.03.2026/06:00:00{F}{F}#7{F}0{F}0{F}0{F}{F}0"]
+    third = run(plant, written(tmp_path / "c.dfq", every_field))
+    assert (third.stored, third.repeated) == (0, 1)
 
 
 def test_dates_that_may_be_either_are_asked_about(plant: Database, tmp_path: Path) -> None:
