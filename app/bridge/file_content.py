@@ -382,7 +382,10 @@ class _Reader:
                 self._fault(item.line, "K0004", "does not say its time zone: set zone, such as Europe/Belgrade.")
                 return
             body["measured_at"] = (clock.moment(value.at) if clock else value.at).isoformat()
-        self._add(item.line, f"{name}/{item.characteristic}", body, item.fields, None, alone)
+        told = item.fields
+        if value.at is None and value.batch and not value.part:  # a batch is many parts: the next one may be as large
+            told = told | {"file": self.stamp}
+        self._add(item.line, f"{name}/{item.characteristic}", body, told, None, alone)
 
     def _key_of(self, part: str, characteristic: aqdef.Characteristic) -> tuple[str | None, str]:
         """The key of a characteristic by part and number or name, number, or name; and its name for sentences."""

@@ -229,6 +229,13 @@ def test_readings_without_time_and_part_are_told_apart_by_the_file(tmp_path: Pat
     assert len(keys) == 2
 
 
+@pytest.mark.parametrize(("field", "keys"), [("K0006/1 B7", 2), ("K0014/1 S7", 1), ("K0004/1 23.11.2026/06:05", 1)])
+def test_parts_of_one_batch_that_are_as_large_are_not_taken_for_one(tmp_path: Path, field: str, keys: int) -> None:
+    text = f"{DESCRIPTION}K0001/1 40.01\n{field}\n"
+    files = [read(tmp_path, text, f"{name}.dfq", name, format="aqdef", names=AQDEF_NAMES) for name in "abb"]
+    assert len({file.entries[0].key for file in files}) == keys
+
+
 def test_an_own_key_names_the_reading_wherever_it_stands(tmp_path: Path) -> None:
     columns = {"measured": "actual", "characteristic": "feature", "key": "id"}
     one = read(tmp_path, "id;feature;actual\n7;D40;40,01\n", columns=columns)
