@@ -36,6 +36,8 @@ EVENTS = (CORRECTION, CHANGED, EXCLUDED, *ZONES.values())
 IN_EFFECT, EMPIRICAL, NUMBER = "offset in effect, mm", "empirical value, mm", "correction in effect"
 PROCESS = (IN_EFFECT, NUMBER, EMPIRICAL)
 """K0011: the location's offset where it is known, the last correction in effect, and what was taken off the measured size."""
+OF_THE_READING = {"K0001", "K0002", "K0004", "K0014", "K0053"}
+"""Fields that the reading itself fills. One that a sender put beside it would be another value, or another time or part."""
 
 
 class _Of(NamedTuple):
@@ -124,12 +126,12 @@ def _values(
         changed = before is not None and any(before < each <= at for each in changes)
         before = at
         context = row["context"] or {}
-        kept = dict(context.get("fields") or {})
+        kept: dict[str, str] = context.get("fields") or {}
         yield Written(
             of.place,
             row["corrected_size"],
             at.astimezone(zone).replace(tzinfo=None, microsecond=0),
-            _validity(row, kept.pop("K0002", "")),
+            _validity(row, kept.get("K0002", "")),
             row["part"] or "",
             list(dict.fromkeys([*(context.get("events") or ()), *_events(row, changed=changed)])),
             order=context.get("order") or "",
@@ -140,7 +142,7 @@ def _values(
             gauge=context.get("gauge") or machine.key,
             process=(context.get("process") or {}) | _process(row, offsets),
             comment=context.get("comment") or "",
-            fields=kept,
+            fields={name: text for name, text in kept.items() if name not in OF_THE_READING},
         )
 
 

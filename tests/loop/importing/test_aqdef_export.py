@@ -162,3 +162,14 @@ def test_readings_by_the_api(server: Server, tmp_path: Path) -> None:
     assert client.get("/api/v1/readings.dfq?characteristic=,").status_code == 422
     several = client.get(f"/api/v1/readings.dfq?characteristic={shop.characteristic},{other}&last=200000")
     assert (several.status_code, "ask for fewer" in several.text) == (422, True)
+
+
+def test_further_fields_of_a_sender_are_no_values(server: Server) -> None:
+    shop = Shop(server)
+    fields = {"K0001": "99", "K0002": "255", "K0004": "x", "K0014": "SN-9", "K0053": "B", "K0081": "7"}
+    context = {"order": "A", "fields": fields}
+    shop.call(
+        "POST", "/readings", 201, characteristic=shop.characteristic, measured=39.992, part="SN-1", context=context
+    )
+    lines = shop.admin.get(f"/api/v1/readings.dfq?characteristic={shop.characteristic}").text.splitlines()
+    assert [line for line in lines if line[:3] == "K00"] == ["K0014/0 SN-1", "K0053/0 A", "K0081/1 7"]
