@@ -38,6 +38,7 @@ VALUE_FIELDS = {
     "K0081",
     "K0097",
 } | {f"K00{number}" for number in range(54, 64)}
+_VALUE_ITSELF = {"K0001", "K0002", "K0020"}
 NO_VALUE = {255, 256}
 """K0002: missing, deleted. Any other than 0: there, but not to be evaluated."""
 
@@ -105,10 +106,13 @@ class _Reading:
         self._open: dict[int, Value] = {}
         self._begun: dict[int, int] = {}  # values of each characteristic
         self._rows = 0
+        self._row_line = 0  # where the last of them stands
         self._portions: list[str] = []  # of the last line
         self._before: list[str] = []  # of the one above
         self._timed: set[int] = set()  # characteristics whose values have a time of their own
         self._for_all: dict[str, str] = {}
+        self._above: set[str] = set()  # fields for all that stand above their values, as above the first ones
+        self._waiting: Remark | None = None  # the last of them, until its values come
         self._closed = False  # by a field for all: what comes next is another row
         self._held: dict[str, str] = {}
         self._begins: str | None = None
@@ -134,6 +138,12 @@ class _Reading:
             yield Remark(number, "", line[:40], _("is neither a K field nor a value; it is passed over"))
 
     def end(self) -> Iterator[Value | Remark]:
+        waiting = [self._waiting] if self._waiting is not None and self._begun else []
+        for at, above in self._ahead().items() if self._rows else ():
+            field, text = next(iter(above.fields.items()))
+            waiting.append(Remark(above.line, f"{field}/{at}", text[:40], "", wrong=True))
+        reason = _("stands above the first values and below the last ones: nobody can tell which it belongs to")
+        yield from (each._replace(reason=reason) for each in waiting)
         yield from self._all_open()
         for (index, count), (line, fields) in self._of_values.items():
             if not index or count <= self._begun.get(index, 0):
@@ -180,11 +190,25 @@ class _Reading:
         of_all, of_row, own = (self._of_values.get(at, nothing)[1] for at in ((index, 0), (0, count), (index, count)))
         return of_all | fields | of_row | own
 
+    def _ahead(self) -> dict[int, Value]:
+        """Fields of single characteristics that stand above the line of their values, as the first ones do."""
+        if self._begins is None or self._begins in _VALUE_ITSELF:
+            return {}
+        return {
+            index: each
+            for index, each in self._open.items()
+            if each.line > self._row_line and _VALUE_ITSELF.isdisjoint(each.fields)
+        }
+
     def _row(self, number: int, line: str) -> Iterator[Value | Remark]:
         """Read a line that holds a value of each characteristic, in the order of their indices."""
+        above, ahead = self._for_all, self._ahead()
+        for index in ahead:
+            del self._open[index]
         yield from self._all_open()
-        self._for_all.clear()
+        self._for_all, self._waiting = {}, None
         self._rows += 1
+        self._row_line = number
         portions = line.split(OF_CHARACTERISTIC)
         self._before, self._portions = self._portions, portions
         for index, portion in enumerate(portions, 1):
@@ -210,7 +234,8 @@ class _Reading:
                 fields["K0006"] = fields["K0006"].removeprefix("#")
             self._held |= {name: cell for name, cell in fields.items() if name in HELD}
             self._begun[index] = self._rows
-            self._open[index] = Value(index, number, self._with_own(index, self._rows, self._held | fields))
+            own = above | ahead[index].fields if index in ahead else above
+            self._open[index] = Value(index, number, self._with_own(index, self._rows, self._held | own | fields))
 
     def _nobody(self, number: int, index: int, value: str) -> Remark:
         most = len(self._characteristics)
@@ -232,9 +257,15 @@ class _Reading:
         if key == "K0006":
             value = value.removeprefix("#")
         if index == 0:
+            if not self._begun:
+                self._above.add(key)
+            if self._open and key in self._above:
+                yield from self._all_open()
+                self._for_all = {}
             self._closed = bool(self._open)
             if not self._open:
                 self._for_all[key] = value
+                self._waiting = Remark(number, f"{key}/0", value[:40], "", wrong=True)
             for each in self._open.values():
                 each.fields.setdefault(key, value)
             return
@@ -245,16 +276,19 @@ class _Reading:
 
     def _of_one(self, number: int, key: str, index: int, value: str) -> Iterator[Value | Remark]:
         first = "K0020" if self._characteristics[index].counts else "K0001"
-        self._begins = self._begins or (key if key in {"K0001", "K0002", "K0004"} else first)
+        # Where values stand in K lines, the first field of the first one begins the others too.
+        self._begins = self._begins or (first if self._rows else key)
+        self._waiting = None
         current = self._open.get(index)
-        if current is not None and key in current.fields and key in {first, self._begins}:
+        begins = key in {first, self._begins}
+        if current is not None and begins and not current.fields.keys().isdisjoint({key, first}):
             if self._closed:
                 yield from self._all_open()
             else:
                 yield self._done(self._open.pop(index))
             self._for_all = {}
             current = None
-        elif current is not None and self._closed and key in {first, self._begins}:
+        elif current is not None and self._closed and begins:
             yield from self._all_open()
             current = None
         elif current is None and self._closed:

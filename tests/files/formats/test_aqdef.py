@@ -113,6 +113,60 @@ def test_a_field_before_the_values_belongs_to_the_next_ones(tmp_path: Path) -> N
     assert [each.fields.get("K0014") for each in found if isinstance(each, Value)] == ["SN-1", None]
 
 
+SETS = [[f"1{F}0{C}3{F}0"], ["K0001/1 1", "K0001/2 3"]], [[f"2{F}0{C}4{F}0"], ["K0001/1 2", "K0001/2 4"]]
+
+
+@pytest.mark.parametrize("lines", [0, 1])
+@pytest.mark.parametrize("index", [0, 1])
+def test_fields_that_stand_above_the_first_values_stand_above_all(tmp_path: Path, lines: int, index: int) -> None:
+    rows = [f"K0014/{index} SN-1", *SETS[0][lines], f"K0014/{index} SN-2", *SETS[1][lines]]
+    _description, found = parsed(tmp_path, HEAD + rows)
+    values = [each for each in found if isinstance(each, Value)]
+    assert len(values) == len(found) == 4
+    parts = {each.fields["K0001"]: each.fields.get("K0014") for each in values}
+    others = {"3": "SN-1", "4": "SN-2"} if index == 0 else {"3": None, "4": None}
+    assert parts == {"1": "SN-1", "2": "SN-2"} | others
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_fields_above_the_first_and_below_the_last_values_are_refused(tmp_path: Path, index: int) -> None:
+    rows = [f"K0014/{index} SN-1", *SETS[0][0], f"K0014/{index} SN-2", *SETS[1][0], f"K0014/{index} SN-3"]
+    _description, found = parsed(tmp_path, HEAD + rows)
+    [remark] = [str(each) for each in found if isinstance(each, Remark)]
+    assert remark.startswith(f"line 11, K0014/{index}: 'SN-3' stands above the first values and below the last ones")
+
+
+def test_fields_above_a_line_that_holds_nothing_are_of_no_other(tmp_path: Path) -> None:
+    rows = ["K0014/1 SN-1", "K0001/1 1", "K0014/1 SN-2", f"{F}{F}12.08.2026{C}3", f"2{F}0{C}4{F}0", f"{F}"]
+    _description, found = parsed(tmp_path, HEAD + rows)
+    assert [(each.fields.get("K0001"), each.fields.get("K0014")) for each in found if isinstance(each, Value)] == [
+        ("1", "SN-1"),
+        (None, "SN-2"),
+        ("3", None),
+        ("2", None),
+        ("4", None),
+        (None, None),
+    ]
+
+
+def test_validity_below_a_line_counts_for_its_value(tmp_path: Path) -> None:
+    time = "12.08.2026/15:23:45"
+    _description, found = parsed(tmp_path, [*HEAD, f"1{F}0{F}{time}{C}3{F}0", "K0002/1 129", f"2{F}0", "K0002/1 256"])
+    values = [each for each in found if isinstance(each, Value)]
+    assert [(each.fields["K0001"], each.fields["K0002"]) for each in values] == [("1", "129"), ("3", "0"), ("2", "256")]
+
+
+def test_a_field_of_a_value_that_the_line_leaves_out_is_no_other_s(tmp_path: Path) -> None:
+    rows = [f"{C}3{F}0", "K0014/1 SN-1", "K0014/2 SN-1", f"2{F}0{C}4{F}0"]
+    _description, found = parsed(tmp_path, HEAD + rows)
+    assert [(each.fields.get("K0001"), each.fields.get("K0014")) for each in found if isinstance(each, Value)] == [
+        ("3", "SN-1"),
+        (None, "SN-1"),
+        ("2", None),
+        ("4", None),
+    ]
+
+
 def test_values_with_numbers_of_their_own(tmp_path: Path) -> None:
     _description, found = parsed(tmp_path, [*HEAD, "K0001/1/1 5", "K0001/1/2 6", "K0014/1/1 A", "K0014/1/2 B"])
     assert [(each.fields["K0001"], each.fields["K0014"]) for each in found if isinstance(each, Value)] == [
