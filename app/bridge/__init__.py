@@ -10,6 +10,7 @@ the public API through ``inband_client`` and imports nothing of the server.
     json_text        JSON of others, without what cannot be sent on
     kinds            the protocols, one module each
     store            readings kept until the server has them, corrections on their way, the quarantine: SQLite
+    store_tables     its tables, and what is read out of them
     guards           the bridge's own limits for a correction, whatever the server says
     control_side     the task that talks to one control
     server_side      the task that talks to the server for one machine

@@ -81,8 +81,8 @@ async def _connected(unit: Unit) -> None:
                 await link.acknowledge(received)
         async with asyncio.timeout(machine.patience):
             for outcome in await link.outcomes():
-                waits = any(order.number == outcome.number for order in unit.orders)
-                if (waits or outcome.number != answered) and await store.answered(machine.key, outcome):
+                offered = any(order.number == outcome.number for order in unit.orders)
+                if (offered or outcome.number != answered) and await store.answered(machine.key, outcome):
                     unit.to_tell = True
                     unit.news.set()
                 answered = outcome.number

@@ -384,7 +384,7 @@ class _Reader:
             body["measured_at"] = (clock.moment(value.at) if clock else value.at).isoformat()
         told = item.fields
         if value.at is None and value.batch and not value.part:  # a batch is many parts: the next one may be as large
-            told = told | {"file": self.stamp}
+            told = told | {"file": self.content.stamp}
         self._add(item.line, f"{name}/{item.characteristic}", body, told, None, alone)
 
     def _key_of(self, part: str, characteristic: aqdef.Characteristic) -> tuple[str | None, str]:

@@ -8,7 +8,7 @@ LARGEST: Final = 1e18
 
 
 def read_json(text: str | bytes) -> Any:
-    """What it says.
+    """Read JSON.
 
     Raises `json.JSONDecodeError` or `UnicodeDecodeError` where it is no JSON, and `ValueError` with words that go behind a
     name, such as “holds NaN, which is no number”.

@@ -16,7 +16,8 @@ from app.bridge.configuration import Server
 from app.bridge.guards import against
 from app.bridge.links import Order
 from app.bridge.offset_change import writes_offsets
-from app.bridge.store import Intent, StoreError, Waiting
+from app.bridge.store import StoreError
+from app.bridge.store_tables import Intent, Waiting
 from app.bridge.unit import Unit
 from inband_client import (
     AsyncClient,

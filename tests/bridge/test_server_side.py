@@ -267,7 +267,7 @@ def test_a_rejection_that_somebody_was_quicker_with_leaves_nothing_on_offer(tmp_
     unit = unit_of(Model(), store_in(tmp_path))
     unit.orders = (Order(17, 3, 0.0, -0.01),)  # superseded as well
     run(server_side._ask(unit, cast("AsyncClient", server)))
-    assert unit.orders == ()
+    assert not unit.orders
 
 
 def test_what_stands_behind_a_rejected_correction_of_its_tool_is_asked_for_anew(tmp_path: Path) -> None:
@@ -275,7 +275,7 @@ def test_what_stands_behind_a_rejected_correction_of_its_tool_is_asked_for_anew(
     server = Scripted(correction(18, after=-0.2, amount=-0.2), correction(19, after=-0.21))
     unit = story(tmp_path, server)
     assert [(what, number) for what, number, _ in server.heard] == [("reject", 18)]
-    assert unit.orders == ()
+    assert not unit.orders
     assert unit.to_tell
     assert unit.news.is_set()
     server.waiting = [correction(19, after=-0.01)]

@@ -457,7 +457,7 @@ def test_a_file_that_goes_on_growing_brings_its_new_lines_only(tmp_path: Path) -
 
 
 def test_a_file_that_takes_longer_than_a_call_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    read_in_time, began = folder.read_content, []
+    read_in_time, began = read_content, []
 
     def slow(*given: Any) -> Content:
         began.append(given)

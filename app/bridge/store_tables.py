@@ -1,0 +1,63 @@
+"""Tables of the store, and what is read out of them."""
+
+from typing import Any, Final, NamedTuple
+
+from app.bridge.links import Order, Outcome
+
+SCHEMA: Final = """
+CREATE TABLE IF NOT EXISTS reading (
+    id INTEGER PRIMARY KEY, machine TEXT NOT NULL, key TEXT NOT NULL, body TEXT NOT NULL,
+    state TEXT NOT NULL CHECK (state IN ('waiting', 'sent', 'quarantined')),
+    reason TEXT, at REAL NOT NULL, sent_at REAL, UNIQUE (machine, key)
+);
+CREATE INDEX IF NOT EXISTS reading_state ON reading (machine, state, id);
+CREATE INDEX IF NOT EXISTS reading_sent ON reading (sent_at) WHERE state = 'sent';
+CREATE TABLE IF NOT EXISTS ring (
+    machine TEXT PRIMARY KEY, epoch INTEGER, sequence INTEGER NOT NULL, generation INTEGER NOT NULL
+);
+CREATE TABLE IF NOT EXISTS intent (
+    machine TEXT NOT NULL, number INTEGER NOT NULL, tool_memory INTEGER NOT NULL, before REAL NOT NULL, after REAL NOT NULL,
+    mapping TEXT NOT NULL, state TEXT NOT NULL CHECK (state IN ('open', 'answered', 'told', 'withdrawn')),
+    applied INTEGER, held REAL, differs INTEGER, reason TEXT, at REAL NOT NULL, PRIMARY KEY (machine, number)
+);
+CREATE TABLE IF NOT EXISTS location (
+    machine TEXT NOT NULL, tool_memory INTEGER NOT NULL, held REAL, told REAL, proved TEXT, proved_at REAL,
+    PRIMARY KEY (machine, tool_memory)
+);
+CREATE TABLE IF NOT EXISTS fact (machine TEXT NOT NULL, name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (machine, name));
+"""
+
+
+class Waiting(NamedTuple):
+    """A reading that the server does not have yet."""
+
+    id: int
+    key: str
+    body: dict[str, Any]
+    at: float
+
+
+class Quarantined(NamedTuple):
+    """A reading that the server, or the bridge, refuses, with the reason. at: when it came, seconds since 1970."""
+
+    key: str
+    body: dict[str, Any]
+    reason: str
+    at: float
+
+
+class Counts(NamedTuple):
+    """Readings of a machine: waiting, when the oldest of them came, quarantined."""
+
+    waiting: int
+    oldest: float | None
+    quarantined: int
+
+
+class Intent(NamedTuple):
+    """A correction that was made known to the control. mapping: the hash it was converted by."""
+
+    order: Order
+    state: str
+    mapping: str
+    outcome: Outcome | None
