@@ -139,6 +139,8 @@ class RegisterLink:
             )
         slots = to_fetch(block, stored.sequence)
         self._look_at_next(stored.sequence + 1, waits=not slots and block.written > stored.sequence)
+        if not self.remark and block.answer == Answer.ON_HOLD and block.mail.number not in {0, block.answered}:
+            self.remark = f"Correction {block.mail.number} waits: the NC program holds corrections (answer 9). Release them there."
         fresh = (
             self._polled is not None
             and (now - self._polled[0]).total_seconds() < FRESH * self.machine.interval + 1

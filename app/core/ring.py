@@ -36,6 +36,8 @@ MODULUS: Final = 9973
 """Of the check sums: the largest prime below 10,000."""
 RESOLUTION: Final = 10_000
 """Lengths enter a check sum in steps of 1/10,000 of the control's unit."""
+LARGEST: Final = 1e12
+"""No number of a slot is as large: what is, or is no number, was never written by the NC program."""
 INCH: Final = 25.4
 """mm in an inch."""
 
@@ -217,7 +219,7 @@ def _whole(value: float) -> int | None:
 def read_slot(registers: Sequence[float]) -> Slot | None:
     """The reading in a slot's ten registers; None while it is empty, half written, or its check sum does not fit."""
     sequence, again = _whole(registers[Field.SEQ]), _whole(registers[Field.SEQ2])
-    if not sequence or sequence != again or not all(isfinite(value) for value in registers):
+    if not sequence or sequence != again or not all(abs(value) < LARGEST for value in registers):
         return None
     numbers = [
         _whole(registers[place])

@@ -221,6 +221,26 @@ def test_the_mailbox_brings_a_correction_and_its_answer() -> None:
     run(story())
 
 
+def test_a_correction_that_the_nc_program_holds_is_remarked() -> None:
+    model = Model(on_hold=True)
+    made(model)
+
+    async def story() -> None:
+        link, _ = link_of(model)
+        await link.fetch(Position())
+        await link.offer([Order(18, 3, 0.0, 0.010)])
+        made(model)
+        await link.fetch(Position())
+        assert link.remark.startswith("Correction 18 waits: the NC program holds corrections (answer 9).")
+        model.on_hold = False
+        made(model)
+        await link.fetch(Position())
+        assert link.remark == ""
+        assert await link.outcomes() == [Outcome(18, applied=True, offset=0.010)]
+
+    run(story())
+
+
 @pytest.mark.parametrize("answer", [Answer.CHECK_WRONG, Answer.ON_HOLD])
 def test_an_answer_counts_though_the_nc_has_looked_at_mail_behind_it(answer: Answer) -> None:
     """It had applied the correction while the bridge took it back: the number of before with another check sum lay there."""

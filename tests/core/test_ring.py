@@ -80,6 +80,14 @@ def test_a_size_that_is_not_the_one_written_does_not_count(slot: Slot, differenc
     assert read_slot(registers) is None
 
 
+@pytest.mark.parametrize("value", [1e305, -1e12, float("inf"), float("nan")])
+@pytest.mark.parametrize("place", Field)
+def test_a_number_that_no_program_writes_does_not_count(place: Field, value: float) -> None:
+    registers = slot_registers(reading(7))
+    registers[place] = value
+    assert read_slot(registers) is None
+
+
 @given(SLOTS)
 def test_eight_digits_are_enough(slot: Slot) -> None:
     assume(abs(slot.measured) < 1000)
