@@ -153,6 +153,18 @@ class TestPlantOnANode:
             assert connection.execute("SELECT count(*) FROM far.reading_summary WHERE level = 5").fetchone() == (7,)
             assert citus.node_of(connection, "far") == citus.nodes(connection)[1]
 
+    def test_a_key_that_comes_again_is_answered_as_before(self, client: httpx.Client) -> None:
+        def send(number: int) -> tuple[int, int]:
+            body = {"characteristic": "shaft", "measured": 40.001, "key": f"again-{number // 8}"}
+            answer = client.post("/api/v1/readings", json=body)
+            return answer.status_code, answer.json().get("sequence", 0)
+
+        with ThreadPoolExecutor(8) as pool:
+            found = list(pool.map(send, range(160)))
+        assert {status for status, _ in found} == {200, 201}
+        for first in range(0, 160, 8):
+            assert len({sequence for _, sequence in found[first : first + 8]}) == 1
+
     @pytest.mark.parametrize(
         "path",
         [

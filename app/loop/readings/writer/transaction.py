@@ -40,7 +40,8 @@ class StaleSnapshot(Exception):
 
 
 # The snapshot is not true any more, a key is known already, or a refused reading may be the repetition of a stored one.
-STALE = (psycopg.errors.DivisionByZero, psycopg.errors.UniqueViolation, StaleSnapshot)
+# InternalError_: Citus tells the unique violation of another node by its words, but not always by its code.
+STALE = (psycopg.errors.DivisionByZero, psycopg.errors.UniqueViolation, psycopg.errors.InternalError_, StaleSnapshot)
 
 
 async def transact(
