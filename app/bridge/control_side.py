@@ -65,6 +65,10 @@ async def _connected(unit: Unit) -> None:
             full, full_at = await store.is_full(), time.monotonic() + FULL_EVERY
             await unit.look_if_held()  # the server's side does not come to it while the server is away
         if full:
+            if machine.corrections != "none" and not unit.offered:  # a hold and an age count all the same
+                async with asyncio.timeout(machine.patience):
+                    await link.fetch(position)
+                    await link.offer(())
             raise StoreError(
                 f"The store holds {store.largest / 1e6:g} MB, its largest size: nothing is fetched until the server has"
                 " taken readings. They wait at the control."

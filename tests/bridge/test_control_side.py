@@ -31,7 +31,13 @@ async def too_old(unit: Unit) -> None:
     unit.orders_until = time.monotonic()
 
 
-@pytest.mark.parametrize("event", [held_by_command, held_for_one_machine, too_old])
+async def held_while_the_store_is_full(unit: Unit) -> None:
+    unit.store.largest = 1
+    await until(lambda: unit.state == "full", "the store is full")
+    await held_by_command(unit)
+
+
+@pytest.mark.parametrize("event", [held_by_command, held_for_one_machine, too_old, held_while_the_store_is_full])
 def test_an_offered_correction_is_withdrawn_while_the_server_is_away(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, event: Callable[[Unit], Awaitable[Any]]
 ) -> None:
