@@ -7,6 +7,8 @@ connections and memory of the coordinator and of the fullest worker, and the rea
 """
 
 import argparse
+import contextlib
+import io
 import os
 import re
 import shutil
@@ -41,7 +43,8 @@ CONNECTIONS = "SELECT count(*) FROM pg_stat_activity WHERE backend_type = 'clien
 def add(url: str, key: str) -> tuple[float, float]:
     """Add a plant and distribute it; the seconds of both."""
     begun = time.perf_counter()
-    commands.add_plant(key, **USUAL, database_url=url)
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        commands.add_plant(key, **USUAL, database_url=url)
     added = time.perf_counter()
     with psycopg.connect(url, autocommit=True) as connection:
         citus.distribute(connection, key)
@@ -125,7 +128,11 @@ def stage(cluster: list[EmbeddedServer], folder: Path, plants: list[str], second
             coordinator, *workers = [of_node(node) for node in cluster]
             own = memory(process.pid)
             stop.set()
-            working.result(180)
+            try:
+                working.result(180)
+            except AssertionError as error:
+                error.add_note(f"The server's log is {folder / 'serve.log'}.")
+                raise
     finally:
         process.terminate()
         process.wait(60)
