@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from datetime import datetime
 from math import isfinite
 from typing import Protocol
@@ -13,6 +14,7 @@ from app.bridge.links import (
     Clock,
     ControlAway,
     CountersLost,
+    LinkError,
     Misconfigured,
     NotNow,
     Order,
@@ -115,8 +117,10 @@ class RegisterLink:
         self._direct = []
         self._heads = []
         identity = await self.registers.connect()
-        if shown := await self.registers.shown_time():
-            learn_date(self.clock, shown, datetime.now().astimezone())
+        with suppress(LinkError, TimeoutError):  # a control that does not tell its date works all the same
+            async with asyncio.timeout(self.machine.patience / 4):
+                if shown := await self.registers.shown_time():
+                    learn_date(self.clock, shown, datetime.now().astimezone())
         return identity
 
     async def close(self) -> None:

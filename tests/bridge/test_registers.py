@@ -4,6 +4,7 @@ import random
 import re
 from collections.abc import Sequence
 from contextlib import suppress
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -219,6 +220,18 @@ def test_the_mailbox_brings_a_correction_and_its_answer() -> None:
         assert len(model.applied) == 1
 
     run(story())
+
+
+@pytest.mark.parametrize("error", [ControlAway("The control has not answered ?Q600 3011."), TimeoutError()])
+def test_a_control_that_does_not_tell_its_date_is_connected_all_the_same(error: Exception) -> None:
+    class Dateless(ModelRegisters):
+        async def shown_time(self) -> datetime | None:
+            raise error
+
+    model = Model(clock_ahead=-86_400.0)
+    link = RegisterLink(machine(model), Dateless(model))
+    assert run(link.connect()) == model.serial
+    assert (link.clock.offset, link.clock.days) == (None, 0)
 
 
 def test_a_correction_that_the_nc_program_holds_is_remarked() -> None:

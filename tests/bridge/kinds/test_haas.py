@@ -292,6 +292,21 @@ def test_each_mistake_is_said() -> None:
     run(work())
 
 
+def test_a_control_that_does_not_answer_for_its_date_is_read_all_the_same() -> None:
+    async def work() -> None:
+        async with haas() as simulator:
+            list(simulator.model.part())
+            real = simulator.answer
+            simulator.answer = lambda text: ">?, UNKNOWN COMMAND" if "3011" in text else real(text)  # type: ignore[method-assign]
+            one = link(settled(simulator, answer=0.5))
+            assert await one.connect() == simulator.model.serial
+            [reading] = await one.fetch(Position())
+            assert reading.body["measured"] == pytest.approx(simulator.model.written[0][1].measured, abs=1e-6)
+            await one.close()
+
+    run(work())
+
+
 def test_an_inch_control_and_its_empty_variables() -> None:
     async def work() -> None:
         model = Model(FEATURES, unit=Length.INCH)
