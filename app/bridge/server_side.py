@@ -131,7 +131,7 @@ async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | Non
     try:
         decision = await client.push(row.body | {"key": row.key})
     except REFUSED as error:
-        if _is_elsewheres(error):
+        if _not_from_inband(error):
             raise
         reason = str(error)
     except Forbidden:
@@ -147,7 +147,7 @@ async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | Non
     return None
 
 
-def _is_elsewheres(error: ProblemError) -> bool:
+def _not_from_inband(error: ProblemError) -> bool:
     """Tell if it is not Inband's: a proxy without a server behind it may answer 404, which says nothing of what was sent."""
     return not error.kind
 
@@ -201,7 +201,7 @@ async def _tell_one(unit: Unit, client: AsyncClient, intent: Intent) -> None:
         Conflict,
         NotFound,
     ) as error:  # superseded while the control took it, told before, or forgotten by a restored server
-        if _is_elsewheres(error):
+        if _not_from_inband(error):
             raise
         said = "is in the offset" if outcome.applied else "was refused by the control"
         log.warning("%s: correction %d %s, but %s", key, order.number, said, error)
