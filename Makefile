@@ -1,5 +1,7 @@
 # make run     the demonstration plant at http://127.0.0.1:8000; ARGS="--past 42" for six weeks behind it
-# make test    lint, then every test on a real PostgreSQL and in a real browser; ARGS="-k name" for some of them
+# make test    lint, then the tests on a real PostgreSQL and in a real browser, in another order each time; ARGS="-k name" for
+#              some of them, ARGS="-p randomly_seed=N" for the order of an earlier run
+# make test-long  what is slow by nature: campaigns of faults, failover, every page in every size, chance with fresh seeds
 # make lint    style, types, lengths, templates, and the walls between the rooms
 # make bench   the benchmarks; each prints ratios
 # make messages  collect what can be translated into frontend/locale/inband.pot
@@ -9,7 +11,7 @@
 SHELL := /bin/sh
 .SHELLFLAGS := -eu -c
 .DELETE_ON_ERROR:
-.PHONY: run test lint bench messages wheel clean
+.PHONY: run test test-long lint bench messages wheel clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -23,6 +25,9 @@ run: $(VENV)/installed
 
 test: lint $(VENV)/browser
 	@$(BIN)/pytest -n auto --dist worksteal $(ARGS)
+
+test-long: $(VENV)/browser
+	@$(BIN)/pytest -n auto --dist worksteal --long $(ARGS)
 
 lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check --quiet

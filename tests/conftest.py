@@ -11,6 +11,7 @@ import os
 import shutil
 import signal
 import socket
+import ssl
 import subprocess
 import sys
 import time
@@ -33,6 +34,7 @@ from app import HOUSE
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
+from tests import quick_passwords  # noqa: F401 - replaces what it is about
 from tests.forked import Forked
 from tests.shop import Person, Shop
 
@@ -40,16 +42,36 @@ for name in [name for name in os.environ if name.startswith(("INBAND_", "PG")) a
     del os.environ[name]  # no test may meet a real installation
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # hundreds of servers start; each would compile the whole house anew
 
+# A computer that is busy is no fault of what is tested: no deadline. `make test` tries the same examples every time,
+# `make test-long` others each time, and prints how to try a failing one again.
+settings.register_profile("short", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile(
-    "inband", deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)  # a computer that is busy is no fault of what is tested
-settings.load_profile("inband")
+    "long", max_examples=1_000, print_blob=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
 expect.set_options(timeout=20_000)  # ms; what is expected comes at once where the computer has nothing else to do
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """One more than usual: a third of the time tests wait, for a browser or for a server that starts."""
     return int(xdist_plugin.pytest_xdist_auto_num_workers(config)) + 1
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    settings.load_profile("long" if config.getoption("--long") else "short")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """`make test` leaves out what is slow by nature; `make test-long` runs that, and all that is tried at random."""
+    long = config.getoption("--long")
+    left_out = [each for each in items if not _runs(each, long=long)]
+    items[:] = [each for each in items if _runs(each, long=long)]
+    config.hook.pytest_deselected(items=left_out)
+
+
+def _runs(item: pytest.Item, *, long: bool) -> bool:
+    if item.get_closest_marker("long"):
+        return long
+    return not long or item.get_closest_marker("hypothesis") is not None
 
 
 TEMPLATE = "template_inband"
@@ -207,6 +229,8 @@ def session(rolled_back_database: Database) -> Iterator[Session]:
 
 # --- the server
 
+TLS = ssl.create_default_context()
+"""For every client: to read the certificates takes longer than most tests."""
 
 Process = subprocess.Popen[bytes] | Forked
 
@@ -234,7 +258,7 @@ class Server:
         """An HTTP client of this server; with ``key`` it calls as that key's owner."""
         if key is not None:
             headers["Authorization"] = f"Bearer {key}"
-        client = httpx.Client(base_url=self.url, headers=headers, timeout=30)
+        client = httpx.Client(base_url=self.url, headers=headers, timeout=30, verify=TLS)
         self._clients.append(client)
         return client
 
@@ -299,7 +323,7 @@ def wait_ready(url: str, process: Process, stderr: Path, seconds: float = 180) -
         if process.poll() is not None:
             pytest.fail(f"the server ended with {process.returncode}:\n{stderr.read_text()}")
         try:
-            if httpx.get(f"{url}/health/ready", timeout=5).status_code == 200:
+            if httpx.get(f"{url}/health/ready", timeout=5, verify=TLS).status_code == 200:
                 return
         except httpx.TransportError:
             pass
@@ -341,16 +365,35 @@ def run_server(new_database: NewDatabase, tmp_path_factory: pytest.TempPathFacto
     return run
 
 
+@pytest.fixture(scope="session")
+def common_server(run_server: RunServer) -> Iterator[Server]:
+    """The server that most files of a worker share. What a test makes there has names of its own: `unique`."""
+    with run_server() as running:
+        yield running
+
+
 @pytest.fixture(scope="module")
-def server(run_server: RunServer) -> Iterator[Server]:
-    """A server for the tests of one file, on a database of its own."""
+def server(request: pytest.FixtureRequest, run_server: RunServer) -> Iterator[Server]:
+    """A running server: the worker's, or with ``pytestmark = pytest.mark.own_server`` one for this file alone.
+
+    One of its own needs whoever looks at lists or settings of the whole plant, or stops the server.
+    """
+    if request.node.get_closest_marker("own_server") is None:
+        yield request.getfixturevalue("common_server")
+        return
     with run_server() as running:
         yield running
 
 
 @pytest.fixture
 def shop(server: Server) -> Shop:
-    """A machine and a characteristic of this test alone; a file with hundreds of tests may make one for all of them."""
+    """A machine and a characteristic of this test alone."""
+    return Shop(server)
+
+
+@pytest.fixture(scope="module")
+def common_shop(server: Server) -> Shop:
+    """A machine and a characteristic for the tests of one file that leave no trace that another one would see."""
     return Shop(server)
 
 
@@ -367,6 +410,11 @@ def engineer(server: Server) -> Person:
 @pytest.fixture(scope="module")
 def viewer(server: Server) -> Person:
     return Person(server, "viewer")
+
+
+@pytest.fixture(scope="module")
+def admin(server: Server) -> Person:
+    return Person(server, "admin")
 
 
 # --- the browser

@@ -6,11 +6,16 @@ word on is the same; that it starts from nothing too, tests/cli/test_serve.py se
 
 import multiprocessing
 import os
+import signal
 import sys
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
-multiprocessing.get_context("forkserver").set_forkserver_preload(["app.main", "app.cli.serve", "tests.forked"])
+from tests.keeper import PR_SET_PDEATHSIG, prctl
+
+multiprocessing.get_context("forkserver").set_forkserver_preload(
+    ["app.main", "app.cli.serve", "tests.quick_passwords", "tests.forked"]
+)
 
 
 class Forked(ForkServerProcess):
@@ -25,6 +30,8 @@ class Forked(ForkServerProcess):
         """Run the command in the forked process."""
         from app.cli import main
 
+        if sys.platform == "linux":
+            prctl(PR_SET_PDEATHSIG, signal.SIGTERM)  # a worker that is killed takes its servers along
         said = os.open(self.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
         for stream in (1, 2):
             os.dup2(said, stream)

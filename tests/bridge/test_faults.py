@@ -13,7 +13,6 @@ from bench.bridge_faults import KINDS, Campaign
 from tests.conftest import Server
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_nothing_is_lost_doubled_or_overwritten(server: Server, tmp_path: Path, kind: str) -> None:
     if kind == "mqtt" and mosquitto() is None:

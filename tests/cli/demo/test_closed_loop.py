@@ -57,7 +57,6 @@ def readings(server: Server, characteristic: str) -> list[dict[str, Any]]:
 
 
 # Mean deviation without corrections divided by that with corrections, as measured: 4.4 (web 20) to 21 (seat Ø35); 2.1 for bushing 25.
-@pytest.mark.slow
 def test_the_loop_holds_sizes_far_better_than_no_loop(server: Server, filled: list[Line]) -> None:
     for spec in plant.MACHINES:
         open_loop = without_corrections(spec, PARTS)
@@ -74,7 +73,6 @@ def test_the_loop_holds_sizes_far_better_than_no_loop(server: Server, filled: li
                 assert fmean(with_loop) < (feature.upper - feature.lower) / 6
 
 
-@pytest.mark.slow
 def test_the_past_is_in_the_past_in_order_and_leaves_nothing_to_be_done(server: Server, filled: list[Line]) -> None:
     found = readings(server, "shaft-d40")
     times = [reading["measured_at"] for reading in found]
@@ -86,7 +84,6 @@ def test_the_past_is_in_the_past_in_order_and_leaves_nothing_to_be_done(server: 
     assert set(left) <= {"hunting"}, "which the rounds may raise at any minute"
 
 
-@pytest.mark.slow
 def test_a_chipped_edge_stops_the_machine_until_somebody_replaces_the_tool(server: Server, filled: list[Line]) -> None:
     line = filled[0]
     thread = threading.Thread(target=line.live, args=(Pace(6000, datetime.now(UTC), line.machine.at),))
@@ -140,7 +137,6 @@ def wait_for_standstill(line: Line) -> int:
     return serial
 
 
-@pytest.mark.slow
 def test_a_second_run_is_judged_by_what_was_in_effect_before_it(server: Server, filled: list[Line]) -> None:
     (again,) = lines(server.url, server.key("admin"), 2, threading.Event(), [plant.MILL_1])
     again.settle()
@@ -212,7 +208,6 @@ def test_the_operator_steps_in_only_after_a_visitor_had_a_minute() -> None:
 # --- the last ones: they set the plant up anew, and the keys of the lines above stop working
 
 
-@pytest.mark.slow
 def test_a_past_of_weeks_has_nights_and_changed_tools_and_stays_in_control(server: Server) -> None:
     tools = tuple(replace(tool, life=60) for tool in plant.MILL_1.tools)
     features = tuple(replace(feature, key=f"{feature.key}-weeks") for feature in plant.MILL_1.features)
@@ -233,7 +228,6 @@ def test_a_past_of_weeks_has_nights_and_changed_tools_and_stays_in_control(serve
     assert fmean([abs(reading["deviation"]) for reading in found[-100:]]) < width / 6
 
 
-@pytest.mark.slow
 def test_a_person_ends_it_when_part_after_part_is_not_accepted(server: Server) -> None:
     features = tuple(replace(feature, key=f"{feature.key}-stuck") for feature in plant.LATHE_3.features)
     spec = replace(plant.LATHE_3, key="lathe-stuck", name="Lathe", features=features)

@@ -61,7 +61,6 @@ def signed_in(port: int, log: Path) -> None:
     pytest.fail(log.read_text())
 
 
-@pytest.mark.slow
 def test_it_prints_how_to_sign_in_runs_and_ends_in_order_and_the_second_start_goes_on(
     new_database: NewDatabase, tmp_path: Path
 ) -> None:

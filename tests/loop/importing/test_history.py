@@ -267,7 +267,6 @@ def test_summaries_for_charts_are_those_of_readings_pushed_one_by_one(plant: Dat
     assert scalar(plant, "SELECT count(*) FROM reading_summary") == 11
 
 
-@pytest.mark.slow
 def test_a_long_file_takes_seconds_and_little_memory(plant: Database, tmp_path: Path) -> None:
     path = table(
         tmp_path / "long.csv", [39.992 + at % 17 / 1000 for at in range(200_000)], begin="2020-01-01T00:00:00Z"
@@ -283,7 +282,6 @@ def test_a_long_file_takes_seconds_and_little_memory(plant: Database, tmp_path: 
     assert scalar(plant, "SELECT max(sequence) FROM reading") == 201_000
 
 
-@pytest.mark.slow
 def test_the_machine_goes_on_while_its_past_is_imported(run_server: RunServer, tmp_path: Path) -> None:
     with run_server() as server:
         set_up(server.database)
@@ -303,7 +301,6 @@ def test_the_machine_goes_on_while_its_past_is_imported(run_server: RunServer, t
     assert tuple(found) == (20_000 + pushed,) * 3
 
 
-@pytest.mark.slow
 def test_killed_in_the_middle_nothing_of_it_is_there_and_it_can_be_repeated(plant: Database, tmp_path: Path) -> None:
     path = table(tmp_path / "long.csv", [39.992] * 60_000, begin="2020-01-01T00:00:00Z")
     command = [sys.executable, "-m", "app", "import", str(path), "--characteristic", "shaft-d40"]

@@ -1,0 +1,195 @@
+"""Whatever a run of the tests starts ends with the run, however the run ends.
+
+PostgreSQL clusters, servers, browsers and brokers are started by the hundred, some in sessions of their own, some stopped on
+purpose. The process that somebody starts as ``pytest`` therefore becomes the keeper of the run, and the run its child: when
+the run has ended, by itself, by Ctrl-C, SIGTERM or SIGKILL, the keeper ends what is left. The kernel gives it every orphan
+of the run (prctl(2), PR_SET_CHILD_SUBREAPER), so none escapes. If the keeper itself is killed, the run hears of it
+(PR_SET_PDEATHSIG) and does the same. If both are killed at once, the next run ends what they left.
+
+A run that ends by itself and leaves a process behind has failed, and the keeper says which.
+
+This is a plugin (``-p tests.keeper`` in pyproject.toml), because that is read before pytest captures anything. Linux only;
+elsewhere tests run without a keeper.
+"""
+
+import contextlib
+import ctypes
+import os
+import re
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FrameType
+
+import pytest
+
+MARK = "TESTS_KEPT_BY"
+"""Variable that everything started by a run inherits: process number and start of its keeper."""
+PROC = Path("/proc")
+PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36
+IN_ORDER = 6.0  # s that an interrupted run may take to end by itself
+BY_ITSELF = 5.0  # s in which what a finished run has started ends by itself
+# PostgreSQL waits for its clients at SIGTERM and ends at once at SIGQUIT.
+WAYS = ((signal.SIGTERM, 3.0), (signal.SIGQUIT, 2.0), (signal.SIGKILL, 3.0))
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option of `make test-long`; keep the run from here on, before pytest captures anything."""
+    parser.addoption("--long", action="store_true", help="run what is slow by nature, and chance with fresh seeds")
+    if sys.platform == "linux" and MARK not in os.environ:
+        keep()
+
+
+def keep() -> None:
+    """Return in a child of this process; this process goes on as its keeper and never returns."""
+    end(abandoned)
+    os.environ[MARK] = f"{os.getpid()} {_start(os.getpid())}"
+    heard = {signal.SIGCHLD, signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, heard)
+    prctl(PR_SET_CHILD_SUBREAPER, 1)
+    keeper, run = os.getpid(), os.fork()
+    if run:
+        os._exit(_watched(run, heard))
+    prctl(PR_SET_CHILD_SUBREAPER, 1)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores it for what runs in the background
+    signal.signal(signal.SIGTERM, _keeper_was_killed)
+    prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    if os.getppid() != keeper:  # killed before it could be heard of
+        os._exit(128 + signal.SIGTERM)
+
+
+def prctl(option: int, value: int) -> None:
+    """prctl(2)."""
+    if ctypes.CDLL(None, use_errno=True).prctl(option, value, 0, 0, 0):
+        raise OSError(ctypes.get_errno(), f"prctl {option}")
+
+
+def _watched(run: int, heard: set[signal.Signals]) -> int:
+    """The exit status of the run, once it and all that it has started have ended."""
+    deadline, ended = None, None
+    while ended is None:
+        info = signal.sigtimedwait(heard, 1 if deadline is None else max(0, deadline - time.monotonic()))
+        if info is not None and info.si_signo != signal.SIGCHLD:
+            if deadline is not None:
+                deadline = 0.0  # asked again: at once
+            elif info.si_signo != signal.SIGINT or info.si_code <= 0:  # the terminal's Ctrl-C reaches the run as well
+                for pid in (run, *_children(run)):  # as the terminal would, the workers too
+                    os.kill(pid, signal.SIGINT)
+            deadline = time.monotonic() + IN_ORDER if deadline is None else deadline
+        if deadline is not None and time.monotonic() >= deadline:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(run, signal.SIGKILL)
+        ended = _reaped().get(run)
+    status = os.waitstatus_to_exitcode(ended)
+    if deadline is None and status >= 0:
+        status = _finished(status)
+    end(descendants)
+    return status if status >= 0 else 128 - status
+
+
+def _finished(status: int) -> int:
+    """The exit status of a run that ended by itself: a failure if it left something behind."""
+    deadline = time.monotonic() + BY_ITSELF
+    while (left := descendants()) and time.monotonic() < deadline:
+        time.sleep(0.05)
+        _reaped()
+    for pid in left:
+        sys.stderr.write(f"left behind by the tests, and ended now: {pid} {_command(pid)}\n")
+    return status or int(bool(left))
+
+
+def _keeper_was_killed(number: int, frame: FrameType | None) -> None:
+    end(descendants)
+    os._exit(128 + number)
+
+
+def end(find: Callable[[], list[int]]) -> None:
+    """End the processes that `find` gives, also stopped ones and those that ignore a request."""
+    for way, seconds in WAYS:
+        for pid in find():
+            for number in (way, signal.SIGCONT):
+                with contextlib.suppress(ProcessLookupError, PermissionError):
+                    os.kill(pid, number)
+        deadline = time.monotonic() + seconds
+        while find() and time.monotonic() < deadline:
+            time.sleep(0.02)
+            _reaped()
+        if not find():
+            return
+
+
+def descendants() -> list[int]:
+    """All that this process has started and that has not ended, and all that those have started."""
+    parents = {pid: parent for pid, state, parent in _processes() if state not in {"Z", "X"}}
+    found = [os.getpid()]
+    for pid in found:
+        found += [child for child, parent in parents.items() if parent == pid]
+    return found[1:]
+
+
+def _children(pid: int) -> list[int]:
+    return [child for child, _, parent in _processes() if parent == pid]
+
+
+def abandoned() -> list[int]:
+    """What a run left behind that was killed together with its keeper, and everything that belongs to this user."""
+    return [pid for pid, state, _ in _processes() if state != "Z" and _is_abandoned(pid)]
+
+
+def _is_abandoned(pid: int) -> bool:
+    with contextlib.suppress(OSError):
+        mark = re.search(rb"(?:^|\0)%b=(\d+) (\d+)\0" % MARK.encode(), (PROC / str(pid) / "environ").read_bytes())
+        if mark is not None:
+            return _start(int(mark[1])) != int(mark[2])
+        # PostgreSQL inherits no environment. Its cluster lies in a folder that pytest locks as long as the run lasts.
+        folder = re.search(rb"postgres\0-D\0(/[^\0]*/pytest-of-[^/\0]+/pytest-\d+)/", _line(pid))
+        if folder is not None:
+            lock = Path(os.fsdecode(folder[1])) / ".lock"
+            return not lock.exists() or _start(int(lock.read_text() or 0)) is None
+    return False
+
+
+def _reaped() -> dict[int, int]:
+    """Children that have ended, with their status."""
+    ended = {}
+    with contextlib.suppress(ChildProcessError):
+        while (found := os.waitpid(-1, os.WNOHANG))[0]:
+            ended[found[0]] = found[1]
+    return ended
+
+
+def _processes() -> Iterator[tuple[int, str, int]]:
+    """Number, state and parent of every process."""
+    for folder in PROC.iterdir():
+        if folder.name.isdigit():
+            with contextlib.suppress(OSError):
+                state, parent = _stat(int(folder.name))[:2]
+                yield int(folder.name), state, int(parent)
+
+
+def _stat(pid: int) -> list[str]:
+    """Fields of /proc/PID/stat from the third on, the state; the second, the name, may hold blanks."""
+    return (PROC / str(pid) / "stat").read_text().rpartition(")")[2].split()
+
+
+def _start(pid: int) -> int | None:
+    """When the process began, in ticks since the system did; None if there is none."""
+    try:
+        fields = _stat(pid)
+    except OSError:
+        return None
+    return None if fields[0] == "Z" else int(fields[19])
+
+
+def _line(pid: int) -> bytes:
+    return (PROC / str(pid) / "cmdline").read_bytes()
+
+
+def _command(pid: int) -> str:
+    try:
+        return _line(pid).replace(b"\0", b" ").decode(errors="replace")[:200]
+    except OSError:
+        return "(ended)"
