@@ -1,6 +1,6 @@
 # make run     the demonstration plant at http://127.0.0.1:8000; ARGS="--past 42" for six weeks behind it
 # make test    lint, then the tests on a real PostgreSQL and in a real browser, in another order each time; ARGS="-k name" for
-#              some of them, ARGS="-p randomly_seed=N" for the order of an earlier run
+#              some of them, ARGS="--randomly-seed=N" for the order of an earlier run
 # make test-long  what is slow by nature: campaigns of faults, failover, every page in every size, chance with fresh seeds
 # make lint    style, types, lengths, templates, and the walls between the rooms
 # make bench   the benchmarks; each prints ratios
