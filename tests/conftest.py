@@ -25,7 +25,6 @@ from urllib.parse import urlsplit
 import httpx
 import psycopg
 import pytest
-from hypothesis import HealthCheck, settings
 from playwright.sync_api import Browser, Page, Playwright, Request, expect, sync_playwright
 from sqlalchemy.orm import Session
 from xdist import plugin as xdist_plugin
@@ -34,7 +33,7 @@ from app import HOUSE
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
-from tests import quick_passwords  # noqa: F401 - replaces what it is about
+from tests import chance, quick_passwords  # noqa: F401 - the passwords replace what they are about
 from tests.forked import Forked
 from tests.shop import Person, Shop
 
@@ -42,12 +41,6 @@ for name in [name for name in os.environ if name.startswith(("INBAND_", "PG")) a
     del os.environ[name]  # no test may meet a real installation
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # hundreds of servers start; each would compile the whole house anew
 
-# A computer that is busy is no fault of what is tested: no deadline. `make test` tries the same examples every time,
-# `make test-long` others each time, and prints how to try a failing one again.
-settings.register_profile("short", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile(
-    "long", max_examples=1_000, print_blob=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)
 expect.set_options(timeout=20_000)  # ms; what is expected comes at once where the computer has nothing else to do
 
 
@@ -57,7 +50,15 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    settings.load_profile("long" if config.getoption("--long") else "short")
+    chance.load(long=config.getoption("--long"))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Say how to have the same order and the same chance again."""
+    seed = config.getoption("randomly_seed", None)
+    if seed is not None and (terminalreporter.stats.get("failed") or terminalreporter.stats.get("error")):
+        long = "--long " if config.getoption("--long") else ""
+        terminalreporter.write_line(f"to repeat it: {long}--randomly-seed={seed}")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

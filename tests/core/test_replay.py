@@ -5,7 +5,7 @@ from dataclasses import replace
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from app.core.decision.limits import ZONES
 from app.core.decision.loops import Mark, ProcessTrace, ReplayResult, _rounded
@@ -22,6 +22,7 @@ from app.core.replay import (
     without_events,
 )
 from bench.replay import followed
+from tests.chance import examples
 
 SHAFT = Parameters(
     target=39.992,
@@ -110,7 +111,7 @@ def traces(draw: st.DrawFn) -> tuple[ProcessTrace, Policy]:
 
 
 @given(traces())
-@settings(max_examples=500, deadline=None)
+@examples(500)
 def test_the_compiled_loop_is_decide_in_closed_loop_bit_for_bit(given_: tuple[ProcessTrace, Policy]) -> None:
     trace, policy = given_
     policy = Policy(
@@ -136,7 +137,7 @@ def test_the_compiled_loop_is_decide_in_closed_loop_bit_for_bit(given_: tuple[Pr
 
 
 @given(st.one_of(st.floats(-1000, 1000), st.integers(-(10**12), 10**12).map(lambda n: (n + 0.5) / 1e9)))
-@settings(max_examples=2000, deadline=None)
+@examples(2000)
 def test_rounding_is_pythons(value: float) -> None:
     for near in (value, np.nextafter(value, np.inf), np.nextafter(value, -np.inf)):
         assert _rounded(float(near)) == round(float(near), 9) + 0.0
@@ -220,7 +221,7 @@ def test_two_characteristics_of_one_tool_share_what_is_corrected() -> None:
     st.sampled_from([-1.0, -0.5, 0.5]),
     st.sampled_from([1.0, 0.9]),
 )
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_taking_the_corrections_out_and_running_the_same_policy_gives_what_was(
     seed: int, wear: float, delay: int, factor: float, effect: float
 ) -> None:

@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import hypothesis.strategies as st
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 
 from app.core.decision.decide import LoopState, decide
 from app.core.decision.limits import ZONES
 from app.core.decision.loops import FARTHEST, Quiet, Series, quiet_run, rows_of
 from app.core.decision.step import CODES, Action, deviation_of
 from app.core.parameters import Mode, Parameters
+from tests.chance import examples
 
 SHAFT = Parameters(
     target=39.992,
@@ -43,7 +44,7 @@ SIZES = st.one_of(
     st.lists(st.tuples(SIZES, st.integers(-1, len(SERIES) - 1)), max_size=60),
     st.lists(st.floats(-0.001, 0.001), min_size=4, max_size=4),
 )
-@settings(max_examples=400, deadline=None)
+@examples(400)
 def test_what_it_decides_is_what_decide_decides(readings: list[tuple[float, int]], begun: list[float]) -> None:
     measured = np.array([SHAFT.target + size for size, _lane in readings])
     lane = np.array([lane for _size, lane in readings], dtype=np.int64)

@@ -4,7 +4,7 @@ from math import cos, hypot, pi, radians, sin
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.geometry.elements import Section, WrongSection
@@ -12,6 +12,7 @@ from app.core.geometry.form import Form, FormKind, Method, ProbedFeature, Verdic
 from app.core.geometry.points import Degenerate, Reason
 from app.core.geometry.relations import DatumRefused, Task, corrected, evaluate
 from app.core.geometry.suspect_points import in_bore
+from tests.chance import examples
 from tests.core.geometry.test_fits import rotation
 
 seeds = st.integers(0, 2**32 - 1)
@@ -222,7 +223,7 @@ class TestVerdict:
 
 
 class TestMoved:
-    @settings(max_examples=30)
+    @examples(30)
     @given(seeds, st.floats(-3000, 3000))
     def test_form_does_not_depend_on_where_and_how_the_part_lies(self, seed: int, far: float) -> None:
         random = np.random.default_rng(seed)
@@ -232,7 +233,7 @@ class TestMoved:
         here = by(evaluate(Task(FormKind.FLATNESS, ProbedFeature(points=tuple(map(tuple, points.tolist()))))))
         assert by(evaluate(Task(FormKind.FLATNESS, ProbedFeature(points=moved)))) == pytest.approx(here, abs=1e-8)
 
-    @settings(max_examples=8)
+    @examples(8)
     @given(seeds, st.floats(0, 360), st.floats(-3000, 3000))
     def test_nor_do_bores_as_far_as_the_machine_turns_and_shifts(self, seed: int, angle: float, far: float) -> None:
         random = np.random.default_rng(seed)

@@ -5,7 +5,7 @@ from itertools import combinations, permutations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.geometry.discs import circumscribed, inscribed
@@ -16,6 +16,7 @@ from app.core.geometry.minimum_zones import (
     minimum_zone_plane,
 )
 from app.core.geometry.points import Degenerate, Floats, Reason
+from tests.chance import examples
 from tests.core.geometry.test_fits import rotation
 
 seeds = st.integers(0, 2**32 - 1)
@@ -74,14 +75,14 @@ class TestExhaustively:
         points = np.column_stack([np.sort(random.uniform(0, 100, count)), random.uniform(-0.02, 0.02, count)])
         assert minimum_zone_line(points).width == pytest.approx(narrowest_strip(points), abs=1e-9)
 
-    @settings(max_examples=25)
+    @examples(25)
     @given(seeds, st.integers(4, 7))
     def test_a_slab(self, seed: int, count: int) -> None:
         random = np.random.default_rng(seed)
         points = np.column_stack([random.uniform(0, 100, (count, 2)), random.uniform(-0.02, 0.02, count)])
         assert minimum_zone_plane(points).width == pytest.approx(narrowest_slab(points), abs=1e-9)
 
-    @settings(max_examples=25)
+    @examples(25)
     @given(seeds, st.integers(5, 7), st.sampled_from([0.001, 0.02, 0.2]))
     def test_a_ring(self, seed: int, count: int, size: float) -> None:
         points = lobed(np.random.default_rng(seed), count, size)
@@ -90,7 +91,7 @@ class TestExhaustively:
         distances = np.linalg.norm(points - ring.centre, axis=1)
         assert [ring.inner, ring.outer] == pytest.approx([distances.min(), distances.max()])
 
-    @settings(max_examples=25)
+    @examples(25)
     @given(seeds, st.integers(4, 12))
     def test_the_smallest_circle_about_points(self, seed: int, count: int) -> None:
         points = np.random.default_rng(seed).normal(size=(count, 2))

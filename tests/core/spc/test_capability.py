@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import anderson, nct
 
@@ -15,6 +15,7 @@ from app.core.spc.capability import Capability, Caution, Limits, capability, exp
 from app.core.spc.normality import anderson_darling, shapiro_wilk
 from app.core.spc.refusal import Reason, Refused
 from app.core.spc.spread import far_off, pooled, subgroups
+from tests.chance import examples
 
 READINGS = st.lists(st.integers(-300, 300), min_size=20, max_size=80).filter(
     lambda values: len(set(values)) > 8 and 2 * Counter(values).most_common(1)[0][1] <= len(values)  # not too coarse
@@ -26,7 +27,7 @@ def of(values: list[float], lower: float, upper: float) -> Capability:
 
 
 @given(values=READINGS, shift=st.integers(-50, 50), scale=st.sampled_from([0.001, 2.0, 100.0]))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_indices_do_not_know_the_unit(values: list[int], shift: int, scale: float) -> None:
     before = of([float(value) for value in values], -350, 350)
     after = of([scale * (value + shift) for value in values], scale * (shift - 350), scale * (shift + 350))
@@ -38,7 +39,7 @@ def test_indices_do_not_know_the_unit(values: list[int], shift: int, scale: floa
 
 
 @given(values=READINGS)
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_a_mirrored_process_is_as_capable(values: list[int]) -> None:
     before = of([float(value) for value in values], -310, 380)
     after = of([-float(value) for value in values], -380, 310)
@@ -48,7 +49,7 @@ def test_a_mirrored_process_is_as_capable(values: list[int]) -> None:
 
 
 @given(values=READINGS)
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_no_index_is_larger_than_the_centred_one(values: list[int]) -> None:
     found = of([float(value) for value in values], -310, 380)
     assert found.cp
@@ -106,7 +107,7 @@ def test_parts_out_of_tolerance_are_counted_and_expected() -> None:
 
 
 @given(values=READINGS, shift=st.integers(-50, 50), scale=st.sampled_from([-7.0, -1.0, 0.001, 2.0]))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_normality_does_not_know_unit_sign_or_zero(values: list[int], shift: int, scale: float) -> None:
     x = np.array(values, dtype=np.float64)
     for test in (anderson_darling, shapiro_wilk):
@@ -116,7 +117,7 @@ def test_normality_does_not_know_unit_sign_or_zero(values: list[int], shift: int
 
 
 @given(values=READINGS, shift=st.integers(-50, 50), scale=st.sampled_from([-7.0, -1.0, 0.001, 2.0]))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_percentiles_do_not_know_unit_sign_or_zero(values: list[int], shift: int, scale: float) -> None:
     x = np.array(values, dtype=np.float64)
     limits = sorted((shift - scale * 310, shift + scale * 380))
@@ -129,7 +130,7 @@ def test_percentiles_do_not_know_unit_sign_or_zero(values: list[int], shift: int
 
 
 @given(values=READINGS, scale=st.sampled_from([-7.0, 0.001, 2.0]))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_what_lies_far_off_lies_there_in_any_unit(values: list[int], scale: float) -> None:
     x = np.array([*values, 90_000], dtype=np.float64)
     assert far_off(x)[-1]

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate
 from scipy.special import log_ndtr
@@ -19,6 +19,7 @@ from app.core.spc.ewma import average_run_length, ewma, moving_average
 from app.core.spc.refusal import Reason, Refused
 from app.core.spc.rules import signals_of
 from app.core.spc.spread import Estimator, subgroups, summary
+from tests.chance import examples
 
 READINGS = st.lists(st.integers(-400, 400).map(lambda tenth: tenth / 10), min_size=20, max_size=60).filter(
     lambda values: len(set(values)) > 5
@@ -43,7 +44,7 @@ def charts(values: Any) -> list[shewhart.ControlChart]:
 
 
 @given(values=READINGS, shift=SHIFTS, scale=SCALES)
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_charts_move_and_stretch_with_their_readings(values: list[float], shift: float, scale: float) -> None:
     for before, after in zip(charts(values), charts([shift + scale * value for value in values]), strict=True):
         moved = 0.0 if before.chart in {"moving_range", "ranges", "deviations"} else shift
@@ -54,7 +55,7 @@ def test_charts_move_and_stretch_with_their_readings(values: list[float], shift:
 
 
 @given(values=READINGS)
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_a_mirrored_process_has_a_mirrored_chart(values: list[float]) -> None:
     for before, after in zip(charts(values), charts([-value for value in values]), strict=True):
         if before.chart in {"moving_range", "ranges", "deviations"}:
@@ -66,7 +67,7 @@ def test_a_mirrored_process_has_a_mirrored_chart(values: list[float]) -> None:
 
 
 @given(values=READINGS, cut=st.integers(1, 19))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_what_remembers_goes_on_where_it_stopped(values: list[float], cut: int) -> None:
     baseline = shewhart.given(1.0, 4.0)
     whole = ewma(baseline, values)

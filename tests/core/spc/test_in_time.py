@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.spc.capability import Limits, expected, expected_ppm, observed
@@ -15,6 +15,7 @@ from app.core.spc.rules import RuleName
 from app.core.spc.spread import freedom_of_moving_ranges
 from app.core.spc.stability import of_readings, stability
 from app.core.spc.uncompensated import scatter, uncompensated
+from tests.chance import examples
 
 RNG = np.random.default_rng(20261121)
 N = 1000
@@ -58,7 +59,7 @@ def test_few_readings_equal_ones_and_many() -> None:
 
 
 @given(seed=st.integers(0, 99), shift=st.sampled_from([-40.0, 0.0, 1000.0]), scale=st.sampled_from([-1.0, 0.001, 7.0]))
-@settings(max_examples=30, deadline=None)
+@examples(30)
 def test_the_model_knows_no_unit_and_no_mirror(seed: int, shift: float, scale: float) -> None:
     made = white(seed, 200) + np.arange(200) / 100
     before, after = in_time(made), in_time(scale * made + shift)

@@ -6,7 +6,7 @@ from math import cos, e, tan
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from app import HOUSE
@@ -30,6 +30,7 @@ from app.core.spc.rules import (
 )
 from app.core.spc.shewhart import Chart
 from app.core.spc.shewhart import given as standard
+from tests.chance import examples
 
 # Quarters reach every limit exactly, and equal neighbours come up often.
 POINTS = st.lists(st.integers(-14, 14).map(lambda quarter: quarter / 4), min_size=1, max_size=80)
@@ -71,7 +72,7 @@ def expected(rule: Rule, z: list[float]) -> set[tuple[int, int]]:
 
 @pytest.mark.parametrize("rule", RULES.values(), ids=lambda rule: rule.name.value)
 @given(z=POINTS)
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_the_points_of_all_signals_are_those_of_the_definition(rule: Rule, z: list[float]) -> None:
     found = [(run, members(run, rule, z)) for run in signals(z, [rule])]
     assert {(run.side, int(i)) for run, points in found for i in points} == expected(rule, z)
@@ -80,7 +81,7 @@ def test_the_points_of_all_signals_are_those_of_the_definition(rule: Rule, z: li
 
 
 @given(z=POINTS, cuts=st.lists(st.integers(1, 79), max_size=6))
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_pieces_give_what_the_whole_gives(z: list[float], cuts: list[int]) -> None:
     watching = Scan(RULES.values())
     edges = [0, *sorted({cut for cut in cuts if cut < len(z)}), len(z)]
@@ -90,7 +91,7 @@ def test_pieces_give_what_the_whole_gives(z: list[float], cuts: list[int]) -> No
 
 
 @given(z=POINTS, most=st.integers(0, 20))
-@settings(max_examples=100, deadline=None)
+@examples(100)
 def test_the_newest_and_the_sides_are_those_of_the_runs_one_by_one(z: list[float], most: int) -> None:
     found = signals(z, RULES.values())
     runs = list(found)
@@ -102,7 +103,7 @@ def test_the_newest_and_the_sides_are_those_of_the_runs_one_by_one(z: list[float
 
 
 @given(z=POINTS)
-@settings(max_examples=100, deadline=None)
+@examples(100)
 def test_turned_over_they_change_sides_and_nothing_else(z: list[float]) -> None:
     def told(points: list[float], turn: int) -> set[tuple[str, int, int, int, int]]:
         return {(run.rule, turn * run.side, run.start, run.end, run.points) for run in signals(points, RULES.values())}
@@ -160,7 +161,7 @@ def test_every_signal_is_kept_when_several_rules_fire_on_one_point() -> None:
 
 
 @given(z=POINTS)
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_the_signals_of_a_cusum_are_its_points_beyond_the_limit(z: list[float]) -> None:
     chart = cusum(standard(0, 1), z, h=3.0)
     found = list(signals_of_cusum(chart))

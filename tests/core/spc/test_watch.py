@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.spc.cusum import cusum
@@ -15,6 +15,7 @@ from app.core.spc.rules import FITTING, RULES, RuleName, signals_of, signals_of_
 from app.core.spc.shewhart import Chart, ControlChart, individuals, moving_ranges
 from app.core.spc.shewhart import given as standard
 from app.core.spc.watch import SignalSpan, Watch
+from tests.chance import examples
 
 UNIT = standard(0.0, 1.0)
 # Of quarters sums are exact; of tenths they are not, and a point on the limit stays there only if it is summed up alike.
@@ -40,7 +41,7 @@ def final(found: list[SignalSpan]) -> set[SignalSpan]:
 
 @pytest.mark.parametrize("chart", CHARTS)
 @given(z=POINTS, cuts=st.lists(st.integers(1, 79), max_size=6), begins=st.frozensets(st.integers(1, 80), max_size=3))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_pieces_give_what_the_whole_gives(
     chart: Chart, z: list[float], cuts: list[int], begins: frozenset[int]
 ) -> None:
@@ -72,7 +73,7 @@ def test_a_point_on_the_limit_is_the_same_wherever_a_piece_ends(chart: Chart) ->
 
 
 @given(z=POINTS)
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_what_is_found_are_the_signals_of_the_chart(z: list[float]) -> None:
     unit = standard(0.0, 1.0, 1.5)
     charts: list[ControlChart] = [

@@ -7,13 +7,14 @@ from typing import Any
 
 import pytest
 from aqdefreader.file import DfqFile
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from app.files.formats import aqdef, aqdef_values
 from app.files.formats.aqdef import Source
 from app.files.formats.aqdef_values import Measured, Value
 from app.files.formats.aqdef_writer import MISSING, Catalogues, Described, Part, Validity, Written, write
+from tests.chance import examples
 
 BEGIN = datetime(2026, 11, 23, 6, 0, 0)
 PARTS = [Part("08/15", "Shaft", "lathe-1", "Lathe 1"), Part("4711", "Bush")]
@@ -171,7 +172,7 @@ def circumstances(description: aqdef.Description, value: Measured) -> tuple[Any,
     )
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.lists(WRITTEN, max_size=30))
 def test_every_value_comes_back_in_its_order(tmp_path_factory: pytest.TempPathFactory, written: list[Written]) -> None:
     path = tmp_path_factory.mktemp("aqdef") / "out.dfq"
@@ -192,7 +193,7 @@ def test_every_value_comes_back_in_its_order(tmp_path_factory: pytest.TempPathFa
         ]  # fmt: skip
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.lists(WRITTEN, max_size=20))
 def test_another_reader_finds_every_value(tmp_path_factory: pytest.TempPathFactory, written: list[Written]) -> None:
     """It averages values of one time, so that each has a second of its own; it takes a file of one part."""

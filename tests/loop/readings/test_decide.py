@@ -6,7 +6,7 @@ from typing import Any
 import hypothesis.strategies as st
 import psycopg
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from app.core.parameters import Parameters, read
 from app.db.engine import Database
@@ -21,6 +21,7 @@ from app.loop.readings.writer.pending import PendingTool, PendingWrites, Stored,
 from app.loop.readings.writer.retry import committed
 from app.loop.readings.writer.snapshot import LoadedAverage, LoadedStream, LoadedTool, Snapshot
 from app.loop.readings.writer.transaction import CommitLost, transact
+from tests.chance import examples
 from tests.loops import run
 from tests.shop import PARAMETERS
 
@@ -79,7 +80,7 @@ def with_keys(drawn: list[ReadingIn]) -> list[ReadingIn]:
 
 
 @given(readings.map(with_keys), st.randoms(use_true_random=False))
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_any_order_of_duplicates_changes_nothing(drawn: list[ReadingIn], chance: Any) -> None:
     once, often = pending_writes(), pending_writes()
     decided(once, drawn)
@@ -100,7 +101,7 @@ def test_any_order_of_duplicates_changes_nothing(drawn: list[ReadingIn], chance:
 
 
 @given(readings)
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_what_is_refused_leaves_the_state_as_it_was(drawn: list[ReadingIn]) -> None:
     pending = pending_writes()
     refusals = [
@@ -116,7 +117,7 @@ def test_what_is_refused_leaves_the_state_as_it_was(drawn: list[ReadingIn]) -> N
 
 
 @given(readings)
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_numbers_have_no_gaps_and_the_offset_is_the_sum_of_what_is_applied(drawn: list[ReadingIn]) -> None:
     pending = pending_writes()
     decided(pending, drawn)
@@ -131,7 +132,7 @@ def test_numbers_have_no_gaps_and_the_offset_is_the_sum_of_what_is_applied(drawn
 
 
 @given(st.lists(micrometres, min_size=1, max_size=60))
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_with_nothing_confirmed_the_corrections_never_add_up_beyond_what_was_seen(drawn: list[float]) -> None:
     """While no correction takes effect, all of them together remove no more than the largest deviation seen."""
     pending = pending_writes()
