@@ -1,29 +1,63 @@
 """A process of Inband that begins where one which has read the whole program stands.
 
-Reading it takes some seconds, and a run of the tests starts servers by the hundred. What the command does from its first
-word on is the same; that it starts from nothing too, tests/cli/test_serve.py sees.
+Reading it takes some seconds, and a run of the tests starts servers and commands by the hundred. What the command does from
+its first word on is the same; that it starts from nothing too, tests/cli/test_serve.py sees.
 """
 
 import multiprocessing
 import os
 import signal
+import subprocess
 import sys
+import tempfile
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
+from app.cli import PARTS
 from tests.keeper import PR_SET_PDEATHSIG, prctl
 
 multiprocessing.get_context("forkserver").set_forkserver_preload(
-    ["app.main", "app.cli.serve", "tests.quick_passwords", "tests.forked"]
+    ["app.main", *PARTS, "tests.quick_passwords", "tests.forked"]
 )
+
+
+def inband(*words: object, typed: str = "", limit: float = 120, **environment: str) -> subprocess.CompletedProcess[str]:
+    """A command as somebody types it: its exit status and what it said.
+
+    It has this process's environment and ``environment``, and a data folder of its own if that names none.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        out, err, keyboard = folder / "out", folder / "err", folder / "keyboard"
+        keyboard.write_text(typed, encoding="utf-8")
+        variables = dict(os.environ) | {"COLUMNS": "200", "INBAND_DATA_DIR": str(folder / "data")} | environment
+        process = Forked([str(word) for word in words], err, out=out, keyboard=keyboard, environment=variables)
+        try:
+            status = process.wait(limit)
+        except TimeoutError:
+            process.kill()
+            process.wait()
+            raise
+        finally:
+            said = [each.read_bytes().decode() if each.exists() else "" for each in (out, err)]
+        return subprocess.CompletedProcess(process.arguments, status, *said)
 
 
 class Forked(ForkServerProcess):
     """``inband …`` with the words that `subprocess.Popen` has for a process; what it says goes to the end of a file."""
 
-    def __init__(self, arguments: list[str], log: Path) -> None:
+    def __init__(
+        self,
+        arguments: list[str],
+        log: Path,
+        *,
+        out: Path | None = None,
+        keyboard: Path | None = None,
+        environment: dict[str, str] | None = None,
+    ) -> None:
         super().__init__()
-        self.arguments, self.log = arguments, log
+        self.arguments, self.environment = arguments, environment
+        self.files = (keyboard or Path(os.devnull), out or log, log)
         self.start()
 
     def run(self) -> None:
@@ -32,9 +66,12 @@ class Forked(ForkServerProcess):
 
         if sys.platform == "linux":
             prctl(PR_SET_PDEATHSIG, signal.SIGTERM)  # a worker that is killed takes its servers along
-        said = os.open(self.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
-        for stream in (1, 2):
-            os.dup2(said, stream)
+        if self.environment is not None:
+            os.environ.clear()
+            os.environ.update(self.environment)
+        for stream, file in enumerate(self.files):
+            os.dup2(os.open(file, os.O_WRONLY | os.O_APPEND | os.O_CREAT if stream else os.O_RDONLY), stream)
+        sys.stdin = open(0, encoding="utf-8", closefd=False)  # noqa: SIM115 - multiprocessing has closed it
         sys.argv = ["inband", *self.arguments]
         main()
 
