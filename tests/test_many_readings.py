@@ -30,8 +30,8 @@ from app.loop.summaries.queries.window import Window
 from app.loop.tables.readings import ResultReading
 from bench.plant import PARAMETERS
 from tests.conftest import MANY, RunServer, Server, drop_database, in_database
-from tests.loop.importing.test_commands import inband
-from tests.loop.importing.test_history import set_up
+from tests.loop.readings.importing.test_commands import inband
+from tests.loop.readings.importing.test_history import set_up
 from tests.loops import in_thread, run
 
 KEY = "long"

@@ -8,7 +8,7 @@ import pytest
 from app.db import disk
 from app.db.engine import Database
 from tests.conftest import NewDatabase
-from tests.loop.importing.test_commands import inband
+from tests.loop.readings.importing.test_commands import inband
 
 
 def test_a_disk_with_room_is_no_matter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

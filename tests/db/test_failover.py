@@ -13,7 +13,7 @@ from bench import failover
 from tests.conftest import RunServer, Server
 from tests.db.clusters import Cluster, cluster
 from tests.loop.readings.record import history, must_hold, must_replay, rows
-from tests.loop.readings.test_broken import push, until
+from tests.loop.readings.writer.test_broken import push, until
 from tests.shop import PARAMETERS, Shop
 
 PATIENCE = "1"  # s

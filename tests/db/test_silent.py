@@ -20,7 +20,7 @@ from app.db.engine import Database
 from tests.conftest import RunServer, Server
 from tests.db.network import Way
 from tests.loop.readings.record import history, must_hold, rows
-from tests.loop.readings.test_broken import at_work, crew, nothing_lost_or_doubled, push, until
+from tests.loop.readings.writer.test_broken import at_work, crew, nothing_lost_or_doubled, push, until
 from tests.shop import Person, Shop
 
 PATIENCE = "1"  # s

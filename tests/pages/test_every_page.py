@@ -196,7 +196,7 @@ PAGES = {
     "/proof": ["/proof"],
 }
 SIGNED_OUT = {"/sign-in", "/invitation/{token}"}
-OPENED_ELSEWHERE = {"/import/{token}"}  # needs a file that was sent; tests/loop/importing
+OPENED_ELSEWHERE = {"/import/{token}"}  # needs a file that was sent; tests/loop/readings/importing
 PARTS = {  # only ever fetched into a page
     "/plant-summary",
     "/todo/count",

@@ -22,7 +22,7 @@ from app.main import FROM_REPLICA
 from tests.conftest import RunServer, Server
 from tests.db.clusters import Cluster, cluster
 from tests.loop.readings.record import rows
-from tests.loop.readings.test_broken import until
+from tests.loop.readings.writer.test_broken import until
 from tests.shop import PARAMETERS, Person, Shop
 
 MOST_BEHIND = 6.0  # s

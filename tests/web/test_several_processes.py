@@ -19,7 +19,7 @@ import pytest
 from app import HOUSE
 from app.db.engine import Database
 from tests.conftest import NewDatabase, RunServer, Server
-from tests.loop.readings.test_broken import at_work, crew, nothing_lost_or_doubled, until
+from tests.loop.readings.writer.test_broken import at_work, crew, nothing_lost_or_doubled, until
 from tests.shop import Person, Shop
 from tests.web.test_live import Listener
 

@@ -12,7 +12,7 @@ from openpyxl import load_workbook
 from pypdf import PdfReader
 
 from tests.conftest import Server
-from tests.loop.importing.test_commands import Done, inband
+from tests.loop.readings.importing.test_commands import Done, inband
 from tests.shop import Shop
 from tests.views.reports.story import facts, report, told
 

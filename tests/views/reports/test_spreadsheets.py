@@ -13,7 +13,7 @@ from openpyxl import load_workbook
 
 from app.files.formats.delimited import defused
 from tests.conftest import Server
-from tests.loop.importing.test_commands import inband
+from tests.loop.readings.importing.test_commands import inband
 from tests.shop import Shop
 from tests.views.reports.story import file, pushed, scatter
 

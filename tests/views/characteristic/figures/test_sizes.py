@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from tests.loop.characteristics.test_figures_api import figure, trace
 from tests.shop import Person, Shop
+from tests.views.characteristic.test_figures_api import figure, trace
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 from sqlalchemy import text
 
 from tests.conftest import RunServer, Server
-from tests.loop.importing.test_history import set_up
+from tests.loop.readings.importing.test_history import set_up
 
 pytestmark = pytest.mark.browser
 PASSWORD = "correct horse battery"

@@ -16,7 +16,7 @@ from app.cli import main
 from app.core.decision.decide import LoopState, decide
 from app.core.parameters import read
 from app.db.engine import Database
-from tests.loop.importing.test_history import set_up
+from tests.loop.readings.importing.test_history import set_up
 
 
 @pytest.fixture

@@ -200,3 +200,16 @@ class TestTwoTouches:
         page.keyboard.press("Enter")
         expect(page.locator("main")).to_contain_text("Nothing else was changed.")
         assert shop.alarms() == []
+
+    def test_who_changed_the_offset_is_asked_in_a_dialog(self, shop: Shop, operator: Person, page: Page) -> None:
+        shop.correction(shop.read(6.0)["correction"]["number"], "applied", offset_after=0.01)
+        operator.sign_in(page)
+        page.goto(f"/alarms?machine={shop.machine}")
+        page.get_by_role("link", name="Say which offset is true").click()
+        dialog = page.get_by_role("dialog")
+        dialog.get_by_role("radio", name="−0.0060 mm").check()
+        dialog.get_by_role("radio", name="Typed in by mistake").check()
+        dialog.get_by_label("Who changed it").fill("Ana")
+        dialog.get_by_role("button", name="Say which offset is true").click()
+        expect(page.locator("main")).to_contain_text("The offset of tool 3 is −0.0060")
+        assert (shop.tool()["offset"], shop.tool()["paused_by"]) == (-0.006, None)

@@ -14,8 +14,8 @@ from app.files.formats.aqdef_values import Measured, Value
 from app.loop.readings import queries
 from app.loop.readings.actions import exclude
 from tests.conftest import Server
-from tests.loop.importing.test_commands import inband
-from tests.loop.importing.test_history import run, scalar, set_up, table
+from tests.loop.readings.importing.test_commands import inband
+from tests.loop.readings.importing.test_history import run, scalar, set_up, table
 from tests.shop import Shop
 
 

@@ -25,8 +25,8 @@ from app.loop.readings.importing.aqdef.content import Wishes
 from app.loop.readings.importing.aqdef.matching import NEW
 from app.loop.readings.importing.history import Flawed
 from tests.conftest import RunServer, Server
-from tests.loop.importing.test_commands import inband
-from tests.loop.importing.test_history import scalar, set_up, stored
+from tests.loop.readings.importing.test_commands import inband
+from tests.loop.readings.importing.test_history import scalar, set_up, stored
 from tests.shop import Shop
 
 BERLIN = Wishes(ZoneInfo("Europe/Berlin"))
