@@ -24,7 +24,7 @@ multiprocessing.get_context("forkserver").set_forkserver_preload(
 def inband(*words: object, typed: str = "", limit: float = 120, **environment: str) -> subprocess.CompletedProcess[str]:
     """A command as somebody types it: its exit status and what it said.
 
-    It has this process's environment and ``environment``, and a data folder of its own if that names none.
+    It has this process's folder and environment and ``environment``, and a data folder of its own if that names none.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -56,7 +56,7 @@ class Forked(ForkServerProcess):
         environment: dict[str, str] | None = None,
     ) -> None:
         super().__init__()
-        self.arguments, self.environment = arguments, environment
+        self.arguments, self.environment, self.folder = arguments, environment, Path.cwd()
         self.files = (keyboard or Path(os.devnull), out or log, log)
         self.start()
 
@@ -66,6 +66,7 @@ class Forked(ForkServerProcess):
 
         if sys.platform == "linux":
             prctl(PR_SET_PDEATHSIG, signal.SIGTERM)  # a worker that is killed takes its servers along
+        os.chdir(self.folder)
         if self.environment is not None:
             os.environ.clear()
             os.environ.update(self.environment)

@@ -30,7 +30,7 @@ from app.loop.summaries.queries.window import Window
 from app.loop.tables.readings import ResultReading
 from bench.plant import PARAMETERS
 from tests.conftest import MANY, RunServer, Server, drop_database, in_database
-from tests.loop.readings.importing.test_commands import inband
+from tests.forked import inband
 from tests.loop.readings.importing.test_history import set_up
 from tests.loops import in_thread, run
 
@@ -74,7 +74,7 @@ class TestExport:
         assert numbers == list(range(MANY - count + 1, MANY + 1))
 
     def test_all_of_them_as_they_are_stored(self, many_readings: Database, tmp_path: Path) -> None:
-        done = inband("export", "--characteristic", KEY, database=many_readings, folder=tmp_path)
+        done = inband("export", "--characteristic", KEY, INBAND_DATABASE_URL=many_readings.dsn)
         assert done.returncode == 0, done.stderr
         assert f"{MANY} readings written" in done.stderr
         told = [
@@ -116,9 +116,9 @@ class TestImport:
 class TestReplay:
     def test_every_line_is_decided(self, many_readings: Database, tmp_path: Path) -> None:
         file, parameters = tmp_path / "long.ndjson", tmp_path / "parameters.json"
-        inband("export", "--characteristic", KEY, "-o", file, database=many_readings, folder=tmp_path)
+        inband("export", "--characteristic", KEY, "-o", file, INBAND_DATABASE_URL=many_readings.dsn)
         parameters.write_text(json.dumps(PARAMETERS))
-        done = inband("replay", file, "--parameters", parameters, folder=tmp_path)
+        done = inband("replay", file, "--parameters", parameters)
         assert done.returncode == 0, done.stderr
         assert [json.loads(line)["sequence"] for line in done.stdout.splitlines()] == list(range(1, MANY + 1))
 
@@ -126,12 +126,12 @@ class TestReplay:
 class TestBackup:
     def test_what_was_backed_up_comes_back(self, many_readings: Database, postgres: str, tmp_path: Path) -> None:
         file, empty = tmp_path / "long.dump", in_database(postgres, "restored_many")
-        assert inband("backup", file, database=many_readings, folder=tmp_path).returncode == 0
+        assert inband("backup", file, INBAND_DATABASE_URL=many_readings.dsn).returncode == 0
         with psycopg.connect(postgres, autocommit=True) as connection:
             connection.execute("CREATE DATABASE restored_many")
         restored = Database(empty, pool_size=1)
         try:
-            done = inband("restore", file, database=restored, folder=tmp_path)
+            done = inband("restore", file, INBAND_DATABASE_URL=restored.dsn)
             assert done.returncode == 0, done.stderr
             everything = "SELECT count(*), sum(hashtextextended(reading::text, 0)) FROM reading"
             with psycopg.connect(many_readings.dsn) as before, psycopg.connect(empty) as after:
@@ -267,7 +267,7 @@ class TestEverythingOverAllOfThem:
     @pytest.mark.parametrize("form", ["csv", "pdf"])
     def test_a_report_by_the_command(self, many_readings: Database, tmp_path: Path, form: str) -> None:
         file = tmp_path / f"long.{form}"
-        done = inband("report", KEY, "--last", MANY, "-o", file, database=many_readings, folder=tmp_path)
+        done = inband("report", KEY, "--last", MANY, "-o", file, INBAND_DATABASE_URL=many_readings.dsn)
         assert done.returncode == 0, done.stderr
         assert file.stat().st_size > 1000
 

@@ -1,14 +1,15 @@
 """A disk that fills up is told of before it is full."""
 
+import contextlib
 import logging
+import sys
 from pathlib import Path
 
 import pytest
 
+from app.cli import main
 from app.db import disk
-from app.db.engine import Database
 from tests.conftest import NewDatabase
-from tests.loop.readings.importing.test_commands import inband
 
 
 def test_a_disk_with_room_is_no_matter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -38,14 +39,17 @@ def test_one_that_is_nearly_full_is_warned_of_once(
     assert "Make room" in line
 
 
-def test_check_says_so_and_fails(new_database: NewDatabase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    database = Database(new_database(), pool_size=1)
-    done = inband("check", database=database, folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "GB free" in done.stderr
+def test_check_says_so_and_fails(
+    new_database: NewDatabase, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["inband", "check", "--database-url", new_database()])
+    with contextlib.suppress(SystemExit):
+        main()
+    assert "GB free" in capfd.readouterr().err
     monkeypatch.setattr(disk, "LEAST", 2**62)
-    full = inband("check", database=database, folder=tmp_path)
-    assert full.returncode == 1
-    assert "nearly full" in full.stderr
-    assert "none to run" in full.stderr
-    database.close()
+    with pytest.raises(SystemExit) as full:
+        main()
+    assert full.value.code == 1
+    said = capfd.readouterr().err
+    assert "nearly full" in said
+    assert "none to run" in said

@@ -14,7 +14,7 @@ from app.files.formats.aqdef_values import Measured, Value
 from app.loop.readings import queries
 from app.loop.readings.actions import exclude
 from tests.conftest import Server
-from tests.loop.readings.importing.test_commands import inband
+from tests.forked import inband
 from tests.loop.readings.importing.test_history import run, scalar, set_up, table
 from tests.shop import Shop
 
@@ -48,7 +48,7 @@ def test_readings_of_several_are_written_with_what_belongs_to_them(plant: Databa
     path = tmp_path / "out.dfq"
     keys = "shaft-d40,shaft-d41"
     done = inband(
-        "export", "--characteristic", keys, "--timezone", "Europe/Berlin", "-o", path, database=plant, folder=tmp_path
+        "export", "--characteristic", keys, "--timezone", "Europe/Berlin", "-o", path, INBAND_DATABASE_URL=plant.dsn
     )
     assert (done.returncode, "6 readings written to AQDEF." in done.stderr) == (0, True), done.stderr
     description, found = read(path)
@@ -69,12 +69,12 @@ def test_readings_of_several_are_written_with_what_belongs_to_them(plant: Databa
 
 def test_what_was_written_is_imported_as_it_was(plant: Database, tmp_path: Path) -> None:
     path = tmp_path / "out.dfq"
-    inband("export", "--characteristic", "shaft-d40", "-o", path, database=plant, folder=tmp_path)
-    done = inband("import", path, "--map", "shaft-d40=shaft-d41", database=plant, folder=tmp_path)
+    inband("export", "--characteristic", "shaft-d40", "-o", path, INBAND_DATABASE_URL=plant.dsn)
+    done = inband("import", path, "--map", "shaft-d40=shaft-d41", INBAND_DATABASE_URL=plant.dsn)
     assert done.returncode == 0, done.stderr
     assert "4 readings of shaft-d41" in done.stderr
     assert "2 are excluded, as the file marks them (K0002)." in done.stderr
-    again = inband("import", path, "--map", "shaft-d40=shaft-d41", database=plant, folder=tmp_path)
+    again = inband("import", path, "--map", "shaft-d40=shaft-d41", INBAND_DATABASE_URL=plant.dsn)
     assert "4 were stored before" in again.stderr
 
 
@@ -106,7 +106,7 @@ def test_the_circumstances_of_readings_are_kept_and_handed_on(database: Database
     set_up(database)
     path, out = tmp_path / "in.dfq", tmp_path / "out.dfq"
     path.write_bytes("\r\n".join([*CIRCUMSTANCES, ""]).encode("cp1252"))
-    done = inband("import", path, database=database, folder=tmp_path)
+    done = inband("import", path, INBAND_DATABASE_URL=database.dsn)
     assert (done.returncode, "'A' is not the number of a nest; it is kept as a text" in done.stderr) == (0, True)
     kept = contexts(database, "shaft-d40")
     assert kept == [
@@ -125,8 +125,8 @@ def test_the_circumstances_of_readings_are_kept_and_handed_on(database: Database
         {"machine": "M1", "fields": {"K0002": "290"}},
         {"fields": {"K0007": "A"}},
     ]
-    inband("export", "--characteristic", "shaft-d40", "-o", out, database=database, folder=tmp_path)
-    again = inband("import", out, "--map", "shaft-d40=shaft-d41", database=database, folder=tmp_path)
+    inband("export", "--characteristic", "shaft-d40", "-o", out, INBAND_DATABASE_URL=database.dsn)
+    again = inband("import", out, "--map", "shaft-d40=shaft-d41", INBAND_DATABASE_URL=database.dsn)
     assert (again.returncode, "1 are excluded" in again.stderr) == (0, True), again.stderr
     probe = {"gauge": "probe of Lathe 1"}
     assert contexts(database, "shaft-d41") == [
@@ -137,10 +137,10 @@ def test_the_circumstances_of_readings_are_kept_and_handed_on(database: Database
 
 
 def test_the_command_teaches(plant: Database, tmp_path: Path) -> None:
-    done = inband("export", "--characteristic", "shaft-d40", "--format", "dfq", database=plant, folder=tmp_path)
+    done = inband("export", "--characteristic", "shaft-d40", "--format", "dfq", INBAND_DATABASE_URL=plant.dsn)
     assert (done.returncode, "name the file" in done.stderr) == (2, True)
     path = tmp_path / "out.dfq"
-    done = inband("export", "--characteristic", "nobody", "-o", path, database=plant, folder=tmp_path)
+    done = inband("export", "--characteristic", "nobody", "-o", path, INBAND_DATABASE_URL=plant.dsn)
     assert (done.returncode, "There is no characteristic 'nobody'" in done.stderr) == (1, True), done.stderr
     assert not path.exists()
 

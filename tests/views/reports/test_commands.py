@@ -5,6 +5,7 @@ import io
 import sys
 import zipfile
 from pathlib import Path
+from subprocess import CompletedProcess
 from typing import Any
 
 import pytest
@@ -12,7 +13,7 @@ from openpyxl import load_workbook
 from pypdf import PdfReader
 
 from tests.conftest import Server
-from tests.loop.readings.importing.test_commands import Done, inband
+from tests.forked import inband
 from tests.shop import Shop
 from tests.views.reports.story import facts, report, told
 
@@ -25,8 +26,8 @@ def shop(server: Server) -> Shop:
     return made
 
 
-def written(shop: Shop, folder: Path, *arguments: object) -> Done:
-    return inband("report", *arguments, database=shop.server.database, folder=folder)
+def written(shop: Shop, *arguments: object) -> CompletedProcess[str]:
+    return inband("report", *arguments, INBAND_DATABASE_URL=shop.server.database.dsn)
 
 
 def test_one_as_pdf_xlsx_and_csv_by_the_name_of_the_file(shop: Shop, tmp_path: Path) -> None:
@@ -34,9 +35,7 @@ def test_one_as_pdf_xlsx_and_csv_by_the_name_of_the_file(shop: Shop, tmp_path: P
     mean, ppk = facts(whole, "numbers")["mean"], facts(whole, "capability")["ppk"]
     for form in ("pdf", "xlsx", "csv"):
         path = tmp_path / f"r.{form}"
-        done = written(
-            shop, tmp_path, key, "--last", 200, "--section", "numbers", "--section", "capability", "-o", path
-        )
+        done = written(shop, key, "--last", 200, "--section", "numbers", "--section", "capability", "-o", path)
         assert (done.returncode, done.stdout) == (0, ""), done.stderr
         assert "1 report written." in done.stderr
     text = "".join(page.extract_text() for page in PdfReader(tmp_path / "r.pdf").pages)
@@ -70,20 +69,20 @@ def test_what_is_meant_for_programs_is_alone_on_standard_output(
 def test_several_in_a_folder_a_zip_or_a_workbook(shop: Shop, tmp_path: Path) -> None:
     both: tuple[Any, ...] = (shop.characteristic, "second", "--section", "numbers")
     folder = tmp_path / "week 47 Đ"
-    assert written(shop, tmp_path, *both, "-o", folder).returncode == 0
+    assert written(shop, *both, "-o", folder).returncode == 0
     assert sorted(path.name for path in folder.iterdir()) == sorted(
         [f"report-{shop.characteristic}.pdf", "report-second.pdf"]
     )
-    assert written(shop, tmp_path, *both, "--format", "csv", "-o", tmp_path / "w.zip").returncode == 0
+    assert written(shop, *both, "--format", "csv", "-o", tmp_path / "w.zip").returncode == 0
     with zipfile.ZipFile(tmp_path / "w.zip") as whole:
         assert "summary.csv" in whole.namelist()
         assert len(whole.namelist()) == 3
-    assert written(shop, tmp_path, *both, "-o", tmp_path / "w.xlsx").returncode == 0
+    assert written(shop, *both, "-o", tmp_path / "w.xlsx").returncode == 0
     assert load_workbook(tmp_path / "w.xlsx").sheetnames == ["Summary", shop.characteristic, "second"]
 
 
 def test_one_that_there_is_not_spoils_no_other_and_is_said(shop: Shop, tmp_path: Path) -> None:
-    done = written(shop, tmp_path, "second", "nobody", "--section", "numbers", "-o", tmp_path / "some.zip")
+    done = written(shop, "second", "nobody", "--section", "numbers", "-o", tmp_path / "some.zip")
     assert done.returncode == 1
     assert "nobody" in done.stderr
     assert "1 report written." in done.stderr
@@ -110,7 +109,7 @@ def test_wrong_use_writes_nothing(
     shop: Shop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], status: int, said: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    done = written(shop, tmp_path, *arguments)
+    done = written(shop, *arguments)
     assert done.returncode == status, done.stderr
     assert said in done.stderr
     assert "Traceback" not in done.stderr

@@ -4,7 +4,6 @@ import csv
 import io
 import re
 import zipfile
-from typing import Any
 
 import pytest
 from hypothesis import example, given
@@ -13,7 +12,7 @@ from openpyxl import load_workbook
 
 from app.files.formats.delimited import defused
 from tests.conftest import Server
-from tests.loop.readings.importing.test_commands import inband
+from tests.forked import inband
 from tests.shop import Shop
 from tests.views.reports.story import file, pushed, scatter
 
@@ -146,9 +145,9 @@ def test_many_at_once_are_defused(shop: Shop) -> None:
                 assert [cell for cell in cells_of(whole.read(name)) if not harmless(cell)] == []
 
 
-def test_the_export_of_readings_is_defused(shop: Shop, tmp_path: Any) -> None:
+def test_the_export_of_readings_is_defused(shop: Shop) -> None:
     database = shop.server.database
-    exported = inband("export", "--characteristic", shop.characteristic, database=database, folder=tmp_path)
+    exported = inband("export", "--characteristic", shop.characteristic, INBAND_DATABASE_URL=database.dsn)
     assert exported.returncode == 0, exported.stderr
     cells = cells_of(exported.stdout.encode())
     assert [cell for cell in cells if not harmless(cell)] == []

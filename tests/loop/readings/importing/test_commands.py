@@ -3,8 +3,6 @@
 import csv
 import io
 import json
-import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +10,10 @@ import pytest
 from sqlalchemy import select, text
 
 from app.access.audit.tables import AuditEntry
-from app.cli import main
 from app.core.decision.decide import LoopState, decide
 from app.core.parameters import read
 from app.db.engine import Database
+from tests.forked import inband
 from tests.loop.readings.importing.test_history import set_up
 
 
@@ -23,34 +21,6 @@ from tests.loop.readings.importing.test_history import set_up
 def plant(database: Database) -> Database:
     set_up(database)
     return database
-
-
-@dataclass
-class Done:
-    """Exit status and output of a command."""
-
-    returncode: int
-    stdout: str
-    stderr: str
-
-
-def inband(*arguments: object, database: Database | None = None, folder: Path) -> Done:
-    """The command in this process: starting Python for each takes longer than what it does."""
-    out, err = io.StringIO(), io.StringIO()
-    environment = {"INBAND_DATA_DIR": str(folder / "data"), "COLUMNS": "200"}
-    if database is not None:
-        environment["INBAND_DATABASE_URL"] = database.dsn
-    with pytest.MonkeyPatch.context() as patch:
-        for name, value in environment.items():
-            patch.setenv(name, value)
-        patch.setattr(sys, "argv", ["inband", *map(str, arguments)])
-        patch.setattr(sys, "stdout", out)
-        patch.setattr(sys, "stderr", err)
-        try:
-            main()
-        except SystemExit as end:
-            return Done(int(end.code or 0), out.getvalue(), err.getvalue())
-    return Done(0, out.getvalue(), err.getvalue())
 
 
 def count(database: Database) -> int:
@@ -72,8 +42,7 @@ def test_import_says_what_it_understood_and_what_it_came_to(plant: Database, tmp
         "shaft-d40",
         "--timezone",
         "Europe/Belgrade",
-        database=plant,
-        folder=tmp_path,
+        INBAND_DATABASE_URL=plant.dsn,
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout == ""
@@ -90,8 +59,7 @@ def test_import_says_what_it_understood_and_what_it_came_to(plant: Database, tmp
         "shaft-d40",
         "--timezone",
         "Europe/Belgrade",
-        database=plant,
-        folder=tmp_path,
+        INBAND_DATABASE_URL=plant.dsn,
     )
     assert "2 were stored before" in again.stderr
     assert count(plant) == 2
@@ -102,7 +70,7 @@ def test_import_names_every_bad_line_and_fails_with_1(plant: Database, tmp_path:
     file.write_text(
         "measured,measured_at\nabout 40,2026-03-02T06:00Z\n39.99,2026-03-02 06:00\n39.99,2026-03-02T06:00Z\n"
     )
-    done = inband("import", file, "--characteristic", "shaft-d40", database=plant, folder=tmp_path)
+    done = inband("import", file, "--characteristic", "shaft-d40", INBAND_DATABASE_URL=plant.dsn)
     assert done.returncode == 1
     assert "line 2, measured: 'about 40' is not a number" in done.stderr
     assert "line 3, measured_at: '2026-03-02 06:00' does not say in which time zone; name the time zone" in done.stderr
@@ -115,7 +83,7 @@ def test_what_is_wrong_with_every_line_is_not_said_for_every_line(plant: Databas
     file = tmp_path / "no-zone.csv"
     times = [f"2026-03-{day:02} 06:00{'Z' if day == 20 else ''}" for day in range(1, 29)]
     file.write_text("Durchmesser,Zeit\n" + "".join(f"39.99,{time}\n" for time in times))
-    done = inband("import", file, "--characteristic", "shaft-d40", database=plant, folder=tmp_path)
+    done = inband("import", file, "--characteristic", "shaft-d40", INBAND_DATABASE_URL=plant.dsn)
     said = [line.partition(":")[0] for line in done.stderr.splitlines() if line.startswith("line")]
     assert said == [
         "line 2, Zeit", "line 3, Zeit", "line 4, Zeit", "lines 5 to 20, Zeit",
@@ -140,7 +108,7 @@ def test_wrong_options_are_said_in_words(
 ) -> None:
     file = tmp_path / "a.csv"
     file.write_text("measured\n39.99\n")
-    done = inband("import", file, "--characteristic", "shaft-d40", *options, database=plant, folder=tmp_path)
+    done = inband("import", file, "--characteristic", "shaft-d40", *options, INBAND_DATABASE_URL=plant.dsn)
     assert words in done.stderr
     assert "Traceback" not in done.stderr
     assert done.returncode == status
@@ -150,19 +118,19 @@ def test_what_is_exported_can_be_imported_and_no_spreadsheet_runs_it(plant: Data
     file = tmp_path / "messung.csv"
     file.write_text(GERMAN)
     imported = ("import", file, "--characteristic", "shaft-d40", "--timezone", "UTC")
-    assert inband(*imported, database=plant, folder=tmp_path).returncode == 0
-    done = inband("export", "--characteristic", "shaft-d40", database=plant, folder=tmp_path)
+    assert inband(*imported, INBAND_DATABASE_URL=plant.dsn).returncode == 0
+    done = inband("export", "--characteristic", "shaft-d40", INBAND_DATABASE_URL=plant.dsn)
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader(io.StringIO(done.stdout)))
     assert [row["measured"] for row in rows] == ["39.9925", "39.9981"]
     assert [row["part"] for row in rows] == ["Дугме", "'=1+1"]
     assert rows[0]["code"] == "imported"
     target = tmp_path / "out.csv"
-    inband("export", "--characteristic", "shaft-d40", "-o", target, database=plant, folder=tmp_path)
+    inband("export", "--characteristic", "shaft-d40", "-o", target, INBAND_DATABASE_URL=plant.dsn)
     assert target.read_text() == done.stdout
-    back = inband("import", target, "--characteristic", "shaft-d40", database=plant, folder=tmp_path)
+    back = inband("import", target, "--characteristic", "shaft-d40", INBAND_DATABASE_URL=plant.dsn)
     assert "2 were stored before" in back.stderr, back.stderr
-    other = inband("import", target, "--characteristic", "shaft-d41", database=plant, folder=tmp_path)
+    other = inband("import", target, "--characteristic", "shaft-d41", INBAND_DATABASE_URL=plant.dsn)
     assert other.returncode == 0
     assert count(plant) == 4
 
@@ -170,11 +138,11 @@ def test_what_is_exported_can_be_imported_and_no_spreadsheet_runs_it(plant: Data
 def test_export_of_some_and_as_ndjson(plant: Database, tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     file.write_text("measured,measured_at\n" + "".join(f"39.99{n},2026-03-0{n}T06:00Z\n" for n in range(1, 8)))
-    assert inband("import", file, "--characteristic", "shaft-d40", database=plant, folder=tmp_path).returncode == 0
+    assert inband("import", file, "--characteristic", "shaft-d40", INBAND_DATABASE_URL=plant.dsn).returncode == 0
 
     def exported(*options: str) -> list[Any]:
         done = inband(
-            "export", "--characteristic", "shaft-d40", "--format", "ndjson", *options, database=plant, folder=tmp_path
+            "export", "--characteristic", "shaft-d40", "--format", "ndjson", *options, INBAND_DATABASE_URL=plant.dsn
         )
         assert done.returncode == 0, done.stderr
         return [json.loads(line)["sequence"] for line in done.stdout.splitlines()]
@@ -201,7 +169,7 @@ def test_replay_of_the_published_example_needs_no_database(tmp_path: Path) -> No
     file, parameters = tmp_path / "a.csv", tmp_path / "l93.txt"
     file.write_text("measured\n" + "".join(f"{10 + d / 1000:.3f}\n" for d in PUBLISHED))
     parameters.write_text(PARAMETERS)
-    done = inband("replay", file, "--parameters", parameters, "--factor", "-1", folder=tmp_path)
+    done = inband("replay", file, "--parameters", parameters, "--factor", "-1", INBAND_DATA_DIR=str(tmp_path / "data"))
     assert done.returncode == 0, done.stderr
     decisions = [json.loads(line) for line in done.stdout.splitlines()]
     corrections = [d["correction"]["amount"] if d["correction"] else None for d in decisions]
@@ -220,7 +188,7 @@ def test_replay_decides_as_the_core_does_whatever_the_file_says_of_corrections(t
              "upper_deviation": 0.02, "lower_deviation": -0.02, "zero_range": 0.004, "averaging_limit": 0.0133,
              "wear_limit": 0.3, "confidence_limit": 1}  # fmt: skip
     parameters.write_text(json.dumps({"key": "x", "parameters": given}))
-    done = inband("replay", file, "--parameters", parameters, "--json", folder=tmp_path)
+    done = inband("replay", file, "--parameters", parameters, "--json")
     assert done.returncode == 0, done.stderr
     state, expected = LoopState(), []
     for deviation in deviations:
@@ -235,14 +203,14 @@ def test_replay_says_what_is_wrong_with_parameters_and_lines(tmp_path: Path) -> 
     file, parameters = tmp_path / "a.csv", tmp_path / "l93.txt"
     file.write_text("measured\n10.001\nten\n")
     parameters.write_text(PARAMETERS)
-    done = inband("replay", file, "--parameters", parameters, folder=tmp_path)
+    done = inband("replay", file, "--parameters", parameters)
     assert done.returncode == 1
     assert "--factor -1" in done.stderr
-    done = inband("replay", file, "--parameters", parameters, "--factor", "-1", folder=tmp_path)
+    done = inband("replay", file, "--parameters", parameters, "--factor", "-1")
     assert done.returncode == 1
     assert "line 3, measured: 'ten' is not a number" in done.stderr
     assert len(done.stdout.splitlines()) == 1
     parameters.write_text(PARAMETERS.replace("R34=0.0133", "R34=0.05"))
-    done = inband("replay", file, "--parameters", parameters, "--factor", "-1", folder=tmp_path)
+    done = inband("replay", file, "--parameters", parameters, "--factor", "-1")
     assert "R35/2" in done.stderr
     assert "Traceback" not in done.stderr

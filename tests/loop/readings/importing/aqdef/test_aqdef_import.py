@@ -25,7 +25,7 @@ from app.loop.readings.importing.aqdef.content import Wishes
 from app.loop.readings.importing.aqdef.matching import NEW
 from app.loop.readings.importing.history import Flawed
 from tests.conftest import RunServer, Server
-from tests.loop.readings.importing.test_commands import inband
+from tests.forked import inband
 from tests.loop.readings.importing.test_history import scalar, set_up, stored
 from tests.shop import Shop
 
@@ -253,7 +253,7 @@ def test_limits_that_are_others_here_are_said(plant: Database, tmp_path: Path) -
 
 def test_the_command_says_what_becomes_of_each(plant: Database, tmp_path: Path) -> None:
     path = written(tmp_path / "shift.dfq", HEAD + ROWS)
-    done = inband("import", path, "--timezone", "Europe/Berlin", database=plant, folder=tmp_path)
+    done = inband("import", path, "--timezone", "Europe/Berlin", INBAND_DATABASE_URL=plant.dsn)
     assert done.returncode == 0, done.stderr
     assert "shaft-d40 Seat → shaft-d40" in done.stderr
     assert (
@@ -265,13 +265,13 @@ def test_the_command_says_what_becomes_of_each(plant: Database, tmp_path: Path) 
     assert "1 are excluded" in done.stderr
     with plant.begin() as session:
         machines.add_machine(session, MachineIn(key="mill-1", name="Mill 1", control="fanuc"), "tests")
-    done = inband("import", path, "--timezone", "Europe/Berlin", "--create-missing", database=plant, folder=tmp_path)
+    done = inband("import", path, "--timezone", "Europe/Berlin", "--create-missing", INBAND_DATABASE_URL=plant.dsn)
     assert (done.returncode, "say on which machine" in done.stderr) == (1, True), done.stderr
     options = ["--timezone", "Europe/Berlin", "--map", "L1=+,shaft-0815:17=shaft-d41", "--machine", "mill-1"]
-    done = inband("import", path, *options, database=plant, folder=tmp_path)
+    done = inband("import", path, *options, INBAND_DATABASE_URL=plant.dsn)
     assert done.returncode == 1
     assert "shaft-d41: Every value lies more than" in done.stderr
-    done = inband("import", path, *options[:2], "--map", "L1=+", "--machine", "mill-1", database=plant, folder=tmp_path)
+    done = inband("import", path, *options[:2], "--map", "L1=+", "--machine", "mill-1", INBAND_DATABASE_URL=plant.dsn)
     assert done.returncode == 0, done.stderr
     assert "shaft-0815-l1-length is set up" in done.stderr
     with plant.begin() as session:
@@ -289,11 +289,11 @@ def test_the_command_teaches(plant: Database, tmp_path: Path) -> None:
         (["--live"], "as history only"),
         (["--characteristic", "shaft-d40"], "say which is which with --map"),
     ):
-        done = inband("import", path, *options, database=plant, folder=tmp_path)
+        done = inband("import", path, *options, INBAND_DATABASE_URL=plant.dsn)
         assert done.returncode == 2, done.stderr
         assert said in " ".join(done.stderr.split()), done.stderr
     lonely = written(tmp_path / "b.dfx", ["1"])
-    assert "b.dfd" in inband("import", lonely, database=plant, folder=tmp_path).stderr
+    assert "b.dfd" in inband("import", lonely, INBAND_DATABASE_URL=plant.dsn).stderr
 
 
 @pytest.fixture(scope="module")
