@@ -5,6 +5,7 @@ Target 40 mm; zero ±1 µm, averaging ±5 µm, tolerance ±8 µm, wear from 300 
 
 import itertools
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import httpx
@@ -55,6 +56,12 @@ class Shop:
             parameters=PARAMETERS | parameters,
         )
 
+    def another(self, word: str, **parameters: Any) -> str:
+        """Add a characteristic with a name that no other test has; its key."""
+        key = unique(word)
+        self.add(key, **parameters)
+        return key
+
     def call(
         self, method: str, path: str, /, status: int = 200, client: httpx.Client | None = None, **body: Any
     ) -> Any:
@@ -73,6 +80,27 @@ class Shop:
             measured=round(40 + micrometres / 1000, 6),
             **more,
         )
+
+    def push(
+        self,
+        micrometres: Sequence[float],
+        characteristic: str | None = None,
+        *,
+        answers: bool = False,
+        **more: Sequence[Any],
+    ) -> list[dict[str, Any]]:
+        """Push readings that deviate by so much, in one batch; more: a column for each further field.
+
+        With ``answers`` each is answered as a single one is.
+        """
+        rows = [
+            {"characteristic": characteristic or self.characteristic, "measured": round(40 + value / 1000, 9)}
+            | {name: column[at] for name, column in more.items()}
+            for at, value in enumerate(micrometres)
+        ]
+        answer = self.admin.post(f"/api/v1/readings/batch?decisions={str(answers).lower()}", json=rows)
+        assert answer.status_code == 201, answer.text
+        return answer.json()["items"] if answers else []
 
     def correction(self, number: int, verb: str | None = None, status: int = 200, **body: Any) -> Any:
         """Look at a correction, or do something to it."""

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 from random import Random
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from sqlalchemy.orm import Session
 
@@ -18,11 +18,10 @@ from app.loop.characteristics.queries import CurrentCharacteristic, characterist
 from app.loop.summaries.queries import Window
 from app.quality.control_charts import charts, figures
 from app.quality.control_charts.downsampling import MOST_POINTS, STRETCHES, thinned
-from app.quality.control_charts.queries import baseline_in_force, charted
+from app.quality.control_charts.queries import Charted, baseline_in_force, charted
 from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import View
-from tests.conftest import Server
-from tests.quality.control_charts.rows import frozen, pushed
+from tests.quality.control_charts.rows import frozen
 from tests.shop import Shop
 
 BASELINES: list[dict[str, Any]] = [
@@ -38,9 +37,9 @@ NAMES = [" ".join(map(str, each.values())) for each in BASELINES]
 
 
 @pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
+def history(common_shop: Shop) -> Shop:
     """400 readings of a loop, in parts of one to three and with pauses, a tool change after 250, some excluded."""
-    shop, rng = Shop(server), Random(4)
+    rng = Random(4)
     values = [rng.gauss(0, 2) + 0.02 * (n % 250) for n in range(400)]
     parts, moments, part = [], [], 0
     for n in range(400):
@@ -48,29 +47,44 @@ def shop(server: Server) -> Shop:
         parts.append(f"SN-{part}")
         moments.append(f"2026-11-{1 + part // 60:02d}T{part % 60 // 3:02d}:{part % 3 * 20:02d}:{n % 60:02d}Z")
     for low, high in ((0, 250), (250, 400)):
-        pushed(shop, values[low:high], part=parts[low:high], measured_at=moments[low:high])
+        common_shop.push(values[low:high], part=parts[low:high], measured_at=moments[low:high])
         if high == 250:
-            shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="Worn")
+            common_shop.call("POST", f"/machines/{common_shop.machine}/tools/3/change", offset=0.0, reason="Worn")
     for sequence in (3, 130, 131, 132, 290, 399):
-        shop.call("POST", f"/readings/{shop.characteristic}/{sequence}/exclude", reason="False trigger")
-    return shop
+        common_shop.call("POST", f"/readings/{common_shop.characteristic}/{sequence}/exclude", reason="False trigger")
+    return common_shop
+
+
+class By(NamedTuple):
+    """A baseline in force, and all that it charts."""
+
+    session: Session
+    current: CurrentCharacteristic
+    baseline: Baseline
+    points: Charted
+    views: dict[Chart, View]
+
+
+FEWER = settings(max_examples=settings().max_examples // 10)  # for each baseline, and each reads the database
 
 
 @pytest.fixture(params=BASELINES, ids=NAMES, scope="module")
-def by(request: pytest.FixtureRequest, shop: Shop) -> Iterator[tuple[Session, CurrentCharacteristic, Baseline]]:
+def by(request: pytest.FixtureRequest, history: Shop) -> Iterator[By]:
     body = {"quantity": "deviation"} | request.param
-    frozen(shop, 11, 200, excluded=[{"first": 60, "last": 64, "reason": "Chip"}], **body)
-    with shop.server.database.begin() as session:
-        current = characteristic_named(session, shop.characteristic)
+    frozen(history, 11, 200, excluded=[{"first": 60, "last": 64, "reason": "Chip"}], **body)
+    with history.server.database.begin() as session:
+        current = characteristic_named(session, history.characteristic)
         baseline = baseline_in_force(session, current.characteristic)
         assert baseline is not None
-        yield session, current, baseline
+        kinds = charts.kinds(baseline)
+        views = {kind: charts.view(session, current, baseline, Window(11, 400, 400), kind) for kind in kinds}
+        yield By(session, current, baseline, charted(session, current, baseline, Window(1, 400, 400)), views)
 
 
+@FEWER
 @given(cuts=st.lists(st.integers(1, 400), max_size=6))
-def test_streaming_equals_batch(by: tuple[Session, CurrentCharacteristic, Baseline], cuts: list[int]) -> None:
-    session, current, baseline = by
-    whole = charted(session, current, baseline, Window(1, 400, 400))
+def test_streaming_equals_batch(by: By, cuts: list[int]) -> None:
+    session, current, baseline, whole, _views = by
     assert whole.chart is not None
     pointed, pieces = 0, []
     for high in sorted({*cuts, 400}):
@@ -84,14 +98,12 @@ def test_streaming_equals_batch(by: tuple[Session, CurrentCharacteristic, Baseli
     assert z == pytest.approx(whole.chart.z, abs=1e-9)
 
 
+@FEWER
 @given(first=st.integers(1, 400), last=st.integers(1, 400))
-def test_every_chart_is_the_same_through_any_window(
-    by: tuple[Session, CurrentCharacteristic, Baseline], first: int, last: int
-) -> None:
-    session, current, baseline = by
+def test_every_chart_is_the_same_through_any_window(by: By, first: int, last: int) -> None:
+    session, current, baseline, _points, views = by
     first, last = sorted((first, last))
-    for kind in charts.kinds(baseline):
-        whole = charts.view(session, current, baseline, Window(11, 400, 400), kind)
+    for kind, whole in views.items():
         part = charts.view(session, current, baseline, Window(max(first, 11), last, 400), kind)
         inside = (whole.last >= max(first, 11)) & (whole.last <= last)
         assert part.last.tolist() == whole.last[inside].tolist(), kind
@@ -103,10 +115,10 @@ def test_every_chart_is_the_same_through_any_window(
                 assert np.broadcast_to(mine, len(part)) == pytest.approx(wanted, abs=1e-12), kind
 
 
-def test_what_is_excluded_is_no_point_and_a_tool_begins_anew(shop: Shop) -> None:
-    frozen(shop, 11, 200, excluded=[{"first": 60, "last": 64, "reason": "Chip"}], quantity="without_corrections")
-    with shop.server.database.begin() as session:
-        current = characteristic_named(session, shop.characteristic)
+def test_what_is_excluded_is_no_point_and_a_tool_begins_anew(history: Shop) -> None:
+    frozen(history, 11, 200, excluded=[{"first": 60, "last": 64, "reason": "Chip"}], quantity="without_corrections")
+    with history.server.database.begin() as session:
+        current = characteristic_named(session, history.characteristic)
         baseline = baseline_in_force(session, current.characteristic)
         assert baseline is not None
         points = charted(session, current, baseline, Window(1, 400, 400))

@@ -12,7 +12,6 @@ from app.core.spc.shewhart import Chart
 from app.core.spc.watch import Watch
 from app.quality.control_charts.monitoring import Place, Setting, read_rules, stored_rules
 from app.quality.control_charts.rules_pictures import OF_CHARTS, PATTERNS, picture
-from tests.conftest import Server
 from tests.quality.control_charts.line import Line
 from tests.shop import Person, Shop
 
@@ -174,8 +173,8 @@ class TestPictures:
 
 
 class TestPage:
-    def test_trying_changes_nothing_and_switching_on_takes_a_reason(self, shop: Shop, server: Server) -> None:
-        line, engineer = Line(shop), Person(server, "engineer")
+    def test_trying_changes_nothing_and_switching_on_takes_a_reason(self, shop: Shop, engineer: Person) -> None:
+        line = Line(shop)
         line.push([0.5] * 10)
         path = f"/characteristics/{line.key}/rules"
         page = engineer.open(path)
@@ -208,16 +207,16 @@ class TestPage:
         broken = engineer.send(path, 422, step="save", reason="x", **{"main.nelson_99": "watch", "main": "watch"})
         assert "corrected" in broken
 
-    def test_who_may_only_look_finds_no_form(self, shop: Shop, server: Server) -> None:
-        line, viewer = Line(shop), Person(server, "viewer")
+    def test_who_may_only_look_finds_no_form(self, shop: Shop, viewer: Person) -> None:
+        line = Line(shop)
         page = viewer.open(f"/characteristics/{line.key}/rules?set=western&last=all")
         assert 'type="radio"' not in page
         assert "Western Electric" in page
         viewer.send(f"/characteristics/{line.key}/rules", 403, step="save", reason="x")
         viewer.open(f"/characteristics/{line.key}/rules?last=5", 422)
 
-    def test_without_a_baseline_it_leads_to_the_editor(self, shop: Shop, server: Server) -> None:
+    def test_without_a_baseline_it_leads_to_the_editor(self, shop: Shop, engineer: Person) -> None:
         line = Line(shop, baseline=False)
-        page = Person(server, "engineer").open(f"/characteristics/{line.key}/rules")
+        page = engineer.open(f"/characteristics/{line.key}/rules")
         assert f"/characteristics/{line.key}/control/freeze" in page
         assert "1 in 370 points" in page

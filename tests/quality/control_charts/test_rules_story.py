@@ -1,18 +1,15 @@
 """An engineer in Chromium: tries rules, switches them on, sees a signal come in, follows its alarm and says what it was."""
 
-from typing import Any
-
 from playwright.sync_api import Page, expect
 
 from tests.quality.control_charts.line import Line
 from tests.shop import Person, Shop
 
 
-def test_from_the_rules_to_the_cause(page: Page, server: Any) -> None:
-    shop = Shop(server)
+def test_from_the_rules_to_the_cause(page: Page, shop: Shop, engineer: Person) -> None:
     line = Line(shop)
     line.push([0.5] * 12 + [-1.0, 1.0])
-    Person(server, "engineer").sign_in(page)
+    engineer.sign_in(page)
     page.goto(f"/characteristics/{line.key}/control")
     page.get_by_role("link", name="Rules", exact=True).click()
     row = page.get_by_role("row").filter(has_text="9 points in a row")

@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 from sqlalchemy import select
 
+from app.loop.tables.characteristics import Characteristic
 from app.quality.control_charts import signals_actions
 from app.quality.control_charts.signal_tables import Watching
-from tests.conftest import Server
 from tests.quality.control_charts.line import Line
 from tests.shop import Person, Shop
 
@@ -199,7 +199,7 @@ def test_a_false_reading_behind_a_signal_is_taken_out(shop: Shop) -> None:
     assert [each["state"] for each in line.signals()] == ["withdrawn"]
 
 
-def test_its_run_is_marked_on_its_chart(shop: Shop, server: Server) -> None:
+def test_its_run_is_marked_on_its_chart(shop: Shop, viewer: Person) -> None:
     line = Line(shop)
     line.push([0.0, 9.0, 9.0])
     line.look()
@@ -208,7 +208,7 @@ def test_its_run_is_marked_on_its_chart(shop: Shop, server: Server) -> None:
     (box,) = [shape for shape in shop.call("GET", path)["layout"]["shapes"] if shape["type"] == "rect"]
     assert (box["x0"], box["x1"]) == (61.5, 63.5)
     shop.call("GET", f"/characteristics/{Line(shop, 'other').key}/figures/control?signal={signal['id']}", 404)
-    page = Person(server, "viewer").open(f"/signals/{signal['id']}")
+    page = viewer.open(f"/signals/{signal['id']}")
     assert f"signal={signal['id']}" in page
 
 
@@ -236,7 +236,7 @@ def test_a_look_that_finds_nothing_new_writes_nothing(shop: Shop) -> None:
 
     def noted() -> list[Any]:
         with shop.server.database.begin() as session:
-            rows = session.scalars(select(Watching))
+            rows = session.scalars(select(Watching).join(Characteristic).where(Characteristic.key == line.key))
             return [(row.characteristic_id, row.looked, row.at) for row in rows]
 
     before = noted()
@@ -267,14 +267,10 @@ def test_pages_of_signals_go_on_where_the_one_before_ended(shop: Shop) -> None:
 def test_what_is_read_in_chunks_finds_the_same_at_their_borders(
     shop: Shop, monkeypatch: pytest.MonkeyPatch, chunk: int
 ) -> None:
-    every: dict[str, Any] = {
-        "main": dict.fromkeys([f"nelson_{n}" for n in range(1, 9)] + ["western_4"], "watch"),
-        **{place: {"nelson_1": "watch"} for place in ("scatter", "ewma", "moving_average", "cusum")},
-    }
     values = [((n * 7919) % 97 - 48) / 7 + (2.0 if n > 30 else 0.0) for n in range(61)]
     whole, pieces = Line(shop, "whole"), Line(shop, "pieces")
     for line in (whole, pieces):
-        line.rules(**every)
+        line.rules(**EVERY)
     whole.push(values)
     whole.look()
     pieces.push(values)

@@ -1,6 +1,5 @@
 """Wear, forecast and hunting through the front door, and what the rounds make of them."""
 
-from random import Random
 from typing import Any
 
 import pytest
@@ -10,36 +9,8 @@ from app.jobs.actions import run_jobs
 from app.loop.tables.characteristics import Characteristic
 from app.quality.wear.actions import JOB
 from app.quality.wear.tables import Outlook
+from tests.quality.closed_loop import cut, scatter
 from tests.shop import Shop
-
-
-def shift(
-    shop: Shop,
-    parts: int,
-    *,
-    wear: float = 0.0,
-    scatter: float = 0.0,
-    seed: int = 1,
-    characteristic: str | None = None,
-    factor: float = -1.0,
-    tool: int = 3,
-    begin: float = 0.0,
-) -> None:
-    """So many parts (µm), each cut with every correction issued before it, measured and told at once."""
-    rng = Random(seed)
-    offset = shop.tool(tool)["offset"]
-    known = shop.tool(tool)["last_correction"]
-    in_effect = known["number"] if known else 0
-    for part in range(parts):
-        deviation = begin + wear * part + rng.gauss(0, scatter) - 1000 * offset / factor
-        answer = shop.read(
-            round(deviation, 4),
-            characteristic,
-            correction_in_effect=in_effect,
-        )
-        if answer["correction"]:
-            offset += answer["correction"]["amount"]
-            in_effect = answer["correction"]["number"]
 
 
 def of(shop: Shop, **query: Any) -> Any:
@@ -52,7 +23,7 @@ def figure(shop: Shop, query: str = "") -> Any:
 
 
 def test_behind_a_closed_loop_the_wear_shows_though_the_sizes_stay(shop: Shop) -> None:
-    shift(shop, 120, wear=0.2, scatter=0.5)
+    cut(shop, scatter(120, sigma=0.5, wear=0.2), delay=0)
     told = of(shop)
     per_part = told["wear_per_part"]
     assert per_part["is_wear"]
@@ -66,7 +37,7 @@ def test_behind_a_closed_loop_the_wear_shows_though_the_sizes_stay(shop: Shop) -
 
 def test_parts_left_by_hand(shop: Shop) -> None:
     """Without scatter: 0.2 µm per part. Of 40 parts the last has worn 7.8 µm; R37 lies at 300 µm."""
-    shift(shop, 40, wear=0.2, scatter=0.001)
+    cut(shop, scatter(40, sigma=0.001, wear=0.2), delay=0)
     told = {each["towards"]: each for each in of(shop)["forecasts"]}
     assert told["wear"]["parts"] == pytest.approx((300 - 7.8) / 0.2, rel=0.001)
     assert told["wear"]["low"] <= told["wear"]["parts"] <= told["wear"]["high"]
@@ -77,9 +48,8 @@ def test_parts_left_by_hand(shop: Shop) -> None:
 
 
 def test_the_offset_limit_comes_before_r37(shop: Shop) -> None:
-    shop.add("limited", max_total=0.05, tool_memory=4, average_memory=6)
-    shop.characteristic = "limited"
-    shift(shop, 40, wear=0.2, scatter=0.001, tool=4)
+    shop.characteristic = shop.another("limited", max_total=0.05, tool_memory=4, average_memory=6)
+    cut(shop, scatter(40, sigma=0.001, wear=0.2), delay=0, tool=4)
     told = of(shop)
     assert told["first"] == "offset"
     first = told["forecasts"][0] if told["forecasts"][0]["towards"] == "offset" else told["forecasts"][1]
@@ -87,9 +57,8 @@ def test_the_offset_limit_comes_before_r37(shop: Shop) -> None:
 
 
 def test_measure_only_comes_to_the_end_of_its_tolerance(shop: Shop) -> None:
-    shop.add("open", mode="measure_only", tool_memory=4, average_memory=6)
-    shop.characteristic = "open"
-    shift(shop, 30, wear=-0.1, scatter=0.001, tool=4)
+    shop.characteristic = shop.another("open", mode="measure_only", tool_memory=4, average_memory=6)
+    cut(shop, scatter(30, sigma=0.001, wear=-0.1), delay=0, tool=4)
     told = of(shop)
     assert told["first"] == "tolerance"
     assert told["forecasts"][0]["parts"] == pytest.approx((8 - 2.9) / 0.1, rel=0.01)
@@ -97,9 +66,9 @@ def test_measure_only_comes_to_the_end_of_its_tolerance(shop: Shop) -> None:
 
 
 def test_no_wear_no_number_and_too_few_readings_no_line(shop: Shop) -> None:
-    shift(shop, 5, scatter=0.5)
+    cut(shop, scatter(5, sigma=0.5, wear=0.0), delay=0)
     assert of(shop)["wear_per_part"] is None
-    shift(shop, 40, scatter=0.5, seed=4)
+    cut(shop, scatter(40, seed=4, sigma=0.5, wear=0.0), delay=0)
     told = of(shop)
     assert not told["wear_per_part"]["is_wear"]
     assert told["forecasts"] == []
@@ -107,9 +76,9 @@ def test_no_wear_no_number_and_too_few_readings_no_line(shop: Shop) -> None:
 
 
 def test_a_new_tool_begins_a_new_curve(shop: Shop) -> None:
-    shift(shop, 40, wear=0.2, scatter=0.1)
+    cut(shop, scatter(40, sigma=0.1, wear=0.2), delay=0)
     shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="new insert")
-    shift(shop, 15, wear=0.5, scatter=0.1, seed=2)
+    cut(shop, scatter(15, seed=2, sigma=0.1, wear=0.5), delay=0)
     told = of(shop)
     assert told["first_sequence"] == 41
     assert told["wear_per_part"]["value"] == pytest.approx(0.0005, rel=0.1)
@@ -120,11 +89,11 @@ def test_a_new_tool_begins_a_new_curve(shop: Shop) -> None:
 
 @pytest.mark.parametrize("moves", [True, False], ids=["the parts move with it", "it is only told"])
 def test_the_curve_goes_on_over_an_edit_by_hand(shop: Shop, moves: bool) -> None:
-    shift(shop, 30, wear=0.1, scatter=0.1)
+    cut(shop, scatter(30, sigma=0.1, wear=0.1), delay=0)
     before = shop.tool()["offset"]
     shop.call("PUT", f"/machines/{shop.machine}/tools/3", offset=before - 0.04, reason="typed in")
     # What the machine really holds: 40 µm less, or what it held all along, which only now is known.
-    shift(shop, 30, wear=0.1, scatter=0.1, seed=2, begin=3.0 + (0.0 if moves else 40.0))
+    cut(shop, scatter(30, seed=2, sigma=0.1, wear=0.1, begin=3.0 + (0.0 if moves else 40.0)), delay=0)
     told = of(shop)
     assert told["wear_per_part"]["readings"] > 50
     assert told["wear_per_part"]["value"] == pytest.approx(0.0001, rel=0.15)
@@ -132,29 +101,29 @@ def test_the_curve_goes_on_over_an_edit_by_hand(shop: Shop, moves: bool) -> None
 
 
 def test_a_new_target_and_an_empirical_value_do_not_bend_the_curve(shop: Shop) -> None:
-    shift(shop, 30, wear=0.1, scatter=0.1)
+    cut(shop, scatter(30, sigma=0.1, wear=0.1), delay=0)
     shop.call(
         "PATCH",
         f"/characteristics/{shop.characteristic}",
         parameters={"target": 40.002},
         reason="fit was too tight",
     )
-    shift(shop, 30, wear=0.1, scatter=0.1, seed=2, begin=3.0)
+    cut(shop, scatter(30, seed=2, sigma=0.1, wear=0.1, begin=3.0), delay=0)
     shop.call("PUT", f"/machines/{shop.machine}/averages/5", empirical_value=0.004, reason="micrometer")
-    shift(shop, 30, wear=0.1, scatter=0.1, seed=3, begin=6.0)
+    cut(shop, scatter(30, seed=3, sigma=0.1, wear=0.1, begin=6.0), delay=0)
     told = of(shop)["wear_per_part"]
     assert told["readings"] > 80
     assert told["value"] == pytest.approx(0.0001, rel=0.1)
 
 
 def test_excluded_readings_are_left_out(shop: Shop) -> None:
-    shift(shop, 20, wear=0.1, scatter=0.1)
+    cut(shop, scatter(20, sigma=0.1, wear=0.1), delay=0)
     shop.call("POST", f"/readings/{shop.characteristic}/7/exclude", reason="chip")
     assert of(shop)["wear_per_part"]["readings"] == 19
 
 
 def test_last_says_how_far_back(shop: Shop) -> None:
-    shift(shop, 60, wear=0.1, scatter=0.1)
+    cut(shop, scatter(60, sigma=0.1, wear=0.1), delay=0)
     told = of(shop, last=20)
     assert (told["first_sequence"], told["last_sequence"]) == (41, 60)
     assert told["wear_per_part"]["readings"] == 20
@@ -187,7 +156,7 @@ def outlook(shop: Shop) -> Outlook:
 
 def test_a_loop_that_runs_after_its_scatter_is_told_once_and_by_how_much(shop: Shop) -> None:
     nervous(shop)
-    shift(shop, 60, scatter=1.0, tool=4)
+    cut(shop, scatter(60, sigma=1.0, wear=0.0), delay=0, tool=4)
     told = of(shop)["hunting"]
     assert told["state"] == "hunting"
     assert told["reversals"] > 25
@@ -204,7 +173,7 @@ def test_a_loop_that_runs_after_its_scatter_is_told_once_and_by_how_much(shop: S
     assert "With R33 at" in alarm["text"]
     assert outlook(shop).hunting == "hunting"
     shop.acknowledge(alarm["id"], "noted")
-    shift(shop, 10, scatter=1.0, seed=2, tool=4)
+    cut(shop, scatter(10, seed=2, sigma=1.0, wear=0.0), delay=0, tool=4)
     go(shop)
     assert shop.alarms() == [], "once while it lasts"
     shop.call(
@@ -213,7 +182,7 @@ def test_a_loop_that_runs_after_its_scatter_is_told_once_and_by_how_much(shop: S
         parameters={"zero_range": told["remedy"]["zero_range"]},
         reason="hunted",
     )
-    shift(shop, 60, scatter=1.0, seed=3, tool=4)
+    cut(shop, scatter(60, seed=3, sigma=1.0, wear=0.0), delay=0, tool=4)
     go(shop)
     assert shop.alarms() == []
     assert of(shop)["hunting"]["state"] == "quiet"
@@ -222,14 +191,14 @@ def test_a_loop_that_runs_after_its_scatter_is_told_once_and_by_how_much(shop: S
 def test_the_signal_path_is_the_floor_of_the_advice(shop: Shop) -> None:
     nervous(shop)
     shop.call("PATCH", f"/machines/{shop.machine}", signal_path="plc", probing_feed=1200)  # 5 µm
-    shift(shop, 40, scatter=0.5, tool=4)
+    cut(shop, scatter(40, sigma=0.5, wear=0.0), delay=0, tool=4)
     told = of(shop)["hunting"]
     assert told["state"] == "hunting"
     assert told["remedy"]["zero_range"] is None or told["remedy"]["zero_range"] >= 0.0049
 
 
 def test_the_outlook_is_what_the_numbers_say_and_is_made_anew_only_where_something_moved(shop: Shop) -> None:
-    shift(shop, 40, wear=0.2, scatter=0.1)
+    cut(shop, scatter(40, sigma=0.1, wear=0.2), delay=0)
     go(shop)
     noted = outlook(shop)
     told = {each["towards"]: each for each in of(shop)["forecasts"]}
@@ -274,10 +243,10 @@ def test_forecasts_are_tested_on_the_edges_before_and_told_with_what_comes(shop:
     """Two edges that wore faster in the end: the rounds test what would have been foretold, and page and API say so."""
     assert of(shop)["record"] is None
     for edge in (1, 2):
-        shift(shop, 60, wear=0.2, scatter=0.2, seed=edge)
-        shift(shop, 12, wear=2.0, scatter=0.2, seed=edge + 10, begin=12.0)
+        cut(shop, scatter(60, seed=edge, sigma=0.2, wear=0.2), delay=0)
+        cut(shop, scatter(12, seed=edge + 10, sigma=0.2, wear=2.0, begin=12.0), delay=0)
         shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="worn")
-    shift(shop, 40, wear=0.2, scatter=0.2, seed=5)
+    cut(shop, scatter(40, seed=5, sigma=0.2, wear=0.2), delay=0)
     go(shop)
     told = of(shop)
     record = told["record"]

@@ -1,7 +1,6 @@
 """The life of a proposed change: by programs, by people without scripts, and as a story in a browser."""
 
 import re
-import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -10,23 +9,20 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.conftest import Server
-from tests.quality.what_if.loop import cut, scatter
+from tests.quality.closed_loop import cut, scatter
 from tests.shop import Person, Shop
+from tests.waits import until
 
 WHY = "Ana said: „Nula je premala“ & R33 < scatter; half the corrections"
 
 
 @pytest.fixture
-def shop(server: Server) -> Shop:
-    made = Shop(server)
-    made.call(
-        "PATCH",
-        f"/characteristics/{made.characteristic}",
-        parameters={"zero_range": 0.0003, "weighting_factor": 1},
-        reason="As found",
-    )
-    cut(made, scatter(36))
-    return made
+def ran(shop: Shop) -> Shop:
+    """A loop that corrects too often."""
+    changed = {"zero_range": 0.0003, "weighting_factor": 1}
+    shop.call("PATCH", f"/characteristics/{shop.characteristic}", parameters=changed, reason="As found")
+    cut(shop, scatter(36))
+    return shop
 
 
 def propose(shop: Shop, status: int = 201, **more: Any) -> Any:
@@ -44,22 +40,22 @@ def current(shop: Shop) -> dict[str, Any]:
     return found
 
 
-def test_a_proposal_changes_nothing_until_it_is_approved(shop: Shop) -> None:
-    before = current(shop)
-    made = propose(shop)
+def test_a_proposal_changes_nothing_until_it_is_approved(ran: Shop) -> None:
+    before = current(ran)
+    made = propose(ran)
     assert (made["status"], made["from_version"], made["reason"]) == ("open", 2, WHY)
     assert made["changes"] == {"zero_range": 0.0025, "weighting_factor": 2.0}
     evidence = made["evidence"]
     assert evidence["other"]["corrections"] < evidence["today"]["corrections"]
     assert evidence["measured_effect"]["text"]
-    assert current(shop) == before
+    assert current(ran) == before
 
-    approved = decide(shop, made["id"], "approve")
+    approved = decide(ran, made["id"], "approve")
     assert (approved["status"], approved["made_version"]) == ("approved", 3)
     assert approved["evidence"] == evidence
-    after = current(shop)
+    after = current(ran)
     assert (after["parameters_version"], after["parameters"]["zero_range"]) == (3, 0.0025)
-    audit = shop.call("GET", f"/audit?subject=characteristic/{shop.characteristic}")["items"]
+    audit = ran.call("GET", f"/audit?subject=characteristic/{ran.characteristic}")["items"]
     reasons = {each["action"]: each["why"] for each in reversed(audit)}
     assert reasons["change proposed"] == WHY
     assert reasons["proposal approved"] == "Looked at the evidence"
@@ -67,55 +63,55 @@ def test_a_proposal_changes_nothing_until_it_is_approved(shop: Shop) -> None:
     assert WHY in reasons["parameters changed"]
 
 
-def test_what_is_proposed_twice_or_changes_nothing_is_refused(shop: Shop) -> None:
-    made = propose(shop)
-    assert str(made["id"]) in propose(shop, 409)["detail"]
-    assert "already in force" in propose(shop, 422, zero_range=0.0003, weighting_factor=1)["detail"]
-    assert propose(shop, zero_range=0.002)["id"] > made["id"]
-    assert [each["field"] for each in propose(shop, 422, zero_range=0.003, reason="  ")["errors"]] == ["reason"]
-    assert len(shop.call("GET", f"/characteristics/{shop.characteristic}/proposals?status=open")["items"]) == 2
+def test_what_is_proposed_twice_or_changes_nothing_is_refused(ran: Shop) -> None:
+    made = propose(ran)
+    assert str(made["id"]) in propose(ran, 409)["detail"]
+    assert "already in force" in propose(ran, 422, zero_range=0.0003, weighting_factor=1)["detail"]
+    assert propose(ran, zero_range=0.002)["id"] > made["id"]
+    assert [each["field"] for each in propose(ran, 422, zero_range=0.003, reason="  ")["errors"]] == ["reason"]
+    assert len(ran.call("GET", f"/characteristics/{ran.characteristic}/proposals?status=open")["items"]) == 2
 
 
-def test_changed_parameters_make_it_outdated(shop: Shop) -> None:
-    made = propose(shop)
-    path = f"/characteristics/{shop.characteristic}"
-    shop.call("PATCH", path, parameters={"zero_range": 0.0005}, reason="Meanwhile")
-    assert shop.call("GET", f"/proposals/{made['id']}")["status"] == "outdated"
-    assert "version 3 is in force" in decide(shop, made["id"], "approve", 409)["detail"]
-    assert current(shop)["parameters"]["zero_range"] == 0.0005
-    assert shop.call("GET", "/proposals?status=outdated&limit=1")["items"][0]["id"] == made["id"]
-    assert decide(shop, made["id"], "reject")["status"] == "rejected"
+def test_changed_parameters_make_it_outdated(ran: Shop) -> None:
+    made = propose(ran)
+    path = f"/characteristics/{ran.characteristic}"
+    ran.call("PATCH", path, parameters={"zero_range": 0.0005}, reason="Meanwhile")
+    assert ran.call("GET", f"/proposals/{made['id']}")["status"] == "outdated"
+    assert "version 3 is in force" in decide(ran, made["id"], "approve", 409)["detail"]
+    assert current(ran)["parameters"]["zero_range"] == 0.0005
+    assert ran.call("GET", "/proposals?status=outdated&limit=1")["items"][0]["id"] == made["id"]
+    assert decide(ran, made["id"], "reject")["status"] == "rejected"
 
 
 @pytest.mark.parametrize("verb", ["approve", "reject", "withdraw"])
-def test_it_is_decided_once(shop: Shop, verb: str) -> None:
-    made = propose(shop)
-    assert decide(shop, made["id"], verb)["decided_why"] == "Looked at the evidence"
+def test_it_is_decided_once(ran: Shop, verb: str) -> None:
+    made = propose(ran)
+    assert decide(ran, made["id"], verb)["decided_why"] == "Looked at the evidence"
     for again in ("approve", "reject", "withdraw"):
-        assert "already" in decide(shop, made["id"], again, 409)["detail"]
-    assert current(shop)["parameters_version"] == (3 if verb == "approve" else 2)
+        assert "already" in decide(ran, made["id"], again, 409)["detail"]
+    assert current(ran)["parameters_version"] == (3 if verb == "approve" else 2)
 
 
-def test_who_may_do_what(shop: Shop, server: Server) -> None:
+def test_who_may_do_what(ran: Shop, server: Server) -> None:
     viewer, operator = (server.client(server.key(role)) for role in ("viewer", "operator"))
-    propose(shop, 403, client=viewer)
-    made = propose(shop, client=operator)
+    propose(ran, 403, client=viewer)
+    made = propose(ran, client=operator)
     for verb in ("approve", "reject"):
-        decide(shop, made["id"], verb, 403, client=operator)
-    decide(shop, made["id"], "withdraw", 403, client=viewer)
-    propose(shop, 403, client=shop.machine_client)
+        decide(ran, made["id"], verb, 403, client=operator)
+    decide(ran, made["id"], "withdraw", 403, client=viewer)
+    propose(ran, 403, client=ran.machine_client)
     ana, ivo = Person(server, "operator"), Person(server, "operator")
     ivo.send(f"/proposals/{made['id']}", 403, do="withdraw", reason="Not mine")
-    page = ana.send(f"/characteristics/{shop.characteristic}/what-if", r33="2,5", k="3", last="5000", reason="Mine")
+    page = ana.send(f"/characteristics/{ran.characteristic}/what-if", r33="2,5", k="3", last="5000", reason="Mine")
     assert "is proposed" in page
     assert "Withdraw" in page
     assert "Approve</button>" not in page
 
 
-def test_of_two_at_once_one_is_first(shop: Shop, server: Server) -> None:
+def test_of_two_at_once_one_is_first(ran: Shop, server: Server) -> None:
     clients = [server.client(server.key("engineer")) for _each in range(4)]
     body = {"zero_range": 0.0025, "reason": WHY}
-    path = f"/api/v1/characteristics/{shop.characteristic}/proposals"
+    path = f"/api/v1/characteristics/{ran.characteristic}/proposals"
     with ThreadPoolExecutor(4) as pool:
         sent = list(pool.map(lambda client: client.post(path, json=body), clients))
         assert sorted(each.status_code for each in sent) == [201, 409, 409, 409]
@@ -123,11 +119,20 @@ def test_of_two_at_once_one_is_first(shop: Shop, server: Server) -> None:
         at = f"/api/v1/proposals/{made}/approve"
         decided = list(pool.map(lambda client: client.post(at, json={"reason": "Yes"}), clients))
     assert sorted(each.status_code for each in decided) == [200, 409, 409, 409]
-    assert current(shop)["parameters_version"] == 3
+    assert current(ran)["parameters_version"] == 3
 
 
-def test_what_one_approves_another_cannot_reject_at_the_same_moment(shop: Shop, server: Server) -> None:
-    made = propose(shop)
+def waiting(server: Server) -> int:
+    """How many wait for a lock."""
+    with psycopg.connect(server.database.dsn) as looking:
+        (found,) = looking.execute(
+            "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND wait_event_type = 'Lock'"
+        ).fetchall()[0]
+    return int(found)
+
+
+def test_what_one_approves_another_cannot_reject_at_the_same_moment(ran: Shop, server: Server) -> None:
+    made = propose(ran)
     client = server.client(server.key("engineer"))
 
     def send(verb: str) -> int:
@@ -138,48 +143,48 @@ def test_what_one_approves_another_cannot_reject_at_the_same_moment(shop: Shop, 
     with psycopg.connect(server.database.dsn) as holding, ThreadPoolExecutor(4) as pool:
         holding.execute("SELECT 1 FROM machine_state FOR UPDATE")
         sent = [pool.submit(send, verb) for verb in ("approve", "reject", "reject", "approve")]
-        time.sleep(1.5)  # all of them have looked, and wait for the machine
+        until(lambda: waiting(server) >= len(sent))  # all of them have looked
         holding.rollback()
         answers = [each.result() for each in sent]
     assert sorted(answers) == [200, 409, 409, 409]
-    found = shop.call("GET", f"/proposals/{made['id']}")
-    assert (found["status"] == "approved") == (current(shop)["parameters_version"] == found["from_version"] + 1)
+    found = ran.call("GET", f"/proposals/{made['id']}")
+    assert (found["status"] == "approved") == (current(ran)["parameters_version"] == found["from_version"] + 1)
 
 
-def test_a_form_keeps_what_was_typed(shop: Shop, server: Server) -> None:
+def test_a_form_keeps_what_was_typed(ran: Shop, server: Server) -> None:
     engineer = Person(server, "engineer")
-    path = f"/characteristics/{shop.characteristic}/what-if"
+    path = f"/characteristics/{ran.characteristic}/what-if"
     page = engineer.open(f"{path}?r33=9&k=many&last=5000", 422)
     assert 'value="many"' in page
     assert 'value="9"' in page
     assert 'aria-invalid="true"' in page
     page = engineer.send(path, 422, r33="2.5", last="5000", reason="")
     assert 'value="2.5"' in page
-    made = propose(shop)
+    made = propose(ran)
     page = engineer.send(f"/proposals/{made['id']}", 422, do="approve", reason=" ")
     assert "Approve</button>" in page
-    assert current(shop)["parameters_version"] == 2
+    assert current(ran)["parameters_version"] == 2
     assert "approve, reject or withdraw" in engineer.send(f"/proposals/{made['id']}", 422, do="", reason="x")
 
 
-def test_it_is_shown_where_decisions_wait_and_where_parameters_are_set_up(shop: Shop, server: Server) -> None:
+def test_it_is_shown_where_decisions_wait_and_where_parameters_are_set_up(ran: Shop, server: Server) -> None:
     engineer = Person(server, "engineer")
-    made = propose(shop)
+    made = propose(ran)
     assert "proposed" in engineer.open("/corrections")
-    setup = engineer.open(f"/setup/characteristics/{shop.characteristic}")
+    setup = engineer.open(f"/setup/characteristics/{ran.characteristic}")
     assert f"/proposals/{made['id']}" in setup
     assert "Nula je premala" in setup
     assert f"/proposals/{made['id']}" in engineer.open("/proposals")
-    decide(shop, made["id"], "reject")
-    assert f"/proposals/{made['id']}" not in engineer.open(f"/setup/characteristics/{shop.characteristic}")
+    decide(ran, made["id"], "reject")
+    assert f"/proposals/{made['id']}" not in engineer.open(f"/setup/characteristics/{ran.characteristic}")
     assert f"/proposals/{made['id']}" in engineer.open("/proposals?status=rejected")
 
 
-def test_from_the_map_to_a_new_version(shop: Shop, server: Server, page: Page) -> None:
+def test_from_the_map_to_a_new_version(ran: Shop, server: Server, page: Page) -> None:
     """An engineer looks for fewer corrections, walks the map by keyboard, proposes a setting and approves it."""
     engineer = Person(server, "engineer")
     engineer.sign_in(page)
-    page.goto(f"/characteristics/{shop.characteristic}")
+    page.goto(f"/characteristics/{ran.characteristic}")
     page.get_by_role("navigation", name="Pages of this characteristic").get_by_role("link", name="What if").click()
     expect(page.get_by_text("Do corrections act in full?")).to_be_visible()
     expect(page.locator("setting-map .at-today")).to_have_count(1)
@@ -210,18 +215,18 @@ def test_from_the_map_to_a_new_version(shop: Shop, server: Server, page: Page) -
 
     page.goto("/corrections")
     page.get_by_role("link", name="Look at the evidence").click()
-    page.get_by_role("row", name=shop.characteristic).get_by_role("link").first.click()
+    page.get_by_role("row", name=ran.characteristic).get_by_role("link").first.click()
     page.get_by_label("Reason").fill("Agreed with the shop floor")
     page.get_by_role("button", name="Approve").click()
     expect(page.get_by_text("in force as a new version")).to_be_visible()
     page.get_by_role("link", name="version 3").click()
     expect(page.locator("#versions")).to_contain_text("Agreed with the shop floor")
-    assert current(shop)["parameters"]["weighting_factor"] == 2.0
+    assert current(ran)["parameters"]["weighting_factor"] == 2.0
 
 
-def test_no_cell_needs_a_script(shop: Shop, server: Server) -> None:
+def test_no_cell_needs_a_script(ran: Shop, server: Server) -> None:
     engineer = Person(server, "engineer")
-    path = f"/characteristics/{shop.characteristic}/what-if"
+    path = f"/characteristics/{ran.characteristic}/what-if"
     text = engineer.open(path)
     assert text.count("<td data-level") > 200
     assert f'href="{path}?k=2&amp;r33=' in text

@@ -9,25 +9,25 @@ import pytest
 
 from app.quality.what_if.tool_history import Delays, _delays
 from tests.conftest import Server
+from tests.quality.closed_loop import cut, scatter
 from tests.quality.control_charts.rows import frozen
-from tests.quality.what_if.loop import cut, scatter
 from tests.shop import Person, Shop
 
 PARTS = 160
 
 
-@pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
+def nervous(shop: Shop) -> Shop:
     """A loop whose R33 is too small for its scatter: 0.3 µm for 1.4 µm."""
-    made = Shop(server)
-    made.call(
-        "PATCH",
-        f"/characteristics/{made.characteristic}",
-        parameters={"zero_range": 0.0003, "weighting_factor": 1},
-        reason="As found",
-    )
-    cut(made, scatter(PARTS))
-    return made
+    changed = {"zero_range": 0.0003, "weighting_factor": 1}
+    shop.call("PATCH", f"/characteristics/{shop.characteristic}", parameters=changed, reason="As found")
+    return shop
+
+
+@pytest.fixture(scope="module")
+def ran(common_shop: Shop) -> Shop:
+    """One that ran, which nobody changes."""
+    cut(nervous(common_shop), scatter(PARTS))
+    return common_shop
 
 
 def ask(shop: Shop, *, status: int = 200, what: str = "", **asked: Any) -> Any:
@@ -44,8 +44,8 @@ def alike(a: dict[str, Any], b: dict[str, Any]) -> bool:
     return same and all(a[name] == pytest.approx(b[name], abs=1e-12) for name in a.keys() - APART)
 
 
-def test_todays_settings_give_what_happened(shop: Shop) -> None:
-    found = ask(shop)
+def test_todays_settings_give_what_happened(ran: Shop) -> None:
+    found = ask(ran)
     assert found["readings"] == PARTS
     assert found["delay"] == 1
     assert (found["likeness"]["verdict"], found["likeness"]["same"]) == ("well", 1.0)
@@ -55,8 +55,8 @@ def test_todays_settings_give_what_happened(shop: Shop) -> None:
     assert alike(found["today"], found["other"])
 
 
-def test_a_wider_zero_range_corrects_less(shop: Shop) -> None:
-    found = ask(shop, zero_range=0.0025, weighting_factor=2)
+def test_a_wider_zero_range_corrects_less(ran: Shop) -> None:
+    found = ask(ran, zero_range=0.0025, weighting_factor=2)
     assert found["other"]["settings"]["zero_range"] == 0.0025
     assert found["today"]["settings"]["zero_range"] == 0.0003
     assert found["other"]["corrections"] < found["today"]["corrections"] / 4
@@ -64,23 +64,23 @@ def test_a_wider_zero_range_corrects_less(shop: Shop) -> None:
     assert found["other"]["ppk"] > found["today"]["ppk"]
 
 
-def test_the_assumption_is_checked_on_the_readings(shop: Shop) -> None:
-    effect = ask(shop)["measured_effect"]
+def test_the_assumption_is_checked_on_the_readings(ran: Shop) -> None:
+    effect = ask(ran)["measured_effect"]
     assert effect["low"] < 1 < effect["high"]
     assert effect["is_full"] is True
     assert effect["corrections"] > PARTS / 2
-    assert ask(shop, effect=None)["effect"] == pytest.approx(effect["value"])
+    assert ask(ran, effect=None)["effect"] == pytest.approx(effect["value"])
 
 
-def test_the_map_is_of_what_ifs(shop: Shop) -> None:
+def test_the_map_is_of_what_ifs(ran: Shop) -> None:
     asked: dict[str, Any] = {"weighting_factors": [1, 2], "zero_ranges": [0.0003, 0.002, 0.006]}
-    made = ask(shop, what="/map", **asked)
+    made = ask(ran, what="/map", **asked)
     cells = made["cells"]
     assert [(each["weighting_factor"], each["zero_range"]) for each in cells] == [
         (k, r33) for k in asked["weighting_factors"] for r33 in asked["zero_ranges"]
     ]
     assert alike(cells[0]["figures"], made["today"])  # today's setting is on it
-    assert alike(cells[4]["figures"], ask(shop, zero_range=0.002, weighting_factor=2)["other"])
+    assert alike(cells[4]["figures"], ask(ran, zero_range=0.002, weighting_factor=2)["other"])
     # R33 beyond R34 (5 µm) is a setting that cannot be; it says why.
     assert cells[2]["figures"] is None
     assert "R34" in cells[2]["reason"]
@@ -91,15 +91,14 @@ def test_the_map_is_of_what_ifs(shop: Shop) -> None:
     assert best["inside"]
 
 
-def test_a_map_of_another_averaging_limit(shop: Shop) -> None:
-    made = ask(shop, what="/map", averaging_limit=0.007)
+def test_a_map_of_another_averaging_limit(ran: Shop) -> None:
+    made = ask(ran, what="/map", averaging_limit=0.007)
     assert made["averaging_limit"] == 0.007
     assert max(each["zero_range"] for each in made["cells"] if each["figures"]) > 0.005
     assert len(made["cells"]) >= 300
 
 
-def test_what_was_held_and_what_was_excluded_removed_nothing(server: Server) -> None:
-    shop = Shop(server)
+def test_what_was_held_and_what_was_excluded_removed_nothing(shop: Shop) -> None:
     shop.call(
         "PATCH",
         f"/characteristics/{shop.characteristic}",
@@ -108,9 +107,9 @@ def test_what_was_held_and_what_was_excluded_removed_nothing(server: Server) -> 
     )
     course = scatter(60, 5)
     course[30] += 40
-    answers = cut(shop, course)
+    answers = cut(shop, course, jumps=[30])
     assert answers[30]["correction"]["status"] == "held"
-    made = [each for each in answers if each["correction"] and each["correction"]["status"] == "pending"]
+    made = [each for each in answers if each["correction"] and each["correction"]["status"] != "held"]
     sizes = {each["sequence"]: abs(each["correction"]["amount"]) for each in made}
     assert len(sizes) > 5
     gone = next(iter(sizes))
@@ -122,8 +121,7 @@ def test_what_was_held_and_what_was_excluded_removed_nothing(server: Server) -> 
     assert alike(found["truly"], found["likeness"]["replayed"])
 
 
-def test_excluded_readings_and_probe_faults_are_left_out_and_named(server: Server) -> None:
-    shop = Shop(server)
+def test_excluded_readings_and_probe_faults_are_left_out_and_named(shop: Shop) -> None:
     cut(shop, scatter(40))
     before = ask(shop)
     shop.read(1200.0)  # beyond R36: the probe, not the part
@@ -142,27 +140,23 @@ def test_excluded_readings_and_probe_faults_are_left_out_and_named(server: Serve
 
 
 @pytest.mark.parametrize("readings", [0, 1])
-def test_too_few_readings_are_refused_with_what_to_do(server: Server, readings: int) -> None:
-    shop = Shop(server)
-    for _reading in range(readings):
-        shop.read(1.0)
+def test_too_few_readings_are_refused_with_what_to_do(shop: Shop, readings: int) -> None:
+    shop.push([1.0] * readings)
     for what in ("", "/map"):
         problem = ask(shop, status=422, what=what)
         assert f"holds {readings} readings" in problem["detail"]
         assert problem["what_to_do"]
 
 
-def test_a_period_without_readings_is_refused(shop: Shop) -> None:
+def test_a_period_without_readings_is_refused(ran: Shop) -> None:
     old: dict[str, Any] = {"from": "2020-01-01T00:00:00Z", "to": "2020-02-01T00:00:00Z", "last": None}
-    assert "0 readings" in ask(shop, status=422, **old)["detail"]
+    assert "0 readings" in ask(ran, status=422, **old)["detail"]
     turned: dict[str, Any] = {"from": "2020-02-01T00:00:00Z", "to": "2020-01-01T00:00:00Z"}
-    assert [each["field"] for each in ask(shop, status=422, **turned)["errors"]] == ["from"]
+    assert [each["field"] for each in ask(ran, status=422, **turned)["errors"]] == ["from"]
 
 
-def test_equal_readings_tell_nothing_and_say_so(server: Server) -> None:
-    shop = Shop(server)
-    for _reading in range(120):
-        shop.read(0.5)
+def test_equal_readings_tell_nothing_and_say_so(shop: Shop) -> None:
+    shop.push([0.5] * 120)
     found = ask(shop)
     assert found["truly"]["spread"] == 0.0
     assert found["truly"]["ppk"] is None
@@ -173,10 +167,10 @@ def test_equal_readings_tell_nothing_and_say_so(server: Server) -> None:
 
 
 def test_the_truth_is_quoted_as_on_the_page_of_capability_and_replays_by_the_same_rules(
-    server: Server, shop: Shop
+    server: Server, ran: Shop
 ) -> None:
-    found = ask(shop)
-    page = shop.call("GET", f"/characteristics/{shop.characteristic}/capability")
+    found = ask(ran)
+    page = ran.call("GET", f"/characteristics/{ran.characteristic}/capability")
     assert found["truly"]["readings"] == page["readings"], "none of them lies in the wear zone"
     assert (found["truly"]["quote"], found["truly"]["quoted"]) == (
         page["quote"],
@@ -186,19 +180,18 @@ def test_the_truth_is_quoted_as_on_the_page_of_capability_and_replays_by_the_sam
         page["quote"],
         pytest.approx(page["quoted"]["value"]),
     )
-    text = Person(server, "viewer").open(f"/characteristics/{shop.characteristic}/what-if")
+    text = Person(server, "viewer").open(f"/characteristics/{ran.characteristic}/what-if")
     assert "Index to report" in text
     assert f"pk {page['quoted']['value']:.2f}" in text
 
 
-def test_replays_of_coarse_readings_carry_no_index(server: Server) -> None:
-    shop = Shop(server)
+def test_replays_of_coarse_readings_carry_no_index(shop: Shop) -> None:
     cut(shop, [0.0 if at % 4 else 2.0 * (-1) ** (at // 4) for at in range(40)])  # a gauge that shows whole 2 µm
     found = ask(shop)
     for name in ("truly", "today", "other"):
         assert (found[name]["ppk"], found[name]["quoted"], found[name]["why_none"]) == (None, None, "unresolved"), name
     assert {cell["figures"]["ppk"] for cell in ask(shop, what="/map")["cells"] if cell["figures"]} == {None}
-    assert "none: readings too coarse" in Person(server, "viewer").open(
+    assert "none: readings too coarse" in Person(shop.server, "viewer").open(
         f"/characteristics/{shop.characteristic}/what-if"
     )
 
@@ -216,39 +209,38 @@ def test_replays_of_coarse_readings_carry_no_index(server: Server) -> None:
         ({"effect": 0}, "effect"),
     ],
 )
-def test_settings_out_of_order_are_named(shop: Shop, asked: dict[str, Any], field: str) -> None:
-    problem = ask(shop, status=422, **asked)
+def test_settings_out_of_order_are_named(ran: Shop, asked: dict[str, Any], field: str) -> None:
+    problem = ask(ran, status=422, **asked)
     assert [each["field"] for each in problem["errors"]] == [field]
     assert "parameters." not in problem["detail"]
 
 
-def test_more_than_can_be_had_is_refused_with_what_can(shop: Shop) -> None:
+def test_more_than_can_be_had_is_refused_with_what_can(ran: Shop) -> None:
     many: dict[str, Any] = {
         "weighting_factors": [1 + at / 10 for at in range(200)],
         "zero_ranges": [at / 1e5 for at in range(200)],
     }
-    problem = ask(shop, status=422, what="/map", **many)
+    problem = ask(ran, status=422, what="/map", **many)
     assert "40000 settings" in problem["detail"]
     assert "2500" in problem["detail"]
-    assert ask(shop, last=1_000_000_000)["readings"] == PARTS  # there are no more
+    assert ask(ran, last=1_000_000_000)["readings"] == PARTS  # there are no more
 
 
-def test_many_at_once_take_turns(shop: Shop) -> None:
-    path = f"/api/v1/characteristics/{shop.characteristic}/what-if/map"
+def test_many_at_once_take_turns(ran: Shop) -> None:
+    path = f"/api/v1/characteristics/{ran.characteristic}/what-if/map"
     with ThreadPoolExecutor(8) as pool:
-        answers = list(pool.map(lambda _one: shop.admin.post(path, json={"last": 5000}), range(8)))
+        answers = list(pool.map(lambda _one: ran.admin.post(path, json={"last": 5000}), range(8)))
     statuses = [answer.status_code for answer in answers]
     assert set(statuses) <= {200, 429}
     assert 200 in statuses
     assert all(answer.headers["retry-after"] for answer in answers if answer.status_code == 429)
 
 
-def test_a_tool_that_two_characteristics_correct_is_replayed_with_both(server: Server) -> None:
-    shop = Shop(server)
+def test_a_tool_that_two_characteristics_correct_is_replayed_with_both(shop: Shop) -> None:
     other = f"{shop.characteristic}-too"
     shop.add(other, average_memory=6)
     number, offset = 0, 0.0
-    for free in scatter(60, 3):
+    for free in scatter(40, 3):
         for key, more in ((shop.characteristic, 0.0), (other, 0.4)):
             answer = shop.read(round(free + more + offset, 4), key, correction_in_effect=number)
             if answer["correction"]:
@@ -260,15 +252,14 @@ def test_a_tool_that_two_characteristics_correct_is_replayed_with_both(server: S
 
 
 @pytest.mark.parametrize("serials", [True, False])
-def test_a_cutter_that_serves_outside_and_inside_is_replayed_as_it_went(server: Server, serials: bool) -> None:
+def test_a_cutter_that_serves_outside_and_inside_is_replayed_as_it_went(shop: Shop, serials: bool) -> None:
     """Each feature turns the offset into size in its own way, and either may be asked about, whichever is measured first."""
-    shop = Shop(server)
     outside, inside = f"outside-{shop.machine}", f"inside-{shop.machine}"
     factors = {outside: -0.5, inside: 0.5}
     for memory, key in enumerate(factors, 6):
         shop.add(key, factor=factors[key], average_memory=memory, max_step=0.002)
     issued: list[tuple[int, int, float]] = []  # part, number, mm of offset
-    for part, free in enumerate(scatter(60, seed=7)):
+    for part, free in enumerate(scatter(40, seed=7)):
         effective = [each for each in issued if part > each[0] + 1]
         offset = sum(amount for _part, _number, amount in effective) * 1000
         for later, (key, factor) in enumerate(factors.items()):
@@ -293,13 +284,12 @@ def test_a_cutter_that_serves_outside_and_inside_is_replayed_as_it_went(server: 
         assert alike(found["truly"], found["likeness"]["replayed"])
 
 
-def test_a_machine_that_tells_by_time_has_its_pipeline_too(server: Server) -> None:
+def test_a_machine_that_tells_by_time_has_its_pipeline_too(shop: Shop) -> None:
     """Three parts lie between cutting and measuring; which corrections they were cut with is told by the time alone."""
-    shop = Shop(server)
     changed = {"zero_range": 0.0003, "weighting_factor": 1}
     shop.call("PATCH", f"/characteristics/{shop.characteristic}", parameters=changed, reason="As found")
     offset, cut_parts = 0.0, []
-    for free in scatter(50, 11):
+    for free in scatter(30, 11):
         for pending in shop.call("GET", f"/machines/{shop.machine}/corrections?status=pending")["items"]:
             shop.correction(pending["number"], "applied")
             offset += pending["amount"] * 1000
@@ -329,43 +319,39 @@ def test_a_machine_that_begins_to_tell_by_number_has_the_pipeline_that_it_has() 
     assert _delays(joined | {"correction_in_effect": np.full(60, -1)}, part) == Delays(delay, delay, delay)
 
 
-def test_corrections_that_waited_unequally_long_are_told(server: Server, shop: Shop) -> None:
+def test_corrections_that_waited_unequally_long_are_told(shop: Shop, ran: Shop) -> None:
     """Somebody lets what has gathered take effect every ten parts; the record says so, and why the replay differs."""
-    made = Shop(server)
-    changed = {"zero_range": 0.0003, "weighting_factor": 1}
-    made.call("PATCH", f"/characteristics/{made.characteristic}", parameters=changed, reason="As found")
-    number, offset, newest = 0, 0.0, (0, 0.0)
-    for at, free in enumerate(scatter(120, 5)):
-        if at % 10 == 0:
-            number, offset = newest
-        correction = made.read(round(free + offset, 3), correction_in_effect=number)["correction"]
-        if correction is not None:
-            newest = (correction["number"], round(newest[1] + correction["amount"] * 1000, 6))
-    found = ask(made)
+    nervous(shop)
+    course, number, offset = scatter(120, 5), 0, 0.0
+    for at in range(0, len(course), 10):
+        told = [round(free + offset, 3) for free in course[at : at + 10]]
+        for answer in shop.push(told, answers=True, correction_in_effect=[number] * 10):
+            if answer["correction"] is not None:
+                number, offset = answer["correction"]["number"], offset + answer["correction"]["amount"] * 1000
+    found = ask(shop)
     (said,) = [each for each in found["cautions"] if "delay of corrections varied" in each]
     assert "nine of ten after 0 to 9 more parts" in said
     assert found["likeness"]["same"] < 0.95
     assert not [
-        each for each in ask(shop)["cautions"] if "delay of corrections varied" in each
+        each for each in ask(ran)["cautions"] if "delay of corrections varied" in each
     ]  # there all waited for one part
 
 
-def test_why_another_index_may_be_quoted_than_on_the_page_of_capability_is_told(server: Server) -> None:
+def test_why_another_index_may_be_quoted_than_on_the_page_of_capability_is_told(shop: Shop) -> None:
     """There control is judged by the frozen baseline, here by limits of the readings themselves."""
-    own = Shop(server)
-    cut(own, scatter(60))
-    assert "frozen baseline" not in " ".join(ask(own)["cautions"])
-    frozen(own, 1, 60)
-    (caution,) = [text for text in ask(own)["cautions"] if "frozen baseline" in text]
+    cut(shop, scatter(60))
+    assert "frozen baseline" not in " ".join(ask(shop)["cautions"])
+    frozen(shop, 1, 60)
+    (caution,) = [text for text in ask(shop)["cautions"] if "frozen baseline" in text]
     assert "judges by the frozen baseline 1" in caution
 
 
-def test_the_figure_draws_both_courses(shop: Shop) -> None:
-    path = f"/characteristics/{shop.characteristic}/figures/what-if?zero_range=0.0025&weighting_factor=2"
-    figure = shop.call("GET", path)
+def test_the_figure_draws_both_courses(ran: Shop) -> None:
+    path = f"/characteristics/{ran.characteristic}/figures/what-if?zero_range=0.0025&weighting_factor=2"
+    figure = ran.call("GET", path)
     courses = [each for each in figure["data"] if each["meta"] == "course"]
     assert [len(each["y"]) for each in courses] == [PARTS, PARTS]
-    truth = shop.call("GET", f"/readings?characteristic={shop.characteristic}&limit=1000")["items"]
+    truth = ran.call("GET", f"/readings?characteristic={ran.characteristic}&limit=1000")["items"]
     assert courses[0]["y"] == pytest.approx([each["deviation"] * 1000 for each in truth], abs=0.001)
-    as_today = shop.call("GET", f"/characteristics/{shop.characteristic}/figures/what-if")
+    as_today = ran.call("GET", f"/characteristics/{ran.characteristic}/figures/what-if")
     assert [each["name"] for each in as_today["data"] if each["meta"] == "course"] == ["Current settings"]
