@@ -70,12 +70,12 @@ $(VENV)/installed-dev: pyproject.toml constraints.txt | $(BIN)/python
 
 # A browser for the tests: one that is installed, else Debian's where we may install it, else Playwright's own.
 $(VENV)/browser: | $(VENV)/installed-dev
-	@for each in chromium chromium-browser google-chrome; do \
+	@for each in chromium-headless-shell chromium chromium-browser google-chrome; do \
 		if $$each --version > $@ 2>/dev/null; then exit 0; fi; done; \
 	echo "Installing Chromium for the tests (once) ..." >&2; \
 	if test "$$(id -u)" = 0; then as_root=; else as_root="sudo -n"; fi; \
 	if command -v apt-get >/dev/null && $$as_root true 2>/dev/null \
 		&& $$as_root apt-get update -qq && $$as_root env DEBIAN_FRONTEND=noninteractive \
-			apt-get install -y -qq --no-install-recommends chromium fonts-liberation >/dev/null \
-		&& chromium --version > $@ 2>/dev/null; then exit 0; fi; \
+			apt-get install -y -qq --no-install-recommends chromium-headless-shell fonts-liberation >/dev/null \
+		&& chromium-headless-shell --version > $@ 2>/dev/null; then exit 0; fi; \
 	$(BIN)/playwright install chromium && echo "Playwright's own" > $@

@@ -429,9 +429,15 @@ def playwright() -> Iterator[Playwright]:
 
 @pytest.fixture(scope="session")
 def browser(playwright: Playwright) -> Iterator[Browser]:
-    """Chromium: Debian's where there is one, else Playwright's own."""
+    """Chromium: Debian's where there is one, best without the windows that nobody sees, else Playwright's own."""
     found = next(
-        filter(_works, filter(None, map(shutil.which, ["chromium", "chromium-browser", "google-chrome"]))), None
+        filter(
+            _works,
+            filter(
+                None, map(shutil.which, ["chromium-headless-shell", "chromium", "chromium-browser", "google-chrome"])
+            ),
+        ),
+        None,
     )
     running = playwright.chromium.launch(executable_path=found, args=BROWSER_OPTIONS)
     yield running
