@@ -228,7 +228,10 @@ def main() -> None:
     if arguments.against and not (arguments.against / PYTHON).exists():
         parser.error(f"{arguments.against / PYTHON} is missing: install that version into a .venv of its own first")
     homes = [HOUSE] + ([arguments.against.resolve()] if arguments.against else [])
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chromium-headless-shell"))), None)
+    chromium = next(
+        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chromium-headless-shell"))),
+        None,
+    )
     with sync_playwright() as playwright, ExitStack() as running:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         versions = [running.enter_context(version(home, arguments.readings, browser)) for home in homes]
