@@ -338,7 +338,10 @@ RunServer = Callable[..., AbstractContextManager[Server]]
 
 @pytest.fixture(scope="session")
 def run_server(new_database: NewDatabase, tmp_path_factory: pytest.TempPathFactory) -> RunServer:
-    """``with run_server() as server``: a server on a fresh database; ``run_server(url, workers=2)`` on one that exists."""
+    """``with run_server() as server``: a server on a fresh database; ``run_server(url, workers=2)`` on one that exists.
+
+    With `workers`, also one, it is a program of its own, as a service manager starts it.
+    """
 
     @contextmanager
     def run(database_url: str | None = None, **options: object) -> Iterator[Server]:
@@ -350,7 +353,8 @@ def run_server(new_database: NewDatabase, tmp_path_factory: pytest.TempPathFacto
             command += [f"--{option.replace('_', '-')}", str(value)]
 
         def start() -> Process:
-            process = Forked(command, stderr) if not options else begun(command, stderr)
+            program = "workers" in options
+            process = begun(command, stderr) if program else Forked(command, stderr, environment=dict(os.environ))
             wait_ready(f"http://127.0.0.1:{port}", process, stderr)
             return process
 
