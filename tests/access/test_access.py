@@ -5,34 +5,29 @@ from typing import Any
 import httpx
 import pytest
 
+from tests.conftest import Server
 from tests.shop import PARAMETERS, Shop
 
 ROLES = ["nobody", "machine", "other machine", "viewer", "operator", "engineer", "admin"]
 
 
 @pytest.fixture(scope="module")
-def shop(server: Any) -> Shop:
-    return Shop(server)
-
-
-@pytest.fixture(scope="module")
-def callers(server: Any, shop: Shop) -> dict[str, httpx.Client]:
-    other = Shop(server)
+def callers(server: Server, common_shop: Shop) -> dict[str, httpx.Client]:
     return {
         "nobody": server.client(),
-        "machine": shop.machine_client,
-        "other machine": other.machine_client,
+        "machine": common_shop.machine_client,
+        "other machine": Shop(server).machine_client,
         **{role: server.client(server.key(role)) for role in ROLES[3:]},
     }
 
 
-NEW_MACHINE = {"key": "fresh", "name": "Fresh", "control": "other"}
+NEW_MACHINE = {"key": "fresh", "name": "Fresh", "control": "none"}
 NEW_CHARACTERISTIC = {"key": "fresh", "name": "Fresh", "machine": "nowhere", "parameters": PARAMETERS}
 # method, path, body, who may (from this role on), may the machine's own key, status for those who may
 ROUTES: list[tuple[str, str, Any, str, bool, int]] = [
     ("GET", "/machines", None, "viewer", True, 200),
     ("GET", "/machines/{machine}", None, "viewer", True, 200),
-    ("POST", "/machines", {**NEW_MACHINE, "control": "none"}, "engineer", False, 422),
+    ("POST", "/machines", NEW_MACHINE, "engineer", False, 422),
     ("PATCH", "/machines/{machine}", {"name": "Lathe"}, "engineer", False, 200),
     ("GET", "/machines/{machine}/keys", None, "engineer", False, 200),
     ("POST", "/machines/{machine}/keys", {"name": "k"}, "engineer", False, 201),
@@ -54,12 +49,10 @@ ROUTES: list[tuple[str, str, Any, str, bool, int]] = [
 ]
 
 
-@pytest.mark.parametrize("who", ROLES)
 @pytest.mark.parametrize(("method", "path", "body", "role", "own", "status"), ROUTES)
-def test_roles(
-    shop: Shop,
+def test_every_caller_gets_what_the_role_may(
+    common_shop: Shop,
     callers: dict[str, httpx.Client],
-    who: str,
     method: str,
     path: str,
     body: Any,
@@ -67,27 +60,21 @@ def test_roles(
     own: bool,
     status: int,
 ) -> None:
-    path = path.format(machine=shop.machine, characteristic=shop.characteristic)
-    if who == "nobody":
-        expected = 401
-    elif who == "machine":
-        expected = status if own else 403
-    elif who == "other machine":
-        expected = status if own and path in {"/machines", "/characteristics"} else 403  # its own part of the list
-    else:
-        expected = status if ROLES.index(who) >= ROLES.index(role) else 403
-    answer = callers[who].request(method, f"/api/v1{path}", json=body)
-    assert answer.status_code == expected, answer.text
-    if expected >= 400:
-        problem = answer.json()
-        assert answer.headers["content-type"] == "application/problem+json"
-        assert problem["what_to_do"]
-    if expected in {401, 403}:
-        assert (expected == 401) == ("www-authenticate" in answer.headers)
+    path = path.format(machine=common_shop.machine, characteristic=common_shop.characteristic)
+    own_list = own and path in {"/machines", "/characteristics"}  # a machine sees its own part of it
+    expected = {"nobody": 401, "machine": status if own else 403, "other machine": status if own_list else 403}
+    expected |= {each: status if ROLES.index(each) >= ROLES.index(role) else 403 for each in ROLES[3:]}
+    answers = {who: client.request(method, f"/api/v1{path}", json=body) for who, client in callers.items()}
+    assert {who: answer.status_code for who, answer in answers.items()} == expected
+    for who, answer in answers.items():
+        if answer.status_code >= 400:
+            assert answer.headers["content-type"] == "application/problem+json", who
+            assert answer.json()["what_to_do"], who
+        assert ("www-authenticate" in answer.headers) == (answer.status_code == 401), who
 
 
-def test_a_machine_sees_itself_alone_in_lists(shop: Shop, callers: dict[str, httpx.Client]) -> None:
-    Shop(shop.server)
+def test_a_machine_sees_itself_alone_in_lists(common_shop: Shop, callers: dict[str, httpx.Client]) -> None:
+    shop = common_shop
     machines = callers["machine"].get("/api/v1/machines").json()["items"]
     assert [machine["key"] for machine in machines] == [shop.machine]
     characteristics = callers["machine"].get("/api/v1/characteristics").json()["items"]
@@ -97,14 +84,14 @@ def test_a_machine_sees_itself_alone_in_lists(shop: Shop, callers: dict[str, htt
 @pytest.mark.parametrize(
     "header", ["", "Bearer", "Basic YTpi", "Bearer nothing-we-know", "bearer inband_" + "x" * 5000]
 )
-def test_unknown_ways_to_sign_in_are_401(server: Any, header: str) -> None:
+def test_unknown_ways_to_sign_in_are_401(server: Server, header: str) -> None:
     answer = server.client().get("/api/v1/machines", headers={"Authorization": header})
     assert answer.status_code == 401
     assert "Bearer" in answer.headers["www-authenticate"]
 
 
 @pytest.mark.parametrize("path", ["/setup", "/setup/machines/new", "/account", "/setup/people?x=1"])
-def test_people_are_asked_to_sign_in_and_brought_back(server: Any, path: str) -> None:
+def test_people_are_asked_to_sign_in_and_brought_back(server: Server, path: str) -> None:
     answer = server.client().get(path)
     assert answer.status_code == 303
     assert answer.headers["location"] == f"/sign-in?next={path.replace('?', '%3F').replace('=', '%3D')}"

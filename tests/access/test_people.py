@@ -2,7 +2,6 @@
 
 import re
 import threading
-import time
 import unicodedata
 from contextlib import suppress
 from typing import Any
@@ -17,7 +16,9 @@ from app.access.callers import Caller
 from app.access.sign_in import sign_in
 from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
+from tests.shop import unique
 
+pytestmark = pytest.mark.own_server
 PASSWORD = "correct horse battery"
 
 
@@ -242,7 +243,7 @@ def test_a_new_password_needs_the_old_one(session: Session) -> None:
 
 
 @pytest.fixture(scope="module")
-def admin(server: Any) -> httpx.Client:
+def boss(server: Any) -> httpx.Client:
     server.person("Boss", "admin", PASSWORD)
     client: httpx.Client = server.client()
     assert client.post("/sign-in", data={"name": "Boss", "password": PASSWORD}).status_code == 303
@@ -255,8 +256,8 @@ class TestOverHttp:
         assert found
         return found[1]
 
-    def test_an_invitation_from_link_to_signed_in(self, server: Any, admin: httpx.Client) -> None:
-        shown = admin.post("/setup/people/invitations", data={"role": "operator", "csrf": self.csrf(admin)})
+    def test_an_invitation_from_link_to_signed_in(self, server: Any, boss: httpx.Client) -> None:
+        shown = boss.post("/setup/people/invitations", data={"role": "operator", "csrf": self.csrf(boss)})
         link = re.search(r"/invitation/[\w-]+", shown.text)
         assert link
         guest = server.client()
@@ -274,7 +275,7 @@ class TestOverHttp:
         assert (me["name"], me["role"]) == ("Vesna", "operator")
         assert server.client().get(link[0]).status_code == 404
 
-    def test_ending_access_ends_every_session(self, server: Any, admin: httpx.Client) -> None:
+    def test_ending_access_ends_every_session(self, server: Any, boss: httpx.Client) -> None:
         server.person("Dragan", "engineer", PASSWORD)
         theirs = server.client()
         theirs.post("/sign-in", data={"name": "Dragan", "password": PASSWORD})
@@ -284,20 +285,20 @@ class TestOverHttp:
         changed = api.patch(f"/api/v1/people/{person['id']}", json={"role": "viewer"})
         assert changed.json()["role"] == "viewer"
         assert theirs.get("/api/v1/audit").status_code == 403, "a role counts at once"
-        ended = admin.post(f"/setup/people/{person['id']}/disable", data={"csrf": self.csrf(admin)})
+        ended = boss.post(f"/setup/people/{person['id']}/disable", data={"csrf": self.csrf(boss)})
         assert ended.headers["location"] == "/setup/people?done=disabled"
         assert theirs.get("/api/v1/machines").status_code == 401
         again = server.client().post("/sign-in", data={"name": "Dragan", "password": PASSWORD})
         assert again.status_code == 401
         assert api.patch(f"/api/v1/people/{person['id']}", json={"disabled": False}).json()["disabled_at"] is None
 
-    def test_the_last_administrator_cannot_leave(self, admin: httpx.Client) -> None:
-        me = admin.get("/api/v1/people/me").json()
+    def test_the_last_administrator_cannot_leave(self, boss: httpx.Client) -> None:
+        me = boss.get("/api/v1/people/me").json()
         for what, data in (("disable", {}), ("role", {"role": "viewer"})):
-            refused = admin.post(f"/setup/people/{me['id']}/{what}", data={"csrf": self.csrf(admin), **data})
+            refused = boss.post(f"/setup/people/{me['id']}/{what}", data={"csrf": self.csrf(boss), **data})
             assert refused.status_code == 409
             assert "only administrator" in refused.text
-        assert admin.get("/setup/people").status_code == 200
+        assert boss.get("/setup/people").status_code == 200
 
     def test_a_changed_password_signs_out_other_browsers(self, server: Any) -> None:
         server.person("Ema", "viewer", PASSWORD)
@@ -315,7 +316,7 @@ class TestOverHttp:
         assert here.get("/account").status_code == 200
         assert there.get("/account").status_code == 303
 
-    def test_a_forgotten_password(self, server: Any, admin: httpx.Client) -> None:
+    def test_a_forgotten_password(self, server: Any, boss: httpx.Client) -> None:
         server.person("Fata", "viewer", PASSWORD)
         theirs = server.client()
         theirs.post("/sign-in", data={"name": "Fata", "password": PASSWORD})
@@ -324,7 +325,7 @@ class TestOverHttp:
             for one in server.client(server.key()).get("/api/v1/people").json()["items"]
             if one["name"] == "Fata"
         )
-        shown = admin.post(f"/setup/people/{number}/password", data={"csrf": self.csrf(admin)})
+        shown = boss.post(f"/setup/people/{number}/password", data={"csrf": self.csrf(boss)})
         password = re.search(r"(?:[0-9a-f]{4}-){3}[0-9a-f]{4}", shown.text)
         assert password
         assert theirs.get("/account").status_code == 303, "signed out"
@@ -339,7 +340,7 @@ class TestOverHttp:
     @pytest.mark.parametrize("body", [{"role": "king"}, {"disabled": "maybe"}, {"name": "x"}, [], None])
     def test_bad_changes_of_people_are_refused(self, server: Any, body: Any) -> None:
         client = server.client(server.key())
-        server.person(f"Changed {time.time_ns()}", "viewer", PASSWORD)
+        server.person(unique("Changed"), "viewer", PASSWORD)
         person = client.get("/api/v1/people").json()["items"][0]
         assert client.patch(f"/api/v1/people/{person['id']}", json=body).status_code == 422
         assert client.get(f"/api/v1/people/{person['id']}").json() == person
