@@ -30,7 +30,9 @@ MARK = "TESTS_KEPT_BY"
 PROC = Path("/proc")
 PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36
 IN_ORDER = 6.0  # s that an interrupted run may take to end by itself
-BY_ITSELF = 60.0  # s in which what a finished run has started ends by itself; on a busy computer a fork server takes some
+BY_ITSELF = (
+    60.0  # s in which what a finished run has started ends by itself; on a busy computer a fork server takes some
+)
 # PostgreSQL waits for its clients at SIGTERM and ends at once at SIGQUIT.
 WAYS = ((signal.SIGTERM, 3.0), (signal.SIGQUIT, 2.0), (signal.SIGKILL, 3.0))
 

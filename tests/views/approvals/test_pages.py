@@ -115,7 +115,7 @@ class TestInABrowser:
         expect(page.locator("main")).to_contain_text("All that awaited approval for tool 4 is approved")
         assert {shop.correction(n)["status"] for n in (first, second)} == {"pending"}
 
-    @pytest.mark.parametrize("width", [800, 1280])
+    @pytest.mark.parametrize("width", [800, pytest.param(1280, marks=pytest.mark.long)])
     def test_everything_is_large_enough_for_a_finger(
         self, shop: Shop, operator: Person, page: Page, width: int
     ) -> None:

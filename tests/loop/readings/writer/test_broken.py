@@ -22,6 +22,8 @@ from tests.loop.readings.load import Sender, all_at_once, scattered
 from tests.loop.readings.record import history, must_be_stored, must_hold, must_replay, rows
 from tests.shop import PARAMETERS, Shop
 
+pytestmark = pytest.mark.own_server  # it is stopped, and its database made to fail
+
 WRITERS = "FROM pg_stat_activity WHERE application_name = 'inband-readings' AND datname = current_database()"
 
 
@@ -44,15 +46,20 @@ def at_work(senders: list[Sender], disturb: Callable[[], None]) -> list[Sender]:
         working = pool.submit(all_at_once, senders, stop)
         try:
             disturb()
-            before = [len(sender.answers) for sender in senders]
-            deadline = time.monotonic() + 30
-            while any(len(s.answers) <= count for s, count in zip(senders, before, strict=True)):
-                assert time.monotonic() < deadline, "not everybody is served again"
-                assert not working.done(), working.result()
-                time.sleep(0.02)
+            until_answered(senders, working)
         finally:
             stop.set()
         return working.result(60)
+
+
+def until_answered(senders: list[Sender], working: Future[Any] | None = None) -> None:
+    """Wait until each of them has got one more answer."""
+    before = [len(sender.answers) for sender in senders]
+    deadline = time.monotonic() + 60
+    while any(len(s.answers) <= count for s, count in zip(senders, before, strict=True)):
+        assert time.monotonic() < deadline, "not everybody is served"
+        assert working is None or not working.done(), working and working.result()
+        time.sleep(0.02)
 
 
 def nothing_lost_or_doubled(shop: Shop, senders: list[Sender]) -> None:
@@ -66,26 +73,28 @@ def nothing_lost_or_doubled(shop: Shop, senders: list[Sender]) -> None:
 
 
 class TestServer:
-    def test_killed_under_load_again_and_again(self, shop: Shop, server: Server) -> None:
+    @pytest.mark.parametrize("kills", [1, pytest.param(6, marks=pytest.mark.long)])
+    def test_killed_under_load_again_and_again(self, shop: Shop, server: Server, kills: int) -> None:
         chance = random.Random(3)
         senders = crew(shop, server)
 
         def disturb() -> None:
-            for _kill in range(6):
-                time.sleep(chance.uniform(0.2, 0.6))
+            for _kill in range(kills):
+                until_answered(senders)
+                time.sleep(chance.uniform(0.0, 0.4))  # at any moment
                 server.kill()
                 server.restart()
 
         at_work(senders, disturb)
         nothing_lost_or_doubled(shop, senders)
-        assert sum(sender.again for sender in senders) >= 6
+        assert sum(sender.again for sender in senders) >= kills
         assert sum(sender.repeated for sender in senders) < sum(sender.again for sender in senders)
 
     def test_ended_in_order_under_load_it_answers_what_it_has_taken(self, shop: Shop, server: Server) -> None:
         senders = crew(shop, server)
 
         def disturb() -> None:
-            time.sleep(0.5)
+            until_answered(senders)
             assert server.stop() == 0
             server.restart()
 
@@ -118,11 +127,10 @@ class TestServer:
                 f"POST /api/v1/readings HTTP/1.1\r\nHost: {host}\r\nAuthorization: Bearer {key}\r\n"
                 f'Content-Length: 500\r\n\r\n{{"characteristic": "{shop.characteristic}", "measured": 40.0}}'.encode()
             )
-            time.sleep(0.1)
         assert shop.read(0.0)["sequence"] == 1
 
 
-def until(condition: Callable[[], object], seconds: float = 15) -> None:
+def until(condition: Callable[[], object], seconds: float = 60) -> None:
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "it did not come to that"
@@ -130,7 +138,8 @@ def until(condition: Callable[[], object], seconds: float = 15) -> None:
 
 
 class TestConnection:
-    def test_cut_off_by_the_database_again_and_again(self, shop: Shop, server: Server) -> None:
+    @pytest.mark.parametrize("cuts", [8, pytest.param(40, marks=pytest.mark.long)])
+    def test_cut_off_by_the_database_again_and_again(self, shop: Shop, server: Server, cuts: int) -> None:
         chance = random.Random(4)
         senders = crew(shop, server)
         cut = 0
@@ -138,12 +147,11 @@ class TestConnection:
 
             def disturb() -> None:
                 nonlocal cut
-                for _cut in range(40):
-                    time.sleep(chance.uniform(0.01, 0.1))
+                while cut < cuts:
+                    time.sleep(chance.uniform(0.01, 0.1))  # at any moment
                     cut += len(connection.execute(f"SELECT pg_terminate_backend(pid) {WRITERS}").fetchall())
 
             at_work(senders, disturb)
-        assert cut > 20
         nothing_lost_or_doubled(shop, senders)
         assert sum(sender.again for sender in senders) == 0, "the server was there all the time"
 
@@ -235,12 +243,10 @@ class TestDatabase:
             assert int(problem.headers["retry-after"]) > 0
             assert problem.json()["type"] == "urn:inband:problem:database-away"
             assert "Nothing of this request was stored" in problem.json()["detail"]
-        # Who comes later is not kept waiting, however many they are.
-        begun = time.monotonic()
+        # Who comes later is not kept waiting, however many they are: each in its turn would take minutes.
         with ThreadPoolExecutor(20) as pool:
             answers = [pool.submit(push, shop, key=f"w{number}") for number in range(20)]
-            assert {answer.result().status_code for answer in answers} == {503}
-        assert time.monotonic() - begun < 4
+            assert {answer.result(40).status_code for answer in answers} == {503}
         assert shop.machine_client.get("/api/v1/alarms").status_code == 503
         assert shop.server.client().get("/health/ready").status_code == 503
         assert shop.server.client().get("/health/live").status_code == 200
@@ -271,7 +277,7 @@ class TestDatabase:
         assert [reading["key"] for reading in history(away.url, shop.characteristic)] == ["k"]
         must_hold(away.url)
 
-    @pytest.mark.parametrize("batch", [False, True])
+    @pytest.mark.parametrize("batch", [False, pytest.param(True, marks=pytest.mark.long)])
     def test_cut_off_after_the_commit_it_is_not_done_again(self, shop: Shop, away: EmbeddedServer, batch: bool) -> None:
         """A commit that waits for a standby has happened here; cut off now, nobody hears of it."""
         with psycopg.connect(away.url, autocommit=True) as connection:

@@ -73,7 +73,7 @@ def store(database: Database, batch: list[dict[str, Any]]) -> int:
     return sum(isinstance(outcome, ColumnarReadings) for outcome in outcomes)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3))])
 def test_as_columns_is_as_one_by_one(server: Server, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     chance = random.Random(seed)
     (one, names), (other, others) = twin(server), twin(server)

@@ -78,7 +78,7 @@ class Forgetful(Twin):
         run(push())
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3))])
 def test_readings_are_decided_from_memory_as_if_all_were_loaded(server: Server, seed: int) -> None:
     twins = [Twin(server), Forgetful(server)]
     chance = random.Random(seed)

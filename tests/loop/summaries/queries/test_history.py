@@ -23,6 +23,8 @@ from bench.readings import fill
 from tests.conftest import Server
 from tests.shop import Shop
 
+pytestmark = pytest.mark.own_server  # very many readings that no machine has sent
+
 COUNT = 2 * BLOCK + 77
 
 

@@ -26,6 +26,8 @@ from bench.readings import fill
 from tests.conftest import Server
 from tests.shop import Shop
 
+pytestmark = pytest.mark.own_server  # very many readings that no machine has sent
+
 COUNT = 200_123
 BEGUN = datetime(2026, 1, 5, 6, tzinfo=UTC)  # the generator's; one reading a second
 
