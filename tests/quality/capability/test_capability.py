@@ -11,17 +11,8 @@ from app.quality.capability import verdict_queries
 from app.quality.capability.actions import JOB
 from app.quality.capability.verdict_queries import Verdict, verdicts_by_characteristic
 from tests.conftest import Server
+from tests.quality.closed_loop import cut, scatter
 from tests.shop import Person, Shop
-
-
-def push(shop: Shop, values: list[float], characteristic: str | None = None) -> None:
-    """Readings that deviate by so many µm, at once."""
-    body = [
-        {"characteristic": characteristic or shop.characteristic, "measured": round(40 + value / 1000, 6)}
-        for value in values
-    ]
-    answer = shop.admin.post("/api/v1/readings/batch", json=body)
-    assert answer.status_code == 201, answer.text
 
 
 def of(shop: Shop, query: str = "last=all", characteristic: str | None = None, status: int = 200) -> Any:
@@ -35,9 +26,9 @@ def quiet(count: int, seed: int = 1, sigma: float = 0.9, mean: float = 0.0) -> l
 
 def test_by_hand(shop: Shop) -> None:
     """-2, -1, 0, 1, 2 µm by turns, 20 of each: mean 0, s^2 = 2 x 100/99; limits ±8 µm."""
-    shop.add("by-hand", mode="measure_only", tool_memory=0)
-    push(shop, [-2.0, -1.0, 0.0, 1.0, 2.0] * 20, "by-hand")
-    found = of(shop, characteristic="by-hand")
+    key = shop.another("by-hand", mode="measure_only", tool_memory=0)
+    shop.push([-2.0, -1.0, 0.0, 1.0, 2.0] * 20, key)
+    found = of(shop, characteristic=key)
     s = (2 * 100 / 99) ** 0.5
     assert found["readings"] == 100
     assert found["sigma_overall"] * 1000 == pytest.approx(s)
@@ -46,7 +37,7 @@ def test_by_hand(shop: Shop) -> None:
     # Moving ranges: 1, 1, 1, 1 and from 2 to -2 4; 80 of 1 and 19 of 4 over 99.
     assert found["sigma_within"] * 1000 == pytest.approx((80 + 19 * 4) / 99 / 1.1283791671)
     assert (found["outside"], found["ppm_observed"]["total"], found["compensated"]) == (0, 0.0, False)
-    upper = of(shop, "last=all&side=upper", "by-hand")
+    upper = of(shop, "last=all&side=upper", key)
     assert (upper["lower_limit"], upper["cp"], upper["ppk"]["method"]) == (None, None, "noncentral_t")
 
 
@@ -54,32 +45,33 @@ def test_what_too_few_readings_carry(shop: Shop) -> None:
     nothing = of(shop)
     assert (nothing["readings"], nothing["ppk"], nothing["stable"], nothing["quote"]) == (0, None, None, "none")
     assert "20 are missing" in nothing["refused"]
-    push(shop, quiet(1))
+    shop.push(quiet(1))
     assert "19 are missing" in of(shop)["refused"]
-    push(shop, quiet(40))
+    shop.push(quiet(40))
     some = of(shop)
     assert some["ppk"] is not None
     assert some["in_time"] is None
     assert any("Fewer than 100" in each for each in some["cautions"])
-    shop.add("equal", mode="measure_only", tool_memory=0)
-    push(shop, [1.0] * 60, "equal")
-    equal = of(shop, characteristic="equal")
+    equal = shop.another("equal", mode="measure_only", tool_memory=0)
+    shop.push([1.0] * 60, equal)
+    equal = of(shop, characteristic=equal)
     assert "All values are the same" in equal["refused"]
     assert [each["p_value"] for each in equal["normality"]] == [None, None]
 
 
-def test_what_is_not_normal_says_whether_percentiles_carry_it(server: Server, shop: Shop) -> None:
-    for key, count in (("skew-few", 80), ("skew", 400)):
-        shop.add(key, mode="measure_only", tool_memory=0, wear_limit=0.9)
-        push(shop, [value**2 for value in quiet(count, seed=count)], key)
-    few, more = (" ".join(of(shop, characteristic=key)["cautions"]) for key in ("skew-few", "skew"))
+def test_what_is_not_normal_says_whether_percentiles_carry_it(viewer: Person, shop: Shop) -> None:
+    keys = []
+    for count in (80, 400):
+        keys.append(shop.another("skew", mode="measure_only", tool_memory=0, wear_limit=0.9))
+        shop.push([value**2 for value in quiet(count, seed=count)], keys[-1])
+    few, more = (" ".join(of(shop, characteristic=key)["cautions"]) for key in keys)
     assert "too few for percentiles (80 of 100)" in few
     assert "take the percentile method" not in few
-    assert of(shop, characteristic="skew")["quote"] == "percentile"
+    assert of(shop, characteristic=keys[1])["quote"] == "percentile"
     assert "hardly more than the smallest and the largest" in more
-    sections = shop.call("GET", "/characteristics/skew/report.json?last=all&section=capability")["sections"]
+    sections = shop.call("GET", f"/characteristics/{keys[1]}/report.json?last=all&section=capability")["sections"]
     assert "hardly more than the smallest" in " ".join(sections[0]["warnings"])
-    page = Person(server, "viewer").open("/characteristics/skew/capability?last=all")
+    page = viewer.open(f"/characteristics/{keys[1]}/capability?last=all")
     assert page.count("hardly more than the smallest") == 1
 
 
@@ -89,22 +81,22 @@ def test_a_number_of_readings_that_is_none_is_told_in_words(shop: Shop) -> None:
 
 
 def test_excluded_readings_and_probe_faults_are_named_and_left_out(shop: Shop) -> None:
-    shop.add("named", mode="measure_only", tool_memory=0)
-    push(shop, [*quiet(60), 7.9, 1500.0], "named")
-    shop.call("POST", "/readings/named/61/exclude", 200, reason="chip under the stylus")
-    found = of(shop, characteristic="named")
+    key = shop.another("named", mode="measure_only", tool_memory=0)
+    shop.push([*quiet(60), 7.9, 1500.0], key)
+    shop.call("POST", f"/readings/{key}/61/exclude", 200, reason="chip under the stylus")
+    found = of(shop, characteristic=key)
     assert (found["readings"], found["excluded"], found["probe_faults"]) == (60, [61], [62])
     assert found["sigma_overall"] < 0.0015
 
 
 def test_readings_far_from_all_others_are_named_counted_and_kept_out_of_the_picture(shop: Shop) -> None:
-    shop.add("far", mode="measure_only", tool_memory=0)
-    push(shop, [*quiet(120), 250.0, *quiet(30, seed=2), -180.0], "far")
-    found = of(shop, characteristic="far")
+    key = shop.another("far", mode="measure_only", tool_memory=0)
+    shop.push([*quiet(120), 250.0, *quiet(30, seed=2), -180.0], key)
+    found = of(shop, characteristic=key)
     assert (found["far"], found["readings"], found["outside"]) == ([121, 152], 152, 2)
     assert found["ppk"]["value"] < 0.3
     assert any("Readings 121, 152 lie far from all others (up to +250.0 µm)" in each for each in found["cautions"])
-    figure = shop.call("GET", "/characteristics/far/figures/capability?last=all")
+    figure = shop.call("GET", f"/characteristics/{key}/figures/capability?last=all")
     low, high = figure["layout"]["xaxis"]["range"]
     assert -20 < low < high < 20
     assert sum(figure["data"][0]["y"]) == 150
@@ -113,16 +105,16 @@ def test_readings_far_from_all_others_are_named_counted_and_kept_out_of_the_pict
 
 
 def test_every_part_is_judged_by_the_tolerance_in_force(shop: Shop) -> None:
-    shop.add("changed", mode="measure_only", tool_memory=0)
-    push(shop, [6.0, -6.0, 7.0] * 10, "changed")
+    key = shop.another("changed", mode="measure_only", tool_memory=0)
+    shop.push([6.0, -6.0, 7.0] * 10, key)
     shop.call(
         "PATCH",
-        "/characteristics/changed",
+        f"/characteristics/{key}",
         parameters={"target": 40.0, "tolerance_width": 0.01, "averaging_limit": None},
         reason="new drawing",
     )
-    push(shop, [6.0, *quiet(29)], "changed")
-    found = of(shop, characteristic="changed")
+    shop.push([6.0, *quiet(29)], key)
+    found = of(shop, characteristic=key)
     assert [(each["half"], each["readings"]) for each in found["versions"]] == [(0.008, 30), (0.005, 30)]
     assert found["upper_limit"] == 0.005
     assert found["outside"] == 1, "only the one that was judged by the narrow tolerance"
@@ -131,12 +123,7 @@ def test_every_part_is_judged_by_the_tolerance_in_force(shop: Shop) -> None:
 
 def test_a_compensated_process_three_ways(shop: Shop) -> None:
     """Wear 0.2 µm a part, scatter 0.5 µm, corrected at once: without corrections the tool runs out of its tolerance."""
-    rng, offset, known = Random(3), 0.0, 0
-    for part in range(300):
-        answer = shop.read(round(0.2 * part + rng.gauss(0, 0.5) + 1000 * offset, 4), correction_in_effect=known)
-        if answer["correction"]:
-            offset += answer["correction"]["amount"]
-            known = answer["correction"]["number"]
+    cut(shop, scatter(300, seed=3, sigma=0.5, wear=0.2), delay=0)
     found = of(shop)
     without = found["without"]
     assert found["compensated"]
@@ -152,55 +139,54 @@ def test_a_compensated_process_three_ways(shop: Shop) -> None:
 
 
 def test_the_model_in_time_and_which_number_it_allows(shop: Shop) -> None:
-    shop.add("drifting", mode="measure_only", tool_memory=0)
-    push(shop, [value + 0.02 * place for place, value in enumerate(quiet(250))], "drifting")
-    found = of(shop, characteristic="drifting")
+    drifting = shop.another("drifting", mode="measure_only", tool_memory=0)
+    shop.push([value + 0.02 * place for place, value in enumerate(quiet(250))], drifting)
+    found = of(shop, characteristic=drifting)
     assert (found["in_time"]["model"], found["in_time"]["location"], found["stable"]) == ("C3", "systematic", False)
     assert found["quote"] in {"ppk", "percentile"}
-    shop.add("steady", mode="measure_only", tool_memory=0)
-    push(shop, quiet(250, seed=5), "steady")
-    found = of(shop, characteristic="steady")
+    steady = shop.another("steady", mode="measure_only", tool_memory=0)
+    shop.push(quiet(250, seed=5), steady)
+    found = of(shop, characteristic=steady)
     assert (found["in_time"]["model"], found["stable"], found["quote"]) == ("A1", True, "cpk")
     assert "Cp and Cpk may be reported" in found["in_time"]["means"]
 
     # Heavy tails: the mean and the scatter hold, yet a rule fires more often than chance explains. The model says no other
     # than the verdict of stability and the index named to be quoted.
-    shop.add("tails", mode="measure_only", tool_memory=0)
+    tails = shop.another("tails", mode="measure_only", tool_memory=0)
     rng = Random(2)
-    push(shop, [round(rng.choice((-1, 1)) * rng.expovariate(1 / 0.6), 3) for _ in range(250)], "tails")
-    found = of(shop, characteristic="tails")
+    shop.push([round(rng.choice((-1, 1)) * rng.expovariate(1 / 0.6), 3) for _ in range(250)], tails)
+    found = of(shop, characteristic=tails)
     assert (found["in_time"]["model"], found["stable"], found["quote"]) == ("A2", False, "percentile")
     # Two questions, two names: the run rules speak against it, the model in time does not; the caution says which.
     assert (found["in_control"], found["constant_in_time"]) == (False, True)
     assert found["stability"].startswith("Not in control")
     assert "the process is not in control (run rules). Ppk" in found["cautions"][0]
     assert "report Ppk by percentiles, not Cp and Cpk" in found["in_time"]["means"]
-    page = shop.admin.get("/characteristics/tails/capability?last=all").text
+    page = shop.admin.get(f"/characteristics/{tails}/capability?last=all").text
     assert found["in_time"]["means"] in page
-    report = shop.admin.get("/characteristics/tails/report?section=capability&last=all").text
+    report = shop.admin.get(f"/characteristics/{tails}/report?section=capability&last=all").text
     assert found["in_time"]["means"] in report
 
 
 def test_which_readings(shop: Shop) -> None:
-    shop.add("chosen", mode="measure_only", tool_memory=0)
-    push(shop, quiet(80), "chosen")
-    assert of(shop, "last=30", "chosen")["first_sequence"] == 51
-    assert of(shop, "", "chosen")["readings"] == 80
-    assert of(shop, "from=2001-01-01T00:00:00Z&to=2001-01-02T00:00:00Z", "chosen")["readings"] == 0
+    key = shop.another("chosen", mode="measure_only", tool_memory=0)
+    shop.push(quiet(80), key)
+    assert of(shop, "last=30", key)["first_sequence"] == 51
+    assert of(shop, "", key)["readings"] == 80
+    assert of(shop, "from=2001-01-01T00:00:00Z&to=2001-01-02T00:00:00Z", key)["readings"] == 0
     for wrong in ("last=0", "last=-3", "side=left", "confidence=1", "confidence=nan", "last=x", "from=yesterday"):
-        of(shop, wrong, "chosen", 422)
-    of(shop, "from=2026-01-02T00:00:00Z&to=2026-01-01T00:00:00Z", "chosen", 422)
-    of(shop, "last=999999999999999999", "chosen")
+        of(shop, wrong, key, 422)
+    of(shop, "from=2026-01-02T00:00:00Z&to=2026-01-01T00:00:00Z", key, 422)
+    of(shop, "last=999999999999999999", key)
     shop.call("GET", "/characteristics/nobody/capability", 404)
 
 
 @pytest.mark.parametrize("picture", ["histogram", "probability"])
 def test_figures_have_limits_and_every_reading(shop: Shop, picture: str) -> None:
-    key = f"drawn-{picture}"
-    shop.add(key, mode="measure_only", tool_memory=0)
+    key = shop.another("drawn", mode="measure_only", tool_memory=0)
     path = f"/characteristics/{key}/figures/capability?picture={picture}"
     assert shop.call("GET", path)["data"] == []
-    push(shop, quiet(200), key)
+    shop.push(quiet(200), key)
     figure = shop.call("GET", path)
     assert [shape["x0"] for shape in figure["layout"]["shapes"]][:2] == [-8.0, 8.0]
     (drawn, *_lines) = figure["data"]
@@ -223,9 +209,8 @@ def judge(server: Server, key: str) -> None:
 @pytest.mark.parametrize("stored", [False, True])
 @pytest.mark.parametrize(("shape", "quote"), [("quiet", "cpk"), ("jump", "percentile"), ("few", "none")])
 def test_overview_and_page_say_the_same(server: Server, shop: Shop, shape: str, quote: str, stored: bool) -> None:
-    key = f"same-{shape}-{int(stored)}"
-    shop.add(key, mode="measure_only", tool_memory=0)
-    push(shop, {"quiet": quiet(200), "jump": [*([7.9] * 30), *quiet(200, seed=9)], "few": quiet(5)}[shape], key)
+    key = shop.another("same", mode="measure_only", tool_memory=0)
+    shop.push({"quiet": quiet(200), "jump": [*([7.9] * 30), *quiet(200, seed=9)], "few": quiet(5)}[shape], key)
     if stored:
         judge(server, key)
     told, found = of(shop, "", key), verdict_for_overview(server, key).of
@@ -238,74 +223,74 @@ def test_overview_and_page_say_the_same(server: Server, shop: Shop, shape: str, 
 
 
 def test_the_overview_keeps_the_last_verdict_that_could_be_quoted(server: Server, shop: Shop) -> None:
-    shop.add("broke", mode="measure_only", tool_memory=0)
-    push(shop, [*quiet(120, seed=9), 250.0], "broke")  # an edge broke: one part lies far off
-    told = of(shop, "", "broke")
+    key = shop.another("broke", mode="measure_only", tool_memory=0)
+    shop.push([*quiet(120, seed=9), 250.0], key)  # an edge broke: one part lies far off
+    told = of(shop, "", key)
     assert (told["quote"], told["quoted"], told["why_none"]) == ("none", None, "a reading lies far from all others")
     assert told["cautions"][0] == "Do not report an index: a reading lies far from all others."
-    found = verdict_for_overview(server, "broke")
+    found = verdict_for_overview(server, key)
     assert (found.of.readings, found.of.last, found.now) == (120, 120, "far_off")
     assert found.of.value is not None
     assert found.of.value > 0.5, "not that of the broken edge"
     assert found.of.last_at is not None
 
 
-def test_it_is_kept_whatever_the_reason_and_until_the_tolerance_changes(server: Server, shop: Shop) -> None:
-    shop.add("kept", mode="measure_only", tool_memory=0)
-    push(shop, quiet(60), "kept")
-    judge(server, "kept")
-    first = verdict_for_overview(server, "kept")
-    push(shop, [0.0] * 100, "kept")  # the probe's cable is loose: more than half of the readings are equal
+def test_it_is_kept_whatever_the_reason_and_until_the_tolerance_changes(
+    server: Server, viewer: Person, shop: Shop
+) -> None:
+    key = shop.another("kept", mode="measure_only", tool_memory=0)
+    shop.push(quiet(60), key)
+    judge(server, key)
+    first = verdict_for_overview(server, key)
+    shop.push([0.0] * 100, key)  # the probe's cable is loose: more than half of the readings are equal
     for stored in (False, True):
         if stored:
-            judge(server, "kept")
-        found = verdict_for_overview(server, "kept")
+            judge(server, key)
+        found = verdict_for_overview(server, key)
         assert (found.of.value, found.of.last, found.now) == (first.of.value, 60, "unresolved")
-    assert "since then: readings too coarse" in Person(server, "viewer").open(f"/overview?machine={shop.machine}")
-    shop.call("PATCH", "/characteristics/kept", parameters={"tolerance_width": 0.03}, reason="drawing B")
-    push(shop, [0.0], "kept")
+    assert "since then: readings too coarse" in viewer.open(f"/overview?machine={shop.machine}")
+    shop.call("PATCH", f"/characteristics/{key}", parameters={"tolerance_width": 0.03}, reason="drawing B")
+    shop.push([0.0], key)
     for stored in (False, True):
         if stored:
-            judge(server, "kept")
-        found = verdict_for_overview(server, "kept")
+            judge(server, key)
+        found = verdict_for_overview(server, key)
         assert (found.of.value, found.of.why, found.now) == (None, "unresolved", None), "that was another tolerance"
 
 
 def test_a_stored_verdict_is_shown_only_as_long_as_it_may_be(server: Server, shop: Shop) -> None:
-    shop.add("aging", mode="measure_only", tool_memory=0)
-    push(shop, quiet(100), "aging")
-    judge(server, "aging")
+    key = shop.another("aging", mode="measure_only", tool_memory=0)
+    shop.push(quiet(100), key)
+    judge(server, key)
 
     def waits() -> bool:
         with server.database.begin() as session:
-            return ("aging",) in [unit.key for unit in JOB.due(session)]
+            return (key,) in [unit.key for unit in JOB.due(session)]
 
     assert not waits()
-    push(shop, quiet(2, seed=3), "aging")
-    assert (verdict_for_overview(server, "aging").of.last, waits()) == (100, False), (
-        "two of a hundred change nothing yet"
-    )
-    push(shop, quiet(1, seed=4), "aging")
-    assert (verdict_for_overview(server, "aging").of.last, waits()) == (100, True)
-    push(shop, quiet(2, seed=5), "aging")
-    assert verdict_for_overview(server, "aging").of.last == 105, "worked out on the spot"
+    shop.push(quiet(2, seed=3), key)
+    assert (verdict_for_overview(server, key).of.last, waits()) == (100, False), "two of a hundred change nothing yet"
+    shop.push(quiet(1, seed=4), key)
+    assert (verdict_for_overview(server, key).of.last, waits()) == (100, True)
+    shop.push(quiet(2, seed=5), key)
+    assert verdict_for_overview(server, key).of.last == 105, "worked out on the spot"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(verdict_queries, "MOST_ON_THE_SPOT", 0)
-        assert verdict_for_overview(server, "aging").of.last == 100, "of too many at once what is stored, with its date"
+        assert verdict_for_overview(server, key).of.last == 100, "of too many at once what is stored, with its date"
         with server.database.begin() as session:
             never = verdicts_by_characteristic(session)[
                 characteristic_named(session, shop.characteristic).characteristic.id
             ]
         assert (never.of.value, never.of.why) == (None, "not_yet")
-    judge(server, "aging")
+    judge(server, key)
     assert not waits()
-    shop.call("POST", "/readings/aging/7/exclude", reason="chip under the stylus")
-    assert (verdict_for_overview(server, "aging").of.readings, waits()) == (104, True)
+    shop.call("POST", f"/readings/{key}/7/exclude", reason="chip under the stylus")
+    assert (verdict_for_overview(server, key).of.readings, waits()) == (104, True)
 
 
-def test_the_period_is_typed_as_people_write_it_and_stays_if_it_is_wrong(server: Server, shop: Shop) -> None:
-    push(shop, quiet(40))
-    viewer, path = Person(server, "viewer"), f"/characteristics/{shop.characteristic}/capability"
+def test_the_period_is_typed_as_people_write_it_and_stays_if_it_is_wrong(viewer: Person, shop: Shop) -> None:
+    shop.push(quiet(40))
+    path = f"/characteristics/{shop.characteristic}/capability"
     page = viewer.open(f"{path}?from=2020-01-01+06:00&to=2020-01-02&timezone=Europe/Belgrade")
     assert "20 are missing" in page
     assert 'value="2020-01-01T05:00"' in page, "by the plant's clock, UTC"
@@ -321,10 +306,10 @@ def test_the_period_is_typed_as_people_write_it_and_stays_if_it_is_wrong(server:
     viewer.open(f"{path}?last=0", 422)
 
 
-def test_the_page_greys_what_must_not_be_quoted(server: Server, shop: Shop) -> None:
-    shop.add("greyed", mode="measure_only", tool_memory=0)
-    push(shop, [value + 0.02 * place for place, value in enumerate(quiet(250))], "greyed")
-    page = Person(server, "viewer").open("/characteristics/greyed/capability")
+def test_the_page_greys_what_must_not_be_quoted(viewer: Person, shop: Shop) -> None:
+    key = shop.another("greyed", mode="measure_only", tool_memory=0)
+    shop.push([value + 0.02 * place for place, value in enumerate(quiet(250))], key)
+    page = viewer.open(f"/characteristics/{key}/capability")
     assert "Do not report Cp and Cpk" in page
     assert page.count("do not report") >= 2
     assert "No gauge study yet" in page

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from sqlalchemy.orm import Session
 
@@ -21,6 +21,7 @@ from app.quality.control_charts.downsampling import MOST_POINTS, STRETCHES, thin
 from app.quality.control_charts.queries import Charted, baseline_in_force, charted
 from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import View
+from tests.chance import examples
 from tests.quality.control_charts.rows import frozen
 from tests.shop import Shop
 
@@ -65,7 +66,7 @@ class By(NamedTuple):
     views: dict[Chart, View]
 
 
-FEWER = settings(max_examples=settings().max_examples // 10)  # for each baseline, and each reads the database
+FEW = examples(10)  # of each baseline, and each reads the database
 
 
 @pytest.fixture(params=BASELINES, ids=NAMES, scope="module")
@@ -81,7 +82,7 @@ def by(request: pytest.FixtureRequest, history: Shop) -> Iterator[By]:
         yield By(session, current, baseline, charted(session, current, baseline, Window(1, 400, 400)), views)
 
 
-@FEWER
+@FEW
 @given(cuts=st.lists(st.integers(1, 400), max_size=6))
 def test_streaming_equals_batch(by: By, cuts: list[int]) -> None:
     session, current, baseline, whole, _views = by
@@ -98,7 +99,7 @@ def test_streaming_equals_batch(by: By, cuts: list[int]) -> None:
     assert z == pytest.approx(whole.chart.z, abs=1e-9)
 
 
-@FEWER
+@FEW
 @given(first=st.integers(1, 400), last=st.integers(1, 400))
 def test_every_chart_is_the_same_through_any_window(by: By, first: int, last: int) -> None:
     session, current, baseline, _points, views = by

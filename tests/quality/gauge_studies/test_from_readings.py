@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Server
 from tests.quality.gauge_studies.test_studies import refused, send, single
 from tests.shop import Person, Shop
 
@@ -26,8 +25,7 @@ def probe(shop: Shop, count: int, sigma: float = 0.2, seed: int = 1) -> list[flo
     """Readings of one part, µm from the target, none of which corrects anything."""
     rng = Random(seed)
     values = [round(rng.gauss(0, sigma), 3) for _ in range(count)]
-    for value in values:
-        shop.read(value)
+    shop.push(values)
     return values
 
 
@@ -61,8 +59,7 @@ def test_values_are_those_that_decisions_use(shop: Shop) -> None:
     """With an empirical value of 3 µm a part of 40 mm is read as 40.003, and the measuring system as it is used says 40."""
     shop.call("PUT", f"/machines/{shop.machine}/averages/5", empirical_value=0.003, reason="against the CMM")
     sizes = [3.0, 3.2, 2.8, 3.1, 2.9] * 5
-    for size in sizes:
-        shop.read(size)
+    shop.push(sizes)
     study = take(shop, 1, 25)
     assert study["rows"] == [{"values": pytest.approx([round(40 + (size - 3) / 1000, 6) for size in sizes])}]
     assert study["bias"]["bias"] == pytest.approx(0.0, abs=1e-9)
@@ -75,7 +72,7 @@ def test_values_are_those_that_decisions_use(shop: Shop) -> None:
     assert touched["rows"] == [{"values": pytest.approx([40.0001, 39.9999])}]
 
 
-def test_an_empirical_value_that_changed_inside_the_study_is_seen(server: Server, shop: Shop) -> None:
+def test_an_empirical_value_that_changed_inside_the_study_is_seen(viewer: Person, shop: Shop) -> None:
     probe(shop, 10)
     shop.call("PUT", f"/machines/{shop.machine}/averages/5", empirical_value=0.002, reason="against the CMM")
     probe(shop, 10, seed=2)
@@ -83,7 +80,7 @@ def test_an_empirical_value_that_changed_inside_the_study_is_seen(server: Server
     assert study["settings"]["source"]["empirical_values"] == [{"from": 1, "value": 0.0}, {"from": 11, "value": 0.002}]
     said = "The empirical value changed inside this study (+0.0 µm from reading 1 on, +2.0 µm from reading 11 on)"
     assert study["caution"].startswith(said)
-    assert said in Person(server, "viewer").open(f"/gauges/{study['id']}")
+    assert said in viewer.open(f"/gauges/{study['id']}")
     assert take(shop, 11, 20)["caution"] is None
 
 
@@ -139,8 +136,7 @@ class TestZeroRange:
 
     def test_parts_that_scatter_more_decide_and_may_leave_no_room_below_r34(self, shop: Shop) -> None:
         rng = Random(5)
-        for _ in range(60):
-            shop.read(round(rng.gauss(0, 2.0), 3), correction_in_effect=None)
+        shop.push([round(rng.gauss(0, 2.0), 3) for _ in range(60)])
         study = send(shop, "type_one", single(), reference=40.0, characteristic=shop.characteristic)
         assert study["zero_range"]["zero_range"] > 0.004
         assert any("from part to part" in each for each in study["zero_range"]["reasoning"])

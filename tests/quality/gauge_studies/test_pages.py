@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.conftest import Server
 from tests.quality.gauge_studies.test_studies import aiag, send, single
 from tests.shop import Person, Shop
 
@@ -141,8 +140,7 @@ class TestPasted:
 
 class TestReadings:
     def test_repeated_probing_fills_the_grid(self, shop: Shop, operator: Person) -> None:
-        for value in [0.1, -0.2, 0.3, 0.0, -0.1] * 6:
-            shop.read(value)
+        shop.push([0.1, -0.2, 0.3, 0.0, -0.1] * 6)
         asked = form(shop, "type_one", do="readings", first="1", through="30", take="readings")
         page = operator.send("/gauges/new", 200, **asked)
         grid = {name: cell(page, name) for name in re.findall(r'<input name="(c_[0-9_]+)"', page)}
@@ -184,9 +182,8 @@ def test_a_way_from_capability_and_set_up_to_the_studies_and_back(shop: Shop, en
     engineer.open("/gauges?machine=nobody", 200)
 
 
-def test_who_sees_and_who_enters(shop: Shop, server: Server) -> None:
+def test_who_sees_and_who_enters(shop: Shop, viewer: Person, operator: Person) -> None:
     study = send(shop, "bias", single(), reference=40.0)
-    viewer, operator = Person(server, "viewer"), Person(server, "operator")
     assert f"/gauges/{study['id']}/correct" not in viewer.open(f"/gauges/{study['id']}")
     viewer.open("/gauges/new", 403)
     operator.open(f"/gauges/{study['id']}/correct", 403)

@@ -10,7 +10,7 @@ import pytest
 
 from app.quality.proof.cases import FOLDER
 from tests.conftest import Server
-from tests.shop import Person, Shop
+from tests.shop import Person, Shop, unique
 
 CASES = json.loads((FOLDER / "gauge.json").read_text())
 Rows = list[dict[str, Any]]
@@ -205,13 +205,14 @@ class TestHalfStudies:
 
 class TestKeeping:
     def test_sent_again_nothing_happens_twice(self, shop: Shop) -> None:
-        first = send(shop, "grr", aiag(), key="study-1")
-        assert send(shop, "grr", aiag(), 200, key="study-1") == first
-        send(shop, "grr", aiag(scale=2), 409, key="study-1")
+        key = unique("study")
+        first = send(shop, "grr", aiag(), key=key)
+        assert send(shop, "grr", aiag(), 200, key=key) == first
+        send(shop, "grr", aiag(scale=2), 409, key=key)
 
     def test_two_at_once_with_one_key_make_one_study(self, shop: Shop) -> None:
         with ThreadPoolExecutor(4) as pool:
-            given = {"kind": "grr", "machine": shop.machine, "gauge": "Probe", "rows": aiag(), "key": "twice"}
+            given = {"kind": "grr", "machine": shop.machine, "gauge": "Probe", "rows": aiag(), "key": unique("twice")}
             answers = list(
                 pool.map(lambda _n: shop.admin.post("/api/v1/gauge-studies", json=given).status_code, range(4))
             )
@@ -244,7 +245,7 @@ class TestKeeping:
         (change, *_rest) = shop.call("GET", f"/audit?subject=gauge-study/{study['id']}")["items"]
         assert change["after"]["rows"][0]["values"][0] == 0.3
 
-    def test_of_two_who_put_the_same_revision_right_the_second_is_told(self, server: Server, shop: Shop) -> None:
+    def test_of_two_who_put_the_same_revision_right_the_second_is_told(self, engineer: Person, shop: Shop) -> None:
         study = send(shop, "bias", single(), reference=40.0)
         path, given = f"/gauge-studies/{study['id']}", {"gauge": "P", "reference": 40.0, "reason": "typed wrongly"}
         with ThreadPoolExecutor(2) as pool:
@@ -254,7 +255,6 @@ class TestKeeping:
         told = next(answer.json() for answer in answers if answer.status_code == 409)
         assert "has made revision 2 meanwhile" in told["detail"]
         # On the page: what was typed stays, and whoever was told may store it all the same.
-        engineer = Person(server, "engineer")
         form: dict[str, Any] = {
             "gauge": "P",
             "reference": "40.0",

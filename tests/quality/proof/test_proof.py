@@ -3,8 +3,6 @@
 import asyncio
 import gc
 import json
-import subprocess
-import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +21,7 @@ from app.settings import Settings
 from app.web.templates import environment
 from tests import loops
 from tests.conftest import Server
+from tests.forked import inband
 from tests.shop import Person
 
 
@@ -130,7 +129,7 @@ class TestOncePerProcess:
             async with app.router.lifespan_context(app):
                 assert kept == [False]
                 started.set()
-                for _moment in range(200):
+                for _moment in range(1200):
                     if len(kept) == 2:
                         break
                     await asyncio.sleep(0.05)
@@ -153,12 +152,6 @@ class TestOncePerProcess:
         assert queries._begun is None
 
 
-def inband(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "app", *arguments], cwd=HOUSE, capture_output=True, text=True, timeout=120
-    )
-
-
 class TestCommand:
     def test_the_published_examples_come_out(self) -> None:
         done = inband("proof", "--json")
@@ -172,7 +165,7 @@ class TestCommand:
         described[0]["expected"]["averages_um"][2] = 4.626
         path = tmp_path / "examples.json"
         path.write_text(json.dumps(described), encoding="utf-8")
-        done = inband("proof", "--examples", str(path))
+        done = inband("proof", "--examples", path)
         assert done.returncode == 1
         assert "wrong averaging example of the measuring cycles" in done.stderr
         assert "1 not as published" in done.stderr
@@ -181,7 +174,7 @@ class TestCommand:
     def test_a_file_that_holds_no_examples_is_told(self, tmp_path: Path, text: str) -> None:
         path = tmp_path / "examples.json"
         path.write_text(text, encoding="utf-8")
-        done = inband("proof", "--examples", str(path))
+        done = inband("proof", "--examples", path)
         assert done.returncode == 1
         assert "no examples that can be read" in done.stderr
         assert "Traceback" not in done.stderr
@@ -193,8 +186,8 @@ def request_of(path: str) -> Request:
 
 
 class TestPage:
-    def test_it_shows_every_example_with_its_source(self, server: Server, page: Page) -> None:
-        Person(server, "viewer").sign_in(page)
+    def test_it_shows_every_example_with_its_source(self, viewer: Person, page: Page) -> None:
+        viewer.sign_in(page)
         page.get_by_role("link", name="Proof").click()
         expect(page.get_by_role("heading", level=1)).to_have_text("Proof")
         expect(page.get_by_role("status").filter(has_text="all as published")).to_be_visible()
