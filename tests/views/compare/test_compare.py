@@ -2,7 +2,6 @@
 
 from datetime import UTC, datetime, timedelta
 from html import unescape
-from typing import Any
 from urllib.parse import urlencode
 from zoneinfo import ZoneInfo
 
@@ -10,25 +9,21 @@ import pytest
 
 from app.language.times import in_zone
 from app.views.compare.series import begin_before
-from tests.shop import Shop
-from tests.views.set_up.test_setup_pages import PASSWORD, Browser
+from tests.shop import Person, Shop
 
 BERLIN = ZoneInfo("Europe/Berlin")
 
 
 @pytest.fixture(scope="module")
-def shop(server: Any) -> Shop:
+def compared(common_shop: Shop) -> Shop:
     """Two characteristics; of the first three readings by version 1, a tool change, and two by version 2."""
-    shop = Shop(server)
+    shop = common_shop
     shop.add(f"{shop.characteristic}-b", target=20.0, tolerance_width=0.032)
-    for deviation in (1.0, 2.0, 3.0):
-        shop.read(deviation)
+    shop.push([1.0, 2.0, 3.0])
     shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0, reason="new insert")
     shop.call("PATCH", f"/characteristics/{shop.characteristic}", parameters={"R33": 0.002}, reason="quieter probe")
-    for deviation in (-1.0, -2.0):
-        shop.read(deviation)
+    shop.push([-1.0, -2.0])
     shop.call("POST", "/readings", 201, characteristic=f"{shop.characteristic}-b", measured=20.008)
-    server.person("Vera", "viewer", PASSWORD)
     return shop
 
 
@@ -41,47 +36,44 @@ def words(shop: Shop, query: str) -> set[str]:
     return {note["text"] for note in shop.call("GET", f"/compare/figure?{query}")["layout"]["annotations"]}
 
 
-def test_characteristics_versions_tools_and_periods(shop: Shop) -> None:
-    one, two = shop.characteristic, f"{shop.characteristic}-b"
-    assert series(shop, f"of={one}&of={two}") == [[1, 2, 3, -1, -2], [8]]
-    assert series(shop, f"of={one}&of={two}&of_tolerance=true")[1] == [50], "of half the tolerance, 16 µm"
-    assert series(shop, f"of={one}&by=version") == [[1, 2, 3], [-1, -2]]
-    assert series(shop, f"of={one}&by=tool") == [[1, 2, 3], [-1, -2]]
-    assert series(shop, f"of={one}&by=period&last=2") == [[2, 3], [-1, -2]]
-    figure = shop.call("GET", f"/compare/figure?of={one}&of={two}")["layout"]
+def test_characteristics_versions_tools_and_periods(compared: Shop) -> None:
+    one, two = compared.characteristic, f"{compared.characteristic}-b"
+    assert series(compared, f"of={one}&of={two}") == [[1, 2, 3, -1, -2], [8]]
+    assert series(compared, f"of={one}&of={two}&of_tolerance=true")[1] == [50], "of half the tolerance, 16 µm"
+    assert series(compared, f"of={one}&by=version") == [[1, 2, 3], [-1, -2]]
+    assert series(compared, f"of={one}&by=tool") == [[1, 2, 3], [-1, -2]]
+    assert series(compared, f"of={one}&by=period&last=2") == [[2, 3], [-1, -2]]
+    figure = compared.call("GET", f"/compare/figure?of={one}&of={two}")["layout"]
     assert figure["yaxis"]["range"] == figure["yaxis2"]["range"], "one scale"
-    assert words(shop, f"of={one}&of={two}") >= {"±8\xa0µm", "±16\xa0µm"}
-    assert not words(shop, f"of={one}&of={two}&overlaid=true") & {"±8\xa0µm", "tolerance"}, "no limit of all"
-    assert "tolerance" in words(shop, f"of={one}&of={two}&overlaid=true&of_tolerance=true")
-    shop.call("GET", "/compare/figure?of=nobody", 404)
-    shop.call("GET", f"/compare/figure?of={one}&by=size", 422)
+    assert words(compared, f"of={one}&of={two}") >= {"±8\xa0µm", "±16\xa0µm"}
+    assert not words(compared, f"of={one}&of={two}&overlaid=true") & {"±8\xa0µm", "tolerance"}, "no limit of all"
+    assert "tolerance" in words(compared, f"of={one}&of={two}&overlaid=true&of_tolerance=true")
+    compared.call("GET", "/compare/figure?of=nobody", 404)
+    compared.call("GET", f"/compare/figure?of={one}&by=size", 422)
 
 
-def test_the_period_before_is_as_long_by_the_clock(server: Any, shop: Shop) -> None:
+def test_the_period_before_is_as_long_by_the_clock(viewer: Person, compared: Shop) -> None:
     def at(day: int) -> datetime:
         return datetime(2026, 10, day, tzinfo=BERLIN).astimezone(UTC)
 
     with in_zone(BERLIN):  # the clocks go back on the 25th
         assert begin_before(at(25), at(26)) == at(24)
         assert begin_before(at(26), at(27)) == at(25)
-    key = f"{shop.characteristic}-c"
-    shop.add(key)
+    key = compared.another("by-the-clock")
     begin = datetime(2026, 6, 2, 6, tzinfo=UTC)
     for deviation, moment in ((1.0, begin - timedelta(hours=3)), (2.0, begin), (3.0, begin + timedelta(hours=3))):
-        shop.read(deviation, key, measured_at=moment.isoformat())
+        compared.read(deviation, key, measured_at=moment.isoformat())
     until = begin + timedelta(hours=6)
-    assert series(shop, urlencode({"of": key, "by": "period", "from": begin, "to": until})) == [[1], [2, 3]]
-    viewer = Browser(server, "Vera")
-    viewer.get(f"/compare?of={key}&by=period&from=0001-01-01T00:00&to=9999-12-31T23:59")
-    viewer.get(f"/compare?of={key}&by=period&from=0002-01-01T00:00")
+    assert series(compared, urlencode({"of": key, "by": "period", "from": begin, "to": until})) == [[1], [2, 3]]
+    viewer.open(f"/compare?of={key}&by=period&from=0001-01-01T00:00&to=9999-12-31T23:59")
+    viewer.open(f"/compare?of={key}&by=period&from=0002-01-01T00:00")
 
 
-def test_the_statistics_of_each_stand_below(server: Any, shop: Shop) -> None:
-    viewer = Browser(server, "Vera")
-    text = unescape(viewer.get(f"/compare?of={shop.characteristic}&by=version"))
-    assert f"Seat {shop.characteristic}, version 1" in text
-    assert f"characteristics/{shop.characteristic}?first=4&through=5" in text
+def test_the_statistics_of_each_stand_below(viewer: Person, compared: Shop) -> None:
+    text = unescape(viewer.open(f"/compare?of={compared.characteristic}&by=version"))
+    assert f"Seat {compared.characteristic}, version 1" in text
+    assert f"characteristics/{compared.characteristic}?first=4&through=5" in text
     assert "+2.00" in text  # the mean of version 1, µm
     assert "−1.50" in text  # of version 2
-    assert "nobody" in viewer.get("/compare?of=nobody", 404)
-    assert "Nothing to compare yet" in viewer.get("/compare")
+    assert "nobody" in viewer.open("/compare?of=nobody", 404)
+    assert "Nothing to compare yet" in viewer.open("/compare")

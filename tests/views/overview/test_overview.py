@@ -5,24 +5,19 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Server
 from tests.shop import Shop
 
 SPREAD = ((1 + 0.3**2 + 1.4**2 + 0.6**2) / 4 * 24 / 23) ** 0.5
 
 
 @pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
-    shop = Shop(server)  # its first characteristic is left without readings
-    for key in ("wide", "narrow", "broken"):
+def ranking(common_shop: Shop) -> Shop:
+    """Four that were measured; the first characteristic is left without readings."""
+    shop = common_shop
+    step = (1.0, -1.0, 0.3, -0.3, 1.4, -1.4, 0.6, -0.6)
+    for key, scale, shift in (("wide", 5.0, 0.0), ("narrow", 1.5, 0.0), ("broken", 0.0, 0.0), ("equal", 0.0, 1.0)):
         shop.add(f"{shop.machine}-{key}", tool_memory=0, average_memory=0)
-    shop.add(f"{shop.machine}-equal", tool_memory=0, average_memory=0)
-    readings: list[tuple[str, float]] = []
-    for at in range(24):
-        step = (1.0, -1.0, 0.3, -0.3, 1.4, -1.4, 0.6, -0.6)[at % 8]
-        readings += [("wide", 5.0 * step), ("narrow", 1.5 * step), ("broken", 0.0), ("equal", 1.0)]
-    for key, micrometres in readings:
-        shop.read(micrometres, f"{shop.machine}-{key}")
+        shop.push([scale * step[at % 8] + shift for at in range(24)], f"{shop.machine}-{key}")
     shop.read(1500.0, f"{shop.machine}-narrow")  # a probe fault is no size of a part
     narrow = f"{shop.machine}-narrow"
     alarm = shop.call("GET", f"/alarms?state=active&machine={shop.machine}")["items"][0]["id"]
@@ -40,10 +35,10 @@ def ranked(shop: Shop, **query: Any) -> list[dict[str, Any]]:
     return [item | {"key": item["characteristic"].removeprefix(f"{shop.machine}-")} for item in items]
 
 
-def test_the_part_that_is_out_of_tolerance_comes_first_and_says_why(shop: Shop) -> None:
-    found = ranked(shop)
+def test_the_part_that_is_out_of_tolerance_comes_first_and_says_why(ranking: Shop) -> None:
+    found = ranked(ranking)
     assert len(found) == 5
-    assert [item["key"] for item in found] == ["broken", "narrow", "wide", "equal", shop.characteristic]
+    assert [item["key"] for item in found] == ["broken", "narrow", "wide", "equal", ranking.characteristic]
     broken, narrow, wide, *calm = ([reason["code"] for reason in item["reasons"]] for item in found)
     assert broken == ["outside", "alarm"], "24 equal readings and one out of tolerance carry no Ppk"
     assert narrow == ["alarm", "loud"], "two alarms within one shift; what is excluded calls no part oversize"
@@ -53,8 +48,7 @@ def test_the_part_that_is_out_of_tolerance_comes_first_and_says_why(shop: Shop) 
     assert found[0]["alarms_per_shift"] == pytest.approx(1.0)
 
 
-def test_the_alarm_load_is_that_of_the_days_in_which_the_parts_were_measured(server: Server) -> None:
-    shop = Shop(server)
+def test_the_alarm_load_is_that_of_the_days_in_which_the_parts_were_measured(shop: Shop) -> None:
     now = datetime.now(UTC)
     for days in (30, 20, 10, 2, 1):  # a machine hands in what it kept while it was offline
         shop.read(9.0, measured_at=(now - timedelta(days=days)).isoformat())
@@ -64,8 +58,8 @@ def test_the_alarm_load_is_that_of_the_days_in_which_the_parts_were_measured(ser
     assert item["alarms_per_shift"] == pytest.approx(2 / 21, abs=1e-3)
 
 
-def test_ppk_is_told_of_what_counts(shop: Shop) -> None:
-    by_key = {item["key"]: item for item in ranked(shop)}
+def test_ppk_is_told_of_what_counts(ranking: Shop) -> None:
+    by_key = {item["key"]: item for item in ranked(ranking)}
     assert by_key["wide"]["ppk"] == pytest.approx(8 / 3 / (5.0 * SPREAD), rel=1e-4)
     assert by_key["wide"]["readings"] == 24
     assert "not_capable" in [reason["code"] for reason in by_key["wide"]["reasons"]]
@@ -74,22 +68,22 @@ def test_ppk_is_told_of_what_counts(shop: Shop) -> None:
     assert by_key["narrow"]["ppk"] == pytest.approx(8 / 3 / (1.5 * SPREAD), rel=1e-4)
     # Equal ones have no spread; nothing was measured here at all.
     assert (by_key["equal"]["readings"], by_key["equal"]["ppk"]) == (24, None)
-    assert by_key[shop.characteristic]["ppk"] is None
+    assert by_key[ranking.characteristic]["ppk"] is None
 
 
-def test_it_can_be_ranked_by_one_number_and_read_page_by_page(shop: Shop) -> None:
-    by_ppk = ranked(shop, by="ppk")
+def test_it_can_be_ranked_by_one_number_and_read_page_by_page(ranking: Shop) -> None:
+    by_ppk = ranked(ranking, by="ppk")
     known = [item["ppk"] for item in by_ppk if item["ppk"] is not None]
     assert known == sorted(known)
     assert [item["ppk"] for item in by_ppk[len(known) :]] == [None] * (5 - len(known))
-    first = shop.call("GET", f"/overview?machine={shop.machine}&by=ppk&limit=3")
-    rest = shop.call("GET", f"/overview?machine={shop.machine}&by=ppk&limit=3&after={first['next']}")
+    first = ranking.call("GET", f"/overview?machine={ranking.machine}&by=ppk&limit=3")
+    rest = ranking.call("GET", f"/overview?machine={ranking.machine}&by=ppk&limit=3&after={first['next']}")
     assert rest["next"] is None
     assert [item["characteristic"] for item in first["items"] + rest["items"]] == [
         item["characteristic"] for item in by_ppk
     ]
 
 
-def test_a_machine_that_is_not_there_is_404(shop: Shop) -> None:
-    shop.call("GET", "/overview?machine=nowhere", 404)
-    shop.call("GET", "/overview?by=beauty", 422)
+def test_a_machine_that_is_not_there_is_404(ranking: Shop) -> None:
+    ranking.call("GET", "/overview?machine=nowhere", 404)
+    ranking.call("GET", "/overview?by=beauty", 422)

@@ -8,6 +8,8 @@ import pytest
 from tests.conftest import Server
 from tests.shop import Shop
 
+pytestmark = pytest.mark.own_server
+
 ODD = " 7/8 ?x=1&y #% ö.. "
 BEGIN = datetime.now(UTC).replace(microsecond=0) - timedelta(hours=3)
 

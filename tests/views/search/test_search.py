@@ -9,6 +9,8 @@ from playwright.sync_api import Page, expect
 from tests.conftest import Server
 from tests.shop import Person, Shop
 
+pytestmark = pytest.mark.own_server
+
 ODD = "../7 ?&#%<b> ö"
 
 

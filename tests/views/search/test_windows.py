@@ -6,7 +6,6 @@ import pytest
 from sqlalchemy import text
 
 from app.views.search.readings import FIRST_WINDOW, WIDER, WINDOWS
-from tests.conftest import Server
 from tests.shop import Shop
 from tests.views.search.test_reading_list import listed
 
@@ -26,9 +25,9 @@ ARRIVALS = [LAST - age for age in AGES]
 
 
 @pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
+def old(common_shop: Shop) -> Shop:
     """Readings of two characteristics that came at the same times, the first of them worn."""
-    shop = Shop(server)
+    shop = common_shop
     shop.add(f"{shop.characteristic}-b", tool_memory=0, average_memory=0)
     with shop.server.database.begin() as session:
         session.execute(
@@ -38,16 +37,16 @@ def shop(server: Server) -> Shop:
             SELECT c.machine_id, c.id, n, 40, 0, 0, 0, 0, at, at, 1, false, CASE WHEN n = 1 THEN 'wear' ELSE 'zero' END, 'none',
                 'within_zero_range', 'Windowed-' || n
             FROM characteristic c, unnest(CAST(:arrivals AS timestamptz[])) WITH ORDINALITY AS a(at, n)
-            WHERE c.key LIKE :keys
+            WHERE c.key IN (:key, :key || '-b')
             """),
-            {"keys": f"{shop.characteristic}%", "arrivals": ARRIVALS},
+            {"key": shop.characteristic, "arrivals": ARRIVALS},
         )
         session.execute(
             text("""
             UPDATE stream s SET sequence = :last, last_received_at = :at, last_measured_at = :at
-            FROM characteristic c WHERE c.key LIKE :keys AND s.characteristic_id = c.id
+            FROM characteristic c WHERE c.key IN (:key, :key || '-b') AND s.characteristic_id = c.id
             """),
-            {"keys": f"{shop.characteristic}%", "last": len(ARRIVALS), "at": LAST},
+            {"key": shop.characteristic, "last": len(ARRIVALS), "at": LAST},
         )
     return shop
 
@@ -56,25 +55,25 @@ def rows(shop: Shop, *numbers: int) -> list[tuple[str, int]]:
     return [(shop.characteristic + end, number) for number in numbers for end in ("", "-b")]
 
 
-def test_all_of_them_from_either_end(shop: Shop) -> None:
-    everything = rows(shop, *range(1, len(ARRIVALS) + 1))
-    assert listed(shop, machine=shop.machine) == everything
-    assert listed(shop, machine=shop.machine, order="newest") == everything[::-1]
+def test_all_of_them_from_either_end(old: Shop) -> None:
+    everything = rows(old, *range(1, len(ARRIVALS) + 1))
+    assert listed(old, machine=old.machine) == everything
+    assert listed(old, machine=old.machine, order="newest") == everything[::-1]
 
 
-def test_of_a_period_and_a_zone(shop: Shop) -> None:
+def test_of_a_period_and_a_zone(old: Shop) -> None:
     period = {"from": ARRIVALS[2].isoformat(), "to": ARRIVALS[-3].isoformat()}
-    within = rows(shop, *range(3, len(ARRIVALS) - 1))
-    assert listed(shop, machine=shop.machine, **period) == within
-    assert listed(shop, machine=shop.machine, order="newest", **period) == within[::-1]
-    assert listed(shop, machine=shop.machine, zone="wear", order="newest") == rows(shop, 1)[::-1]
+    within = rows(old, *range(3, len(ARRIVALS) - 1))
+    assert listed(old, machine=old.machine, **period) == within
+    assert listed(old, machine=old.machine, order="newest", **period) == within[::-1]
+    assert listed(old, machine=old.machine, zone="wear", order="newest") == rows(old, 1)[::-1]
     ages = {"from": "0001-01-01T00:00:00Z", "to": "9999-12-31T23:59:59Z"}
-    assert listed(shop, machine=shop.machine, zone="wear", **ages) == rows(shop, 1)
+    assert listed(old, machine=old.machine, zone="wear", **ages) == rows(old, 1)
 
 
-def test_parts_are_found_wherever_they_are(shop: Shop) -> None:
+def test_parts_are_found_wherever_they_are(old: Shop) -> None:
     def found(q: str) -> list[str]:
-        return [item["key"] for item in shop.call("GET", f"/search?q={q}")["items"] if item["kind"] == "part"]
+        return [item["key"] for item in old.call("GET", f"/search?q={q}")["items"] if item["kind"] == "part"]
 
     assert found("Windowed-1") == ["Windowed-1"], "the oldest, by its whole name"
     assert found("Windowed-0") == found("Wi") == []

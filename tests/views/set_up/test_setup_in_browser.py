@@ -1,32 +1,16 @@
 """Set-up in a real browser: the zone diagram draws while one types, by mouse-free hands."""
 
-import re
-from typing import Any
-
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.shop import Shop
+from tests.shop import Person, Shop, unique
 
 pytestmark = pytest.mark.browser
-PASSWORD = "correct horse battery"
-
-
-@pytest.fixture(scope="module")
-def shop(server: Any) -> Shop:
-    server.person("Eva", "engineer", PASSWORD)
-    return Shop(server)
 
 
 @pytest.fixture
-def engineer(page: Page, shop: Shop) -> Page:
-    page.goto("/sign-in?next=/setup/characteristics")
-    expect(page.locator("[name=name]")).to_be_focused()
-    page.keyboard.type("Eva")
-    page.keyboard.press("Tab")
-    page.keyboard.type(PASSWORD)
-    page.keyboard.press("Enter")
-    page.wait_for_url(re.compile(r"^http://[^/]+/setup/characteristics$"))
+def signed_in(page: Page, engineer: Person) -> Page:
+    engineer.sign_in(page)
     return page
 
 
@@ -36,8 +20,8 @@ def limit(page: Page, name: str, side: int = 1) -> str:
     return words.replace("\xa0", " ")
 
 
-def test_the_diagram_follows_the_typing(engineer: Page, shop: Shop) -> None:
-    page = engineer
+def test_the_diagram_follows_the_typing(signed_in: Page) -> None:
+    page = signed_in
     page.goto("/setup/characteristics/new")
     page.fill("[name=nominal]", "40")
     page.fill("[name=upper_deviation]", "0")
@@ -56,8 +40,8 @@ def test_the_diagram_follows_the_typing(engineer: Page, shop: Shop) -> None:
     assert page.locator(".limit.wrong").count() == 0
 
 
-def test_a_tolerance_class_becomes_deviations_when_the_field_is_left(engineer: Page, shop: Shop) -> None:
-    page = engineer
+def test_a_tolerance_class_becomes_deviations_when_the_field_is_left(signed_in: Page) -> None:
+    page = signed_in
     page.goto("/setup/characteristics/new")
     told = page.locator('.field[data-field="nominal"] .error')
     page.fill("[name=nominal]", "40 h")
@@ -74,9 +58,9 @@ def test_a_tolerance_class_becomes_deviations_when_the_field_is_left(engineer: P
 
 
 def test_a_refused_order_is_told_at_once_in_the_words_of_the_server(
-    engineer: Page, shop: Shop, complaints: list[str]
+    signed_in: Page, shop: Shop, complaints: list[str]
 ) -> None:
-    page = engineer
+    page = signed_in
     page.goto(f"/setup/characteristics/{shop.characteristic}")
     page.fill("[name=averaging_limit]", "0.009")
     told = page.locator('.field[data-field="averaging_limit"] .error')
@@ -102,24 +86,28 @@ def test_a_refused_order_is_told_at_once_in_the_words_of_the_server(
     assert shop.call("GET", f"/characteristics/{shop.characteristic}")["parameters"]["averaging_limit"] == 0.006
 
 
-def test_a_machine_and_its_key_by_keyboard_alone(engineer: Page, shop: Shop) -> None:
-    page = engineer
+def test_a_machine_and_its_key_by_keyboard_alone(signed_in: Page) -> None:
+    page = signed_in
     page.goto("/setup/machines/new")
     expect(page.locator("[name=key]")).to_be_focused()
-    page.keyboard.type("by-keyboard")
+    key = unique("by-keyboard")
+    page.keyboard.type(key)
     page.keyboard.press("Tab")
     page.keyboard.type("By keyboard")
     page.keyboard.press("Enter")
-    page.wait_for_url("**/setup/machines/by-keyboard?done=added")
+    page.wait_for_url(f"**/setup/machines/{key}?done=added")
     page.locator("#f-key-name").focus()
     page.keyboard.type("cell PC")
     page.keyboard.press("Enter")
     expect(page.locator(".secret")).to_contain_text("inband_")
 
 
-@pytest.mark.parametrize(("width", "height"), [(1280, 800), (800, 1280), (1920, 1080)])
-def test_nothing_hangs_over_the_edge(engineer: Page, shop: Shop, width: int, height: int) -> None:
-    page = engineer
+@pytest.mark.parametrize(
+    ("width", "height"),
+    [pytest.param(1280, 800, marks=pytest.mark.long), (800, 1280), pytest.param(1920, 1080, marks=pytest.mark.long)],
+)
+def test_nothing_hangs_over_the_edge(signed_in: Page, shop: Shop, width: int, height: int) -> None:
+    page = signed_in
     page.set_viewport_size({"width": width, "height": height})
     for path in (
         "/setup/characteristics",

@@ -2,14 +2,15 @@
 
 import re
 from html import unescape
-from typing import Any
 
 import httpx
 import pytest
 
-from tests.shop import Shop
+from app.loop.characteristics import actions as characteristics
+from app.loop.characteristics.schemas import CharacteristicIn
+from tests.conftest import Server
+from tests.shop import PARAMETERS, Person, Shop, unique
 
-PASSWORD = "correct horse battery"
 SERBIAN = "Седиште „лежаја” Ø40 <b>h6</b> & 'A'"
 FORM = {
     "nominal": "40",
@@ -35,44 +36,6 @@ FORM = {
 }
 
 
-class Browser:
-    """A signed-in browser without scripts: it sends the forms of pages as they are."""
-
-    def __init__(self, server: Any, name: str) -> None:
-        self.client: httpx.Client = server.client()
-        assert self.client.post("/sign-in", data={"name": name, "password": PASSWORD}).status_code == 303
-
-    def get(self, path: str, status: int = 200) -> str:
-        answer = self.client.get(path)
-        assert answer.status_code == status, f"{path}: {answer.status_code}"
-        return answer.text
-
-    def post(self, path: str, status: int = 303, /, **form: str | list[str]) -> httpx.Response:
-        csrf = re.search(r'name="csrf" value="([^"]+)"', self.get("/account"))
-        assert csrf
-        answer = self.client.post(path, data={"csrf": csrf[1], **form})
-        assert answer.status_code == status, f"{path}: {answer.status_code} {answer.text[:3000]}"
-        return answer
-
-
-@pytest.fixture(scope="module")
-def engineer(server: Any) -> Browser:
-    server.person("Eva", "engineer", PASSWORD)
-    return Browser(server, "Eva")
-
-
-@pytest.fixture(scope="module")
-def admin(server: Any) -> Browser:
-    server.person("Ada", "admin", PASSWORD)
-    return Browser(server, "Ada")
-
-
-@pytest.fixture(scope="module")
-def viewer(server: Any) -> Browser:
-    server.person("Vid", "viewer", PASSWORD)
-    return Browser(server, "Vid")
-
-
 def values(page: str) -> dict[str, str]:
     """Values of the inputs of a page."""
     found = {}
@@ -92,26 +55,27 @@ def errors(page: str) -> list[str]:
 
 
 class TestMachines:
-    def test_from_nothing_to_a_key_that_works(self, engineer: Browser, shop: Shop) -> None:
-        made = engineer.post("/setup/machines/new", key="bench-1", name=SERBIAN, control="fanuc")
-        assert made.headers["location"] == "/setup/machines/bench-1?done=added"
-        page = engineer.get(made.headers["location"])
+    def test_from_nothing_to_a_key_that_works(self, engineer: Person, shop: Shop) -> None:
+        key = unique("bench")
+        made = engineer.post("/setup/machines/new", key=key, name=SERBIAN, control="fanuc")
+        assert made.headers["location"] == f"/setup/machines/{key}?done=added"
+        page = engineer.open(made.headers["location"])
         assert "Added." in page
         assert SERBIAN in unescape(page)
         assert "<b>h6" not in page
-        shown = engineer.post("/setup/machines/bench-1/keys", 200, name="cell PC").text
+        shown = engineer.post(f"/setup/machines/{key}/keys", 200, name="cell PC").text
         secret = re.search(r"inband_[\w-]{43}", shown)
         assert secret
         assert "curl" in shown
-        assert secret[0] not in engineer.get("/setup/machines/bench-1"), "this once"
+        assert secret[0] not in engineer.open(f"/setup/machines/{key}"), "this once"
         machine = shop.server.client(secret[0])
-        assert machine.get("/api/v1/machines/bench-1").status_code == 200
-        number = re.search(r"/setup/machines/bench-1/keys/(\d+)/revoke", shown)
+        assert machine.get(f"/api/v1/machines/{key}").status_code == 200
+        number = re.search(rf"/setup/machines/{key}/keys/(\d+)/revoke", shown)
         assert number
         engineer.post(number[0])
-        assert machine.get("/api/v1/machines/bench-1").status_code == 401
+        assert machine.get(f"/api/v1/machines/{key}").status_code == 401
 
-    def test_the_curl_line_works_as_it_is_shown(self, engineer: Browser, shop: Shop) -> None:
+    def test_the_curl_line_works_as_it_is_shown(self, engineer: Person, shop: Shop) -> None:
         shown = unescape(engineer.post(f"/setup/machines/{shop.machine}/keys", 200, name="x").text)
         secret = re.search(r"Bearer (inband_[\w-]+)", shown)
         body = re.search(r"-d '(\{.*?\})'", shown)
@@ -123,40 +87,39 @@ class TestMachines:
         assert answer.status_code == 201
         assert answer.json()["zone"] == "zero"
 
-    def test_what_was_typed_is_not_lost(self, engineer: Browser) -> None:
+    def test_what_was_typed_is_not_lost(self, engineer: Person) -> None:
         page = engineer.post("/setup/machines/new", 422, key="Bad Key", name=SERBIAN, control="fanuc").text
         assert values(page).items() >= {"key": "Bad Key", "name": SERBIAN, "control": "fanuc"}.items()
         assert errors(page)[0].startswith("Must be a key of 1 to 64 characters")
 
-    def test_change(self, engineer: Browser, shop: Shop) -> None:
+    def test_change(self, engineer: Person, shop: Shop) -> None:
         engineer.post(f"/setup/machines/{shop.machine}", key=shop.machine, name="Renamed", control="other")
         assert shop.call("GET", f"/machines/{shop.machine}")["name"] == "Renamed"
         page = engineer.post(f"/setup/machines/{shop.machine}", 422, key=shop.machine, name="x" * 201, control="other")
         assert "At most 200" in str(errors(page.text)) or "at most 200" in str(errors(page.text))
 
-    def test_lists(self, viewer: Browser, shop: Shop) -> None:
-        page = viewer.get("/setup/machines")
+    def test_lists(self, viewer: Person, shop: Shop) -> None:
+        page = viewer.open("/setup/machines")
         assert shop.machine in page
         assert "Add machine" not in page, "a viewer only looks"
 
 
 class TestCharacteristics:
-    def new(self, engineer: Browser, shop: Shop, key: str, status: int = 303, **form: str) -> httpx.Response:
+    def new(self, engineer: Person, shop: Shop, key: str, status: int = 303, **form: str) -> httpx.Response:
         named = {"key": key, "name": SERBIAN, "machine": shop.machine, "part": ""}
         return engineer.post("/setup/characteristics/new", status, **(named | FORM | form))
 
-    def test_a_new_one_as_typed_with_commas(self, engineer: Browser, shop: Shop) -> None:
-        made = self.new(engineer, shop, "typed")
-        assert made.headers["location"] == "/setup/characteristics/typed?done=added"
-        api = shop.call("GET", "/characteristics/typed")
+    def test_a_new_one_as_typed_with_commas(self, engineer: Person, shop: Shop) -> None:
+        key = unique("typed")
+        made = self.new(engineer, shop, key)
+        assert made.headers["location"] == f"/setup/characteristics/{key}?done=added"
+        api = shop.call("GET", f"/characteristics/{key}")
         assert api["name"] == SERBIAN
         assert api["parameters"].items() >= {"target": 39.992, "lower_deviation": -0.016, "zero_range": 0.001}.items()
-        shown = values(engineer.get("/setup/characteristics/typed"))
+        shown = values(engineer.open(f"/setup/characteristics/{key}"))
         assert shown.items() >= {"nominal": "40", "lower_deviation": "-0.016", "target": "", "factor": "-1"}.items()
 
-    def test_a_refused_order_is_told_at_the_field_and_nothing_typed_is_lost(
-        self, engineer: Browser, shop: Shop
-    ) -> None:
+    def test_a_refused_order_is_told_at_the_field_and_nothing_typed_is_lost(self, engineer: Person, shop: Shop) -> None:
         page = self.new(
             engineer, shop, "refused", 422, averaging_limit="0,009", max_step="ein", wear_limit="0.3x", part="0815"
         ).text
@@ -171,42 +134,47 @@ class TestCharacteristics:
         assert re.search(r'id="f-averaging_limit"[^>]*aria-invalid="true"', page)
         shop.call("GET", "/characteristics/refused", 404)
 
-    def test_names_and_parameters_are_told_at_once(self, engineer: Browser, shop: Shop) -> None:
+    def test_names_and_parameters_are_told_at_once(self, engineer: Person, shop: Shop) -> None:
         page = self.new(engineer, shop, "No Key", 422, machine="", zero_range="").text
         assert len(errors(page)) == 3
 
-    def test_a_list_of_very_many_goes_on_on_another_page(self, engineer: Browser, server: Any) -> None:
-        shop = Shop(server)
+    def test_a_list_of_very_many_goes_on_on_another_page(self, engineer: Person, server: Server, shop: Shop) -> None:
         keys = [f"{shop.machine}-{number:03}" for number in range(201)]
-        for key in keys:
-            shop.add(key, tool_memory=4)
-        first = engineer.get(f"/setup/characteristics?machine={shop.machine}")
+        with server.database.begin() as session:
+            for key in keys:
+                added = CharacteristicIn(
+                    key=key, name=key, machine=shop.machine, parameters=PARAMETERS | {"tool_memory": 4}
+                )
+                characteristics.add_characteristic(session, added, "tests")
+        first = engineer.open(f"/setup/characteristics?machine={shop.machine}")
         (more,) = re.findall(r'href="([^"]+)" rel="next"', first)
-        second = engineer.get(unescape(more))
+        second = engineer.open(unescape(more))
         shown = [re.findall(r'href="/setup/characteristics/([^"?]+)"><strong>', page) for page in (first, second)]
         assert sorted(shown[0] + shown[1]) == sorted([shop.characteristic, *keys])
         assert (len(shown[0]), len(shown[1])) == (200, 2)
         assert f'href="/setup/characteristics?machine={shop.machine}&amp;sort=key" rel="prev"' in second
 
-    def test_a_factor_of_ones_own(self, engineer: Browser, shop: Shop) -> None:
-        self.new(engineer, shop, "own-factor", factor="other", factor_other="0,25")
-        assert shop.call("GET", "/characteristics/own-factor")["parameters"]["factor"] == 0.25
-        assert values(engineer.get("/setup/characteristics/own-factor"))["factor_other"] == "0.25"
+    def test_a_factor_of_ones_own(self, engineer: Person, shop: Shop) -> None:
+        key = unique("own-factor")
+        self.new(engineer, shop, key, factor="other", factor_other="0,25")
+        assert shop.call("GET", f"/characteristics/{key}")["parameters"]["factor"] == 0.25
+        assert values(engineer.open(f"/setup/characteristics/{key}"))["factor_other"] == "0.25"
 
-    def test_no_factor_is_asked_for(self, engineer: Browser, shop: Shop) -> None:
+    def test_no_factor_is_asked_for(self, engineer: Person, shop: Shop) -> None:
         page = self.new(engineer, shop, "none", 422, factor="").text
         assert "The factor is missing" in errors(page)[0]
         assert re.search(r'name="factor" value="-1" aria-invalid="true"', page), "the browser goes there"
 
-    def test_change_with_reason_and_history(self, engineer: Browser, shop: Shop) -> None:
-        self.new(engineer, shop, "changed")
-        path = "/setup/characteristics/changed"
+    def test_change_with_reason_and_history(self, engineer: Person, shop: Shop) -> None:
+        key = unique("changed")
+        self.new(engineer, shop, key)
+        path = f"/setup/characteristics/{key}"
         form = {"name": SERBIAN, "part": "", "parameters_version": "1"} | FORM
         page = engineer.post(path, 422, **(form | {"zero_range": "0.002"})).text
         assert "Is required when parameters change" in errors(page)[0]
         assert values(page)["zero_range"] == "0.002"
         engineer.post(path, **(form | {"zero_range": "0.002", "reason": "Нова сонда"}))
-        page = unescape(engineer.get(path))
+        page = unescape(engineer.open(path))
         assert "Нова сонда" in page
         assert re.search(r"Zero range <del>0.001 mm</del> → <ins>0.002 mm</ins>", page)
         assert (
@@ -215,52 +183,54 @@ class TestCharacteristics:
             .endswith("done=same")
         )
 
-    def test_two_engineers_at_once(self, engineer: Browser, admin: Browser, shop: Shop) -> None:
-        self.new(engineer, shop, "contested")
-        path = "/setup/characteristics/contested"
+    def test_two_engineers_at_once(self, engineer: Person, admin: Person, shop: Shop) -> None:
+        key = unique("contested")
+        self.new(engineer, shop, key)
+        path = f"/setup/characteristics/{key}"
         form = {"name": "x", "part": "", "parameters_version": "1", "reason": "because"} | FORM
         admin.post(path, **(form | {"weighting_factor": "3"}))
         page = engineer.post(path, 409, **(form | {"weighting_factor": "4"})).text
-        assert "Ada has changed the parameters meanwhile" in unescape(page)
+        assert f"{admin.name} has changed the parameters meanwhile" in unescape(page)
         assert values(page).items() >= {"weighting_factor": "4", "parameters_version": "2"}.items()
         engineer.post(path, **(values(page) | {"reason": "seen"}))
-        assert shop.call("GET", "/characteristics/contested")["parameters"]["weighting_factor"] == 4
+        assert shop.call("GET", f"/characteristics/{key}")["parameters"]["weighting_factor"] == 4
 
-    def test_one_like_another(self, engineer: Browser, shop: Shop) -> None:
-        self.new(engineer, shop, "model", weighting_factor="4")
-        shown = values(engineer.get("/setup/characteristics/new?like=model"))
+    def test_one_like_another(self, engineer: Person, shop: Shop) -> None:
+        key = unique("model")
+        self.new(engineer, shop, key, weighting_factor="4")
+        shown = values(engineer.open(f"/setup/characteristics/new?like={key}"))
         assert shown.items() >= {"weighting_factor": "4", "machine": shop.machine, "key": ""}.items()
 
-    def test_a_viewer_looks_but_cannot_change(self, viewer: Browser, shop: Shop) -> None:
-        page = viewer.get(f"/setup/characteristics/{shop.characteristic}")
+    def test_a_viewer_looks_but_cannot_change(self, viewer: Person, shop: Shop) -> None:
+        page = viewer.open(f"/setup/characteristics/{shop.characteristic}")
         assert '<fieldset class="stack" disabled>' in page
         assert "Reason for the change" not in page
         viewer.post(f"/setup/characteristics/{shop.characteristic}", 403, name="x")
-        viewer.get("/setup/characteristics/new", 403)
+        viewer.open("/setup/characteristics/new", 403)
 
-    def test_lists_by_machine(self, viewer: Browser, shop: Shop) -> None:
+    def test_lists_by_machine(self, viewer: Person, shop: Shop) -> None:
         other = Shop(shop.server)
-        page = viewer.get(f"/setup/characteristics?machine={other.machine}")
+        page = viewer.open(f"/setup/characteristics?machine={other.machine}")
         assert f"/setup/characteristics/{other.characteristic}" in page
         assert f"/setup/characteristics/{shop.characteristic}" not in page
 
     @pytest.mark.parametrize("form", [{}, {"zero_range": "\0"}, {"parameters_version": "9" * 30}])
-    def test_nonsense_is_answered_in_words(self, engineer: Browser, shop: Shop, form: dict[str, str]) -> None:
+    def test_nonsense_is_answered_in_words(self, engineer: Person, shop: Shop, form: dict[str, str]) -> None:
         answer = engineer.post(f"/setup/characteristics/{shop.characteristic}", 422, **form)
         assert answer.headers["content-type"].startswith("text/html")
 
 
-def test_the_record_of_changes(engineer: Browser, viewer: Browser, shop: Shop) -> None:
+def test_the_record_of_changes(engineer: Person, viewer: Person, shop: Shop) -> None:
     for number in range(3):
         shop.call("PATCH", f"/machines/{shop.machine}", name=f"<i>{number}</i>")
-    page = engineer.get(f"/setup/audit?subject=machine/{shop.machine}")
+    page = engineer.open(f"/setup/audit?subject=machine/{shop.machine}")
     assert page.count("machine changed") >= 3
     assert "&lt;i&gt;2&lt;/i&gt;" in page
-    assert "Nothing recorded here" in engineer.get("/setup/audit?subject=machine/nowhere&before=x")
-    viewer.get("/setup/audit", 403)
+    assert "Nothing recorded here" in engineer.open("/setup/audit?subject=machine/nowhere&before=x")
+    viewer.open("/setup/audit", 403)
 
 
-def test_every_page_of_setup_opens(admin: Browser, shop: Shop) -> None:
+def test_every_page_of_setup_opens(admin: Person, shop: Shop) -> None:
     for path in (
         "/setup/characteristics",
         f"/setup/characteristics/{shop.characteristic}",
@@ -272,12 +242,12 @@ def test_every_page_of_setup_opens(admin: Browser, shop: Shop) -> None:
         "/setup/audit",
         "/account",
     ):
-        assert "<h1" in admin.get(path)
-    assert admin.client.get("/setup").headers["location"] == "/setup/characteristics"
+        assert "<h1" in admin.open(path)
+    assert admin.browser.get("/setup", follow_redirects=False).headers["location"] == "/setup/characteristics"
     for path in (
         "/setup/machines/nowhere",
         "/setup/characteristics/nowhere",
         "/setup/characteristics/new?like=nowhere",
     ):
-        assert "There is no" in admin.get(path, 404)
-    assert "Sign out" in admin.get("/setup/nothing-here", 404), "who is signed in stays so on a wrong address"
+        assert "There is no" in admin.open(path, 404)
+    assert "Sign out" in admin.open("/setup/nothing-here", 404), "who is signed in stays so on a wrong address"

@@ -9,13 +9,14 @@ from playwright.sync_api import Page, expect
 from tests.conftest import Server
 from tests.shop import Person, Shop
 
+pytestmark = pytest.mark.own_server
+
 
 @pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
+def waits(common_shop: Shop) -> Shop:
     """An alarm that holds a correction, a correction that awaits approval, and a proposal."""
-    shop = Shop(server)
-    for deviation in (0.4, 0.0, 0.2, 350.0):
-        shop.read(deviation)
+    shop = common_shop
+    shop.push([0.4, 0.0, 0.2, 350.0])
     shop.add(f"{shop.characteristic}-a", tool_memory=5, average_memory=6, mode="approval")
     shop.read(6.0, f"{shop.characteristic}-a")
     shop.call(
@@ -34,17 +35,19 @@ def kinds(text: str) -> list[str]:
     return re.findall(r'<tr data-kind="(\w+)"', text)
 
 
-def test_the_count_is_the_length_of_the_list_wherever_it_stands(shop: Shop, operator: Person) -> None:
+def test_the_count_is_the_length_of_the_list_wherever_it_stands(waits: Shop, operator: Person) -> None:
     page = operator.open("/todo")
     assert kinds(page) == ["alarm", "correction", "proposal"], "a held correction belongs to its alarm"
     assert counted(page) == counted(operator.open("/todo/count")) == counted(operator.open("/alarms")) == 3
     assert "<strong>3</strong> to do" in operator.open("/")
 
 
-def test_by_machine_and_by_role(shop: Shop, server: Server, operator: Person, engineer: Person, viewer: Person) -> None:
+def test_by_machine_and_by_role(
+    waits: Shop, server: Server, operator: Person, engineer: Person, viewer: Person
+) -> None:
     other = Shop(server)
     assert kinds(operator.open(f"/todo?machine={other.machine}")) == []
-    assert len(kinds(operator.open(f"/todo?machine={shop.machine}"))) == 3
+    assert len(kinds(operator.open(f"/todo?machine={waits.machine}"))) == 3
     assert kinds(operator.open("/todo?mine=true")) == ["alarm", "correction"]
     assert len(kinds(engineer.open("/todo?mine=true"))) == 3
     assert kinds(viewer.open("/todo?mine=true")) == []
@@ -52,18 +55,18 @@ def test_by_machine_and_by_role(shop: Shop, server: Server, operator: Person, en
     assert re.findall(r">(All|Mine) (\d+)</a>", operator.open("/todo")) == [("All", "3"), ("Mine", "2")]
 
 
-def test_machines_and_pickers_have_the_same_count(shop: Shop, server: Server, operator: Person) -> None:
+def test_machines_and_pickers_have_the_same_count(waits: Shop, server: Server, operator: Person) -> None:
     Shop(server)  # a picker stands where there is something to pick
-    link = re.escape(f'href="/todo?machine={shop.machine}"') + "[^>]*>"
+    link = re.escape(f'href="/todo?machine={waits.machine}"') + "[^>]*>"
     assert re.search(link + r"\s*<svg.*?</svg>\s*3</a>", operator.open("/machines"), re.DOTALL)
     assert re.search(link + r'[^<]*<span class="tab-count">3</span>', operator.open("/todo"))
 
 
-def test_the_chosen_machine_is_carried_along(shop: Shop, operator: Person) -> None:
+def test_the_chosen_machine_is_carried_along(waits: Shop, operator: Person) -> None:
     def links(text: str) -> list[str]:
         return re.findall(r'<li>\s*<a href="([^"]*)"', text.split('aria-label="Main"')[1])[:5]
 
-    key = shop.machine
+    key = waits.machine
     whole = ["/", "/todo", "/overview", "/machines", "/setup"]
     chosen = [
         "/",
@@ -85,59 +88,61 @@ def test_the_chosen_machine_is_carried_along(shop: Shop, operator: Person) -> No
         operator.open(path)
 
 
-def test_each_leads_to_its_next_action(shop: Shop, engineer: Person) -> None:
+def test_each_leads_to_its_next_action(waits: Shop, engineer: Person) -> None:
     for path in re.findall(
         r'<a class="button " href="(/(?:alarms|corrections|proposals)[^"]+)"', engineer.open("/todo")
     ):
         engineer.open(path)
 
 
-def test_a_correction_is_decided_from_its_row(shop: Shop, operator: Person, viewer: Person) -> None:
-    shop.add(f"{shop.characteristic}-row", tool_memory=7, average_memory=8, mode="approval")
-    number = shop.read(6.0, f"{shop.characteristic}-row")["correction"]["number"]
-    here = f"/machines/{shop.machine}/corrections/{number}"
+def test_a_correction_is_decided_from_its_row(waits: Shop, operator: Person, viewer: Person) -> None:
+    waits.add(f"{waits.characteristic}-row", tool_memory=7, average_memory=8, mode="approval")
+    number = waits.read(6.0, f"{waits.characteristic}-row")["correction"]["number"]
+    here = f"/machines/{waits.machine}/corrections/{number}"
     assert f'href="{here}?do=approve&amp;from=todo"' in operator.open("/todo")
     assert f'href="{here}?do=approve' not in viewer.open("/todo")
     fields: dict[str, Any] = {"do": "approve", "reason": "As expected", "from": "todo"}
     assert f"Correction {number} is approved" in operator.send(here, **fields)
     fields["do"] = "rejected"
-    shop.correction(number, "applied")
+    waits.correction(number, "applied")
     assert "had been decided meanwhile" in operator.send(here, **fields)
 
 
-def test_the_count_in_the_bar_follows_proposals(page: Page, shop: Shop, engineer: Person) -> None:
+def test_the_count_in_the_bar_follows_proposals(page: Page, waits: Shop, engineer: Person) -> None:
     engineer.sign_in(page)
     page.goto("/machines")
     expect(page.locator("live-status")).to_have_attribute("state", "live")
     before = counted(engineer.open("/todo/count"))
     count = page.locator("#to-do-count [data-to-do]")
     expect(count).to_have_attribute("data-to-do", str(before))
-    proposal = shop.call(
-        "POST", f"/characteristics/{shop.characteristic}/proposals", 201, zero_range=0.003, reason="Fewer still"
+    proposal = waits.call(
+        "POST", f"/characteristics/{waits.characteristic}/proposals", 201, zero_range=0.003, reason="Fewer still"
     )
     expect(count).to_have_attribute("data-to-do", str(before + 1))
-    shop.call("POST", f"/proposals/{proposal['id']}/reject", reason="Too wide")
+    waits.call("POST", f"/proposals/{proposal['id']}/reject", reason="Too wide")
     expect(count).to_have_attribute("data-to-do", str(before))
     page.goto("/todo")
     expect(page.locator("live-status")).to_have_attribute("state", "live")
     expect(page.get_by_role("link", name=f"All {before}")).to_be_visible()
-    again = shop.call("POST", f"/characteristics/{shop.characteristic}/proposals", 201, zero_range=0.003, reason="Few")
+    again = waits.call(
+        "POST", f"/characteristics/{waits.characteristic}/proposals", 201, zero_range=0.003, reason="Few"
+    )
     expect(page.get_by_role("link", name=f"All {before + 1}")).to_be_visible()
     page.goto("/")
     expect(page.locator("live-status")).to_have_attribute("state", "live")
     expect(page.locator("#plant-summary a")).to_have_attribute("data-count", str(before + 1))
-    shop.call("POST", f"/proposals/{again['id']}/reject", reason="Too wide")
+    waits.call("POST", f"/proposals/{again['id']}/reject", reason="Too wide")
     expect(page.locator("#plant-summary a")).to_have_attribute("data-count", str(before))
 
 
 @pytest.mark.browser
 @pytest.mark.parametrize("picker", [".picker", ".period-picker"])
 def test_a_picker_is_closed_by_escape_and_by_a_click_beside_it(
-    picker: str, page: Page, shop: Shop, server: Server, viewer: Person
+    picker: str, page: Page, waits: Shop, server: Server, viewer: Person
 ) -> None:
     Shop(server)
     viewer.sign_in(page)
-    page.goto(f"/characteristics/{shop.characteristic}" if picker == ".period-picker" else "/alarms")
+    page.goto(f"/characteristics/{waits.characteristic}" if picker == ".period-picker" else "/alarms")
     opened = page.locator(f"details{picker}[open]")
     expect(page.locator("live-status")).to_have_attribute("state", "live")
     for close in ("Escape", "a click beside"):
@@ -150,7 +155,7 @@ def test_a_picker_is_closed_by_escape_and_by_a_click_beside_it(
         expect(opened).to_have_count(0)
 
 
-def test_old_addresses_lead_on(shop: Shop, operator: Person) -> None:
+def test_old_addresses_lead_on(waits: Shop, operator: Person) -> None:
     assert "Machines" in operator.open("/tools")
     for path in ("/alarms", "/corrections", "/proposals", "/alarms/history"):
         text = operator.open(path)
