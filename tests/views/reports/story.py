@@ -4,21 +4,11 @@ from random import Random
 from typing import Any
 
 from app.jobs.actions import run_jobs
-from app.quality.control_charts.signals_actions import JOB
+from app.main import JOBS
 from tests.shop import Shop
 
 PERIOD = "last=all"
-
-
-def pushed(shop: Shop, values: list[float], characteristic: str | None = None, part: str = "SN", **more: Any) -> None:
-    """Readings that deviate by so many µm, at once."""
-    key = characteristic or shop.characteristic
-    rows = [
-        {"characteristic": key, "measured": round(40 + value / 1000, 7), "part": f"{part}-{at}"} | more
-        for at, value in enumerate(values)
-    ]
-    answer = shop.admin.post("/api/v1/readings/batch", json=rows)
-    assert answer.status_code in {200, 201}, answer.text
+SAID = {"cause": "material", "comment": "New batch, harder by 20 HB"}  # of the newest signal
 
 
 def scatter(count: int, seed: int = 1, sigma: float = 1.5, mean: float = 0.2) -> list[float]:
@@ -27,10 +17,15 @@ def scatter(count: int, seed: int = 1, sigma: float = 1.5, mean: float = 0.2) ->
     return [round(rng.gauss(mean, sigma), 3) for _ in range(count)]
 
 
+def sent(shop: Shop, values: list[float]) -> None:
+    """Readings of parts with names."""
+    shop.push(values, part=[f"SN-{at}" for at in range(len(values))])
+
+
 def told(shop: Shop) -> None:
     """The story."""
     key = shop.characteristic
-    pushed(shop, scatter(300))
+    sent(shop, scatter(300))
     freeze: dict[str, Any] = {
         "quantity": "deviation",
         "first_sequence": 1,
@@ -38,22 +33,24 @@ def told(shop: Shop) -> None:
         "reason": "Mirno, Đorđe",
     }
     shop.call("POST", f"/characteristics/{key}/baselines", 201, **freeze)
-    pushed(shop, scatter(250, seed=2))
+    sent(shop, scatter(250, seed=2))
     for correction in shop.call("GET", f"/machines/{shop.machine}/corrections?status=pending")["items"][:40]:
         shop.correction(correction["number"], "applied")
     shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="=1+1 insert worn")
-    pushed(shop, [9.1, -9.2, *scatter(48, seed=3, mean=2.5)])
+    sent(shop, [9.1, -9.2, *scatter(48, seed=3, mean=2.5)])
     shop.read(1500)  # a probe fault
     fault = next(each for each in shop.alarms() if each["kind"] == "probe_fault")
     shop.acknowledge(fault["id"], "noted", comment="@SUM(1+1)*cmd|' /C calc'!A0")
-    pushed(shop, scatter(20, seed=4))
+    sent(shop, scatter(20, seed=4))
     for sequence, reason in ((17, "+1+1"), (560, "-2+3 chip")):
         shop.call("POST", f"/readings/{key}/{sequence}/exclude", reason=reason)
     shop.call(
         "PATCH", f"/characteristics/{key}", parameters={"weighting_factor": 3}, reason="\N{PLUS-MINUS SIGN} calmer"
     )
-    pushed(shop, scatter(30, seed=5))
-    run_jobs(shop.server.database, [JOB])
+    sent(shop, scatter(30, seed=5))
+    run_jobs(shop.server.database, JOBS)
+    kept = shop.call("GET", f"/signals?characteristic={key}&state=all")["items"]
+    shop.call("POST", f"/signals/{kept[0]['id']}/comment", **SAID)
 
 
 def report(shop: Shop, query: str = PERIOD, characteristic: str | None = None, status: int = 200) -> Any:

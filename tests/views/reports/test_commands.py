@@ -12,30 +12,27 @@ import pytest
 from openpyxl import load_workbook
 from pypdf import PdfReader
 
-from tests.conftest import Server
 from tests.forked import inband
 from tests.shop import Shop
-from tests.views.reports.story import facts, report, told
+from tests.views.reports.story import facts, report
 
 
 @pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
-    made = Shop(server)
-    told(made)
-    made.add("second")
-    return made
+def second(story: Shop) -> str:
+    """A characteristic beside that of the story."""
+    return story.another("second")
 
 
 def written(shop: Shop, *arguments: object) -> CompletedProcess[str]:
     return inband("report", *arguments, INBAND_DATABASE_URL=shop.server.database.dsn)
 
 
-def test_one_as_pdf_xlsx_and_csv_by_the_name_of_the_file(shop: Shop, tmp_path: Path) -> None:
-    key, whole = shop.characteristic, report(shop, "last=200&section=numbers&section=capability")
+def test_one_as_pdf_xlsx_and_csv_by_the_name_of_the_file(story: Shop, tmp_path: Path) -> None:
+    key, whole = story.characteristic, report(story, "last=200&section=numbers&section=capability")
     mean, ppk = facts(whole, "numbers")["mean"], facts(whole, "capability")["ppk"]
     for form in ("pdf", "xlsx", "csv"):
         path = tmp_path / f"r.{form}"
-        done = written(shop, key, "--last", 200, "--section", "numbers", "--section", "capability", "-o", path)
+        done = written(story, key, "--last", 200, "--section", "numbers", "--section", "capability", "-o", path)
         assert (done.returncode, done.stdout) == (0, ""), done.stderr
         assert "1 report written." in done.stderr
     text = "".join(page.extract_text() for page in PdfReader(tmp_path / "r.pdf").pages)
@@ -49,14 +46,14 @@ def test_one_as_pdf_xlsx_and_csv_by_the_name_of_the_file(shop: Shop, tmp_path: P
 
 
 def test_what_is_meant_for_programs_is_alone_on_standard_output(
-    shop: Shop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    story: Shop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from app.cli import main
 
     out = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
-    for name, value in (("INBAND_DATABASE_URL", shop.server.database.dsn), ("INBAND_DATA_DIR", str(tmp_path))):
+    for name, value in (("INBAND_DATABASE_URL", story.server.database.dsn), ("INBAND_DATA_DIR", str(tmp_path))):
         monkeypatch.setenv(name, value)
-    monkeypatch.setattr(sys, "argv", ["inband", "report", shop.characteristic, "--format", "csv"])
+    monkeypatch.setattr(sys, "argv", ["inband", "report", story.characteristic, "--format", "csv"])
     monkeypatch.setattr(sys, "stdout", out)
     with pytest.raises(SystemExit) as ended:
         main()
@@ -66,28 +63,28 @@ def test_what_is_meant_for_programs_is_alone_on_standard_output(
     assert first == "section,row,key,name,value,unit,text"
 
 
-def test_several_in_a_folder_a_zip_or_a_workbook(shop: Shop, tmp_path: Path) -> None:
-    both: tuple[Any, ...] = (shop.characteristic, "second", "--section", "numbers")
+def test_several_in_a_folder_a_zip_or_a_workbook(story: Shop, second: str, tmp_path: Path) -> None:
+    both: tuple[Any, ...] = (story.characteristic, second, "--section", "numbers")
     folder = tmp_path / "week 47 Đ"
-    assert written(shop, *both, "-o", folder).returncode == 0
+    assert written(story, *both, "-o", folder).returncode == 0
     assert sorted(path.name for path in folder.iterdir()) == sorted(
-        [f"report-{shop.characteristic}.pdf", "report-second.pdf"]
+        [f"report-{story.characteristic}.pdf", f"report-{second}.pdf"]
     )
-    assert written(shop, *both, "--format", "csv", "-o", tmp_path / "w.zip").returncode == 0
+    assert written(story, *both, "--format", "csv", "-o", tmp_path / "w.zip").returncode == 0
     with zipfile.ZipFile(tmp_path / "w.zip") as whole:
         assert "summary.csv" in whole.namelist()
         assert len(whole.namelist()) == 3
-    assert written(shop, *both, "-o", tmp_path / "w.xlsx").returncode == 0
-    assert load_workbook(tmp_path / "w.xlsx").sheetnames == ["Summary", shop.characteristic, "second"]
+    assert written(story, *both, "-o", tmp_path / "w.xlsx").returncode == 0
+    assert load_workbook(tmp_path / "w.xlsx").sheetnames == ["Summary", story.characteristic, second]
 
 
-def test_one_that_there_is_not_spoils_no_other_and_is_said(shop: Shop, tmp_path: Path) -> None:
-    done = written(shop, "second", "nobody", "--section", "numbers", "-o", tmp_path / "some.zip")
+def test_one_that_there_is_not_spoils_no_other_and_is_said(story: Shop, second: str, tmp_path: Path) -> None:
+    done = written(story, "second", "nobody", "--section", "numbers", "-o", tmp_path / "some.zip")
     assert done.returncode == 1
     assert "nobody" in done.stderr
     assert "1 report written." in done.stderr
     with zipfile.ZipFile(tmp_path / "some.zip") as whole:
-        assert sorted(whole.namelist()) == ["report-second.pdf", "summary.csv"]
+        assert sorted(whole.namelist()) == [f"report-{second}.pdf", "summary.csv"]
         assert "nobody" in whole.read("summary.csv").decode()
 
 
@@ -106,10 +103,16 @@ def test_one_that_there_is_not_spoils_no_other_and_is_said(shop: Shop, tmp_path:
     ],
 )
 def test_wrong_use_writes_nothing(
-    shop: Shop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], status: int, said: str
+    story: Shop,
+    second: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    status: int,
+    said: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    done = written(shop, *arguments)
+    done = written(story, *arguments)
     assert done.returncode == status, done.stderr
     assert said in done.stderr
     assert "Traceback" not in done.stderr

@@ -28,8 +28,9 @@ from app.files.documents.content import (
 from app.files.documents.files import file_of
 from app.files.documents.files.fonts import MISSING
 from app.views.characteristic.figures import histogram_counts, histogram_figure
+from tests.chance import examples
 from tests.shop import Person, Shop
-from tests.views.reports.story import facts, file, pushed, report, scatter
+from tests.views.reports.story import facts, file, report, scatter
 
 SERBIAN = "Ležište Ø40 – čađavo ŠĐČĆŽ, Лежиште Њ Џ Ђ"
 
@@ -44,24 +45,24 @@ def warned(found: Any, section: str) -> str:
 
 
 def test_nothing_measured_yet(shop: Shop) -> None:
-    shop.add("nothing")
-    found = report(shop, characteristic="nothing")
+    key = shop.another("nothing")
+    found = report(shop, characteristic=key)
     assert found["period"] == "no readings"
     assert facts(found, "numbers")["count"]["value"] == 0
     assert facts(found, "numbers")["mean"]["text"] == "–"
     assert "No readings" in warned(found, "numbers")
     assert "missing" in warned(found, "capability")
     for form in ("pdf", "xlsx", "csv"):
-        assert len(file(shop, form, characteristic="nothing")) > 1000
+        assert len(file(shop, form, characteristic=key)) > 1000
 
 
 def test_a_period_in_which_nothing_was_measured(shop: Shop) -> None:
-    shop.add("long-ago")
-    pushed(shop, scatter(30), "long-ago")
-    found = report(shop, "from=2001-01-01T00:00:00Z&to=2001-12-31T00:00:00Z", "long-ago")
+    key = shop.another("long-ago")
+    shop.push(scatter(30), key)
+    found = report(shop, "from=2001-01-01T00:00:00Z&to=2001-12-31T00:00:00Z", key)
     assert found["period"].endswith("no readings")
     assert facts(found, "numbers")["count"]["value"] == 0
-    pages, text = pdf(file(shop, "pdf", "from=2001-01-01T00:00:00Z&to=2001-12-31T00:00:00Z", "long-ago"))
+    pages, text = pdf(file(shop, "pdf", "from=2001-01-01T00:00:00Z&to=2001-12-31T00:00:00Z", key))
     assert "No readings were measured" in text
     assert pages <= 3
 
@@ -92,86 +93,86 @@ def test_only_a_spreadsheet_asks_for_the_numbers_of_the_charts() -> None:
 
 
 def test_one_reading(shop: Shop) -> None:
-    shop.add("one")
-    pushed(shop, [1.5], "one")
-    found = report(shop, characteristic="one")
+    key = shop.another("one")
+    shop.push([1.5], key)
+    found = report(shop, characteristic=key)
     said = facts(found, "numbers")
     assert (said["count"]["value"], said["standard_deviation"]["value"]) == (1, None)
     assert said["mean"]["value"] == pytest.approx(1.5)
     assert "A standard deviation needs at least two readings" in warned(found, "numbers")
     assert "19 are missing" in warned(found, "capability")
     for form in ("pdf", "xlsx", "csv"):
-        file(shop, form, characteristic="one")
+        file(shop, form, characteristic=key)
 
 
 def test_all_equal(shop: Shop) -> None:
-    shop.add("equal", mode="measure_only", tool_memory=0, average_memory=0)
-    pushed(shop, [0.5] * 150, "equal")
+    key = shop.another("equal", mode="measure_only", tool_memory=0, average_memory=0)
+    shop.push([0.5] * 150, key)
     shop.call(
         "POST",
-        "/characteristics/equal/baselines",
+        f"/characteristics/{key}/baselines",
         422,
         quantity="deviation",
         first_sequence=1,
         last_sequence=150,
         reason="all the same",
     )
-    found = report(shop, characteristic="equal")
+    found = report(shop, characteristic=key)
     assert facts(found, "numbers")["standard_deviation"]["value"] == 0
     assert warned(found, "capability").startswith("No capability")
     assert "No baseline is in force" in warned(found, "control")
     for form in ("pdf", "xlsx", "csv"):
-        file(shop, form, characteristic="equal")
+        file(shop, form, characteristic=key)
 
 
 def test_only_probe_faults_and_excluded_ones(shop: Shop) -> None:
-    shop.add("faulty")
-    shop.read(1500, "faulty")
-    pushed(shop, [1.0], "faulty")
-    shop.call("POST", "/readings/faulty/2/exclude", reason="Chip")
-    found = report(shop, characteristic="faulty")
+    key = shop.another("faulty")
+    shop.read(1500, key)
+    shop.push([1.0], key)
+    shop.call("POST", f"/readings/{key}/2/exclude", reason="Chip")
+    found = report(shop, characteristic=key)
     assert "missing" in warned(found, "capability")
-    file(shop, "pdf", characteristic="faulty")
+    file(shop, "pdf", characteristic=key)
 
 
-def test_letters_of_the_shop_floors(shop: Shop) -> None:
-    shop.add("letters")
+def test_letters_of_the_shop_floors(shop: Shop, viewer: Person) -> None:
+    key = shop.another("letters")
     names = f"{SERBIAN} 轴承座 Ärmel"
-    shop.call("PATCH", "/characteristics/letters", name=names, part="Дугме № 5")
-    pushed(shop, [1.0, 2.0, 9.5], "letters", part="ЊЏ-ŠĐ")
-    pages, text = pdf(file(shop, "pdf", characteristic="letters"))
+    shop.call("PATCH", f"/characteristics/{key}", name=names, part="Дугме № 5")
+    shop.push([1.0, 2.0, 9.5], key, part=["ЊЏ-ŠĐ"] * 3)
+    pages, text = pdf(file(shop, "pdf", characteristic=key))
     for piece in (*SERBIAN.split(), "轴承座", "Ärmel", "ЊЏ-ŠĐ"):
         assert piece in text.replace("\n", " "), piece
     assert MISSING not in text
     assert pages < 10
-    book = load_workbook(io.BytesIO(file(shop, "xlsx", characteristic="letters")))
+    book = load_workbook(io.BytesIO(file(shop, "xlsx", characteristic=key)))
     assert book.worksheets[0]["A1"].value == names
-    assert names in file(shop, "csv", characteristic="letters").decode("utf-8-sig")
-    assert SERBIAN in Person(shop.server, "viewer").open("/characteristics/letters/report")
+    assert names in file(shop, "csv", characteristic=key).decode("utf-8-sig")
+    assert SERBIAN in viewer.open(f"/characteristics/{key}/report")
 
 
 def test_names_without_end_break_no_page(shop: Shop) -> None:
-    shop.add("endless")
-    shop.call("PATCH", "/characteristics/endless", name="W" * 200, part="Ü" * 100)
-    pushed(shop, [1.0, 9.5, -9.5], "endless", part="P" * 120)
+    key = shop.another("endless")
+    shop.call("PATCH", f"/characteristics/{key}", name="W" * 200, part="Ü" * 100)
+    shop.push([1.0, 9.5, -9.5], key, part=["P" * 120] * 3)
     for alarm in shop.alarms():
         shop.acknowledge(alarm["id"], "noted", comment="nothing but a very long word " + "x" * 400)
-    pages, _text = pdf(file(shop, "pdf", characteristic="endless"))
+    pages, _text = pdf(file(shop, "pdf", characteristic=key))
     assert pages < 12
 
 
 def test_a_long_history_is_no_book(shop: Shop) -> None:
     """Fifteen hundred readings, each of which corrects: what is listed is bounded, and says how much is left out."""
-    shop.add("many", zero_range=0.0, weighting_factor=1, averaging_limit=0.001)
+    key = shop.another("many", zero_range=0.0, weighting_factor=1, averaging_limit=0.001)
     for at in range(3):
-        pushed(shop, scatter(500, seed=at), "many", part=f"L{at}")
-    found = report(shop, "last=100000", "many")
+        shop.push(scatter(500, seed=at), key)
+    found = report(shop, "last=100000", key)
     assert facts(found, "numbers")["count"]["value"] == 1_500
     tables = {each["key"]: each["table"] for each in found["sections"] if each["table"]}
     assert len(tables["corrections"]["rows"]) == 100
     assert tables["corrections"]["more"] > 1_000
     assert tables["decisions"]["more"] == 1_500 - len(tables["decisions"]["rows"])
-    content = file(shop, "pdf", "last=100000", "many")
+    content = file(shop, "pdf", "last=100000", key)
     assert pdf(content)[0] < 20
     assert len(content) < 3_000_000
 
@@ -188,6 +189,7 @@ def of(text: str, rows: int = 3) -> Report:
     return Report("key", text, text, text, text, "UTC", at, (Fact("x", text, words(text)),), (section, more), (text,))
 
 
+@examples(30)
 @given(st.text(max_size=80))
 def test_whatever_is_written_can_be_printed(text: str) -> None:
     for form in Format:

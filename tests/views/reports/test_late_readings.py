@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Server
 from tests.shop import Person, Shop
 from tests.views.reports.story import facts, report, scatter, table
 
@@ -20,8 +19,7 @@ MEANT = [*range(31, 50), *range(51, 70), *range(71, 91), 100, 110]
 
 
 @pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
-    made = Shop(server)
+def late(common_shop: Shop) -> Shop:
     rows = []
     for sequence, value in enumerate(scatter(120, seed=7, mean=0.0), start=1):
         hour, minute = (
@@ -31,41 +29,43 @@ def shop(server: Server) -> Shop:
             hour, value = LATE[sequence]  # noqa: PLW2901
         measured = round(40 + value / 1000, 7)
         rows.append(
-            {"characteristic": made.characteristic, "measured": measured, "measured_at": HOUR.format(hour, minute)}
+            {
+                "characteristic": common_shop.characteristic,
+                "measured": measured,
+                "measured_at": HOUR.format(hour, minute),
+            }
         )
-    assert made.admin.post("/api/v1/readings/batch", json=rows).status_code == 201
+    assert common_shop.admin.post("/api/v1/readings/batch", json=rows).status_code == 201
     baseline: dict[str, Any] = {"quantity": "deviation", "first_sequence": 1, "last_sequence": 30, "reason": "calm"}
-    made.call("POST", f"/characteristics/{made.characteristic}/baselines", 201, **baseline)
-    return made
+    common_shop.call("POST", f"/characteristics/{common_shop.characteristic}/baselines", 201, **baseline)
+    return common_shop
 
 
 def of(shop: Shop, what: str, query: str = PERIOD) -> Any:
     return shop.call("GET", f"/characteristics/{shop.characteristic}/{what}?{query}")
 
 
-def test_the_numbers_of_page_api_and_report_are_those_of_the_period(shop: Shop) -> None:
-    found = of(shop, "statistics")
+def test_the_numbers_of_page_api_and_report_are_those_of_the_period(late: Shop, viewer: Person) -> None:
+    found = of(late, "statistics")
     assert found["count"] == len(MEANT)
     assert (found["minimum"], found["maximum"]) == (pytest.approx(found["minimum"]), 0.006)
-    said = facts(report(shop, PERIOD), "numbers")
+    said = facts(report(late, PERIOD), "numbers")
     assert said["count"]["value"] == found["count"]
     assert said["mean"]["value"] == pytest.approx(found["mean"] * 1000, abs=1e-9)
-    assert of(shop, "capability")["readings"] == found["count"]
-    page = " ".join(
-        unescape(Person(shop.server, "viewer").open(f"/characteristics/{shop.characteristic}?{PERIOD}")).split()
-    )
+    assert of(late, "capability")["readings"] == found["count"]
+    page = " ".join(unescape(viewer.open(f"/characteristics/{late.characteristic}?{PERIOD}")).split())
     for words in (f">{len(MEANT)}</span>", f"{found['minimum'] * 1000:.1f}", "+6.0"):
         assert words.replace("-", "\N{MINUS SIGN}") in page, words
     assert "+7.5" not in page.partition("Decisions")[0]
 
 
-def test_the_figures_show_them(shop: Shop) -> None:
-    bars = of(shop, "figures/histogram")["data"][0]
+def test_the_figures_show_them(late: Shop) -> None:
+    bars = of(late, "figures/histogram")["data"][0]
     assert sum(bars["x"]) == len(MEANT)
     for name in ("zones", "run", "control"):
         shown = {
             int(link.rsplit("/", 1)[1])
-            for trace in of(shop, f"figures/{name}")["data"]
+            for trace in of(late, f"figures/{name}")["data"]
             if trace.get("meta") in {"readings", "run", "points"}
             for link in trace["customdata"]
         }
@@ -73,24 +73,24 @@ def test_the_figures_show_them(shop: Shop) -> None:
 
 
 @pytest.mark.parametrize("chart", ["individuals", "moving_range", "ewma", "cusum"])
-def test_a_control_chart_has_their_points_which_are_what_they_are_in_any_window(shop: Shop, chart: str) -> None:
-    found, whole = (of(shop, "control", f"{query}&chart={chart}") for query in (PERIOD, "last=all"))
+def test_a_control_chart_has_their_points_which_are_what_they_are_in_any_window(late: Shop, chart: str) -> None:
+    found, whole = (of(late, "control", f"{query}&chart={chart}") for query in (PERIOD, "last=all"))
     assert found["points"]["last"] == MEANT
     values = dict(zip(whole["points"]["last"], whole["points"]["value"], strict=True))
     assert found["points"]["value"] == [values[sequence] for sequence in MEANT]
     signals = {(each["rule"], at) for each in whole["signals"] for at in range(each["first"], each["last"] + 1)}
     ends = {(each["rule"], each[end]) for each in found["signals"] for end in ("first", "last")}
     assert ends <= {(rule, at) for rule, at in signals if at in MEANT}
-    file = shop.admin.get(f"/api/v1/characteristics/{shop.characteristic}/control.csv?{PERIOD}&chart={chart}").text
+    file = late.admin.get(f"/api/v1/characteristics/{late.characteristic}/control.csv?{PERIOD}&chart={chart}").text
     assert [int(row["last_reading"]) for row in csv.DictReader(io.StringIO(file.lstrip("\ufeff")))] == MEANT
 
 
-def test_a_report_lists_the_decisions_and_corrections_of_them_alone(shop: Shop) -> None:
-    whole = report(shop, PERIOD + "&sections=decisions,corrections,numbers")
+def test_a_report_lists_the_decisions_and_corrections_of_them_alone(late: Shop) -> None:
+    whole = report(late, PERIOD + "&sections=decisions,corrections,numbers")
     assert [row["reading"]["value"] for row in table(whole, "decisions")] == MEANT[:-51:-1]
     decisions = next(each for each in whole["sections"] if each["key"] == "decisions")
     assert decisions["table"]["more"] == len(MEANT) - 50
     corrected = {row["reading"]["value"] for row in table(whole, "corrections")}
     assert corrected
     assert corrected <= set(MEANT), json.dumps(sorted(corrected))
-    assert facts(whole, "corrections")["issued"]["value"] == of(shop, "statistics")["corrections"]
+    assert facts(whole, "corrections")["issued"]["value"] == of(late, "statistics")["corrections"]

@@ -10,25 +10,17 @@ from pypdf import PdfReader
 
 from app.quality.proof import queries as proof
 from app.quality.proof.cases import cases
-from tests.conftest import Server
 from tests.shop import Person, Shop
-from tests.views.reports.story import PERIOD, facts, file, report, table, told
+from tests.views.reports.story import PERIOD, SAID, facts, file, report, table
 
 # The whole history, a run at its end, and a period by time, which begins and ends within it.
 PERIODS = [PERIOD, "last=60", "from={half}&to={late}"]
 
 
-@pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
-    made = Shop(server)
-    told(made)
-    return made
-
-
 @pytest.fixture(params=PERIODS)
-def period(request: pytest.FixtureRequest, shop: Shop) -> str:
+def period(request: pytest.FixtureRequest, story: Shop) -> str:
     def at(sequence: int) -> str:
-        reading = shop.call("GET", f"/readings/{shop.characteristic}/{sequence}")
+        reading = story.call("GET", f"/readings/{story.characteristic}/{sequence}")
         moment: str = reading["measured_at"]
         return moment.replace("+", "%2B")
 
@@ -36,17 +28,17 @@ def period(request: pytest.FixtureRequest, shop: Shop) -> str:
     return text.format(half=at(320), late=at(590))
 
 
-def of(shop: Shop, what: str, query: str) -> Any:
+def of(story: Shop, what: str, query: str) -> Any:
     query = "" if (what, query) == ("statistics", PERIOD) else query  # it is of all readings if nothing is said
-    return shop.call("GET", f"/characteristics/{shop.characteristic}/{what}?{query}")
+    return story.call("GET", f"/characteristics/{story.characteristic}/{what}?{query}")
 
 
 def um(value: float | None) -> Any:
     return None if value is None else pytest.approx(value * 1000, abs=2e-9)
 
 
-def test_the_numbers_are_those_of_the_statistics(shop: Shop, period: str) -> None:
-    said, found = facts(report(shop, period), "numbers"), of(shop, "statistics", period)
+def test_the_numbers_are_those_of_the_statistics(story: Shop, period: str) -> None:
+    said, found = facts(report(story, period), "numbers"), of(story, "statistics", period)
     assert said["count"]["value"] == found["count"] > 20
     assert said["excluded"]["value"] == found["excluded"]
     assert said["probe_faults"]["value"] == found["probe_faults"]
@@ -59,8 +51,8 @@ def test_the_numbers_are_those_of_the_statistics(shop: Shop, period: str) -> Non
         assert said[f"zone_{zone}"]["value"] == number
 
 
-def test_capability_is_that_of_its_page(shop: Shop, period: str) -> None:
-    said, found = facts(report(shop, period), "capability"), of(shop, "capability", period)
+def test_capability_is_that_of_its_page(story: Shop, period: str) -> None:
+    said, found = facts(report(story, period), "capability"), of(story, "capability", period)
     assert said["readings"]["value"] == found["readings"] > 20
     for name in ("cp", "cpk", "pp", "ppk", "cpm"):
         assert said[name]["value"] == pytest.approx(found[name]["value"], abs=1e-12)
@@ -80,21 +72,21 @@ def test_capability_is_that_of_its_page(shop: Shop, period: str) -> None:
     assert [name for name in ("cp", "cpk", "pp", "ppk") if not said[name]["note"]] == quotable
 
 
-def test_probe_faults_and_exclusions_are_left_out_and_named(shop: Shop) -> None:
-    numbers = next(each for each in report(shop)["sections"] if each["key"] == "numbers")
+def test_probe_faults_and_exclusions_are_left_out_and_named(story: Shop) -> None:
+    numbers = next(each for each in report(story)["sections"] if each["key"] == "numbers")
     assert numbers["warnings"][0].startswith("1 of these readings is a probe fault")
-    counted = facts(report(shop), "numbers")
+    counted = facts(report(story), "numbers")
     assert (counted["probe_faults"]["value"], counted["zone_probe_fault"]["value"]) == (1, 1)
-    assert counted["outside"]["value"] == facts(report(shop), "capability")["outside"]["value"]
-    said = facts(report(shop), "capability")
+    assert counted["outside"]["value"] == facts(report(story), "capability")["outside"]["value"]
+    said = facts(report(story), "capability")
     assert (said["excluded"]["value"], said["excluded"]["note"]) == (2, "17, 560")
     assert (said["faults"]["value"], said["faults"]["note"]) == (1, "601")
-    assert [row["reading"]["value"] for row in table(report(shop), "excluded")] == [560, 17]
+    assert [row["reading"]["value"] for row in table(report(story), "excluded")] == [560, 17]
 
 
 @pytest.mark.parametrize("kind", ["individuals", "moving_range"])
-def test_control_limits_are_those_of_the_frozen_baseline(shop: Shop, period: str, kind: str) -> None:
-    found, whole = of(shop, "control", f"{period}&chart={kind}"), report(shop, period)
+def test_control_limits_are_those_of_the_frozen_baseline(story: Shop, period: str, kind: str) -> None:
+    found, whole = of(story, "control", f"{period}&chart={kind}"), report(story, period)
     said = facts(whole, "control")
     assert said["baseline"]["value"] == found["baseline"] == 1
     assert said[f"{kind}_points"]["value"] == found["count"] > 20
@@ -109,30 +101,28 @@ def test_control_limits_are_those_of_the_frozen_baseline(shop: Shop, period: str
     shown = [(each["first"], each["last"], each["points"]) for each in found["signals"]]
     assert [each for each in shown if each not in listed] == []
     # By the same baseline whatever the period: nothing is estimated anew.
-    assert said["baseline_sigma"]["value"] == um(of(shop, "baselines/1", "")["sigma"])
+    assert said["baseline_sigma"]["value"] == um(of(story, "baselines/1", "")["sigma"])
 
 
-def test_signals_on_record_stand_in_it_with_what_was_said_of_them(shop: Shop) -> None:
-    kept = shop.call("GET", f"/signals?characteristic={shop.characteristic}&state=all")["items"]
+def test_signals_on_record_stand_in_it_with_what_was_said_of_them(story: Shop) -> None:
+    kept = story.call("GET", f"/signals?characteristic={story.characteristic}&state=all")["items"]
     assert kept, "the story gives signals"
-    comment: dict[str, Any] = {"cause": "material", "comment": "New batch, harder by 20 HB"}
-    shop.call("POST", f"/signals/{kept[0]['id']}/comment", **comment)
-    whole = report(shop)
+    whole = report(story)
     assert facts(whole, "control")["kept"]["value"] == len(kept)
     rows = {row["number"]["value"]: row for row in table(whole, "control") if row["number"]["value"] is not None}
     assert set(rows) == {each["id"] for each in kept}
     said = rows[kept[0]["id"]]
-    assert (said["state"]["value"], said["comment"]["value"]) == ("explained", comment["comment"])
+    assert (said["state"]["value"], said["comment"]["value"]) == ("explained", SAID["comment"])
 
 
-def test_corrections_and_alarms_are_those_on_record(shop: Shop, period: str) -> None:
-    whole, window = report(shop, period), of(shop, "statistics", period)
-    chart = of(shop, "control", period)
+def test_corrections_and_alarms_are_those_on_record(story: Shop, period: str) -> None:
+    whole, window = report(story, period), of(story, "statistics", period)
+    chart = of(story, "control", period)
     low, high = chart["first_sequence"], chart["last_sequence"]
     numbers: list[int] = []
     for row in table(whole, "corrections")[:20]:
         number = row["number"]["value"]
-        found = shop.call("GET", f"/corrections/{shop.machine}/{number}")
+        found = story.call("GET", f"/corrections/{story.machine}/{number}")
         assert row["amount"]["value"] == um(found["amount"])
         assert row["status"]["value"] == found["status"]
         assert low <= row["reading"]["value"] <= high
@@ -141,8 +131,8 @@ def test_corrections_and_alarms_are_those_on_record(shop: Shop, period: str) -> 
     assert facts(whole, "corrections")["issued"]["value"] == window["corrections"]
     alarms = [
         each["id"]
-        for each in shop.alarms("all")
-        if each.get("characteristic") == shop.characteristic
+        for each in story.alarms("all")
+        if each.get("characteristic") == story.characteristic
         and each["sequence"] is not None
         and low <= each["sequence"] <= high
     ]
@@ -168,30 +158,28 @@ def plain(text: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def whole(shop: Shop) -> Any:
-    return report(shop)
+def whole(story: Shop) -> Any:
+    return report(story)
 
 
-def test_the_pdf_shows_every_value_in_the_same_words(shop: Shop, whole: Any) -> None:
-    pages = PdfReader(io.BytesIO(file(shop, "pdf"))).pages
+def test_the_pdf_shows_every_value_in_the_same_words(story: Shop, whole: Any) -> None:
+    pages = PdfReader(io.BytesIO(file(story, "pdf"))).pages
     text = plain("".join(page.extract_text() for page in pages))
     missing = [said for said in said_in(whole) if plain(said) not in text]
     assert missing == []
     for page in pages:
-        assert f"({shop.characteristic})" in page.extract_text(), "every page says what it is about"
+        assert f"({story.characteristic})" in page.extract_text(), "every page says what it is about"
 
 
-def test_the_page_shows_every_value_in_the_same_words(shop: Shop, whole: Any) -> None:
+def test_the_page_shows_every_value_in_the_same_words(story: Shop, whole: Any, viewer: Person) -> None:
     from html import unescape
 
-    text = plain(
-        unescape(Person(shop.server, "viewer").open(f"/characteristics/{shop.characteristic}/report?{PERIOD}"))
-    )
+    text = plain(unescape(viewer.open(f"/characteristics/{story.characteristic}/report?{PERIOD}")))
     assert [said for said in said_in(whole) if plain(said) not in text] == []
 
 
-def test_the_xlsx_holds_the_numbers_as_numbers(shop: Shop, whole: Any) -> None:
-    book = load_workbook(io.BytesIO(file(shop, "xlsx")))
+def test_the_xlsx_holds_the_numbers_as_numbers(story: Shop, whole: Any) -> None:
+    book = load_workbook(io.BytesIO(file(story, "xlsx")))
     first = {(row[0].value, row[2].value) for row in book.worksheets[0].iter_rows(min_row=1, max_col=3)}
     for section in whole["sections"]:
         for fact in section["facts"]:
@@ -202,12 +190,12 @@ def test_the_xlsx_holds_the_numbers_as_numbers(shop: Shop, whole: Any) -> None:
                 ), fact
     # The points of the control chart stand beside the chart that the spreadsheet draws of them.
     points = {row[0]: row[1] for row in book["Individuals"].iter_rows(min_row=2, max_col=2, values_only=True)}
-    found = of(shop, "control", PERIOD)["points"]
+    found = of(story, "control", PERIOD)["points"]
     assert points == {last: um(value) for last, value in zip(found["last"], found["value"], strict=True)}
 
 
-def test_the_csv_holds_every_value_once_by_its_names(shop: Shop, whole: Any) -> None:
-    rows = list(csv.DictReader(io.StringIO(file(shop, "csv").decode("utf-8-sig"))))
+def test_the_csv_holds_every_value_once_by_its_names(story: Shop, whole: Any) -> None:
+    rows = list(csv.DictReader(io.StringIO(file(story, "csv").decode("utf-8-sig"))))
     values = {(row["section"], row["row"], row["key"]): row["value"] for row in rows}
     assert len(values) == len(rows)
     for section in whole["sections"]:
@@ -221,8 +209,8 @@ def test_the_csv_holds_every_value_once_by_its_names(shop: Shop, whole: Any) -> 
                     assert float(said) == pytest.approx(value["value"])
 
 
-def test_the_same_report_twice_says_the_same(shop: Shop) -> None:
-    one, two = report(shop), report(shop)
+def test_the_same_report_twice_says_the_same(story: Shop) -> None:
+    one, two = report(story), report(story)
     one["made_at"] = two["made_at"] = None
     assert one == two
 
@@ -233,7 +221,7 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(proof, "failing", lambda: (proof.Result(case, (), "ValueError: planted"),))
 
 
-def test_a_failing_proof_stands_above_everything(shop: Shop, failing: None) -> None:
+def test_a_failing_proof_stands_above_everything(story: Shop, failing: None) -> None:
     from datetime import UTC, datetime
 
     from app.files.documents.content import Format
@@ -242,8 +230,8 @@ def test_a_failing_proof_stands_above_everything(shop: Shop, failing: None) -> N
     from app.views.reports import queries
     from app.views.reports.request import ReportRequest, SectionName
 
-    with shop.server.database.begin() as session:
-        current = characteristic_named(session, shop.characteristic)
+    with story.server.database.begin() as session:
+        current = characteristic_named(session, story.characteristic)
         made = queries.report_of(
             session, current, ReportRequest(sections=(SectionName.NUMBERS,)), datetime(2026, 11, 22, tzinfo=UTC)
         )

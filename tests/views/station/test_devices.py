@@ -7,10 +7,12 @@ from typing import Any
 import httpx
 import pytest
 from playwright.sync_api import Browser, expect
+from sqlalchemy import select
 
 from app.access import devices
 from app.access.identification import FREE
-from tests.conftest import Server
+from app.access.tables import Person as PersonOnRecord
+from tests.conftest import TLS, Server
 from tests.shop import PASSWORD, Person, Shop
 
 PIN, BADGE = "2746", "0004711882"
@@ -53,22 +55,19 @@ def tablet(server: Server, shop: Shop) -> Tablet:
 
 
 @pytest.fixture(scope="module")
-def admin(server: Server) -> Person:
-    return Person(server, "admin")
-
-
-@pytest.fixture(scope="module")
-def milica(server: Server, admin: Person) -> Person:
+def milica(server: Server, admin: Person) -> Iterator[Person]:
     """An operator with a PIN and a badge."""
     person = Person(server, "operator")
     assert "The PIN is set" in person.send("/account/pin", password=PASSWORD, pin=PIN)
-    number = next(one["id"] for one in _people(server) if one["name"] == person.name)
-    assert "The badge is bound" in admin.send("/setup/stations/badges", person=str(number), code=BADGE)
-    return person
+    number = _number(server, person)
+    assert "The badge is bound" in admin.send("/setup/stations/badges", person=number, code=BADGE)
+    yield person
+    admin.send(f"/setup/stations/badges/{number}/remove")
 
 
-def _people(server: Server) -> Any:
-    return server.client(server.key()).get("/api/v1/people?limit=500").json()["items"]
+def _number(server: Server, person: Person) -> str:
+    with server.database.begin() as session:
+        return str(session.scalars(select(PersonOnRecord.id).where(PersonOnRecord.name == person.name)).one())
 
 
 def _last_entry(shop: Shop, action: str) -> Any:
@@ -141,14 +140,15 @@ class TestWhatItMay:
         assert f"bound to machine {tablet.shop.machine}" in refused.text
         token = {COOKIE: tablet.browser.cookies[COOKIE]}
         for path in ("/", "/alarms", "/setup/stations", "/account", f"/machines/{tablet.shop.machine}/tools"):
-            answer = httpx.get(server.url + path, cookies=token, headers={"Accept": "text/html"})
+            answer = httpx.get(server.url + path, cookies=token, headers={"Accept": "text/html"}, verify=TLS)
             assert answer.status_code in {303, 401}, path
         for path in ("/api/v1/machines", "/api/v1/alarms", "/api/v1/events", "/api/v1/people/me"):
-            assert httpx.get(server.url + path, cookies=token).status_code == 401, path
+            assert httpx.get(server.url + path, cookies=token, verify=TLS).status_code == 401, path
         pushed = httpx.post(
             f"{server.url}/api/v1/readings",
             cookies=token,
             json={"characteristic": tablet.shop.characteristic, "measured": 40.0},
+            verify=TLS,
         )
         assert pushed.status_code == 401
 
@@ -207,7 +207,7 @@ class TestWhoActs:
     def test_who_has_no_access_any_more_is_nobody(self, server: Server, tablet: Tablet) -> None:
         gone = Person(server, "operator")
         gone.send("/account/pin", password=PASSWORD, pin="8351")
-        number = next(one["id"] for one in _people(server) if one["name"] == gone.name)
+        number = _number(server, gone)
         tablet.shop.call("PATCH", f"/people/{number}", disabled=True)
         tablet.shop.read(12.0)
         tablet.acknowledge(401, other_name=gone.name, pin="8351")
@@ -269,7 +269,7 @@ class TestSecrets:
 
     def test_a_badge_is_of_one_person(self, server: Server, admin: Person, milica: Person, tablet: Tablet) -> None:
         other = Person(server, "operator")
-        number = str(next(one["id"] for one in _people(server) if one["name"] == other.name))
+        number = _number(server, other)
         assert "bound to somebody already" in admin.send("/setup/stations/badges", 409, person=number, code=BADGE)
         assert "Must have" in admin.send("/setup/stations/badges", 422, person=number, code="12")
         admin.send("/setup/stations/badges", person=number, code="7700112233")
