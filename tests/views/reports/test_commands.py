@@ -79,7 +79,7 @@ def test_several_in_a_folder_a_zip_or_a_workbook(story: Shop, second: str, tmp_p
 
 
 def test_one_that_there_is_not_spoils_no_other_and_is_said(story: Shop, second: str, tmp_path: Path) -> None:
-    done = written(story, "second", "nobody", "--section", "numbers", "-o", tmp_path / "some.zip")
+    done = written(story, second, "nobody", "--section", "numbers", "-o", tmp_path / "some.zip")
     assert done.returncode == 1
     assert "nobody" in done.stderr
     assert "1 report written." in done.stderr
