@@ -1,8 +1,6 @@
-"""Thirty faults at random points, five with each kind: nothing lost, nothing doubled, no edit overwritten.
+"""Faults at random points while parts are made: nothing lost, nothing doubled, no edit overwritten."""
 
-``python -m bench.bridge_faults`` does more.
-"""
-
+import random
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +9,12 @@ import pytest
 from app.bridge.simulators.mqtt import mosquitto
 from bench.bridge_faults import KINDS, Campaign
 from tests.conftest import Server
+from tests.shop import unique
+
+pytestmark = pytest.mark.own_server
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS))
-def test_nothing_is_lost_doubled_or_overwritten(server: Server, tmp_path: Path, kind: str) -> None:
-    if kind == "mqtt" and mosquitto() is None:
-        pytest.skip("mosquitto is not installed")
+def campaign(server: Server, folder: Path, kind: str, **more: Any) -> Campaign:
     client = server.client(server.key())
 
     def call(method: str, path: str, **body: Any) -> Any:
@@ -24,5 +22,20 @@ def test_nothing_is_lost_doubled_or_overwritten(server: Server, tmp_path: Path, 
         answer.raise_for_status()
         return answer.json()
 
-    found = Campaign(server, call, tmp_path, kind).run(5)
+    return Campaign(server, call, folder, kind, name=unique("faults"), **more)
+
+
+def test_the_loop_outlives_bridge_server_and_links(server: Server, tmp_path: Path) -> None:
+    """One kind, and each fault once. What other kinds do when their link is cut, tests/bridge/kinds shows."""
+    faults = ["bridge killed", "link to the control cut", "edited by hand", "server killed", "link to the server cut"]
+    found = campaign(server, tmp_path, "heidenhain", pause=0.5).go_through([*faults, "power of the control lost"])
+    assert found["corrections"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_nothing_is_lost_doubled_or_overwritten(server: Server, tmp_path: Path, kind: str) -> None:
+    if kind == "mqtt" and mosquitto() is None:
+        pytest.skip("mosquitto is not installed")
+    found = campaign(server, tmp_path, kind, seed=random.SystemRandom().randrange(10**6)).run(10)
     assert found["readings"] > 15
