@@ -41,7 +41,8 @@ class Shop:
         name = self.machine.replace("lathe-", "Lathe ")
         self.call("POST", "/machines", 201, key=self.machine, name=name, control="sinumerik")
         self.add(self.characteristic)
-        self.machine_client: httpx.Client = server.client(server.key(machine=self.machine))
+        self.machine_key: str = server.key(machine=self.machine)
+        self.machine_client: httpx.Client = server.client(self.machine_key)
 
     def add(self, key: str, **parameters: Any) -> None:
         """A characteristic of this machine."""

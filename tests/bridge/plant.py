@@ -16,6 +16,8 @@ from app.bridge.store import Store
 from app.bridge.unit import Unit, ended
 from app.core.ring import Register
 from inband_client import AsyncClient
+from tests.conftest import TLS
+from tests.shop import Shop
 
 PATIENCE = 30.0  # s: of a machine under load
 
@@ -118,10 +120,20 @@ async def until(met: Callable[[], Awaitable[Any] | Any], what: str) -> None:
 
 
 @asynccontextmanager
-async def bridge(url: str, secret: str, unit: Unit, *, heartbeat: bool = False) -> AsyncIterator[Unit]:
+async def controlled(unit: Unit) -> AsyncIterator[Unit]:
+    """The task that talks to the control, for as long as the block runs."""
+    task = asyncio.create_task(control_side.run(unit))
+    try:
+        yield unit
+    finally:
+        await ended([task])
+
+
+@asynccontextmanager
+async def bridge(shop: Shop, unit: Unit, *, heartbeat: bool = False) -> AsyncIterator[Unit]:
     """The tasks of one machine, for as long as the block runs."""
-    server = Server(url=url, ask=0.2, heartbeat=0.5)
-    async with AsyncClient(url, secret, patience=0.0) as client:
+    server = Server(url=shop.server.url, ask=0.2, heartbeat=0.1)
+    async with AsyncClient(server.url, shop.machine_key, patience=0.0, verify=TLS) as client:
         work = [control_side.run(unit), server_side.run(unit, client, server), guided_test.run(unit, client)]
         if heartbeat:
             work.append(server_side.beat(unit, client, server))

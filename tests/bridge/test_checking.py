@@ -47,7 +47,7 @@ def test_a_characteristic_of_another_machine_is_told_as_that(shop: Shop, tmp_pat
     file = tmp_path / "printed.txt"
     file.write_text("", encoding="ascii")
     machine = table("dprnt", file=str(file)) | {"characteristics": {"1": other.characteristic}}
-    machine["secret"] = shop.machine_client.headers["Authorization"].split()[1]
+    machine["secret"] = shop.machine_key
     content = {"server": {"url": shop.server.url}, "machine": {shop.machine: machine}}
     said = [str(each) for each in run(check(configuration_from(content, tmp_path)))]
     assert f"✗ {shop.machine}: characteristic 1 = {other.characteristic!r} belongs to another machine" in said

@@ -37,7 +37,7 @@ def test_a_size_comes_back_to_its_target(shop: Shop, tmp_path: Path, feature: Fe
             location=(location(feature),),
             corrections=mode,
         )
-        async with bridge(shop.server.url, shop.machine_client.headers["Authorization"].split()[1], one):
+        async with bridge(shop, one):
             await parts(model, 1)
             await until(
                 lambda: model.registers[Register.APPLIED] or model.registers[Register.MAIL_NUMBER], "a correction"

@@ -1,6 +1,5 @@
 """The control's side alone: the server is away, and what keeps a correction from the control counts all the same."""
 
-import asyncio
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -11,9 +10,9 @@ import pytest
 from app.bridge import control_side
 from app.bridge.links import Order, Outcome, Position
 from app.bridge.simulators.model import Feature, Model
-from app.bridge.unit import Unit, ended
+from app.bridge.unit import Unit
 from app.core.ring import Register
-from tests.bridge.plant import ModelRegisters, store_in, unit_of, until
+from tests.bridge.plant import ModelRegisters, controlled, store_in, unit_of, until
 from tests.loops import run
 
 M = "lathe-1"
@@ -51,11 +50,10 @@ def test_an_offered_correction_is_withdrawn_while_the_server_is_away(
         order = Order(1, 3, 0.0, -0.01)
         await unit.store.intend(M, order, "hash")
         unit.orders = (order,)
-        task = asyncio.create_task(control_side.run(unit))
-        await until(lambda: model.registers[Register.MAIL_NUMBER] == 1, "the correction in the mailbox")
-        await event(unit)
-        await until(lambda: model.registers[Register.MAIL_NUMBER] == 0, "the correction taken back")
-        await ended([task])
+        async with controlled(unit):
+            await until(lambda: model.registers[Register.MAIL_NUMBER] == 1, "the correction in the mailbox")
+            await event(unit)
+            await until(lambda: model.registers[Register.MAIL_NUMBER] == 0, "the correction taken back")
         unit.store.close()
 
     run(story())
@@ -77,19 +75,18 @@ def test_a_correction_that_was_answered_is_not_written_again_while_the_server_is
         order = Order(1, 3, 0.0, -0.01)
         await unit.store.intend(M, order, "hash")
         unit.orders = (order,)
-        task = asyncio.create_task(control_side.run(unit))
 
         async def answered() -> bool:
             return bool(await unit.store.intents(M, "answered"))
 
-        await until(answered, "the correction is set")
-        model.edit(place, 0.0)
-        registers.away = True
-        await until(lambda: unit.state == "control_away", "the line is cut")
-        registers.away = False
-        seen = unit.polls
-        await until(lambda: unit.polls > seen + 3, "the line is back")
-        await ended([task])
+        async with controlled(unit):
+            await until(answered, "the correction is set")
+            model.edit(place, 0.0)
+            registers.away = True
+            await until(lambda: unit.state == "control_away", "the line is cut")
+            registers.away = False
+            seen = unit.polls
+            await until(lambda: unit.polls > seen + 3, "the line is back")
         unit.store.close()
 
     run(story())
@@ -110,16 +107,15 @@ def test_an_answer_counts_that_the_bridge_sees_before_it_knows_the_correction(tm
         await unit.link.offer([order])
         for _ in model.part():
             pass
-        task = asyncio.create_task(control_side.run(unit))
-        await until(lambda: unit.polls > 1, "the answer is seen")
-        await unit.store.intend(M, order, "hash")
-        unit.orders = (order,)
 
         async def answered() -> bool:
             return [each.outcome for each in await unit.store.intents(M, "answered")] == [Outcome(1, True, -0.01)]
 
-        await until(answered, "the answer counts")
-        await ended([task])
+        async with controlled(unit):
+            await until(lambda: unit.polls > 1, "the answer is seen")
+            await unit.store.intend(M, order, "hash")
+            unit.orders = (order,)
+            await until(answered, "the answer counts")
         unit.store.close()
 
     run(story())

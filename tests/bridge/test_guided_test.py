@@ -13,17 +13,17 @@ import psycopg
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.bridge import control_side, guided_test, offset_change
+from app.bridge import guided_test, offset_change
 from app.bridge.configuration import Location, Machine
 from app.bridge.kinds import opcua
 from app.bridge.offset_change import noted
 from app.bridge.simulators.model import Feature, Model
 from app.bridge.simulators.opcua import serve
 from app.bridge.store import Store
-from app.bridge.unit import Guided, Unit, ended
+from app.bridge.unit import Guided, Unit
 from app.loop.connections.touch_tests.pages import TOO_SOON
 from tests.bridge.kinds.test_opcua import machine as opcua_machine
-from tests.bridge.plant import ModelRegisters, bridge, parts, store_in, unit_of, until
+from tests.bridge.plant import ModelRegisters, bridge, controlled, parts, store_in, unit_of, until
 from tests.conftest import Server
 from tests.loops import run
 from tests.shop import Person, Shop
@@ -50,10 +50,6 @@ def model() -> Model:
 def unit(shop: Shop, model: Model, store: Store, registers: ModelRegisters | None = None, **fields: Any) -> Unit:
     fields = {"characteristics": {"1": shop.characteristic}, "touch_tests_by_page": True, "proof_needed": True} | fields
     return unit_of(model, store, registers, key=shop.machine, **fields)
-
-
-def secret(shop: Shop) -> str:
-    return shop.machine_client.headers["Authorization"].split()[1]
 
 
 class Guide:
@@ -102,9 +98,19 @@ class Guide:
         return await self.reaches(state)
 
 
+def asked_before(shop: Shop, seconds: float) -> None:
+    """Let the last touch test of this machine be in its state for so long. 0: no longer, however slow the test is."""
+    with psycopg.connect(shop.server.database.dsn) as connection:
+        connection.execute(
+            "UPDATE touch_test SET state_at = now() - make_interval(secs => %s)"
+            " WHERE id = (SELECT max(t.id) FROM touch_test t JOIN machine m ON m.id = t.machine_id WHERE m.key = %s)",
+            [seconds or -60, shop.machine],
+        )
+
+
 @asynccontextmanager
 async def running(shop: Shop, one: Unit) -> Any:
-    async with bridge(shop.server.url, secret(shop), one, heartbeat=True):
+    async with bridge(shop, one, heartbeat=True):
         yield Guide(shop)
 
 
@@ -132,7 +138,7 @@ def test_a_location_is_proved_at_the_page(shop: Shop, server: Server, model: Mod
             **{name: getattr(chosen, name) for name in chosen.__struct_fields__} | {"key": shop.machine}
         )
         one = Unit(chosen, opcua.link(chosen), store)
-        async with bridge(server.url, secret(shop), one, heartbeat=True):
+        async with bridge(shop, one, heartbeat=True):
             facts["unit"] = one
             await enough.wait()
         facts["proof"], facts["hash"] = await proof(one), chosen.mapping_hash(chosen.location[0])
@@ -149,17 +155,18 @@ def test_a_location_is_proved_at_the_page(shop: Shop, server: Server, model: Mod
         expect(part.locator(".readout.big")).to_contain_text("0.0000mm")
         expect(part).to_contain_text("wear_length_1 of tool 3, edge 1")
         assert model.offsets[PLACE] == BEFORE
-        page.wait_for_timeout(TOO_SOON * 1000)
+        asked_before(shop, TOO_SOON)
         part.get_by_role("button", name="Yes, change it").click()
         expect(part.locator(".readout.big")).to_contain_text("0.0100mm")
         assert model.offsets[PLACE] == pytest.approx(AFTER)
-        page.wait_for_timeout(TOO_SOON * 1000)
+        asked_before(shop, TOO_SOON)
         part.get_by_role("button", name="Yes").click()
         expect(part).to_contain_text("10 µm larger in size")
+        asked_before(shop, 0)
         part.get_by_role("button", name="Yes").click()  # a second click
         expect(page.get_by_text("this did not count")).to_be_visible()
         expect(part).to_contain_text("Step 3 of 3")
-        page.wait_for_timeout(TOO_SOON * 1000)
+        asked_before(shop, TOO_SOON)
         part.get_by_role("button", name="Yes").click()
         expect(part).to_contain_text("Proved")
         expect(part).to_contain_text("Taken back: 0.0000 mm")
@@ -229,7 +236,7 @@ def test_after_a_crash_the_next_start_takes_back(shop: Shop, model: Model, tmp_p
         assert model.offsets[PLACE] == pytest.approx(AFTER)
         store = store_in(tmp_path)
         other = unit(shop, model, store)
-        async with bridge(shop.server.url, secret(shop), other, heartbeat=True):
+        async with bridge(shop, other, heartbeat=True):
             over = await guide.reaches("cancelled")
             assert "was ended during the touch test" in over["detail"]
             assert model.offsets[PLACE] == pytest.approx(BEFORE)
@@ -249,7 +256,7 @@ def test_an_offset_that_somebody_else_has_set_is_left_alone_after_a_crash(
             await guide.ask()
             await guide.comes_to("written")
         model.edit(PLACE, 0.5)
-        async with bridge(shop.server.url, secret(shop), unit(shop, model, store), heartbeat=True):
+        async with bridge(shop, unit(shop, model, store), heartbeat=True):
             over = await guide.reaches("failed")
         assert "Set 0.0000 mm in wear_length_1 of tool 3, edge 1 by hand." in over["detail"]
         assert model.offsets[PLACE] == 0.5
@@ -270,11 +277,10 @@ def test_while_the_server_is_away_the_time_limit_takes_back(
             assert test is not None
         # all tasks are cut off; that of the control goes on without those that speak with the server
         test.until = 0.0
-        task = asyncio.create_task(control_side.run(one))
-        await until(lambda: test.end is not None, "the end")
+        async with controlled(one):
+            await until(lambda: test.end is not None, "the end")
         assert model.offsets[PLACE] == pytest.approx(BEFORE)
-        await ended([task])
-        async with bridge(shop.server.url, secret(shop), one, heartbeat=True):  # the server is there again
+        async with bridge(shop, one, heartbeat=True):  # the server is there again
             over = await guide.reaches("cancelled")
             assert "No answer came" in over["detail"]
         one.store.close()
@@ -498,10 +504,7 @@ def test_the_page_says_what_to_set_by_hand_while_the_bridge_is_waited_for(
         person = Person(server, "operator")
         path = f"/machines/{shop.machine}/touch-tests/{guide.number}"
         assert "set that by hand" not in await asyncio.to_thread(person.open, path)
-        with psycopg.connect(shop.server.database.dsn) as connection:
-            connection.execute(
-                "UPDATE touch_test SET state_at = state_at - interval '1 minute' WHERE id = %s", [guide.number]
-            )
+        await asyncio.to_thread(asked_before, shop, 60)
         page = await asyncio.to_thread(person.open, path)
         assert "the screen showed 0.0000 mm in wear_length_1 of tool 3, edge 1" in page
         assert "set that by hand" in page
@@ -534,10 +537,9 @@ def test_the_end_of_the_bridge_takes_back_what_is_just_being_written(
         change = await offset_change.planned(one.link, one.machine, 3, 0.01, 1)
         now = time.monotonic()
         one.test = Guided(1, 3, 0.01, math.inf, heard="go", since=now, reached="read", change=change)
-        task = asyncio.create_task(control_side.run(one))
-        await until(lambda: model.offsets[PLACE] == pytest.approx(AFTER), "the write")
-        await guided_test.end_all([one])
-        await ended([task])
+        async with controlled(one):
+            await until(lambda: model.offsets[PLACE] == pytest.approx(AFTER), "the write")
+            await guided_test.end_all([one])
         assert model.offsets[PLACE] == pytest.approx(BEFORE)
         one.store.close()
 

@@ -3,7 +3,7 @@
 import asyncio
 import random
 from collections.abc import AsyncIterator, Sequence
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from app.bridge import control_side
 from app.bridge.configuration import Machine, configuration_from
 from app.bridge.kinds.dprnt import PrintedLink, Settings
 from app.bridge.links import ControlAway, LinkError, Misconfigured, Position, Received
@@ -23,8 +22,8 @@ from app.cli.bridge import bridge as commands
 from app.core.printed_line import LineReader, Printed, line_of
 from app.core.ring import Slot, Unit
 from app.errors import InbandError
-from tests.bridge.plant import bridge, machine, parts, store_in, until
-from tests.loops import run
+from tests.bridge.plant import bridge, controlled, machine, parts, store_in, until
+from tests.loops import in_thread, run
 from tests.shop import Shop
 
 SLOT = Slot(1, 1, 40.001, 0, 1, 3, 0, 43_200.0)
@@ -44,15 +43,8 @@ def printed_machine(settings: Settings, **other: Any) -> Machine:
     return machine(Model(), **{"kind": "dprnt", "settings": settings, "corrections": "none", "location": ()} | other)
 
 
-@asynccontextmanager
-async def controlled(one: Machine, store: Store) -> AsyncIterator[Tasks]:
-    tasks = Tasks(one, PrintedLink(one), store)
-    task = asyncio.create_task(control_side.run(tasks))
-    try:
-        yield tasks
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+def fetching(one: Machine, store: Store) -> AbstractAsyncContextManager[Tasks]:
+    return controlled(Tasks(one, PrintedLink(one), store))
 
 
 async def sizes(store: Store) -> dict[str, float]:
@@ -78,7 +70,7 @@ def test_readings_come_by_tcp_and_what_a_cut_has_swallowed_comes_with_the_second
         async with printing() as simulator:
             store = store_in(tmp_path)
             one = printed_machine(Settings(connect=f"127.0.0.1:{simulator.port}"))
-            async with controlled(one, store) as tasks:
+            async with fetching(one, store) as tasks:
                 await until(lambda: simulator.connections, "the connection")
                 await parts(simulator.model, 3)
                 await all_stored(store, simulator.model)
@@ -104,7 +96,7 @@ def test_a_serial_port(tmp_path: Path, framing: Any, *, parity: bool) -> None:
         async with printing(parity=parity) as simulator:
             store = store_in(tmp_path)
             one = printed_machine(Settings(serial=simulator.device, framing=framing))
-            async with controlled(one, store) as tasks:
+            async with fetching(one, store) as tasks:
                 await until(lambda: tasks.state == "online", "the port")
                 simulator.send(b"\x12%\r\nINBLINE E12 N4\r\n")
                 await parts(simulator.model, 4)
@@ -123,7 +115,7 @@ def test_a_port_that_listens_keeps_connections_apart(tmp_path: Path) -> None:
         server.close()
         await server.wait_closed()
         one = printed_machine(Settings(listen=port, listen_on="127.0.0.1"))
-        async with controlled(one, store) as tasks:
+        async with fetching(one, store) as tasks:
             await until(lambda: "Nobody is connected" in tasks.detail, "the port")
             writers = [(await asyncio.open_connection("127.0.0.1", port))[1] for _ in range(2)]
             text = lines(1), lines(2)
@@ -155,7 +147,7 @@ def test_a_file_that_grows_shrinks_and_is_read_again_after_a_restart(tmp_path: P
 
             await until(met, str(keys))
 
-        async with controlled(one, store) as tasks:
+        async with fetching(one, store) as tasks:
             await until(lambda: "cannot be read" in tasks.detail, "no file yet")
             half = len(lines(1)) + 20
             file.write_bytes(lines(1, 2)[:half])
@@ -169,7 +161,7 @@ def test_a_file_that_grows_shrinks_and_is_read_again_after_a_restart(tmp_path: P
             await stored("7:1", "7:2", "7:3", "7:5")
             file.write_bytes(lines(6, 7))  # longer, and read no earlier
             await stored("7:1", "7:2", "7:3", "7:5", "7:6", "7:7")
-        async with controlled(one, store):
+        async with fetching(one, store):
             with file.open("ab") as end:
                 end.write(lines(8))
             await stored("7:1", "7:2", "7:3", "7:5", "7:6", "7:7", "7:8")
@@ -292,7 +284,7 @@ def test_counters_of_a_file_are_not_accepted_as_all_would_come_again(
         f'\n[machine.mill-1.dprnt]\n{name} = "{value}"\n',
         encoding="utf-8",
     )
-    said = CliRunner().invoke(commands, ["accept-counters", "mill-1", "--config", str(plant)])
+    said = in_thread(lambda: CliRunner().invoke(commands, ["accept-counters", "mill-1", "--config", str(plant)]))
     assert isinstance(said.exception, InbandError) == refused
     assert "would come a second time" in str(said.exception) or not refused
 
@@ -343,8 +335,7 @@ def test_the_server_gets_each_reading_once(shop: Shop, tmp_path: Path) -> None:
                 key=shop.machine,
                 characteristics={"1": shop.characteristic},
             )
-            secret = shop.machine_client.headers["Authorization"].split()[1]
-            async with bridge(shop.server.url, secret, Tasks(one, PrintedLink(one), store)):
+            async with bridge(shop, Tasks(one, PrintedLink(one), store)):
                 await until(lambda: simulator.connections, "the connection")
                 for _ in range(5):
                     simulator.send(chance.randbytes(12))

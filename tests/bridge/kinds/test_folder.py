@@ -2,16 +2,15 @@
 
 import asyncio
 import os
+import threading
 import time
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import pytest
 
-from app.bridge import control_side
 from app.bridge.configuration import ConfigurationError, Machine, configuration_from
 from app.bridge.file_content import Content, read_content
 from app.bridge.kinds import folder
@@ -21,7 +20,7 @@ from app.bridge.simulators.folder import FolderSimulator
 from app.bridge.simulators.model import Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit
-from tests.bridge.plant import store_in, until
+from tests.bridge.plant import PATIENCE, controlled, store_in, until
 from tests.loops import run
 
 HEAD = "time;part;feature;actual\n"
@@ -41,16 +40,8 @@ def machine(folder: Path, unit: str = "mm", names: dict[str, str] | None = None,
     return configuration_from(content, folder).machines[0]
 
 
-@asynccontextmanager
-async def fetching(chosen: Machine, store: Store) -> AsyncIterator[Unit]:
-    unit = Unit(chosen, Folder(chosen), store)
-    task = asyncio.create_task(control_side.run(unit))
-    try:
-        yield unit
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
-        await unit.link.close()
+def fetching(chosen: Machine, store: Store) -> AbstractAsyncContextManager[Unit]:
+    return controlled(Unit(chosen, Folder(chosen), store))
 
 
 def write(path: Path, text: str, encoding: str = "utf-8") -> Path:
@@ -342,7 +333,7 @@ def test_later_files_wait_for_one_that_is_being_written(tmp_path: Path) -> None:
     """Readings come in the order in which they were measured; a file that is never whole holds nothing up for long."""
 
     async def work() -> None:
-        link = Folder(machine(tmp_path, settle=1.0))
+        link = Folder(machine(tmp_path, settle=3600.0))
         write(tmp_path / "a.csv", HEAD + LINE[:-4])
         write(tmp_path / "b.csv", HEAD + LINE.replace("P1", "P2"))
         os.utime(tmp_path / "b.csv", (time.time() + 1, time.time() + 1))
@@ -358,6 +349,9 @@ def test_later_files_wait_for_one_that_is_being_written(tmp_path: Path) -> None:
             parts += [each.body["part"] for each in received]
             await link.acknowledge(received)
         assert parts == ["P1", "P2"]
+        await link.close()
+        link = Folder(machine(tmp_path, settle=0.3))
+        await link.connect()
         for number in range(40):  # a file that grows all the time, with an old time of modification
             write(tmp_path / "log.csv", HEAD + LINE[:-4] + "0" * number)
             os.utime(tmp_path / "log.csv", (1, 1))
@@ -457,11 +451,11 @@ def test_a_file_that_goes_on_growing_brings_its_new_lines_only(tmp_path: Path) -
 
 
 def test_a_file_that_takes_longer_than_a_call_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    read_in_time, began = read_content, []
+    read_in_time, began, go_on = read_content, [], threading.Event()
 
     def slow(*given: Any) -> Content:
         began.append(given)
-        time.sleep(1.5)
+        go_on.wait(PATIENCE)
         return read_in_time(*given)
 
     monkeypatch.setattr(folder, "read_content", slow)
@@ -471,6 +465,7 @@ def test_a_file_that_takes_longer_than_a_call_is_read_once(tmp_path: Path, monke
         write(tmp_path / "a.csv", HEAD + LINE)
         async with fetching(msgspec.structs.replace(machine(tmp_path), patience=0.3), store) as unit:
             await until(lambda: "a.csv is still being read" in unit.detail, "the bridge says so")
+            go_on.set()
             await until((tmp_path / "done" / "a.csv").exists, "the file is done")
         assert await sizes(store) == [40.0123]
         assert len(began) == 1

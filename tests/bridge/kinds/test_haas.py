@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from app.bridge import control_side
 from app.bridge.checking import check
 from app.bridge.configuration import Configuration, Machine, Server, configuration_from
 from app.bridge.configuration import Store as StoreSettings
@@ -21,7 +20,7 @@ from app.bridge.store import Store
 from app.bridge.unit import Unit
 from app.core.ring import Register
 from app.core.ring import Unit as Length
-from tests.bridge.plant import bridge, location, machine, parts, store_in, until
+from tests.bridge.plant import bridge, controlled, location, machine, parts, store_in, until
 from tests.loops import run
 from tests.shop import Shop
 
@@ -67,17 +66,6 @@ async def collector(port: int, *queries: str, pause: float = 0.002) -> AsyncIter
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         writer.close()
-
-
-@asynccontextmanager
-async def controlled(unit: Unit) -> AsyncIterator[None]:
-    """The task that talks to the control, for as long as the block runs."""
-    task = asyncio.create_task(control_side.run(unit))
-    try:
-        yield
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
 
 
 async def everything(store: Store, model: Model) -> None:
@@ -355,7 +343,7 @@ def test_the_loop_closes_through_a_server(shop: Shop, tmp_path: Path) -> None:
             store = store_in(tmp_path)
             one = settled(simulator, key=shop.machine, characteristics={"1": shop.characteristic})
             unit = Unit(one, link(one), store)
-            async with bridge(shop.server.url, shop.machine_client.headers["Authorization"].split()[1], unit):
+            async with bridge(shop, unit):
                 await parts(model, 1)
                 await until(lambda: model.registers[Register.MAIL_NUMBER], "a correction")
                 await parts(model, 2)

@@ -4,13 +4,12 @@ import asyncio
 import random
 import re
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from app.bridge import control_side
 from app.bridge.configuration import ConfigurationError, Machine, configuration_from
 from app.bridge.kinds.heidenhain import Settings, TncLink, correction_program
 from app.bridge.links import ControlAway, LinkError, Order, Outcome, Position
@@ -20,7 +19,7 @@ from app.bridge.store import Store
 from app.bridge.unit import Unit as Tasks
 from app.core.printed_line import Printed, line_of
 from app.core.ring import Slot, Unit
-from tests.bridge.plant import machine, parts, store_in, until
+from tests.bridge.plant import controlled, machine, parts, store_in, until
 from tests.loops import run
 
 PLACE = (3, 1, "QR31")
@@ -45,15 +44,8 @@ def settings(simulator: TncSimulator, **other: Any) -> Settings:
     return Settings(**given | other)
 
 
-@asynccontextmanager
-async def controlled(one: Machine, store: Store) -> AsyncIterator[Tasks]:
-    tasks = Tasks(one, TncLink(one), store)
-    task = asyncio.create_task(control_side.run(tasks))
-    try:
-        yield tasks
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+def fetching(one: Machine, store: Store) -> AbstractAsyncContextManager[Tasks]:
+    return controlled(Tasks(one, TncLink(one), store))
 
 
 async def stored(store: Store) -> dict[str, float]:
@@ -127,7 +119,7 @@ def test_readings_arrive_once_and_in_order_through_cuts(tmp_path: Path) -> None:
     async def work() -> None:
         store = store_in(tmp_path)
         chance = random.Random(3)
-        async with control() as simulator, controlled(tnc(settings(simulator)), store) as tasks:
+        async with control() as simulator, fetching(tnc(settings(simulator)), store) as tasks:
             for _ in range(6):
                 await parts(simulator.model, chance.randint(1, 4))
                 await asyncio.sleep(chance.random() / 5)

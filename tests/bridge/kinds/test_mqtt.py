@@ -3,8 +3,9 @@
 import asyncio
 import json
 import subprocess
+from collections import Counter
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
 from typing import Any, Self
 
@@ -12,15 +13,14 @@ import aiomqtt
 import msgspec
 import pytest
 
-from app.bridge import control_side
 from app.bridge.configuration import ConfigurationError, Machine, configuration_from
-from app.bridge.kinds.mqtt import MqttLink, link
+from app.bridge.kinds.mqtt import AT_ONCE, MqttLink, link
 from app.bridge.links import ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.simulators.model import Model
 from app.bridge.simulators.mqtt import MqttSimulator, free_port, mosquitto, start_broker
 from app.bridge.store import Store
-from app.bridge.unit import Unit, ended
-from tests.bridge.plant import bridge, store_in, until
+from app.bridge.unit import Unit
+from tests.bridge.plant import PATIENCE, bridge, controlled, store_in, until
 from tests.loops import run
 from tests.shop import Shop
 
@@ -82,14 +82,8 @@ async def connected(chosen: Machine) -> AsyncIterator[MqttLink]:
         await there.close()
 
 
-@asynccontextmanager
-async def fetching(chosen: Machine, store: Store) -> AsyncIterator[Unit]:
-    unit = Unit(chosen, link(chosen), store)
-    task = asyncio.create_task(control_side.run(unit))
-    try:
-        yield unit
-    finally:
-        await ended([task])
+def fetching(chosen: Machine, store: Store) -> AbstractAsyncContextManager[Unit]:
+    return controlled(Unit(chosen, link(chosen), store))
 
 
 async def fetched(there: MqttLink, count: int = 1) -> list[Received]:
@@ -368,34 +362,40 @@ def test_every_reading_once_while_broker_and_bridge_are_killed(tmp_path: Path) -
 
 def test_a_backlog_comes_through_a_broker_that_is_slow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It answers for some messages before a call is given up, never for all that it has sent."""
-    count, one_by_one, publish = 300, asyncio.Lock(), MqttLink._publish
+    count, answered, publish = 2 * AT_ONCE, AT_ONCE + 10, MqttLink._publish
+    connections: Counter[object] = Counter()
 
     async def slow(there: MqttLink, topic: str, content: object, **other: Any) -> None:
-        async with one_by_one:
-            await asyncio.sleep(0.01)
-            await publish(there, topic, content, **other)
+        client = there._there()
+        if topic == "stored":
+            connections[client] += 1
+            if connections[client] > answered:
+                await asyncio.Event().wait()  # until the call is given up
+        await publish(there, topic, content, **other)
 
     monkeypatch.setattr(MqttLink, "_publish", slow)
 
     async def work() -> None:
         store = store_in(tmp_path)
         async with Broker(tmp_path) as broker:
-            chosen = msgspec.structs.replace(machine(broker.port), patience=2.5)
+            chosen = msgspec.structs.replace(machine(broker.port), patience=2.0)
             async with connected(chosen):
                 pass  # the session is there: the broker keeps messages for it
             await say(broker.port, "readings", *(READING | {"key": f"k{number}"} for number in range(count)))
             told: set[str] = set()
-            async with aiomqtt.Client("127.0.0.1", broker.port) as client, fetching(chosen, store):
+            async with aiomqtt.Client("127.0.0.1", broker.port) as client, fetching(chosen, store) as unit:
                 await client.subscribe(f"{TOPIC}/stored", qos=1)
-                async with asyncio.timeout(30):
+                async with asyncio.timeout(PATIENCE):
                     async for message in client.messages:
                         told.add(json.loads(bytes(message.payload))["key"])
                         if len(told) == count:
                             break
-                await asyncio.sleep(1.5)  # the last are acknowledged to the broker
-            async with connected(chosen) as there:  # nothing is left at the broker
-                await asyncio.sleep(0.3)
-                assert await there.fetch(Position()) == []
+                polls = unit.polls
+                await until(lambda: unit.polls > polls, "the last are acknowledged to the broker")
+            assert len(connections) > 1
+            await say(broker.port, "readings", READING | {"key": "later"})
+            async with connected(chosen) as there:  # nothing else is left at the broker
+                assert [each.key for each in await fetched(there)] == ["later"]
         store.close()
 
     run(work())
@@ -418,12 +418,11 @@ def test_corrections_reach_the_machine_once_through_a_server(shop: Shop, tmp_pat
             fields = {"key": shop.machine, "characteristics": {"1": shop.characteristic}}
             chosen = msgspec.structs.replace(machine(broker.port), **fields)
             unit = Unit(chosen, link(chosen), store)
-            secret = shop.machine_client.headers["Authorization"].split()[1]
             try:
-                async with bridge(shop.server.url, secret, unit):
-                    for number in range(14):
+                async with bridge(shop, unit):
+                    for number in range(8):
                         await _part(model)
-                        if number == 6:
+                        if number == 4:
                             await broker.kill()
                             await broker.start()
                         await until(lambda: len(simulator.stored) == len(model.truth()), "everything is stored")
