@@ -4,14 +4,12 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.loop.connections import wording
-from tests.conftest import Server
 from tests.loop.connections.test_alarms import run, silent_for
 from tests.loop.connections.test_heartbeat import ago, beat
 from tests.shop import Person, Shop
 
 
-def test_the_list_says_how_each_stands(shop: Shop, server: Server) -> None:
-    viewer = Person(server, "viewer")
+def test_the_list_says_how_each_stands(shop: Shop, viewer: Person) -> None:
     beat(
         shop,
         state="control_away",
@@ -34,8 +32,7 @@ def test_the_list_says_how_each_stands(shop: Shop, server: Server) -> None:
     assert f'href="/machines/{shop.machine}/connection"' in home
 
 
-def test_the_page_of_a_machine_shows_proofs_and_quarantine(shop: Shop, server: Server) -> None:
-    viewer = Person(server, "viewer")
+def test_the_page_of_a_machine_shows_proofs_and_quarantine(shop: Shop, viewer: Person) -> None:
     assert "No bridge has spoken for this machine" in viewer.open(f"/machines/{shop.machine}/connection")
     beat(
         shop,
@@ -60,38 +57,40 @@ def test_the_page_of_a_machine_shows_proofs_and_quarantine(shop: Shop, server: S
     assert "Remove the connection" not in page
 
 
-def test_a_silent_bridge_is_shown_and_an_administrator_removes_it(shop: Shop, server: Server) -> None:
+def test_a_silent_bridge_is_shown_and_an_administrator_removes_it(shop: Shop, admin: Person, engineer: Person) -> None:
     beat(shop, detail="all is well")
     silent_for(shop, 5)
     run(shop)
-    admin, path = Person(server, "admin"), f"/machines/{shop.machine}/connection"
+    path = f"/machines/{shop.machine}/connection"
     page = admin.open(path)
     assert "Silent" in page
     assert "all is well" not in page, "what it said last is not how it is now"
     assert f'href="{path}"' in admin.open(f"/alarms?machine={shop.machine}")
-    Person(server, "engineer").send(f"{path}/remove", 403)
+    engineer.send(f"{path}/remove", 403)
     assert "No bridge has spoken for this machine" in admin.send(f"{path}/remove")
     assert shop.alarms() == []
 
 
-def test_the_page_follows_by_itself(shop: Shop, server: Server, page: Page) -> None:
+def test_the_page_follows_by_itself(shop: Shop, viewer: Person, page: Page) -> None:
     beat(shop)
-    Person(server, "viewer").sign_in(page)
+    page.clock.install()
+    viewer.sign_in(page)
     page.goto(f"/machines/{shop.machine}/connection")
     expect(page.locator("#connection .badge").first).to_have_text("Online")
     beat(shop, state="wrong_machine", detail="SN-2 answers, not SN-1.")
     expect(page.locator("#connection .badge").first).to_have_text("Wrong machine")
     expect(page.locator("#connection")).to_contain_text("SN-2 answers, not SN-1.")
     beat(shop, state="wrong_machine", waiting=12)  # no event: it is looked at every ten seconds
-    expect(page.locator("#connection .readouts")).to_contain_text("12", timeout=30_000)
+    page.clock.fast_forward(10_000)
+    expect(page.locator("#connection .readouts")).to_contain_text("12")
 
 
-def test_keys_say_when_they_were_used_last(shop: Shop, server: Server) -> None:
+def test_keys_say_when_they_were_used_last(shop: Shop, engineer: Person) -> None:
     beat(shop)
     keys = shop.call("GET", f"/machines/{shop.machine}/keys")["items"]
     assert set(keys[0]) >= {"last_used_at", "created_at"}
     shop.call("POST", f"/machines/{shop.machine}/keys", 201, name="spare")
-    page = Person(server, "engineer").open(f"/setup/machines/{shop.machine}")
+    page = engineer.open(f"/setup/machines/{shop.machine}")
     assert "Last used" in page
     assert "never" in page
 
@@ -104,7 +103,7 @@ def test_clocks_in_words(offset: float | None, said: str, off: bool) -> None:
     assert (wording.clock(offset), wording.clock_is_off(offset)) == (said, off)
 
 
-def test_every_state_has_a_word_and_a_sentence(shop: Shop) -> None:
+def test_every_state_has_a_word_and_a_sentence() -> None:
     for state in (
         "starting",
         "online",
