@@ -8,7 +8,7 @@ from app.main import JOBS
 from tests.shop import Shop
 
 PERIOD = "last=all"
-SAID = {"cause": "material", "comment": "New batch, harder by 20 HB"}  # of the newest signal
+SAID: dict[str, Any] = {"cause": "material", "comment": "New batch, harder by 20 HB"}  # of the newest signal
 
 
 def scatter(count: int, seed: int = 1, sigma: float = 1.5, mean: float = 0.2) -> list[float]:

@@ -389,6 +389,7 @@ class TestPage:
         row.get_by_role("button", name="Throw away").click()
         expect(page.locator(f"#job-{number}")).to_have_count(0)
 
+    @pytest.mark.usefixtures("bores")
     def test_what_was_typed_wrong_is_kept_and_named(self, viewer: Person) -> None:
         text = viewer.send("/reports", 422, characteristic="bore-2", **{"from": "yesterday", "timezone": "Mars"})
         assert 'id="f-from-error"' in text
