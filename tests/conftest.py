@@ -348,6 +348,7 @@ def run_server(new_database: NewDatabase, tmp_path_factory: pytest.TempPathFacto
         own = database_url is None
         url = new_database() if database_url is None else database_url
         stderr, port = tmp_path_factory.mktemp("server") / "stderr", free_port()
+        options = {"data_dir": stderr.parent / "data"} | options  # no test may write to a real installation
         command = ["serve", "--port", str(port), "--database-url", url]
         for option, value in options.items():
             command += [f"--{option.replace('_', '-')}", str(value)]

@@ -1,7 +1,6 @@
 """AQDEF files into a real database: through the actions and the command."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from zoneinfo import ZoneInfo
@@ -24,10 +23,9 @@ from app.loop.readings.importing.aqdef.actions import Outcome
 from app.loop.readings.importing.aqdef.content import Wishes
 from app.loop.readings.importing.aqdef.matching import NEW
 from app.loop.readings.importing.history import Flawed
-from tests.conftest import RunServer, Server
 from tests.forked import inband
 from tests.loop.readings.importing.test_history import scalar, set_up, stored
-from tests.shop import Shop
+from tests.shop import Person, Shop
 
 BERLIN = Wishes(ZoneInfo("Europe/Berlin"))
 HEAD = [
@@ -296,25 +294,13 @@ def test_the_command_teaches(plant: Database, tmp_path: Path) -> None:
     assert "b.dfd" in inband("import", lonely, INBAND_DATABASE_URL=plant.dsn).stderr
 
 
-@pytest.fixture(scope="module")
-def server(run_server: RunServer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """It keeps what is sent in a folder of this test."""
-    with run_server(data_dir=tmp_path_factory.mktemp("plant") / "data") as running:
-        running.person("Eva", "engineer", "correct horse battery")
-        yield running
-
-
-def signed_in(server: Server) -> httpx.Client:
-    client = server.client()
-    assert client.post("/sign-in", data={"name": "Eva", "password": "correct horse battery"}).status_code == 303
-    return client
-
-
-def send(client: httpx.Client, *files: tuple[str, str]) -> httpx.Response:
+def send(person: Person, *files: tuple[str, str]) -> httpx.Response:
+    """What is answered is the address of the preview, or what is wrong."""
+    client = person.browser
     csrf = re.search(r'name="csrf" value="([^"]+)"', client.get("/account").text)
     assert csrf
     parts = [("file", (name, content.encode())) for name, content in files]
-    return client.post("/import", data={"csrf": csrf[1], "characteristic": ""}, files=parts)
+    return client.post("/import", data={"csrf": csrf[1], "characteristic": ""}, files=parts, follow_redirects=False)
 
 
 def own_lines(shop: Shop) -> list[str]:
@@ -330,14 +316,10 @@ def own_lines(shop: Shop) -> list[str]:
 
 
 @pytest.mark.browser
-def test_a_file_on_the_page(server: Server, page: Page, tmp_path: Path) -> None:
-    shop = Shop(server)
+def test_a_file_on_the_page(shop: Shop, engineer: Person, page: Page, tmp_path: Path) -> None:
     lines = own_lines(shop)
-    page.goto("/sign-in?next=/import")
-    page.fill("[name=name]", "Eva")
-    page.fill("[name=password]", "correct horse battery")
-    page.keyboard.press("Enter")
-    page.wait_for_url(re.compile(r"/import$"))
+    engineer.sign_in(page)
+    page.goto("/import")
     page.set_input_files("[name=file]", written(tmp_path / "shift.dfq", lines))
     page.get_by_role("button", name="Preview").click()
     rows = page.locator("tbody tr")
@@ -355,19 +337,19 @@ def test_a_file_on_the_page(server: Server, page: Page, tmp_path: Path) -> None:
     assert [each["measured"] for each in found] == [39.991, 39.992, 39.992]
 
 
-def test_a_pair_is_sent_together_and_what_is_wrong_is_shown(server: Server) -> None:
-    shop, client = Shop(server), signed_in(server)
+def test_a_pair_is_sent_together_and_what_is_wrong_is_shown(shop: Shop, engineer: Person) -> None:
+    client = engineer.browser
     head = f"K0100 1\nK2001/1 {shop.characteristic}\nK2142/1 mm\n"
-    alone = send(client, ("a.dfx", "1"))
+    alone = send(engineer, ("a.dfx", "1"))
     assert (alone.status_code, "choose the .dfd that describes them too" in alone.text) == (422, True)
-    assert "Choose one file, or a .dfd and its .dfx" in send(client, ("a.dfq", head), ("b.csv", "x")).text
-    good = send(client, ("a.dfx", f"39.99{F}0{F}2.3.2026/6:00\n"), ("a.dfd", head))
+    assert "Choose one file, or a .dfd and its .dfx" in send(engineer, ("a.dfq", head), ("b.csv", "x")).text
+    good = send(engineer, ("a.dfx", f"39.99{F}0{F}2.3.2026/6:00\n"), ("a.dfd", head))
     preview = client.get(good.headers["location"]).text
     assert re.search(r'<td class="num">1</td>', preview)
-    bad = client.get(send(client, ("a.dfx", f"39.99{F}0{F}32.3.2026/6:00\nx\n"), ("a.dfd", head)).headers["location"])
+    bad = client.get(send(engineer, ("a.dfx", f"39.99{F}0{F}32.3.2026/6:00\nx\n"), ("a.dfd", head)).headers["location"])
     assert "32.3.2026/6:00" in bad.text
     assert "day is out of range for month" in bad.text
-    nothing = client.get(send(client, ("a.dfq", "measured\n1\n")).headers["location"])
+    nothing = client.get(send(engineer, ("a.dfq", "measured\n1\n")).headers["location"])
     assert (nothing.status_code, "no line begins with a K field" in nothing.text) == (200, True)
     address = good.headers["location"]
     for said in (
@@ -382,8 +364,7 @@ def test_a_pair_is_sent_together_and_what_is_wrong_is_shown(server: Server) -> N
         assert client.get(f"{address}?{said}").status_code == 200, said
 
 
-def test_a_file_by_the_api(server: Server) -> None:
-    shop = Shop(server)
+def test_a_file_by_the_api(shop: Shop) -> None:
     lines = own_lines(shop)
     body: dict[str, Any] = {"name": "shift.dfq", "content": "\r\n".join(lines), "timezone": "Europe/Berlin"}
     tried = shop.call("POST", "/readings/aqdef", **body, dry_run=True)["characteristics"][0]
@@ -435,8 +416,7 @@ def test_signs_that_nobody_sees_are_in_no_name_that_is_set_up(plant: Database, t
         ({"values": ""}, "values", ""),
     ],
 )
-def test_the_api_says_what_is_wrong(server: Server, wrong: dict[str, Any], field: str, said: str) -> None:
-    shop = Shop(server)
+def test_the_api_says_what_is_wrong(shop: Shop, wrong: dict[str, Any], field: str, said: str) -> None:
     body = {
         "name": "a.dfq",
         "content": "\n".join(HEAD + ROWS),
