@@ -34,63 +34,58 @@ CONTRACT: dict[str, Any] = {
 }
 
 
-@pytest.fixture(scope="module")
-def shop(server: Any) -> Shop:
-    return Shop(server)
+def path(common_shop: Shop, more: str = "") -> str:
+    return f"/characteristics/{common_shop.characteristic}{more}"
 
 
-def path(shop: Shop, more: str = "") -> str:
-    return f"/characteristics/{shop.characteristic}{more}"
-
-
-def change(shop: Shop, status: int = 200, /, **parameters: Any) -> Any:
-    return shop.call("PATCH", path(shop), status, parameters=parameters, reason="because")
+def change(common_shop: Shop, status: int = 200, /, **parameters: Any) -> Any:
+    return common_shop.call("PATCH", path(common_shop), status, parameters=parameters, reason="because")
 
 
 class TestSetUp:
-    def test_the_example_of_the_contract(self, shop: Shop) -> None:
+    def test_the_example_of_the_contract(self, common_shop: Shop) -> None:
         body: dict[str, Any] = {
             "key": "shaft-d40",
             "name": "Bearing seat Ø40 h6",
-            "machine": shop.machine,
+            "machine": common_shop.machine,
             "part": "shaft-0815",
             "unit": "mm",
         }
-        made = shop.call("POST", "/characteristics", 201, **body, parameters=CONTRACT)
+        made = common_shop.call("POST", "/characteristics", 201, **body, parameters=CONTRACT)
         assert {name: made[name] for name in body} == body
         assert made["parameters"].items() >= CONTRACT.items()
         assert (made["parameters"]["target"], made["parameters"]["tolerance_width"]) == (39.992, 0.016)
         assert (made["parameters_version"], made["warnings"]) == (1, [])
-        assert shop.call("GET", "/characteristics/shaft-d40") == made
+        assert common_shop.call("GET", "/characteristics/shaft-d40") == made
 
-    def test_r_numbers_mean_the_same_as_names(self, shop: Shop) -> None:
+    def test_r_numbers_mean_the_same_as_names(self, common_shop: Shop) -> None:
         r_of = {field.name: field.r or field.name for field in FIELDS}
         under_r = {r_of.get(name, name): value for name, value in CONTRACT.items()}
         assert "R33" in under_r
-        body: dict[str, Any] = {"name": "x", "machine": shop.machine}
-        by_r = shop.call("POST", "/characteristics", 201, key="by-r", **body, parameters=under_r)
-        by_name = shop.call("POST", "/characteristics", 201, key="by-name", **body, parameters=CONTRACT)
+        body: dict[str, Any] = {"name": "x", "machine": common_shop.machine}
+        by_r = common_shop.call("POST", "/characteristics", 201, key="by-r", **body, parameters=under_r)
+        by_name = common_shop.call("POST", "/characteristics", 201, key="by-name", **body, parameters=CONTRACT)
         assert by_r["parameters"] == by_name["parameters"]
 
-    def test_codes_of_the_control_and_two_points(self, shop: Shop) -> None:
+    def test_codes_of_the_control_and_two_points(self, common_shop: Shop) -> None:
         given = PARAMETERS | {"r31": 1, "R30": 2, "R24": 1}
-        made = shop.call(
-            "POST", "/characteristics", 201, key="coded", name="x", machine=shop.machine, parameters=given
+        made = common_shop.call(
+            "POST", "/characteristics", 201, key="coded", name="x", machine=common_shop.machine, parameters=given
         )["parameters"]
         assert (made["direction"], made["axis"], made["variant"]) == ("negative", "Z", "two_point")
 
-    def test_a_target_changed_to_the_same_in_inches_is_named(self, shop: Shop) -> None:
-        shop.add("to-inches")
+    def test_a_target_changed_to_the_same_in_inches_is_named(self, common_shop: Shop) -> None:
+        common_shop.add("to-inches")
         given: dict[str, Any] = {"parameters": {"target": 1.5748}, "reason": "new drawing"}
-        made = shop.call("PATCH", "/characteristics/to-inches", **given)
+        made = common_shop.call("PATCH", "/characteristics/to-inches", **given)
         assert ("looks_like_inches", "parameters.target") in {
             (each["code"], each["field"]) for each in made["warnings"]
         }
 
-    def test_unusual_values_are_taken_with_a_warning(self, shop: Shop) -> None:
+    def test_unusual_values_are_taken_with_a_warning(self, common_shop: Shop) -> None:
         given = PARAMETERS | {"weighting_factor": 7, "wear_limit": 0.05}
-        made = shop.call(
-            "POST", "/characteristics", 201, key="unusual", name="x", machine=shop.machine, parameters=given
+        made = common_shop.call(
+            "POST", "/characteristics", 201, key="unusual", name="x", machine=common_shop.machine, parameters=given
         )
         assert made["warnings"] == [
             {
@@ -119,57 +114,63 @@ class TestSetUp:
         ],
     )
     def test_what_the_cycles_would_not_take_is_warned_of(
-        self, shop: Shop, given: dict[str, Any], code: str, field: str
+        self, common_shop: Shop, given: dict[str, Any], code: str, field: str
     ) -> None:
-        shop.call("PATCH", f"/machines/{shop.machine}", type="lathe")
+        common_shop.call("PATCH", f"/machines/{common_shop.machine}", type="lathe")
         key = f"unusual-{code}-{field}".replace("_", "-")
-        made = shop.call(
-            "POST", "/characteristics", 201, key=f"{key}-{len(str(given))}", name="x", machine=shop.machine,
+        made = common_shop.call(
+            "POST", "/characteristics", 201, key=f"{key}-{len(str(given))}", name="x", machine=common_shop.machine,
             parameters=PARAMETERS | given,
         )  # fmt: skip
         assert [(each["code"], each["field"]) for each in made["warnings"]] == [(code, f"parameters.{field}")]
-        shop.call("PATCH", f"/machines/{shop.machine}", type="mill")
+        common_shop.call("PATCH", f"/machines/{common_shop.machine}", type="mill")
         if code in {"not_on_lathe", "factor_on_lathe"}:
-            assert shop.call("GET", f"/characteristics/{made['key']}")["warnings"] == []
+            assert common_shop.call("GET", f"/characteristics/{made['key']}")["warnings"] == []
 
-    def test_a_taken_key_is_a_conflict_and_an_unknown_machine_is_named(self, shop: Shop) -> None:
+    def test_a_taken_key_is_a_conflict_and_an_unknown_machine_is_named(self, common_shop: Shop) -> None:
         body: dict[str, Any] = {"name": "x", "parameters": PARAMETERS}
-        shop.call("POST", "/characteristics", 409, key=shop.characteristic, machine=shop.machine, **body)
-        problem = shop.call("POST", "/characteristics", 422, key="lost", machine="nowhere", **body)
+        common_shop.call(
+            "POST", "/characteristics", 409, key=common_shop.characteristic, machine=common_shop.machine, **body
+        )
+        problem = common_shop.call("POST", "/characteristics", 422, key="lost", machine="nowhere", **body)
         assert problem["errors"] == [{"field": "machine", "message": "There is no machine 'nowhere'; set it up first"}]
 
-    def test_it_takes_readings_at_once(self, shop: Shop) -> None:
-        shop.add("ready")
-        assert shop.read(3.0, "ready")["parameters_version"] == 1
+    def test_it_takes_readings_at_once(self, common_shop: Shop) -> None:
+        common_shop.add("ready")
+        assert common_shop.read(3.0, "ready")["parameters_version"] == 1
 
-    def test_lists(self, shop: Shop) -> None:
+    def test_lists(self, common_shop: Shop) -> None:
         keys: list[str] = []
         page: Any = {"next": ""}
         while page["next"] is not None:
-            page = shop.call("GET", f"/characteristics?machine={shop.machine}&limit=2&after={page['next']}")
+            page = common_shop.call(
+                "GET", f"/characteristics?machine={common_shop.machine}&limit=2&after={page['next']}"
+            )
             keys += [item["key"] for item in page["items"]]
         assert keys == sorted(keys)
-        assert shop.characteristic in keys
-        shop.call("GET", "/characteristics?machine=nowhere", 404)
+        assert common_shop.characteristic in keys
+        common_shop.call("GET", "/characteristics?machine=nowhere", 404)
 
 
 class TestChange:
     def test_a_part_of_the_parameters_makes_a_new_version(self, server: Any) -> None:
-        shop = Shop(server)
-        assert shop.read(3.0)["parameters_version"] == 1
-        before = shop.call("GET", path(shop))["parameters"]
-        after = shop.call("PATCH", path(shop), parameters={"R33": 0.002, "mode": "approval"}, reason="new probe")
+        common_shop = Shop(server)
+        assert common_shop.read(3.0)["parameters_version"] == 1
+        before = common_shop.call("GET", path(common_shop))["parameters"]
+        after = common_shop.call(
+            "PATCH", path(common_shop), parameters={"R33": 0.002, "mode": "approval"}, reason="new probe"
+        )
         assert after["parameters"] == before | {"zero_range": 0.002, "mode": "approval"}
         assert after["parameters_version"] == 2
-        assert shop.read(3.0)["parameters_version"] == 2
-        assert shop.call("GET", f"/readings/{shop.characteristic}/1")["parameters_version"] == 1
-        versions = shop.call("GET", path(shop, "/parameters"))["items"]
+        assert common_shop.read(3.0)["parameters_version"] == 2
+        assert common_shop.call("GET", f"/readings/{common_shop.characteristic}/1")["parameters_version"] == 1
+        versions = common_shop.call("GET", path(common_shop, "/parameters"))["items"]
         assert [(one["version"], one["reason"], one["by"]) for one in versions] == [
             (2, "new probe", "key a test's key"),
             (1, None, "key a test's key"),
         ]
         assert versions[1]["parameters"] == before
-        entry = shop.call("GET", f"/audit?subject=characteristic/{shop.characteristic}")["items"][0]
+        entry = common_shop.call("GET", f"/audit?subject=characteristic/{common_shop.characteristic}")["items"][0]
         assert (entry["before"], entry["after"], entry["why"]) == (
             {"zero_range": 0.001, "mode": "automatic"},
             {"zero_range": 0.002, "mode": "approval"},
@@ -177,90 +178,100 @@ class TestChange:
         )
 
     def test_a_tolerance_class_in_place_of_the_nominal_size(self, server: Any) -> None:
-        shop = Shop(server)
-        after = shop.call("PATCH", path(shop), parameters={"nominal": "40 g6"}, reason="new drawing")["parameters"]
+        common_shop = Shop(server)
+        after = common_shop.call("PATCH", path(common_shop), parameters={"nominal": "40 g6"}, reason="new drawing")[
+            "parameters"
+        ]
         assert (after["nominal"], after["upper_deviation"], after["lower_deviation"]) == (40, -0.009, -0.025)
         assert after["target"] == 39.983
-        (error,) = shop.call("PATCH", path(shop), 422, parameters={"R42": "40 q6"}, reason="typed wrong")["errors"]
+        (error,) = common_shop.call("PATCH", path(common_shop), 422, parameters={"R42": "40 q6"}, reason="typed wrong")[
+            "errors"
+        ]
         assert error["field"] == "parameters.nominal"
         assert "ISO 286" in error["message"]
 
-    def test_without_a_reason_nothing_changes(self, shop: Shop) -> None:
+    def test_without_a_reason_nothing_changes(self, common_shop: Shop) -> None:
         for reason in ({}, {"reason": None}, {"reason": "   "}):
-            problem = shop.call("PATCH", path(shop), 422, parameters={"R33": 0.002}, **reason)
+            problem = common_shop.call("PATCH", path(common_shop), 422, parameters={"R33": 0.002}, **reason)
             assert problem["errors"][0]["field"] == "reason"
-        assert shop.call("GET", path(shop))["parameters"]["zero_range"] == 0.001
+        assert common_shop.call("GET", path(common_shop))["parameters"]["zero_range"] == 0.001
 
-    def test_name_and_part_need_none_and_make_no_version(self, shop: Shop) -> None:
-        before = shop.call("GET", path(shop))
-        after = shop.call("PATCH", path(shop), name="Седиште „А”", part="0815")
+    def test_name_and_part_need_none_and_make_no_version(self, common_shop: Shop) -> None:
+        before = common_shop.call("GET", path(common_shop))
+        after = common_shop.call("PATCH", path(common_shop), name="Седиште „А”", part="0815")
         assert after == before | {"name": "Седиште „А”", "part": "0815"}
-        assert shop.call("PATCH", path(shop), part=None)["part"] is None
+        assert common_shop.call("PATCH", path(common_shop), part=None)["part"] is None
 
-    def test_what_does_not_differ_makes_no_version(self, shop: Shop) -> None:
-        before = shop.call("GET", path(shop))
-        assert change(shop, 200, **before["parameters"]) == before
-        assert shop.call("PATCH", path(shop), parameters=before["parameters"], name=before["name"]) == before
+    def test_what_does_not_differ_makes_no_version(self, common_shop: Shop) -> None:
+        before = common_shop.call("GET", path(common_shop))
+        assert change(common_shop, 200, **before["parameters"]) == before
+        assert (
+            common_shop.call("PATCH", path(common_shop), parameters=before["parameters"], name=before["name"]) == before
+        )
 
     def test_null_goes_back_to_the_default(self, server: Any) -> None:
-        shop = Shop(server)
-        assert change(shop, R34=None, max_step=0.01)["parameters"]["averaging_limit"] == pytest.approx(0.016 / 3)
-        assert change(shop, max_step=None)["parameters"]["max_step"] is None
-        problem = change(shop, 422, R33=None)
+        common_shop = Shop(server)
+        assert change(common_shop, R34=None, max_step=0.01)["parameters"]["averaging_limit"] == pytest.approx(0.016 / 3)
+        assert change(common_shop, max_step=None)["parameters"]["max_step"] is None
+        problem = change(common_shop, 422, R33=None)
         assert problem["errors"][0] == {
             "field": "parameters.zero_range",
             "message": "R33 zero range is missing; say it",
         }
 
     def test_an_averaging_limit_left_to_its_default_follows_the_tolerance(self, server: Any) -> None:
-        shop = Shop(server)
-        change(shop, averaging_limit=None)
-        narrowed = change(shop, tolerance_width=0.008)["parameters"]
+        common_shop = Shop(server)
+        change(common_shop, averaging_limit=None)
+        narrowed = change(common_shop, tolerance_width=0.008)["parameters"]
         assert narrowed["averaging_limit"] == pytest.approx(0.008 / 3, abs=1e-9)
-        assert change(shop, averaging_limit=0.003, tolerance_width=0.01)["parameters"]["averaging_limit"] == 0.003
+        assert (
+            change(common_shop, averaging_limit=0.003, tolerance_width=0.01)["parameters"]["averaging_limit"] == 0.003
+        )
 
     def test_drawing_and_target_replace_each_other(self, server: Any) -> None:
-        shop = Shop(server)
-        drawn = change(shop, nominal=40, upper_deviation=0.02, lower_deviation=0.0)["parameters"]
+        common_shop = Shop(server)
+        drawn = change(common_shop, nominal=40, upper_deviation=0.02, lower_deviation=0.0)["parameters"]
         assert (drawn["target"], drawn["tolerance_width"], drawn["nominal"]) == (40.01, 0.02, 40.0)
-        moved = change(shop, R42=41)["parameters"]
+        moved = change(common_shop, R42=41)["parameters"]
         assert (moved["target"], moved["upper_deviation"]) == (41.01, 0.02)
-        direct = change(shop, target=40.0)["parameters"]
+        direct = change(common_shop, target=40.0)["parameters"]
         assert (direct["target"], direct["tolerance_width"], direct["nominal"]) == (40.0, 0.02, None)
-        problem = change(shop, 422, nominal=40)
+        problem = change(common_shop, 422, nominal=40)
         assert {error["field"] for error in problem["errors"]} == {
             "parameters.upper_deviation",
             "parameters.lower_deviation",
         }
 
     def test_a_new_target_restarts_the_average_and_only_that_one(self, server: Any) -> None:
-        shop = Shop(server)
-        shop.read(1.0)
-        assert shop.average() == pytest.approx(0.0005)
-        change(shop, weighting_factor=3)
-        assert shop.average() == pytest.approx(0.0005)
-        change(shop, target=40.0000000001)
-        assert shop.average() == pytest.approx(0.0005), "the same to the nanometre"
-        change(shop, target=40.001)
-        assert shop.average() == 0
+        common_shop = Shop(server)
+        common_shop.read(1.0)
+        assert common_shop.average() == pytest.approx(0.0005)
+        change(common_shop, weighting_factor=3)
+        assert common_shop.average() == pytest.approx(0.0005)
+        change(common_shop, target=40.0000000001)
+        assert common_shop.average() == pytest.approx(0.0005), "the same to the nanometre"
+        change(common_shop, target=40.001)
+        assert common_shop.average() == 0
 
     def test_two_engineers_at_once(self, server: Any) -> None:
-        shop = Shop(server)
-        seen = shop.call("GET", path(shop))["parameters_version"]
-        shop.call("PATCH", path(shop), parameters={"R29": 3}, reason="first", parameters_version=seen)
-        problem = shop.call("PATCH", path(shop), 409, parameters={"R29": 4}, reason="second", parameters_version=seen)
+        common_shop = Shop(server)
+        seen = common_shop.call("GET", path(common_shop))["parameters_version"]
+        common_shop.call("PATCH", path(common_shop), parameters={"R29": 3}, reason="first", parameters_version=seen)
+        problem = common_shop.call(
+            "PATCH", path(common_shop), 409, parameters={"R29": 4}, reason="second", parameters_version=seen
+        )
         assert problem["parameters_version"] == 2
         assert "key a test's key" in problem["detail"]
-        assert shop.call("GET", path(shop))["parameters"]["weighting_factor"] == 3
+        assert common_shop.call("GET", path(common_shop))["parameters"]["weighting_factor"] == 3
 
     def test_changes_at_the_same_moment_all_get_a_version(self, server: Any) -> None:
-        shop = Shop(server)
+        common_shop = Shop(server)
         statuses: list[int] = []
 
         def one(number: int) -> None:
             body = {"parameters": {"R27": number}, "reason": f"change {number}"}
-            client = shop.server.client(shop.admin.headers["Authorization"].removeprefix("Bearer "))
-            statuses.append(client.patch(f"/api/v1{path(shop)}", json=body).status_code)
+            client = common_shop.server.client(common_shop.admin.headers["Authorization"].removeprefix("Bearer "))
+            statuses.append(client.patch(f"/api/v1{path(common_shop)}", json=body).status_code)
 
         threads = [threading.Thread(target=one, args=(number,)) for number in range(2, 10)]
         for thread in threads:
@@ -268,25 +279,30 @@ class TestChange:
         for thread in threads:
             thread.join()
         assert statuses == [200] * 8
-        versions = shop.call("GET", path(shop, "/parameters"))["items"]
+        versions = common_shop.call("GET", path(common_shop, "/parameters"))["items"]
         assert [one["version"] for one in versions] == list(range(9, 0, -1))
-        assert versions[0]["parameters"] == shop.call("GET", path(shop))["parameters"]
+        assert versions[0]["parameters"] == common_shop.call("GET", path(common_shop))["parameters"]
 
-    def test_key_and_machine_stay(self, shop: Shop) -> None:
-        other = Shop(shop.server)
+    def test_key_and_machine_stay(self, common_shop: Shop) -> None:
+        other = Shop(common_shop.server)
         body: dict[str, Any] = {"key": "other", "machine": other.machine, "name": "Moved"}
-        problem = shop.call("PATCH", path(shop), 422, **body)
+        problem = common_shop.call("PATCH", path(common_shop), 422, **body)
         assert [error["field"] for error in problem["errors"]] == ["key", "machine"]
-        assert shop.call("PATCH", path(shop), key=shop.characteristic, machine=shop.machine)["name"] != "Moved"
+        assert (
+            common_shop.call("PATCH", path(common_shop), key=common_shop.characteristic, machine=common_shop.machine)[
+                "name"
+            ]
+            != "Moved"
+        )
 
     def test_another_tool_counts_its_own_parts(self, server: Any) -> None:
-        shop = Shop(server)
+        common_shop = Shop(server)
         for _part in range(3):
-            shop.read(0.0)
-        change(shop, tool_memory=7)
-        assert shop.tool(7)["parts"] == 0
-        shop.read(0.0)
-        assert shop.tool(7)["parts"] == 1
+            common_shop.read(0.0)
+        change(common_shop, tool_memory=7)
+        assert common_shop.tool(7)["parts"] == 0
+        common_shop.read(0.0)
+        assert common_shop.tool(7)["parts"] == 1
 
 
 ORDER = [
@@ -314,9 +330,9 @@ ORDER = [
 
 @pytest.mark.parametrize(("given", "field", "message"), ORDER)
 def test_a_broken_order_names_the_pair_and_what_to_do(
-    shop: Shop, given: dict[str, float], field: str, message: str
+    common_shop: Shop, given: dict[str, float], field: str, message: str
 ) -> None:
-    assert change(shop, 422, **given)["errors"] == [{"field": f"parameters.{field}", "message": message}]
+    assert change(common_shop, 422, **given)["errors"] == [{"field": f"parameters.{field}", "message": message}]
 
 
 NUMBERS = [field.name for field in FIELDS if field.kind in {"length", "number", "whole"}]
@@ -347,22 +363,22 @@ for name, more in MORE.items():
 
 
 @pytest.mark.parametrize(("name", "bad"), [(name, bad) for name, values in BAD.items() for bad in values])
-def test_every_bad_parameter_is_named_and_nothing_is_changed(shop: Shop, name: str, bad: Any) -> None:
-    before = shop.call("GET", path(shop, "/parameters"))
+def test_every_bad_parameter_is_named_and_nothing_is_changed(common_shop: Shop, name: str, bad: Any) -> None:
+    before = common_shop.call("GET", path(common_shop, "/parameters"))
     if name in {"nominal", "upper_deviation", "lower_deviation"}:
         drawing = {"nominal": 40, "upper_deviation": 0, "lower_deviation": -0.016}
-        problem = change(shop, 422, **(drawing | {name: bad}))
+        problem = change(common_shop, 422, **(drawing | {name: bad}))
     else:
-        problem = change(shop, 422, **{name: bad})
+        problem = change(common_shop, 422, **{name: bad})
     assert f"parameters.{name}" in [error["field"] for error in problem["errors"]]
     assert all(error["message"] for error in problem["errors"])
-    assert shop.call("GET", path(shop, "/parameters")) == before
+    assert common_shop.call("GET", path(common_shop, "/parameters")) == before
 
 
 @pytest.mark.parametrize("bad", ["NaN", "Infinity", "-Infinity", "1e999", '"\\u0000"', '"\\ud800"', "1" * 5000])
-def test_what_json_readers_disagree_about_is_refused(shop: Shop, bad: str) -> None:
-    answer = shop.admin.patch(
-        f"/api/v1{path(shop)}",
+def test_what_json_readers_disagree_about_is_refused(common_shop: Shop, bad: str) -> None:
+    answer = common_shop.admin.patch(
+        f"/api/v1{path(common_shop)}",
         content=f'{{"parameters": {{"zero_range": {bad}}}, "reason": "x"}}',
         headers={"Content-Type": "application/json"},
     )
@@ -370,13 +386,13 @@ def test_what_json_readers_disagree_about_is_refused(shop: Shop, bad: str) -> No
     assert answer.json()["errors"][0]["field"] in {"parameters.zero_range", "body"}
 
 
-def test_under_two_names_at_once(shop: Shop) -> None:
-    problem = change(shop, 422, R33=0.001, zero_range=0.002)
+def test_under_two_names_at_once(common_shop: Shop) -> None:
+    problem = change(common_shop, 422, R33=0.001, zero_range=0.002)
     assert "is said twice" in problem["errors"][0]["message"]
 
 
-def test_everything_wrong_is_said_at_once(shop: Shop) -> None:
-    problem = shop.call("PATCH", path(shop), 422, parameters={"R34": "x", "R10": 40, "mode": "auto"})
+def test_everything_wrong_is_said_at_once(common_shop: Shop) -> None:
+    problem = common_shop.call("PATCH", path(common_shop), 422, parameters={"R34": "x", "R10": 40, "mode": "auto"})
     assert {error["field"] for error in problem["errors"]} == {
         "parameters.averaging_limit",
         "parameters.tool_memory",
@@ -397,8 +413,8 @@ BODY: dict[str, list[Any]] = {
 
 
 @pytest.mark.parametrize(("field", "bad"), [(field, bad) for field, values in BODY.items() for bad in values])
-def test_every_bad_field_of_a_new_one_is_named(shop: Shop, field: str, bad: Any) -> None:
-    body = {"key": "never", "name": "x", "machine": shop.machine, "parameters": PARAMETERS} | {field: bad}
-    problem = shop.call("POST", "/characteristics", 422, **body)
+def test_every_bad_field_of_a_new_one_is_named(common_shop: Shop, field: str, bad: Any) -> None:
+    body = {"key": "never", "name": "x", "machine": common_shop.machine, "parameters": PARAMETERS} | {field: bad}
+    problem = common_shop.call("POST", "/characteristics", 422, **body)
     assert {error["field"].partition(".")[0] for error in problem["errors"]} == {field}
-    shop.call("GET", "/characteristics/never", 404)
+    common_shop.call("GET", "/characteristics/never", 404)

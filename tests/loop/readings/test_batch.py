@@ -17,6 +17,8 @@ from tests.loop.readings.load import ndjson, scattered
 from tests.loop.readings.record import counts, history, must_hold, must_replay
 from tests.shop import PARAMETERS, Shop
 
+pytestmark = pytest.mark.own_server  # the whole record of its database is held against the rules
+
 NDJSON = {"Content-Type": "application/x-ndjson"}
 
 

@@ -9,6 +9,8 @@ import pytest
 from tests.loop.readings.record import counts, history, must_hold
 from tests.shop import PARAMETERS, Shop
 
+pytestmark = pytest.mark.own_server  # the whole record of its database is held against the rules
+
 AT = "2026-11-21T08:15:02.120+01:00"
 
 

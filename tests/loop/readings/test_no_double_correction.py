@@ -15,6 +15,8 @@ from app.core.parameters import read
 from tests.loop.readings.record import history, must_hold, must_replay
 from tests.shop import PARAMETERS, Shop
 
+pytestmark = pytest.mark.own_server  # the whole record of its database is held against the rules
+
 
 class Lathe:
     """Cuts with its own offset; what lies between cutting and measuring is the pipeline."""
@@ -221,66 +223,65 @@ class TestByMachinedAt:
 
 class TestApproval:
     @pytest.fixture
-    def shop(self, server: Any) -> Shop:
-        made = Shop(server)
-        made.call(
-            "PATCH", f"/characteristics/{made.characteristic}", parameters={"mode": "approval"}, reason="Try it out"
-        )
-        return made
+    def asking(self, shop: Shop) -> Shop:
+        """Each correction waits for a person."""
+        change = {"parameters": {"mode": "approval"}, "reason": "Try it out"}
+        shop.call("PATCH", f"/characteristics/{shop.characteristic}", **change)
+        return shop
 
-    def test_what_awaits_approval_is_outstanding(self, shop: Shop) -> None:
-        assert shop.read(6.0)["correction"]["status"] == "awaiting_approval"
-        assert shop.read(6.0)["outstanding"] == [1]
-        shop.correction(1, "approve", reason="Good")
-        assert shop.read(6.0)["outstanding"] == [1]
-        shop.correction(1, "applied")
-        assert shop.read(0.0)["outstanding"] == []
+    def test_what_awaits_approval_is_outstanding(self, asking: Shop) -> None:
+        assert asking.read(6.0)["correction"]["status"] == "awaiting_approval"
+        assert asking.read(6.0)["outstanding"] == [1]
+        asking.correction(1, "approve", reason="Good")
+        assert asking.read(6.0)["outstanding"] == [1]
+        asking.correction(1, "applied")
+        assert asking.read(0.0)["outstanding"] == []
 
-    def test_what_awaits_approval_cannot_be_in_effect(self, shop: Shop) -> None:
+    def test_what_awaits_approval_cannot_be_in_effect(self, asking: Shop) -> None:
         """The machine has applied a later correction of another tool; ours still waits for a person."""
-        shop.read(6.0)
-        other = f"{shop.characteristic}-o"
-        shop.add(other, tool_memory=4, average_memory=6)
-        shop.read(6.0, other)
-        shop.correction(2, "applied")
-        answer = shop.read(6.0, correction_in_effect=2)
+        asking.read(6.0)
+        other = f"{asking.characteristic}-o"
+        asking.add(other, tool_memory=4, average_memory=6)
+        asking.read(6.0, other)
+        asking.correction(2, "applied")
+        answer = asking.read(6.0, correction_in_effect=2)
         assert (answer["outstanding"], answer["action"]) == ([1], "none")
-        assert shop.correction(1)["status"] == "awaiting_approval"
+        assert asking.correction(1)["status"] == "awaiting_approval"
 
-    def test_corrections_count_in_the_order_in_which_they_took_effect(self, shop: Shop) -> None:
+    def test_corrections_count_in_the_order_in_which_they_took_effect(self, asking: Shop) -> None:
         """Approved in the other order: the machine applies 2, then 1, and says each time which one was the last."""
-        shop.read(6.0)
-        assert shop.read(13.0)["correction"]["amount"] == -0.007
-        shop.correction(2, "approve", reason="First this one")
-        shop.correction(2, "applied")
-        with_second = shop.read(6.0, correction_in_effect=2)
+        asking.read(6.0)
+        assert asking.read(13.0)["correction"]["amount"] == -0.007
+        asking.correction(2, "approve", reason="First this one")
+        asking.correction(2, "applied")
+        with_second = asking.read(6.0, correction_in_effect=2)
         assert (with_second["outstanding"], with_second["decided_deviation"]) == ([1], 0.0)
-        shop.correction(1, "approve", reason="Then that one")
-        still = shop.read(6.0, correction_in_effect=2)
+        asking.correction(1, "approve", reason="Then that one")
+        still = asking.read(6.0, correction_in_effect=2)
         assert still["outstanding"] == [1]
-        assert shop.correction(1)["status"] == "pending"
-        shop.correction(1, "applied")
-        late = shop.read(6.0, correction_in_effect=2)  # cut before the first one took effect, measured after
+        assert asking.correction(1)["status"] == "pending"
+        asking.correction(1, "applied")
+        late = asking.read(6.0, correction_in_effect=2)  # cut before the first one took effect, measured after
         assert (late["outstanding"], late["decided_deviation"]) == ([1], 0.0)
-        with_both = shop.read(0.0, correction_in_effect=1)
+        with_both = asking.read(0.0, correction_in_effect=1)
         assert (with_both["outstanding"], with_both["decided_deviation"]) == ([], 0.0)
         assert not any(reading["correction"] for reading in (with_second, still, late, with_both))
 
-    def test_one_confirmed_on_the_way_to_a_later_one_is_known_to_be(self, shop: Shop) -> None:
+    def test_one_confirmed_on_the_way_to_a_later_one_is_known_to_be(self, asking: Shop) -> None:
         """In the batch that confirms it as in readings after it: by a clock that is behind, the second came before the first."""
-        other = f"{shop.characteristic}-o"
-        shop.add(other, average_memory=6)
-        shop.read(6.0)
+        other = f"{asking.characteristic}-o"
+        asking.add(other, average_memory=6)
+        asking.read(6.0)
         behind = datetime.now(UTC).isoformat()
-        shop.correction(1, "approve", reason="Good")
-        shop.read(13.0, other)
-        shop.read(20.0, other)
+        asking.correction(1, "approve", reason="Good")
+        asking.read(13.0, other)
+        asking.read(20.0, other)
         named: list[dict[str, Any]] = [{"correction_in_effect": 3, "machined_at": behind}, {"correction_in_effect": 2}]
         batch = [{"characteristic": other, "measured": 40.0} | each for each in named]
-        answer = shop.machine_client.post("/api/v1/readings/batch?decisions=true", json=batch)
+        answer = asking.machine_client.post("/api/v1/readings/batch?decisions=true", json=batch)
         assert answer.json()["items"][1]["outstanding"][:2] == [1, 3]
-        assert shop.correction(1)["status"] == "applied"
-        assert shop.read(0.0, other, correction_in_effect=2)["outstanding"][:2] == [1, 3]
+        assert asking.correction(1)["status"] == "applied"
+        assert asking.read(0.0, other, correction_in_effect=2)["outstanding"][:2] == [1, 3]
 
 
 def test_order_of_arrival_decides_and_late_readings_count_what_came_before_them(shop: Shop) -> None:

@@ -10,34 +10,34 @@ LENGTH = {"feature": "tool", "mode": "measure_only", "average_memory": 0, "axis"
 
 
 @pytest.fixture
-def shop(server: Any) -> Shop:
-    made = Shop(server)
-    made.add(f"{made.machine}-length", **LENGTH)
-    return made
+def setter(shop: Shop) -> Shop:
+    """It measures the length of a tool as well."""
+    shop.add(f"{shop.machine}-length", **LENGTH)
+    return shop
 
 
-def test_corrections_of_the_offset_do_not_touch_the_wear_of_a_measured_tool(shop: Shop) -> None:
-    length = f"{shop.machine}-length"
+def test_corrections_of_the_offset_do_not_touch_the_wear_of_a_measured_tool(setter: Shop) -> None:
+    length = f"{setter.machine}-length"
     for part in range(1, 41):
-        correction = shop.read(6.0)["correction"]  # the part asks for a correction of the same tool
+        correction = setter.read(6.0)["correction"]  # the part asks for a correction of the same tool
         if correction:
-            shop.correction(correction["number"], "applied")
-        answer = shop.read(-0.1 * part, length)
+            setter.correction(correction["number"], "applied")
+        answer = setter.read(-0.1 * part, length)
         assert (answer["action"], answer["correction"]) == ("none", None)
-    wear = shop.call("GET", f"/characteristics/{length}/wear")
+    wear = setter.call("GET", f"/characteristics/{length}/wear")
     assert wear["wear_per_part"]["value"] == pytest.approx(-0.0001, rel=0.05)
-    assert shop.alarms() == []
+    assert setter.alarms() == []
 
 
-def test_a_worn_length_raises_the_alarm_of_its_tool(shop: Shop) -> None:
-    answer = shop.read(-310.0, f"{shop.machine}-length")
+def test_a_worn_length_raises_the_alarm_of_its_tool(setter: Shop) -> None:
+    answer = setter.read(-310.0, f"{setter.machine}-length")
     assert (answer["zone"], answer["correction"]) == ("wear", None)
-    (alarm,) = shop.alarms()
+    (alarm,) = setter.alarms()
     assert (alarm["kind"], alarm["tool_memory"]) == ("tool_worn", 3)
 
 
 @pytest.mark.parametrize(("field", "change"), [("mode", {"mode": "automatic"}), ("tool_memory", {"tool_memory": 0})])
-def test_a_tool_has_a_location_and_is_only_measured(shop: Shop, field: str, change: dict[str, Any]) -> None:
-    path, reason = f"/characteristics/{shop.machine}-length", "tried"
-    refused = shop.call("PATCH", path, 422, parameters=change, reason=reason)
+def test_a_tool_has_a_location_and_is_only_measured(setter: Shop, field: str, change: dict[str, Any]) -> None:
+    path, reason = f"/characteristics/{setter.machine}-length", "tried"
+    refused = setter.call("PATCH", path, 422, parameters=change, reason=reason)
     assert [error["field"] for error in refused["errors"]] == [f"parameters.{field}"]

@@ -9,6 +9,8 @@ from tests.conftest import Server
 from tests.loop.readings.record import must_hold, rows
 from tests.shop import Shop
 
+pytestmark = pytest.mark.own_server  # the whole record of its database is held against the rules
+
 NOTHING = dict.fromkeys(
     [
         *("run_out", "out_of_roundness", "taper", "slope", "repeat_range", "repeat_deviation"),
@@ -18,14 +20,14 @@ NOTHING = dict.fromkeys(
 
 
 @pytest.fixture
-def shop(server: Server) -> Iterator[Shop]:
-    made = Shop(server)
-    yield made
-    must_hold(server.database.dsn)
+def checked(shop: Shop) -> Iterator[Shop]:
+    """Whatever is done there, the record holds afterwards."""
+    yield shop
+    must_hold(shop.server.database.dsn)
 
 
-def touched(shop: Shop, name: str, touches: list[Any], status: int = 201) -> Any:
-    return shop.call("POST", "/readings", status, characteristic=name, touches=touches)
+def touched(checked: Shop, name: str, touches: list[Any], status: int = 201) -> Any:
+    return checked.call("POST", "/readings", status, characteristic=name, touches=touches)
 
 
 @pytest.mark.parametrize(
@@ -52,51 +54,51 @@ def touched(shop: Shop, name: str, touches: list[Any], status: int = 201) -> Any
     ],
 )
 def test_a_reading_is_answered_with_the_results_of_its_variant(
-    shop: Shop, parameters: dict[str, Any], touches: list[Any], results: dict[str, Any]
+    checked: Shop, parameters: dict[str, Any], touches: list[Any], results: dict[str, Any]
 ) -> None:
-    name = f"{shop.characteristic}-v"
-    shop.add(name, average_memory=0, **parameters)
-    answer = touched(shop, name, touches)
+    name = f"{checked.characteristic}-v"
+    checked.add(name, average_memory=0, **parameters)
+    answer = touched(checked, name, touches)
     assert answer["results"] == NOTHING | results
-    stored = shop.call("GET", f"/readings/{name}/1")
+    stored = checked.call("GET", f"/readings/{name}/1")
     assert (stored["results"], stored["touches"]) == (NOTHING | results, touches)
-    (listed,) = shop.call("GET", f"/readings?characteristic={name}")["items"]
+    (listed,) = checked.call("GET", f"/readings?characteristic={name}")["items"]
     assert listed["results"] == NOTHING | results
 
 
-def test_a_reading_without_results_has_none_and_no_row(shop: Shop, server: Server) -> None:
-    name = f"{shop.characteristic}-v"
-    shop.add(name, variant="two_point", average_memory=0)
-    assert touched(shop, name, [[-20.0], [20.001]])["results"] is None
-    assert shop.read(1.0)["results"] is None
+def test_a_reading_without_results_has_none_and_no_row(checked: Shop, server: Server) -> None:
+    name = f"{checked.characteristic}-v"
+    checked.add(name, variant="two_point", average_memory=0)
+    assert touched(checked, name, [[-20.0], [20.001]])["results"] is None
+    assert checked.read(1.0)["results"] is None
     found = rows(
         server.database.dsn,
         "SELECT count(*) FROM reading_results r JOIN characteristic c ON c.id = r.characteristic_id WHERE c.key IN (%s, %s)",
         name,
-        shop.characteristic,
+        checked.characteristic,
     )
     assert found == [(0,)]
 
 
-def test_sent_again_the_first_results_come_again(shop: Shop) -> None:
-    name = f"{shop.characteristic}-v"
-    shop.add(name, variant="round", points=2, average_memory=0)
+def test_sent_again_the_first_results_come_again(checked: Shop) -> None:
+    name = f"{checked.characteristic}-v"
+    checked.add(name, variant="round", points=2, average_memory=0)
     body: dict[str, Any] = {"characteristic": name, "touches": [[40.0], [40.002]], "key": "k"}
-    first = shop.call("POST", "/readings", 201, **body)
+    first = checked.call("POST", "/readings", 201, **body)
     assert first["results"]["out_of_roundness"] == 0.002
-    assert shop.call("POST", "/readings", 200, **body) == first
+    assert checked.call("POST", "/readings", 200, **body) == first
 
 
-def test_a_batch_keeps_results_however_large(shop: Shop, server: Server) -> None:
+def test_a_batch_keeps_results_however_large(checked: Shop, server: Server) -> None:
     """Small ones go as JSON, large ones by COPY."""
-    name = f"{shop.characteristic}-v"
-    shop.add(name, variant="round", points=2, average_memory=0)
+    name = f"{checked.characteristic}-v"
+    checked.add(name, variant="round", points=2, average_memory=0)
     for count in (3, 600):
         batch = [
             {"characteristic": name, "touches": [[40.0], [round(40.0 + at / 1e6, 6)]], "key": f"{count}:{at}"}
             for at in range(count)
         ]
-        answer = shop.admin.post("/api/v1/readings/batch?decisions=true", json=batch)
+        answer = checked.admin.post("/api/v1/readings/batch?decisions=true", json=batch)
         assert answer.status_code == 201
         found = [item["results"]["out_of_roundness"] for item in answer.json()["items"]]
         assert found == [round(at / 1e6, 9) for at in range(count)]
@@ -124,21 +126,23 @@ def test_a_batch_keeps_results_however_large(shop: Shop, server: Server) -> None
         ([[40.0, 40.0], 7], "Touches are one list per point"),
     ],
 )
-def test_touches_that_cannot_be_used_are_refused_by_point_and_repeat(shop: Shop, touches: list[Any], says: str) -> None:
-    name = f"{shop.characteristic}-v"
-    shop.add(name, variant="indexed", index=180, repeats=2, average_memory=0)
-    problem = touched(shop, name, touches, 422)
+def test_touches_that_cannot_be_used_are_refused_by_point_and_repeat(
+    checked: Shop, touches: list[Any], says: str
+) -> None:
+    name = f"{checked.characteristic}-v"
+    checked.add(name, variant="indexed", index=180, repeats=2, average_memory=0)
+    problem = touched(checked, name, touches, 422)
     assert says in problem["detail"]
     assert [error["field"] for error in problem["errors"]] == ["touches"]
-    assert shop.call("GET", f"/readings?characteristic={name}")["items"] == []
+    assert checked.call("GET", f"/readings?characteristic={name}")["items"] == []
 
 
-def test_points_that_do_not_fit_the_sections_are_refused(shop: Shop) -> None:
-    problem = shop.call(
+def test_points_that_do_not_fit_the_sections_are_refused(checked: Shop) -> None:
+    problem = checked.call(
         *("POST", "/characteristics", 422),
-        key=f"{shop.characteristic}-v",
+        key=f"{checked.characteristic}-v",
         name="Bore",
-        machine=shop.machine,
+        machine=checked.machine,
         parameters={"R32": 40.0, "R35": 0.016, "R33": 0, "R36": 1, "R37": 0.3, "R23": 4, "accept": {"n": 2, "m": 3}},
     )
     assert problem["errors"] == [

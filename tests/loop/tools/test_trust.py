@@ -20,8 +20,8 @@ from tests.shop import Shop
 
 
 @pytest.fixture
-def database(server: Any) -> Database:
-    """The server's own, to go the rounds by hand."""
+def served(server: Any) -> Database:
+    """The server's own database, to go the rounds by hand."""
     made: Database = server.database
     return made
 
@@ -291,13 +291,13 @@ class TestExpiry:
         shop.call("PATCH", f"/machines/{shop.machine}", corrections_expire_after=8.0)
         return shop
 
-    def test_it_is_superseded_and_the_next_reading_decides_anew(self, hasty: Shop, database: Database) -> None:
+    def test_it_is_superseded_and_the_next_reading_decides_anew(self, hasty: Shop, served: Database) -> None:
         number = pending(hasty)
-        rounds(database)
+        rounds(served)
         assert hasty.correction(number)["status"] == "pending"
-        age(database, hasty, number, hours=8.1)
-        rounds(database)
-        rounds(database)
+        age(served, hasty, number, hours=8.1)
+        rounds(served)
+        rounds(served)
         gone = hasty.correction(number)
         assert (gone["status"], gone["decided_by"]) == ("superseded", None)
         assert "expired" in gone["status_reason"]
@@ -308,10 +308,10 @@ class TestExpiry:
             "correction expired"
         ]
 
-    def test_a_machine_that_applied_it_after_all_is_told_what_to_do(self, hasty: Shop, database: Database) -> None:
+    def test_a_machine_that_applied_it_after_all_is_told_what_to_do(self, hasty: Shop, served: Database) -> None:
         number = pending(hasty)
-        age(database, hasty, number, hours=9)
-        rounds(database)
+        age(served, hasty, number, hours=9)
+        rounds(served)
         problem = hasty.correction(number, "applied", 409, offset_after=-0.006)
         assert "expired" in problem["detail"]
         assert "manual edit of tool 3" in problem["what_to_do"]
@@ -324,44 +324,44 @@ class TestExpiry:
         )
         assert hasty.tool()["offset"] == -0.006
 
-    def test_held_ones_wait_and_approved_ones_begin_anew(self, hasty: Shop, database: Database) -> None:
+    def test_held_ones_wait_and_approved_ones_begin_anew(self, hasty: Shop, served: Database) -> None:
         hasty.add(f"{hasty.characteristic}-a", mode="approval", tool_memory=4, average_memory=6)
         approved = hasty.read(6.0, f"{hasty.characteristic}-a")["correction"]["number"]
         waiting = hasty.read(12.0, f"{hasty.characteristic}-a")["correction"]["number"]
         held = hasty.read(350.0)["correction"]["number"]
         for number in (approved, waiting, held):
-            age(database, hasty, number, hours=9)
+            age(served, hasty, number, hours=9)
         hasty.correction(approved, "approve", reason="agrees")
-        rounds(database)
+        rounds(served)
         assert [hasty.correction(number)["status"] for number in (approved, waiting, held)] == [
             "pending",
             "superseded",
             "held",
         ]
 
-    def test_one_machine_at_a_time_and_only_under_its_lock(self, hasty: Shop, server: Any, database: Database) -> None:
+    def test_one_machine_at_a_time_and_only_under_its_lock(self, hasty: Shop, server: Any, served: Database) -> None:
         """The state that decides readings changes under the lock; the readings of one machine wait for no other."""
-        rounds(database)
+        rounds(served)
         shops = [hasty, Shop(server)]
         shops[1].call("PATCH", f"/machines/{shops[1].machine}", corrections_expire_after=8.0)
         for shop in shops:
-            age(database, shop, pending(shop), hours=9)
-        before = [version(database, shop) for shop in shops]
-        with database.begin() as session:
+            age(served, shop, pending(shop), hours=9)
+        before = [version(served, shop) for shop in shops]
+        with served.begin() as session:
             units = expired(session)
             assert len(units) == 2
             expire_correction(session, units[0])
         now = [shop.correction(1)["status"] for shop in shops]
         assert sorted(now) == ["pending", "superseded"]
-        moved = [version(database, shop) > old for shop, old in zip(shops, before, strict=True)]
+        moved = [version(served, shop) > old for shop, old in zip(shops, before, strict=True)]
         assert moved == [status == "superseded" for status in now]
-        rounds(database)
+        rounds(served)
         assert [shop.correction(1)["status"] for shop in shops] == ["superseded", "superseded"]
 
-    def test_never_unless_it_is_asked_for(self, shop: Shop, database: Database) -> None:
+    def test_never_unless_it_is_asked_for(self, shop: Shop, served: Database) -> None:
         number = pending(shop)
-        age(database, shop, number, hours=10_000)
-        rounds(database)
+        age(served, shop, number, hours=10_000)
+        rounds(served)
         assert shop.correction(number)["status"] == "pending"
 
     def test_the_setting(self, shop: Shop) -> None:
@@ -426,20 +426,20 @@ class TestAtOnce:
         assert shop.tool()["offset"] == pytest.approx(before + applied, abs=1e-9)
         return status
 
-    def test_a_confirmation_against_expiry(self, shop: Shop, database: Database) -> None:
+    def test_a_confirmation_against_expiry(self, shop: Shop, served: Database) -> None:
         shop.call("PATCH", f"/machines/{shop.machine}", corrections_expire_after=1.0)
         for _turn in range(4):
             before, number = shop.tool()["offset"], pending(shop)
-            age(database, shop, number, hours=2)
+            age(served, shop, number, hours=2)
             path = f"/api/v1/corrections/{shop.machine}/{number}/applied"
             with ThreadPoolExecutor(2) as pool:
-                expiring = pool.submit(rounds, database)
+                expiring = pool.submit(rounds, served)
                 answer = pool.submit(shop.machine_client.post, path).result()
                 expiring.result()
             status = self.consistent(shop, number, before)
             assert status == {200: "applied", 409: "superseded"}[answer.status_code]
 
-    def test_excluding_waits_for_the_machine_before_it_takes_a_row(self, shop: Shop, database: Database) -> None:
+    def test_excluding_waits_for_the_machine_before_it_takes_a_row(self, shop: Shop, served: Database) -> None:
         """Whoever acknowledges an alarm as a false reading has the machine, then excludes: the other order would deadlock."""
         shop.call(
             "PATCH", f"/characteristics/{shop.characteristic}", parameters={"plausible_jump": 0.01}, reason="chip"
@@ -447,7 +447,7 @@ class TestAtOnce:
         shop.read(0.5)
         path = f"/api/v1/readings/{shop.characteristic}/1/exclude"
         with ThreadPoolExecutor(1) as pool:
-            with database.begin() as session:
+            with served.begin() as session:
                 lock_machines(session, [entry_of(session, shop.characteristic).machine_id])  # type: ignore[union-attr]
                 waiting = pool.submit(lambda: shop.admin.post(path, json={"reason": "chip"}))
                 _until_somebody_waits(session)

@@ -1,7 +1,6 @@
 """Wide sheets, workbooks and encodings: through the command, and on the page in a real browser."""
 
 import re
-from collections.abc import Iterator
 from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any
@@ -13,18 +12,8 @@ from playwright.sync_api import Page, expect
 from sqlalchemy import text
 
 from app.files.formats.delimited import encoding_of, samples
-from tests.conftest import RunServer, Server
-from tests.shop import Shop
-
-PASSWORD = "correct horse battery"
-
-
-@pytest.fixture(scope="module")
-def server(run_server: RunServer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """It keeps what is sent in a folder of this test."""
-    with run_server(data_dir=tmp_path_factory.mktemp("plant") / "data") as running:
-        running.person("Eva", "engineer", PASSWORD)
-        yield running
+from tests.conftest import Server
+from tests.shop import Person, Shop
 
 
 def workbook(path: Path, header: list[str], rows: list[list[Any]]) -> Path:
@@ -56,25 +45,22 @@ def send(client: httpx.Client, path: Path, characteristic: str = "") -> str:
 
 
 @pytest.fixture
-def client(server: Server) -> httpx.Client:
+def client(server: Server, engineer: Person) -> httpx.Client:
+    """The engineer's, which shows where it is sent on to."""
     client = server.client()
-    assert client.post("/sign-in", data={"name": "Eva", "password": PASSWORD}).status_code == 303
+    client.cookies.update(engineer.browser.cookies)
     return client
 
 
 @pytest.mark.browser
-def test_a_wide_workbook_on_the_page(server: Server, page: Page, tmp_path: Path) -> None:
-    shop = Shop(server)
+def test_a_wide_workbook_on_the_page(shop: Shop, engineer: Person, page: Page, tmp_path: Path) -> None:
     one, two = shop.characteristic, f"{shop.characteristic}-b"
     shop.add(two)
     when = [datetime(2026, 11, 20, 8, minute) for minute in range(3)]  # noqa: DTZ001 - as cells have them
     rows = [["A1", when[0], 40.001, 39.999], ["A2", when[1], None, 40.002], ["A3", when[2], 40.003, 40.001]]
     path = workbook(tmp_path / "shift.xlsx", ["Serial", "Time", one, f"Seat {two}"], rows)
-    page.goto("/sign-in?next=/import")
-    page.fill("[name=name]", "Eva")
-    page.fill("[name=password]", PASSWORD)
-    page.keyboard.press("Enter")
-    page.wait_for_url(re.compile(r"/import$"))
+    engineer.sign_in(page)
+    page.goto("/import")
     page.select_option("[name=characteristic]", "")
     page.set_input_files("[name=file]", path)
     page.get_by_role("button", name="Preview").click()
@@ -89,8 +75,7 @@ def test_a_wide_workbook_on_the_page(server: Server, page: Page, tmp_path: Path)
     assert [part for _value, part, _at in readings(shop, two)] == ["A1", "A2", "A3"]
 
 
-def test_a_workbook_with_merged_heads_dates_and_formulas(server: Server, client: httpx.Client, tmp_path: Path) -> None:
-    shop = Shop(server)
+def test_a_workbook_with_merged_heads_dates_and_formulas(shop: Shop, client: httpx.Client, tmp_path: Path) -> None:
     one, two = shop.characteristic, f"{shop.characteristic}-b"
     shop.add(two)
     rows: list[list[Any]] = [
@@ -117,8 +102,7 @@ def test_a_workbook_with_merged_heads_dates_and_formulas(server: Server, client:
     assert readings(shop, two) == [(39.999, "18", "2026-11-20T08:16")]
 
 
-def test_one_wrong_column_stores_nothing_of_the_others(server: Server, client: httpx.Client, tmp_path: Path) -> None:
-    shop = Shop(server)
+def test_one_wrong_column_stores_nothing_of_the_others(shop: Shop, client: httpx.Client, tmp_path: Path) -> None:
     path = tmp_path / "wide.csv"
     path.write_text(f"part;{shop.characteristic};D40\nA1;40,001;40,002\nA2;40,002;broken\n")
     two = f"{shop.characteristic}-b"
@@ -169,13 +153,12 @@ def test_an_encoding_is_guessed_by_its_letters(tmp_path: Path, encoding: str, wo
     assert words in dict(samples(path))[encoding]
 
 
-def test_a_wrong_encoding_is_shown_with_the_lines_in_each(server: Server, client: httpx.Client, tmp_path: Path) -> None:
-    shop = Shop(server)
+def test_a_wrong_encoding_is_shown_with_the_lines_in_each(shop: Shop, client: httpx.Client, tmp_path: Path) -> None:
     path = tmp_path / "umlaut.csv"
     path.write_bytes("Messwert;Prüfer\n40,001;Müller\n".encode("cp1252"))
     address = send(client, path, shop.characteristic)
     assert "Guessed: cp1252" in client.get(address).text
     refused = client.get(f"{address}&encoding=utf-8").text
     assert "Messwert;Prüfer" in refused
-    with server.database.begin() as session:
+    with shop.server.database.begin() as session:
         assert session.execute(text("SELECT count(*) FROM reading WHERE part = 'Müller'")).scalar_one() == 0

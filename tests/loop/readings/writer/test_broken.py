@@ -227,17 +227,18 @@ def inband(away: EmbeddedServer, run_server: RunServer) -> Iterator[Server]:
 
 class TestDatabase:
     @pytest.fixture
-    def shop(self, inband: Server) -> Shop:
+    def far(self, inband: Server) -> Shop:
+        """Its database is the one that may be stopped."""
         until(lambda: is_ready(inband))
         return Shop(inband)
 
-    def test_away_is_503_and_nothing_is_stored_until_it_is_back(self, shop: Shop, away: EmbeddedServer) -> None:
-        assert push(shop).status_code == 201
+    def test_away_is_503_and_nothing_is_stored_until_it_is_back(self, far: Shop, away: EmbeddedServer) -> None:
+        assert push(far).status_code == 201
         assert away.pid is not None
         os.kill(away.pid, signal.SIGINT)  # the fast end, as by a service manager
         until(lambda: away.pid is None)
         for batch in (False, True):
-            problem = push(shop, key="l", batch=batch)
+            problem = push(far, key="l", batch=batch)
             assert problem.status_code == 503, problem.text
             assert problem.headers["content-type"] == "application/problem+json"
             assert int(problem.headers["retry-after"]) > 0
@@ -245,23 +246,23 @@ class TestDatabase:
             assert "Nothing of this request was stored" in problem.json()["detail"]
         # Who comes later is not kept waiting, however many they are: each in its turn would take minutes.
         with ThreadPoolExecutor(20) as pool:
-            answers = [pool.submit(push, shop, key=f"w{number}") for number in range(20)]
+            answers = [pool.submit(push, far, key=f"w{number}") for number in range(20)]
             assert {answer.result(40).status_code for answer in answers} == {503}
-        assert shop.machine_client.get("/api/v1/alarms").status_code == 503
-        assert shop.server.client().get("/health/ready").status_code == 503
-        assert shop.server.client().get("/health/live").status_code == 200
+        assert far.machine_client.get("/api/v1/alarms").status_code == 503
+        assert far.server.client().get("/health/ready").status_code == 503
+        assert far.server.client().get("/health/live").status_code == 200
         away.start()
-        until(lambda: is_ready(shop.server))  # the watch of the database looks each second
-        assert push(shop, key="l").json()["sequence"] == 2
-        assert push(shop).status_code == 200
+        until(lambda: is_ready(far.server))  # the watch of the database looks each second
+        assert push(far, key="l").json()["sequence"] == 2
+        assert push(far).status_code == 200
         must_hold(away.url)
 
-    def test_crashed_in_the_middle_of_the_commit(self, shop: Shop, away: EmbeddedServer) -> None:
+    def test_crashed_in_the_middle_of_the_commit(self, far: Shop, away: EmbeddedServer) -> None:
         with psycopg.connect(away.url, autocommit=True) as connection:
             connection.execute(SLOW_COMMIT)
         assert away.pid is not None
         with ThreadPoolExecutor(1) as pool:
-            answer: Future[httpx.Response] = pool.submit(push, shop)
+            answer: Future[httpx.Response] = pool.submit(push, far)
             until(lambda: rows(away.url, f"SELECT 1 {WRITERS} AND wait_event = 'PgSleep'"))
             os.kill(away.pid, signal.SIGQUIT)  # ends at once and forgets what was not on disk
             until(lambda: away.pid is None)
@@ -272,13 +273,13 @@ class TestDatabase:
                 connection.execute("SELECT pg_current_xact_id()")
             answered = answer.result()
         while answered.status_code == 503:  # it took its time to come back
-            answered = push(shop)
+            answered = push(far)
         assert answered.json()["sequence"] == 1
-        assert [reading["key"] for reading in history(away.url, shop.characteristic)] == ["k"]
+        assert [reading["key"] for reading in history(away.url, far.characteristic)] == ["k"]
         must_hold(away.url)
 
     @pytest.mark.parametrize("batch", [False, pytest.param(True, marks=pytest.mark.long)])
-    def test_cut_off_after_the_commit_it_is_not_done_again(self, shop: Shop, away: EmbeddedServer, batch: bool) -> None:
+    def test_cut_off_after_the_commit_it_is_not_done_again(self, far: Shop, away: EmbeddedServer, batch: bool) -> None:
         """A commit that waits for a standby has happened here; cut off now, nobody hears of it."""
         with psycopg.connect(away.url, autocommit=True) as connection:
             connection.execute("ALTER SYSTEM SET synchronous_standby_names = 'nobody'")
@@ -286,7 +287,7 @@ class TestDatabase:
             until(lambda: rows(away.url, "SHOW synchronous_standby_names") == [("nobody",)])
             time.sleep(0.3)  # every backend has heard of it
             with ThreadPoolExecutor(1) as pool:
-                answer = pool.submit(push, shop, batch=batch)
+                answer = pool.submit(push, far, batch=batch)
                 until(lambda: rows(away.url, f"SELECT 1 {WRITERS} AND wait_event = 'SyncRep'"))
                 connection.execute(f"SELECT pg_terminate_backend(pid) {WRITERS} AND wait_event = 'SyncRep'")
                 connection.execute("ALTER SYSTEM RESET synchronous_standby_names")
@@ -295,5 +296,5 @@ class TestDatabase:
         assert answered.status_code == 201, answered.text
         if not batch:
             assert answered.json()["correction"]["number"] == 1
-        assert [reading["key"] for reading in history(away.url, shop.characteristic)] == ["k"]
+        assert [reading["key"] for reading in history(away.url, far.characteristic)] == ["k"]
         must_hold(away.url)

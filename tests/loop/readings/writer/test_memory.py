@@ -17,6 +17,8 @@ from tests.loop.readings.record import history, must_hold
 from tests.loops import run
 from tests.shop import Shop
 
+pytestmark = pytest.mark.own_server  # the whole record of its database is held against the rules
+
 TOLD = ("sequence", "measured", "deviation", "decided", "average_before", "average_after", "zone", "action", "code",
         "late", "correction", "amount", "status", "correction_in_effect", "outstanding", "parameters_version")  # fmt: skip
 
