@@ -11,7 +11,7 @@ import pytest
 import uvicorn
 from playwright.sync_api import Browser, Page
 
-from tests.conftest import free_port
+from tests.conftest import TLS, free_port
 from tests.web.showcase import Stage, showcase
 
 
@@ -31,8 +31,8 @@ class Show:
     stage: Stage
 
 
-@pytest.fixture(scope="module")
-def show() -> Iterator[Show]:
+@pytest.fixture(scope="session")
+def served_show() -> Iterator[Show]:
     stage, port = Stage(), free_port()
     config = uvicorn.Config(
         showcase(stage), host="127.0.0.1", port=port, log_level="warning", timeout_graceful_shutdown=1
@@ -48,8 +48,15 @@ def show() -> Iterator[Show]:
 
 
 @pytest.fixture
+def show(served_show: Show) -> Show:
+    """The showcase as it is at first."""
+    served_show.stage.reset()
+    return served_show
+
+
+@pytest.fixture
 def client(show: Show) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=show.url) as made:
+    with httpx.Client(base_url=show.url, verify=TLS) as made:
         yield made
 
 

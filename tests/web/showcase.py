@@ -101,12 +101,16 @@ class Stage:
     """Content that a test can change while the page is open."""
 
     def __init__(self) -> None:
+        self.over = False
+        self.reset()
+
+    def reset(self) -> None:
+        """As it is at first."""
         self.readings = 120
         self.alarms = 2
         self.events: list[str] = []
         self.broken = False
         self.silent = False
-        self.over = False
 
 
 def showcase(stage: Stage | None = None) -> Starlette:

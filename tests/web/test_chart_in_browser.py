@@ -44,7 +44,6 @@ def dragged(page: Page, first: int, last: int) -> None:
 
 
 def test_a_part_of_the_chart_stays_while_readings_arrive_and_goes_by_back(open_page: OpenPage, show: Show) -> None:
-    show.stage.readings = 120
     with open_page("/chart?live=1") as page:
         until(page, DRAWN)
         expect(page.locator("live-status")).to_have_attribute("state", "live")
@@ -89,7 +88,6 @@ def test_with_pan_switched_on_dragging_moves(open_page: OpenPage) -> None:
 
 
 def test_who_follows_sees_the_new_readings(open_page: OpenPage, show: Show) -> None:
-    show.stage.readings = 120
     with open_page("/chart?live=1&zoom=40..60") as page:
         until(page, DRAWN)
         expect(page.locator("live-status")).to_have_attribute("state", "live")

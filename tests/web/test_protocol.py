@@ -15,6 +15,8 @@ import uvicorn
 
 from app.web import protocol
 from app.web.protocol import MOST_HEAD, ServerProtocol
+from tests.conftest import TLS
+from tests.waits import until
 
 PATIENCE = 0.8  # seconds; `ServerProtocol` has more
 
@@ -25,8 +27,19 @@ class Impatient(ServerProtocol):
     body_rate = 2.0
 
 
+class Held:
+    """Requests that are answered when the test says so."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.answered = threading.Event()
+
+
+held = Held()
+
+
 async def application(scope: dict[str, Any], receive: Any, send: Any) -> None:
-    """Answers with the number of bytes it was sent; `/slow` waits until somebody says so."""
+    """Answers with the number of bytes it was sent; `/slow` takes its time, and `/held` waits until somebody says so."""
     body, more = b"", True
     while more:
         message = await receive()
@@ -35,6 +48,10 @@ async def application(scope: dict[str, Any], receive: Any, send: Any) -> None:
         body, more = body + message.get("body", b""), message.get("more_body", False)
     if scope["path"] == "/slow":
         await asyncio.sleep(3 * PATIENCE)
+    if scope["path"] == "/held":
+        held.count += 1
+        while not held.answered.is_set():  # noqa: ASYNC110 - set by another thread
+            await asyncio.sleep(0.01)
     await send({"type": "http.response.start", "status": 200, "headers": []})
     await send({"type": "http.response.body", "body": str(len(body)).encode()})
 
@@ -89,7 +106,8 @@ def test_a_head_without_end_is_refused(port: int, pieces: int) -> None:
 
 
 def test_a_head_of_the_usual_size_is_served(port: int) -> None:
-    answer = httpx.post(f"http://127.0.0.1:{port}/", headers={"Long": "a" * (MOST_HEAD // 2)}, content=b"x" * 300_000)
+    long = {"Long": "a" * (MOST_HEAD // 2)}
+    answer = httpx.post(f"http://127.0.0.1:{port}/", headers=long, content=b"x" * 300_000, verify=TLS)
     assert answer.text == "300000"
 
 
@@ -119,11 +137,13 @@ def test_a_body_that_falls_silent_is_let_go(port: int) -> None:
         assert heard(client) == b""
 
 
-def test_a_slow_body_and_a_slow_answer_are_waited_for(port: int) -> None:
+def test_a_slow_body_and_a_slow_answer_are_waited_for(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    patience = 2.0  # a busy computer may lay a pause of its own between two bytes
+    monkeypatch.setattr(Impatient, "body_patience", patience)
     with connected(port) as client:
         client.sendall(b"POST /slow HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: 8\r\n\r\n")
         for _ in range(8):
-            time.sleep(PATIENCE / 4)
+            time.sleep(patience / 6)
             client.sendall(b"x")
         assert heard(client).partition(b"\r\n\r\n")[2] == b"1\r\n8\r\n0\r\n\r\n"
 
@@ -133,8 +153,8 @@ def test_a_body_that_drips_in_is_let_go(port: int, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(Impatient, "body_rate", 1000.0)
     with connected(port) as client, pytest.raises(ConnectionError):
         client.sendall(b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 100000\r\n\r\n")
-        until = time.monotonic() + 20
-        while time.monotonic() < until:
+        deadline = time.monotonic() + 20
+        while time.monotonic() < deadline:
             time.sleep(PATIENCE / 20)
             client.sendall(b"x")
 
@@ -147,18 +167,20 @@ class TestMoreConnectionsThanFiles:
 
     def test_the_silent_make_room(self, port: int) -> None:
         silent = [connected(port) for _ in range(6)]
-        assert httpx.get(f"http://127.0.0.1:{port}/").text == "0"
+        assert httpx.get(f"http://127.0.0.1:{port}/", verify=TLS).text == "0"
         assert heard(silent[0]) == b""
         for client in silent:
             client.close()
 
     def test_where_all_are_served_a_new_one_is_told_to_come_back(self, port: int) -> None:
-        busy = [connected(port) for _ in range(3)]
+        held.answered.clear()
+        busy, before = [connected(port) for _ in range(3)], held.count
         for client in busy:
-            client.sendall(b"GET /slow HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
-        time.sleep(PATIENCE / 2)
-        refused = httpx.get(f"http://127.0.0.1:{port}/")
+            client.sendall(b"GET /held HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+        until(lambda: held.count == before + len(busy))
+        refused = httpx.get(f"http://127.0.0.1:{port}/", verify=TLS)
         assert (refused.status_code, refused.headers["retry-after"]) == (503, "5")
+        held.answered.set()
         for client in busy:
             assert heard(client).startswith(b"HTTP/1.1 200")
             client.close()

@@ -1,10 +1,7 @@
 """Charts, statistics, reports and searches read a standby, as long as it has what they must show."""
 
-import os
 import re
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -17,13 +14,13 @@ import psycopg
 import pytest
 from fastapi.routing import APIRoute
 
-from app import HOUSE
 from app.main import FROM_REPLICA
 from tests.conftest import RunServer, Server
 from tests.db.clusters import Cluster, cluster
+from tests.forked import inband
 from tests.loop.readings.record import rows
-from tests.loop.readings.writer.test_broken import until
 from tests.shop import PARAMETERS, Person, Shop
+from tests.waits import until
 
 MOST_BEHIND = 6.0  # s
 BEHIND = "X-Inband-Behind"
@@ -44,16 +41,17 @@ def server(servers: Cluster, run_server: RunServer) -> Iterator[Server]:
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("INBAND_READ_DATABASE_URL", servers.nodes[1].url)
         environment.setenv("INBAND_READ_MOST_BEHIND", str(MOST_BEHIND))
-        with run_server(servers.nodes[0].url, workers=1) as running:
+        with run_server(servers.nodes[0].url) as running:
             yield running
 
 
 @pytest.fixture
-def shop(server: Server) -> Shop:
+def followed(server: Server) -> Shop:
+    """A machine and a characteristic of which the standby has all."""
     made = Shop(server)
     for deviation in (1.0, 6.0, 2.0, -3.0):
         made.read(deviation, part=f"P-{made.characteristic}")
-    until(lambda: BEHIND in ask(made).headers, 30)
+    until(lambda: BEHIND in ask(made).headers)
     return made
 
 
@@ -90,53 +88,58 @@ def addresses(shop: Shop) -> Iterator[str]:
                 yield re.sub(r"\{(\w+)[^}]*\}", lambda name: known.get(name[1], "1"), route.path)
 
 
-def test_every_heavy_reading_is_done_there(shop: Shop, server: Server) -> None:
+def test_every_heavy_reading_is_done_there(followed: Shop, server: Server) -> None:
     viewer = Person(server, "viewer")
-    for address in addresses(shop):
-        query = {"q": "shaft", "characteristic": shop.characteristic, "level": "5", "format": "csv"}
-        until(lambda: BEHIND in ask(shop, viewer.browser).headers)  # signing in was a change of theirs
+    for address in addresses(followed):
+        query = {"q": "shaft", "characteristic": followed.characteristic, "level": "5", "format": "csv"}
+        until(lambda: BEHIND in ask(followed, viewer.browser).headers)  # signing in was a change of theirs
         answer = viewer.browser.get(address, params=query)
         assert answer.status_code < 500, f"{address}: {answer.text}"
         assert BEHIND in answer.headers or answer.status_code in {401, 404, 422}, address
 
 
-def test_what_is_to_be_acted_on_is_read_where_it_is_written(shop: Shop) -> None:
-    for address in (f"/alarms?machine={shop.machine}", f"/machines/{shop.machine}"):
-        answer = shop.admin.get(f"/api/v1{address}")
+def test_what_is_to_be_acted_on_is_read_where_it_is_written(followed: Shop) -> None:
+    for address in (f"/alarms?machine={followed.machine}", f"/machines/{followed.machine}"):
+        answer = followed.admin.get(f"/api/v1{address}")
         assert (answer.status_code, BEHIND in answer.headers) == (200, False), address
 
 
-def test_a_report_that_is_fetched_is_in_the_record_of_changes(shop: Shop, servers: Cluster) -> None:
-    answer = shop.admin.get(f"/api/v1/characteristics/{shop.characteristic}/report.csv")
+def test_a_report_that_is_fetched_is_in_the_record_of_changes(followed: Shop, servers: Cluster) -> None:
+    answer = followed.admin.get(f"/api/v1/characteristics/{followed.characteristic}/report.csv")
     assert (answer.status_code, BEHIND in answer.headers) == (200, True)
     written = "SELECT 1 FROM audit_entry WHERE action = 'report written' AND subject = %s"
-    assert rows(servers.nodes[0].url, written, f"characteristic/{shop.characteristic}")
+    assert rows(servers.nodes[0].url, written, f"characteristic/{followed.characteristic}")
 
 
 def test_a_person_sees_their_own_change_and_others_are_told_how_old_it_is(
-    shop: Shop, server: Server, servers: Cluster
+    followed: Shop, server: Server, servers: Cluster
 ) -> None:
     author, reader = Person(server, "engineer"), Person(server, "viewer")
-    until(lambda: all(BEHIND in ask(shop, person.browser).headers for person in (author, reader)))
+    until(lambda: all(BEHIND in ask(followed, person.browser).headers for person in (author, reader)))
     found = re.search(r'<meta name="csrf" content="([^"]+)"', author.open("/alarms"))
     assert found is not None
     token = found[1]
-    address = f"/api/v1/search?q={shop.characteristic}-new"
+    address = f"/api/v1/search?q={followed.characteristic}-new"
     with paused(servers):
-        added = {"key": f"{shop.characteristic}-new", "name": "New", "machine": shop.machine, "parameters": PARAMETERS}
+        added = {
+            "key": f"{followed.characteristic}-new",
+            "name": "New",
+            "machine": followed.machine,
+            "parameters": PARAMETERS,
+        }
         made = author.browser.post("/api/v1/characteristics", json=added, headers={"X-CSRF-Token": token})
         assert made.status_code == 201, made.text
         assert BEHIND in reader.browser.get(address).headers
-        assert f"{shop.characteristic}-new" not in reader.browser.get(address).text
+        assert f"{followed.characteristic}-new" not in reader.browser.get(address).text
         answer = author.browser.get(address)
-        assert BEHIND not in answer.headers or f"{shop.characteristic}-new" in answer.text
+        assert BEHIND not in answer.headers or f"{followed.characteristic}-new" in answer.text
         fresh = reader.browser.get(address, headers={"Cache-Control": "no-cache"})
         assert BEHIND not in fresh.headers
-        assert f"{shop.characteristic}-new" in fresh.text
+        assert f"{followed.characteristic}-new" in fresh.text
         after = reader.browser.get(address, headers={"X-Inband-Event": str(newest_event(servers))})
-        assert f"{shop.characteristic}-new" in after.text, "the page looks again because of an event"
+        assert f"{followed.characteristic}-new" in after.text, "the page looks again because of an event"
         until(lambda: "of the database that they are read from is behind" in reader.open("/overview"))
-    until(lambda: BEHIND in ask(shop, author.browser).headers)
+    until(lambda: BEHIND in ask(followed, author.browser).headers)
     until(lambda: "of the database that they are read from is behind" not in reader.open("/overview"))
 
 
@@ -150,39 +153,39 @@ def state(server: Server) -> tuple[Any, bool]:
     return server.client().get("/health/ready").json()["replica"], "\ninband_replica_used 1.0" in text
 
 
-def test_one_that_lags_too_far_is_not_read(shop: Shop, server: Server, servers: Cluster) -> None:
+def test_one_that_lags_too_far_is_not_read(followed: Shop, server: Server, servers: Cluster) -> None:
     assert state(server)[1]
     with paused(servers):
-        shop.read(1.0)
-        until(lambda: not state(server)[1], 30)
+        followed.read(1.0)
+        until(lambda: not state(server)[1])
         assert "the server that is written to is read" in state(server)[0]
-        assert BEHIND not in ask(shop).headers
+        assert BEHIND not in ask(followed).headers
         assert "inband_replica_behind_seconds" in server.client().get("/metrics").text
-    until(lambda: BEHIND in ask(shop).headers)
+    until(lambda: BEHIND in ask(followed).headers)
     assert state(server) == ("0.0 s behind", True)
 
 
-def test_one_that_is_away_is_not_missed(shop: Shop, server: Server, servers: Cluster) -> None:
+def test_one_that_is_away_is_not_missed(followed: Shop, server: Server, servers: Cluster) -> None:
     servers.kill(servers.nodes[1])
     try:
         for _again in range(5):
-            assert BEHIND not in ask(shop).headers
+            assert BEHIND not in ask(followed).headers
         until(lambda: state(server) == ("away; the server that is written to is read", False))
         assert "not the replica" in server.stderr.read_text()
     finally:
         servers.nodes[1].start()
-    until(lambda: BEHIND in ask(shop).headers, 30)
+    until(lambda: BEHIND in ask(followed).headers)
 
 
-def test_a_query_that_it_ends_is_answered_by_the_other(shop: Shop, servers: Cluster) -> None:
+def test_a_query_that_it_ends_is_answered_by_the_other(followed: Shop, servers: Cluster) -> None:
     """As when what it reads is about to be cleaned away (a conflict with recovery)."""
     waiting = "FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND application_name = 'inband'"
     with ThreadPoolExecutor(1) as pool, psycopg.connect(servers.nodes[0].url) as locking:
         locking.execute("LOCK TABLE reading IN ACCESS EXCLUSIVE MODE")
         locked = "SELECT 1 FROM pg_locks WHERE mode = 'AccessExclusiveLock' AND relation = 'reading'::regclass"
-        until(lambda: rows(servers.nodes[1].url, locked), 30)
-        answer = pool.submit(shop.admin.get, f"/api/v1/readings?characteristic={shop.characteristic}")
-        until(lambda: rows(servers.nodes[1].url, f"SELECT 1 {waiting}"), 30)
+        until(lambda: rows(servers.nodes[1].url, locked))
+        answer = pool.submit(followed.admin.get, f"/api/v1/readings?characteristic={followed.characteristic}")
+        until(lambda: rows(servers.nodes[1].url, f"SELECT 1 {waiting}"))
         rows(servers.nodes[1].url, f"SELECT pg_terminate_backend(pid) {waiting}")
         locking.rollback()
         answered = answer.result()
@@ -194,38 +197,37 @@ def test_a_query_that_it_ends_is_answered_by_the_other(shop: Shop, servers: Clus
 class TestReportsInTheBackground:
     def make(self, shop: Shop) -> Any:
         job = shop.call("POST", "/reports", 201, characteristics=[shop.characteristic], format="csv")
-        until(lambda: shop.call("GET", f"/reports/{job['id']}")["state"] not in {"queued", "running"}, 60)
+        until(lambda: shop.call("GET", f"/reports/{job['id']}")["state"] not in {"queued", "running"})
         return shop.call("GET", f"/reports/{job['id']}")
 
-    def test_lack_nothing_that_was_stored_when_they_were_asked_for(self, shop: Shop, servers: Cluster) -> None:
+    def test_lack_nothing_that_was_stored_when_they_were_asked_for(self, followed: Shop, servers: Cluster) -> None:
         with paused(servers):
-            shop.add(f"{shop.characteristic}-late")
-            shop.read(1.0, f"{shop.characteristic}-late")
-            shop.characteristic = f"{shop.characteristic}-late"
-            made = self.make(shop)
+            followed.add(f"{followed.characteristic}-late")
+            followed.read(1.0, f"{followed.characteristic}-late")
+            followed.characteristic = f"{followed.characteristic}-late"
+            made = self.make(followed)
         assert (made["state"], made["problems"]) == ("done", 0)
 
     def test_are_read_there_and_by_the_other_where_the_standby_ends_the_query(
-        self, shop: Shop, servers: Cluster
+        self, followed: Shop, servers: Cluster
     ) -> None:
         waiting = "FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND application_name = 'inband'"
         with ThreadPoolExecutor(1) as pool, psycopg.connect(servers.nodes[0].url) as locking:
             locking.execute("LOCK TABLE reading IN ACCESS EXCLUSIVE MODE")
             locked = "SELECT 1 FROM pg_locks WHERE mode = 'AccessExclusiveLock' AND relation = 'reading'::regclass"
-            until(lambda: rows(servers.nodes[1].url, locked), 30)
-            making = pool.submit(self.make, shop)
-            until(lambda: rows(servers.nodes[1].url, f"SELECT 1 {waiting}"), 30)
+            until(lambda: rows(servers.nodes[1].url, locked))
+            making = pool.submit(self.make, followed)
+            until(lambda: rows(servers.nodes[1].url, f"SELECT 1 {waiting}"))
             rows(servers.nodes[1].url, f"SELECT pg_terminate_backend(pid) {waiting}")
             locking.rollback()
             made = making.result()
         assert (made["state"], made["problems"]) == ("done", 0)
 
 
-def test_the_check_tells_how_far_it_is_behind(shop: Shop, servers: Cluster) -> None:
+@pytest.mark.usefixtures("followed")
+def test_the_check_tells_how_far_it_is_behind(servers: Cluster) -> None:
     def check(replica: str) -> str:
-        command = [sys.executable, "-m", "app", "check", "--database-url", servers.nodes[0].url]
-        environment = os.environ | {"INBAND_READ_DATABASE_URL": replica}
-        done = subprocess.run(command, cwd=HOUSE, env=environment, capture_output=True, text=True)
+        done = inband("check", "--database-url", servers.nodes[0].url, INBAND_READ_DATABASE_URL=replica)
         return " ".join(done.stderr.split())
 
     words = r"replica: (it has everything|[\d.]+ MB behind); it is read while it is at most \d+ s behind"

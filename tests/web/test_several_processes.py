@@ -18,9 +18,10 @@ import pytest
 
 from app import HOUSE
 from app.db.engine import Database
-from tests.conftest import NewDatabase, RunServer, Server
-from tests.loop.readings.writer.test_broken import at_work, crew, nothing_lost_or_doubled, until
+from tests.conftest import TLS, NewDatabase, RunServer, Server, free_port
+from tests.loop.readings.writer.test_broken import at_work, crew, nothing_lost_or_doubled
 from tests.shop import Person, Shop
+from tests.waits import until
 from tests.web.test_live import Listener
 
 HOW_TO = HOUSE / "docs" / "how-to" / "high-availability.md"
@@ -99,7 +100,7 @@ def page(person: Person) -> int:
         return 0
 
 
-@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("which", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_either_may_be_killed_under_load(front: Server, both: list[Server], which: int) -> None:
     shop, person = Shop(front), Person(front, "engineer")
     senders = crew(shop, front)
@@ -119,8 +120,7 @@ def test_either_may_be_killed_under_load(front: Server, both: list[Server], whic
 
 def test_live_events_go_on_where_they_were(front: Server, both: list[Server]) -> None:
     shop = Shop(front)
-    client = httpx.Client(base_url=both[0].url, headers=dict(shop.admin.headers), timeout=30)
-    with client.stream("GET", "/api/v1/events") as stream:
+    with both[0].client(front.key()).stream("GET", "/api/v1/events") as stream:
         listener = Listener(stream)
         listener.next("hello")
         shop.read(1.0)
@@ -137,7 +137,6 @@ def test_live_events_go_on_where_they_were(front: Server, both: list[Server]) ->
             assert Listener(stream).next("reading").data["sequence"] == 2
     finally:
         both[0].restart()
-        client.close()
 
 
 @pytest.mark.skipif(shutil.which("haproxy") is None, reason="HAProxy is not installed")
@@ -147,9 +146,7 @@ def test_the_proxy_of_the_how_to_goes_on_with_the_other(both: list[Server], fron
     words = "    defaults\n" + "".join(
         itertools.takewhile(lambda line: line.startswith("    ") or line == "\n", rest.splitlines(True))
     )
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     words = words.replace(":443 ssl crt /etc/haproxy/inband.pem", f"127.0.0.1:{port}")
     for address, server in zip(("10.0.4.11:8000", "10.0.4.12:8000"), both, strict=True):
         assert address in words
@@ -160,16 +157,16 @@ def test_the_proxy_of_the_how_to_goes_on_with_the_other(both: list[Server], fron
         ["haproxy", "-db", "-f", str(configuration)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
     try:
-        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=10) as client:
+        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=10, verify=TLS) as client:
 
             def answers() -> bool:
                 with contextlib.suppress(httpx.TransportError):
                     return client.get("/health/ready").status_code == 200
                 return False
 
-            until(answers, 30)
+            until(answers)
             both[0].kill()
-            until(lambda: all(answers() for _again in range(5)), 30)
+            until(lambda: all(answers() for _again in range(5)))
             assert front.client().get("/health/live").status_code == 200
     finally:
         proxy.terminate()
