@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.conftest import Server
 from tests.shop import Person, Shop
 
 PLACES = [
@@ -212,11 +211,11 @@ class TestWithoutScripts:
         assert "Шасија" in viewer.open("/alignments")
         viewer.open("/alignments/new", 403)
 
-    def test_shifts_become_readings_at_once(self, server: Server, operator: Person) -> None:
-        shop = Shop(server)
-        shop.add("pallet-z", target=0.0, tool_memory=0, average_memory=0, mode="measure_only")
-        page = operator.send("/alignments/new", **six(shop.machine, as_c="pallet-z"))
-        assert "/characteristics/pallet-z/readings/1" in page
+    def test_shifts_become_readings_at_once(self, shop: Shop, operator: Person) -> None:
+        pallet = f"{shop.characteristic}-z"
+        shop.add(pallet, target=0.0, tool_memory=0, average_memory=0, mode="measure_only")
+        page = operator.send("/alignments/new", **six(shop.machine, as_c=pallet))
+        assert f"/characteristics/{pallet}/readings/1" in page
         assert shop.alarms()  # 10 µm and more: beyond the tolerance of 8
 
 

@@ -34,18 +34,13 @@ def touches(deviations: list[float], places: list[tuple[list[float], str]] = PLA
 SIX = touches([0.1, 0.1, 0.1, 0.0, 0.3, 0.02])
 
 
-@pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
-    return Shop(server)
-
-
 def post(shop: Shop, status: int = 201, **body: Any) -> Any:
     return shop.call("POST", "/alignments", status, machine=shop.machine, **body)
 
 
 class TestSix:
-    def test_six_touches_are_a_frame(self, shop: Shop) -> None:
-        made = post(shop, touches=SIX, repeatability=0.002, name="pallet 4")
+    def test_six_touches_are_a_frame(self, common_shop: Shop) -> None:
+        made = post(common_shop, touches=SIX, repeatability=0.002, name="pallet 4")
         gamma = 0.3 / 150
         assert made["shift"]["c"] == pytest.approx(0.1)
         assert made["angles"]["z"] == pytest.approx(degrees(np.arctan(gamma)), abs=1e-9)
@@ -56,46 +51,47 @@ class TestSix:
         assert made["advice"]["text"].startswith("One more point near")
         assert f"$P_PFRAME=CTRANS(X,{made['shift']['a']:.6f}".rstrip("0")[:24] in made["program"]
         assert ":CROT(Z," in made["program"]
-        assert shop.call("GET", f"/alignments/{made['id']}") == made
+        assert common_shop.call("GET", f"/alignments/{made['id']}") == made
 
-    def test_by_the_printed_short_form(self, shop: Shop) -> None:
-        made = post(shop, touches=SIX, method="printed")
+    def test_by_the_printed_short_form(self, common_shop: Shop) -> None:
+        made = post(common_shop, touches=SIX, method="printed")
         gamma = 0.3 / 150
         assert made["turns"]["gamma"] == pytest.approx(degrees(gamma), abs=1e-9)
         assert made["shift"] == pytest.approx({"a": 0.02, "b": -20 * gamma, "c": 0.1})
-        told = post(shop, 422, touches=touches([0.0] * 8), method="printed")
+        told = post(common_shop, 422, touches=touches([0.0] * 8), method="printed")
         assert "printed short form" in told["detail"]
 
-    def test_the_work_offset_is_set_anew_where_it_is_known(self, shop: Shop) -> None:
-        made = post(shop, touches=SIX, work_offset="g55", base=[100.0, 200.0, -300.0])
+    def test_the_work_offset_is_set_anew_where_it_is_known(self, common_shop: Shop) -> None:
+        made = post(common_shop, touches=SIX, work_offset="g55", base=[100.0, 200.0, -300.0])
         assert made["given"]["work_offset"] == "G55"
         assert "$P_UIFR[2]=CTRANS(X,10" in made["program"]
-        told = post(shop, 422, touches=SIX, work_offset="G55")
+        told = post(common_shop, 422, touches=SIX, work_offset="G55")
         assert told["errors"][0]["field"] == "base"
         assert (
-            post(shop, 422, touches=SIX, work_offset="G58", base=[0.0, 0.0, 0.0])["errors"][0]["field"] == "work_offset"
+            post(common_shop, 422, touches=SIX, work_offset="G58", base=[0.0, 0.0, 0.0])["errors"][0]["field"]
+            == "work_offset"
         )
 
-    def test_the_old_work_offset_is_kept_and_set_back(self, shop: Shop) -> None:
-        made = post(shop, touches=SIX, work_offset="G55", base=[100.0, 200.0, -300.0])
+    def test_the_old_work_offset_is_kept_and_set_back(self, common_shop: Shop) -> None:
+        made = post(common_shop, touches=SIX, work_offset="G55", base=[100.0, 200.0, -300.0])
         path = f"/api/v1/alignments/{made['id']}/program?restore=true"
         assert made["program"].index("R91=$P_UIFR[2,X,TR]") < made["program"].index("$P_UIFR[2]=CTRANS")
-        assert f"IF R90<>-{made['id']} GOTOF INBAND_OTHER" in shop.admin.get(path).text
-        assert "X#801 Y#802 Z#803" in shop.admin.get(f"{path}&control=fanuc").text
-        frame = post(shop, touches=SIX)["id"]
-        told = shop.admin.get(f"/api/v1/alignments/{frame}/program?restore=true")
+        assert f"IF R90<>-{made['id']} GOTOF INBAND_OTHER" in common_shop.admin.get(path).text
+        assert "X#801 Y#802 Z#803" in common_shop.admin.get(f"{path}&control=fanuc").text
+        frame = post(common_shop, touches=SIX)["id"]
+        told = common_shop.admin.get(f"/api/v1/alignments/{frame}/program?restore=true")
         assert told.status_code == 404
         assert "sets a work offset back" in told.json()["detail"]
 
-    def test_the_table_takes_the_turn(self, shop: Shop) -> None:
-        made = post(shop, touches=SIX, table={"centre": [100.0, 50.0], "position": 90.0})
+    def test_the_table_takes_the_turn(self, common_shop: Shop) -> None:
+        made = post(common_shop, touches=SIX, table={"centre": [100.0, 50.0], "position": 90.0})
         assert made["table"]["turn"] == pytest.approx(-made["angles"]["z"])
         assert made["table"]["position"] == pytest.approx(90 + made["angles"]["z"])
         assert made["table"]["angles"]["z"] == 0
         assert "G0 C=DC(90." in made["program"]
         assert "CROT" not in made["program"]
 
-    def test_where_the_tip_stood_or_where_it_touched(self, shop: Shop) -> None:
+    def test_where_the_tip_stood_or_where_it_touched(self, common_shop: Shop) -> None:
         found = [([0.0, 0.0, 0.1], "+Z"), ([100.0, 0.0, 0.1], "+Z"), ([0.0, 80.0, 0.1], "+Z")]
         found += [([10.0, 0.3, 0.0], "-Y"), ([90.0, 0.3, 0.0], "-Y"), ([0.02, 40.0, 0.0], "-X")]
         nominal = [place[:2] + [0.0] if normal == "+Z" else [round(p, -1) for p in place] for place, normal in found]
@@ -107,66 +103,75 @@ class TestSix:
                 for n, (place, to) in zip(nominal, found, strict=True)
             ],
         ]
-        surface, centre = post(shop, touches=asked[0]), post(shop, touches=asked[1], tip=6.0)
+        surface, centre = post(common_shop, touches=asked[0]), post(common_shop, touches=asked[1], tip=6.0)
         assert surface["shift"] == pytest.approx({"a": 0.02, "b": 0.3, "c": 0.1}, abs=1e-9)
         assert centre["shift"] == pytest.approx(surface["shift"], abs=1e-9)
         assert centre["given"]["tip"] == 6.0
-        again = shop.call("POST", f"/alignments/{centre['id']}/recompute", 201, method="small", reason="to compare")
+        again = common_shop.call(
+            "POST", f"/alignments/{centre['id']}/recompute", 201, method="small", reason="to compare"
+        )
         assert again["shift"] == pytest.approx(surface["shift"], abs=1e-6)
 
-    def test_what_a_person_does_is_on_record(self, shop: Shop) -> None:
-        made = post(shop, touches=SIX)
-        again = shop.call("POST", f"/alignments/{made['id']}/recompute", 201, method="small", reason="for comparison")
-        record = {each["subject"]: each for each in shop.call("GET", "/audit?limit=20")["items"]}
+    def test_what_a_person_does_is_on_record(self, common_shop: Shop) -> None:
+        made = post(common_shop, touches=SIX)
+        again = common_shop.call(
+            "POST", f"/alignments/{made['id']}/recompute", 201, method="small", reason="for comparison"
+        )
+        record = {each["subject"]: each for each in common_shop.call("GET", "/audit?limit=20")["items"]}
         last = record[f"alignment/{made['id']}"]
         assert (last["action"], last["why"]) == ("alignment computed again", "for comparison")
         assert last["after"]["shift"] == pytest.approx(list(again["shift"].values()))
 
-    def test_only_of_its_own_machine(self, server: Server, shop: Shop) -> None:
+    def test_only_of_its_own_machine(self, server: Server, common_shop: Shop) -> None:
         other = Shop(server)
         made = post(other, touches=SIX)
-        shop.call("GET", f"/alignments/{made['id']}", 404, shop.machine_client)
-        shop.call("POST", "/alignments", 403, shop.machine_client, machine=other.machine, touches=SIX)
-        own = shop.call("GET", "/alignments?limit=1000", 200, shop.machine_client)["items"]
-        assert {each["machine"] for each in own} == {shop.machine}
+        common_shop.call("GET", f"/alignments/{made['id']}", 404, common_shop.machine_client)
+        common_shop.call("POST", "/alignments", 403, common_shop.machine_client, machine=other.machine, touches=SIX)
+        post(common_shop, touches=SIX)
+        own = common_shop.call("GET", "/alignments?limit=1000", 200, common_shop.machine_client)["items"]
+        assert {each["machine"] for each in own} == {common_shop.machine}
 
-    def test_once_only_with_a_key(self, shop: Shop) -> None:
-        given = {"machine": shop.machine, "touches": SIX, "key": "align-1"}
-        first = shop.call("POST", "/alignments", 201, shop.machine_client, **given)
-        assert shop.call("POST", "/alignments", 200, shop.machine_client, **given) == first
-        shop.call("POST", "/alignments", 409, shop.machine_client, **(given | {"method": "small"}))
+    def test_once_only_with_a_key(self, common_shop: Shop) -> None:
+        given = {"machine": common_shop.machine, "touches": SIX, "key": "align-1"}
+        first = common_shop.call("POST", "/alignments", 201, common_shop.machine_client, **given)
+        assert common_shop.call("POST", "/alignments", 200, common_shop.machine_client, **given) == first
+        common_shop.call("POST", "/alignments", 409, common_shop.machine_client, **(given | {"method": "small"}))
 
-    def test_a_shift_becomes_readings(self, server: Server) -> None:
-        shop = Shop(server)
-        shop.add("pallet-c", target=0.1, tool_memory=0, average_memory=0, mode="measure_only")
-        made = post(shop, touches=SIX, characteristics={"c": "pallet-c"})
+    def test_a_shift_becomes_readings(self, shop: Shop) -> None:
+        pallet = f"{shop.characteristic}-c"
+        shop.add(pallet, target=0.1, tool_memory=0, average_memory=0, mode="measure_only")
+        made = post(shop, touches=SIX, characteristics={"c": pallet})
         assert made["readings"][0]["sequence"] == 1
-        assert shop.call("GET", "/readings/pallet-c/1")["deviation"] == pytest.approx(0.0)
+        assert shop.call("GET", f"/readings/{pallet}/1")["deviation"] == pytest.approx(0.0)
 
-    def test_of_touches_computed_again_the_last_result_counts(self, server: Server, shop: Shop) -> None:
+    def test_of_touches_computed_again_the_last_result_counts(self, server: Server, common_shop: Shop) -> None:
         """However often, and of which one: a trend has one point for each time the part was touched."""
-        one, other = (post(shop, touches=SIX, name="again")["id"] for _ in range(2))
+        one, other = (post(common_shop, touches=SIX, name="again")["id"] for _ in range(2))
         for of, method in ((one, "small"), (one, "exact"), (one + 2, "printed"), (one, "small")):
-            last = shop.call("POST", f"/alignments/{of}/recompute", 201, method=method, reason="to compare")["id"]
-        figure = shop.call("GET", f"/machines/{shop.machine}/alignments/figure?name=again")
+            last = common_shop.call("POST", f"/alignments/{of}/recompute", 201, method=method, reason="to compare")[
+                "id"
+            ]
+        figure = common_shop.call("GET", f"/machines/{common_shop.machine}/alignments/figure?name=again")
         assert {len(trace["y"]) for trace in figure["data"]} == {2}
-        page = Person(server, "viewer").open(f"/alignments/history?machine={shop.machine}&name=again")
+        page = Person(server, "viewer").open(f"/alignments/history?machine={common_shop.machine}&name=again")
         assert {int(each) for each in re.findall(r"/alignments/(\d+)", page)} == {last, other}
 
 
 class TestMore:
-    def test_the_touch_that_does_not_fit_is_named_and_left_out(self, shop: Shop) -> None:
+    def test_the_touch_that_does_not_fit_is_named_and_left_out(self, common_shop: Shop) -> None:
         bad = touches([0.1, 0.1, 0.1, 0.0, 0.3, 0.02, 0.15, 0.1])
-        made = post(shop, touches=bad, repeatability=0.001)
+        made = post(common_shop, touches=bad, repeatability=0.001)
         assert made["misfits"] == [[7]]
-        again = shop.call("POST", f"/alignments/{made['id']}/recompute", 201, leave_out=[7], reason="burr")
+        again = common_shop.call("POST", f"/alignments/{made['id']}/recompute", 201, leave_out=[7], reason="burr")
         assert again["recomputed_from"] == made["id"]
         assert again["misfits"] == []
         assert len(again["touches"]) == 7
         assert again["shift"]["c"] == pytest.approx(0.1)
-        small = shop.call("POST", f"/alignments/{made['id']}/recompute", 201, method="small", reason="to compare")
+        small = common_shop.call(
+            "POST", f"/alignments/{made['id']}/recompute", 201, method="small", reason="to compare"
+        )
         assert small["method"] == "small"
-        shop.call("POST", f"/alignments/{made['id']}/recompute", 422, leave_out=[9], reason="x")
+        common_shop.call("POST", f"/alignments/{made['id']}/recompute", 422, leave_out=[9], reason="x")
 
 
 class TestRefused:
@@ -185,9 +190,9 @@ class TestRefused:
         ],
     )  # fmt: skip
     def test_with_a_reason_and_what_to_do(
-        self, shop: Shop, body: dict[str, Any], field: str, words: str, remedy: str
+        self, common_shop: Shop, body: dict[str, Any], field: str, words: str, remedy: str
     ) -> None:
-        told = post(shop, 422, **body)
+        told = post(common_shop, 422, **body)
         assert told["errors"][0]["field"] == field
         assert words in told["detail"]
         assert remedy in told["what_to_do"]
@@ -201,19 +206,19 @@ class TestRefused:
             {"nominal": [0, 0], "normal": "+Z", "deviation": 0.1},
         ],
     )
-    def test_what_is_no_touch(self, shop: Shop, touch: dict[str, Any]) -> None:
-        assert post(shop, 422, touches=[*SIX, touch])["errors"][0]["field"].startswith("touches[6]")
+    def test_what_is_no_touch(self, common_shop: Shop, touch: dict[str, Any]) -> None:
+        assert post(common_shop, 422, touches=[*SIX, touch])["errors"][0]["field"].startswith("touches[6]")
 
 
 class TestInThePlane:
-    def test_two_points(self, shop: Shop) -> None:
+    def test_two_points(self, common_shop: Shop) -> None:
         side = [{"nominal": [0, 0], "measured": [0, 0.1]}, {"nominal": [100, 0], "measured": [100, 0.3]}]
-        made = post(shop, kind="two_points", side=side, repeatability=0.001)
+        made = post(common_shop, kind="two_points", side=side, repeatability=0.001)
         assert made["angles"]["z"] == pytest.approx(degrees(np.arctan(0.002)))
         assert made["condition"] is None
         assert set(made["uncertainty"]) == {"a", "b", "gamma"}
 
-    def test_two_holes_from_their_touches(self, shop: Shop) -> None:
+    def test_two_holes_from_their_touches(self, common_shop: Shop) -> None:
         turned = from_angles(0, 0, 0.4)
         holes = []
         for x in (0.0, 120.0):
@@ -222,24 +227,26 @@ class TestInThePlane:
                 [centre[0] + 12 * c, centre[1] + 12 * s] for c, s in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
             ]
             holes.append({"nominal": [x, 40.0], "touches": ring, "tip": 6.0})
-        made = post(shop, kind="two_holes", holes=holes)
+        made = post(common_shop, kind="two_holes", holes=holes)
         assert made["angles"]["z"] == pytest.approx(0.4, abs=1e-7)
         assert (made["shift"]["a"], made["shift"]["b"]) == pytest.approx((3.0, -2.0), abs=1e-7)
         assert made["off"] == pytest.approx(0.0, abs=1e-7)
 
 
 class TestPallets:
-    def test_composed_with_the_part_on_it(self, shop: Shop) -> None:
-        pallet = post(shop, touches=touches([0.1, 0.1, 0.1, 0.0, 0.15, 0.02]), work_offset="G54", base=[1.0, 2.0, 3.0])
-        part = post(shop, touches=touches([0.0, 0.05, 0.0, 0.0, 0.0, 0.3]))
-        made = shop.call("POST", "/alignments/pallets", 201, pallet=pallet["id"], part=part["id"], key="p1")
+    def test_composed_with_the_part_on_it(self, common_shop: Shop) -> None:
+        pallet = post(
+            common_shop, touches=touches([0.1, 0.1, 0.1, 0.0, 0.15, 0.02]), work_offset="G54", base=[1.0, 2.0, 3.0]
+        )
+        part = post(common_shop, touches=touches([0.0, 0.05, 0.0, 0.0, 0.0, 0.3]))
+        made = common_shop.call("POST", "/alignments/pallets", 201, pallet=pallet["id"], part=part["id"], key="p1")
         whole = np.array(pallet["matrix"]) @ np.array(part["matrix"])
         assert np.array(made["matrix"]) == pytest.approx(whole, abs=1e-12)
         assert (made["kind"], made["pallet"], made["part_on_pallet"]) == ("pallet", pallet["id"], part["id"])
         assert "$P_UIFR[1]=" in made["program"]
-        again = shop.call("POST", "/alignments/pallets", 200, pallet=pallet["id"], part=part["id"], key="p1")
+        again = common_shop.call("POST", "/alignments/pallets", 200, pallet=pallet["id"], part=part["id"], key="p1")
         assert again == made
-        posed = shop.call(
+        posed = common_shop.call(
             "POST",
             "/alignments/pallets",
             201,
@@ -248,9 +255,9 @@ class TestPallets:
             pose={"shift": [500.0, 0.0, 0.0], "rotation": 90.0},
         )
         assert posed["matrix"] != made["matrix"]
-        shop.call("POST", f"/alignments/{made['id']}/recompute", 409, reason="x")
-        shop.call("POST", "/alignments/pallets", 422, pallet=pallet["id"], part=pallet["id"])
-        shop.call("POST", "/alignments/pallets", 404, pallet=pallet["id"], part=10**9)
+        common_shop.call("POST", f"/alignments/{made['id']}/recompute", 409, reason="x")
+        common_shop.call("POST", "/alignments/pallets", 422, pallet=pallet["id"], part=pallet["id"])
+        common_shop.call("POST", "/alignments/pallets", 404, pallet=pallet["id"], part=10**9)
 
     def test_lists_in_pages(self, server: Server) -> None:
         shop = Shop(server)
@@ -264,8 +271,8 @@ FAR = touches([0.0, 0.0, 500.0, 0.0, 0.0, 0.0])
 
 
 class TestImplausible:
-    def test_a_typing_error_turns_no_part_by_100_degrees(self, shop: Shop, server: Server) -> None:
-        made = post(shop, touches=FAR)
+    def test_a_typing_error_turns_no_part_by_100_degrees(self, common_shop: Shop, server: Server) -> None:
+        made = post(common_shop, touches=FAR)
         assert [(each["code"], each["field"]) for each in made["warnings"]][:2] == [
             ("touch_far_off", "touches[2]"),
             ("turned_far", None),
@@ -275,32 +282,32 @@ class TestImplausible:
         frame_at, loop_at = made["program"].index("$P_PFRAME"), made["program"].index("GOTOB INBAND_STOP")
         assert loop_at < frame_at
         path = f"/alignments/{made['id']}"
-        fetched = shop.admin.get(f"/api/v1{path}/program?control=fanuc").text
+        fetched = common_shop.admin.get(f"/api/v1{path}/program?control=fanuc").text
         assert fetched.index("#3000=2(INBAND: TOUCH FAR OFF)"[:25]) < fetched.index("G68")
 
-        viewer, machine = server.client(server.key("viewer")), shop.machine_client
-        shop.call("POST", f"{path}/acknowledge", 403, viewer, reason="x")
-        shop.call("POST", f"{path}/acknowledge", 403, machine, reason="x")
-        shop.call("POST", f"{path}/acknowledge", 422)
-        seen = shop.call("POST", f"{path}/acknowledge", reason="a fixture that stands at 105 degrees")
+        viewer, machine = server.client(server.key("viewer")), common_shop.machine_client
+        common_shop.call("POST", f"{path}/acknowledge", 403, viewer, reason="x")
+        common_shop.call("POST", f"{path}/acknowledge", 403, machine, reason="x")
+        common_shop.call("POST", f"{path}/acknowledge", 422)
+        seen = common_shop.call("POST", f"{path}/acknowledge", reason="a fixture that stands at 105 degrees")
         assert seen["warnings"] == made["warnings"]
         assert seen["acknowledged"]["reason"] == "a fixture that stands at 105 degrees"
         assert "INBAND_STOP" not in seen["program"]
-        assert "#3000=2" not in shop.admin.get(f"/api/v1{path}/program?control=fanuc").text
-        told = shop.call("POST", f"{path}/acknowledge", 409, reason="again")
+        assert "#3000=2" not in common_shop.admin.get(f"/api/v1{path}/program?control=fanuc").text
+        told = common_shop.call("POST", f"{path}/acknowledge", 409, reason="again")
         assert seen["acknowledged"]["by"] in told["detail"]
-        record = shop.call("GET", f"/audit?subject=alignment/{made['id']}&limit=1")["items"][0]
+        record = common_shop.call("GET", f"/audit?subject=alignment/{made['id']}&limit=1")["items"][0]
         assert (record["action"], record["why"]) == ("warnings acknowledged", seen["acknowledged"]["reason"])
 
-    def test_half_a_turn_is_stated_as_a_turn(self, shop: Shop) -> None:
+    def test_half_a_turn_is_stated_as_a_turn(self, common_shop: Shop) -> None:
         side = [{"nominal": [0, 0], "measured": [100, 0.1]}, {"nominal": [100, 0], "measured": [0, 0.1]}]
-        made = post(shop, kind="two_points", side=side)
+        made = post(common_shop, kind="two_points", side=side)
         assert made["warnings"][0]["code"] == "points_exchanged"
         assert (made["angles"]["z"], made["turns"]["gamma"]) == (pytest.approx(180), pytest.approx(180))
 
-    def test_inches(self, shop: Shop) -> None:
+    def test_inches(self, common_shop: Shop) -> None:
         holes = [{"nominal": [0, 0], "centre": [0, 0]}, {"nominal": [254, 0], "centre": [10, 0]}]
-        made = post(shop, kind="two_holes", holes=holes)
+        made = post(common_shop, kind="two_holes", holes=holes)
         assert made["warnings"][0]["code"] == "looks_like_inches"
         assert "INBAND_STOP" in made["program"]
 
@@ -320,23 +327,25 @@ class TestImplausible:
             == "plausible_turn"
         )
 
-    def test_a_pallet_composed_with_a_suspicious_part_is_suspicious(self, shop: Shop) -> None:
-        pallet, part = post(shop, touches=SIX)["id"], post(shop, touches=FAR)["id"]
-        made = shop.call("POST", "/alignments/pallets", 201, pallet=pallet, part=part)
+    def test_a_pallet_composed_with_a_suspicious_part_is_suspicious(self, common_shop: Shop) -> None:
+        pallet, part = post(common_shop, touches=SIX)["id"], post(common_shop, touches=FAR)["id"]
+        made = common_shop.call("POST", "/alignments/pallets", 201, pallet=pallet, part=part)
         assert {"turned_far", "composed_of_warned"} <= {each["code"] for each in made["warnings"]}
         assert "INBAND_STOP" in made["program"]
 
-    def test_of_one_kept_before_there_were_warnings_they_are_worked_out(self, shop: Shop, server: Server) -> None:
-        made = post(shop, touches=FAR)
+    def test_of_one_kept_before_there_were_warnings_they_are_worked_out(
+        self, common_shop: Shop, server: Server
+    ) -> None:
+        made = post(common_shop, touches=FAR)
         with psycopg.connect(server.database.dsn, autocommit=True) as connection:
             connection.execute("ALTER TABLE alignment DISABLE TRIGGER append_only")
             connection.execute("UPDATE alignment SET result = result - 'warnings' WHERE id = %s", [made["id"]])
             connection.execute("ALTER TABLE alignment ENABLE TRIGGER append_only")
-        assert shop.call("GET", f"/alignments/{made['id']}") == made
+        assert common_shop.call("GET", f"/alignments/{made['id']}") == made
 
-    def test_the_holes_of_a_plate(self, shop: Shop) -> None:
+    def test_the_holes_of_a_plate(self, common_shop: Shop) -> None:
         """A hundred holes of ten touches: as many as there are on a plate."""
         many = [touch for touch in SIX for _ in range(166)]
         for at, touch in enumerate(many):
             many[at] = touch | {"nominal": [touch["nominal"][0] + at / 10, *touch["nominal"][1:]]}
-        assert len(post(shop, touches=many)["residuals"]) == len(many)
+        assert len(post(common_shop, touches=many)["residuals"]) == len(many)

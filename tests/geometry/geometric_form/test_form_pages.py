@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.shop import Person, Shop
+from tests.shop import Person, Shop, unique
 
 OVAL = "10.01 0\n0 9.99\n-10.01 0\n0 -9.99"
 
@@ -17,7 +17,8 @@ class TestInABrowser:
         page.get_by_role("link", name="New measurement").click()
         page.get_by_role("link", name="Published example").click()
         page.get_by_label("Machine").select_option(shop.machine)
-        page.get_by_role("textbox", name="Feature").fill("bore-d56")
+        feature = unique("bore-d56")
+        page.get_by_role("textbox", name="Feature").fill(feature)
         page.get_by_role("button", name="Evaluate and save").click()
         expect(page.get_by_role("heading", level=1)).to_contain_text("Straightness of an axis")
         expect(page.locator("main")).to_contain_text(
@@ -42,7 +43,7 @@ class TestInABrowser:
         expect(page.locator("tbody tr")).to_have_count(2)
         expect(page.locator("plotly-chart .main-svg").first).to_be_visible(timeout=30_000)
         page.goto("/forms")
-        expect(page.get_by_role("row").filter(has_text="bore-d56")).to_contain_text("Not good")
+        expect(page.get_by_role("row").filter(has_text=feature)).to_contain_text("Not good")
 
     def test_pasted_from_a_spreadsheet_with_decimal_commas(self, shop: Shop, operator: Person, page: Page) -> None:
         operator.sign_in(page)

@@ -43,8 +43,8 @@ def test_what_the_control_would_refuse_is_named(shop: Shop, change: dict[str, An
     )
 
 
-def test_a_call_that_was_read_opens_as_a_plan(shop: Shop, server: Any) -> None:
-    person = Person(server, "engineer")
+def test_a_call_that_was_read_opens_as_a_plan(engineer: Person) -> None:
+    person = engineer
     text = "13 TCH PROBE 452 PRESET COMPENSATION ~\n Q407=+12.5 ~\n Q253=FMAX ~\n Q419=-90 ~\n Q420=+90 ~\n Q422=+2"
     page = person.send("/setup/programs", text=text, do="read")
     assert "radius of the sphere" in page

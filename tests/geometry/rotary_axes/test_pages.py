@@ -5,9 +5,8 @@ import re
 import pytest
 
 from app.geometry.rotary_axes.form_reader import decoded
-from tests.conftest import Server
 from tests.geometry.rotary_axes.bench import NAMES, RADIUS, TRUE, axis, protocol, touched
-from tests.geometry.rotary_axes.walking import QS, grid, machine, runs, take, words
+from tests.geometry.rotary_axes.walking import QS, grid, in_list, machine, runs, take, words
 from tests.shop import Person, Shop
 
 
@@ -132,10 +131,9 @@ class TestEntering:
         assert 'name="x_119"' in operator.send("/kinematics/new", 200, lines="99999", do="grid")
         assert runs(shop) == []
 
-    def test_viewers_look_and_enter_nothing(self, shop: Shop, server: Server) -> None:
+    def test_viewers_look_and_enter_nothing(self, shop: Shop, viewer: Person) -> None:
         take(shop, results={"QS146": QS})
-        viewer = Person(server, "viewer")
-        assert shop.machine in viewer.open("/kinematics")
+        assert in_list(viewer, shop)
         assert "/enter" not in viewer.open(machine(shop))
         viewer.open("/kinematics/new", 403)
         viewer.send("/kinematics/new", 403, machine=shop.machine, pasted=f'QS146="{QS}"')
@@ -165,8 +163,8 @@ class TestDeciding:
         operator.send(f"{here}/undo", 403, reason="x")
         assert "is undone" in engineer.send(f"{here}/undo", reason="Worse than before")
         assert "These values were entered, and the entry was undone" in engineer.open(here)
-        for place in (here, machine(shop), "/kinematics"):
-            assert 'data-state="undone"' in engineer.open(place)
+        for shown in (engineer.open(here), engineer.open(machine(shop)), in_list(engineer, shop)):
+            assert 'data-state="undone"' in shown
         assert shop.call("GET", f"/machines/{shop.machine}/kinematics")["in_effect"].get("EX0C", 0.0) == 0.0
 
     def test_a_kinematics_is_put_back(self, shop: Shop, operator: Person, engineer: Person) -> None:
@@ -193,7 +191,7 @@ class TestDeciding:
             in shown
         )
         assert "Mark as entered" not in shown
-        assert 'data-state="refused"' in operator.open("/kinematics")
+        assert 'data-state="refused"' in in_list(operator, shop)
         assert "Values to enter" not in shown
         operator.open(f"/kinematics/runs/{run}/protocol")
 

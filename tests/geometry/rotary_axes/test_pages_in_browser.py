@@ -6,20 +6,17 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.conftest import Server
 from tests.geometry.rotary_axes.bench import RADIUS, axis, protocol
 from tests.geometry.rotary_axes.walking import grid, last_month, machine, runs, take
 from tests.shop import Person, Shop
 
-pytestmark = pytest.mark.usefixtures("engineer")
+pytestmark = pytest.mark.usefixtures("signed_in")
 SIZES = {"desk": (1280, 800), "large": (1920, 1080), "panel": (800, 1280)}
 
 
 @pytest.fixture
-def engineer(server: Server, page: Page) -> Person:
-    person = Person(server, "engineer")
-    person.sign_in(page)
-    return person
+def signed_in(engineer: Person, page: Page) -> None:
+    engineer.sign_in(page)
 
 
 def chart(page: Page, source: str) -> list[str]:
@@ -134,7 +131,7 @@ def test_the_drift_is_followed_and_a_value_chosen(shop: Shop, page: Page) -> Non
     expect(page.locator("#run-list tbody tr")).to_have_count(4)  # without loading the page again
 
 
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("size", ["panel", *(pytest.param(size, marks=pytest.mark.long) for size in ("desk", "large"))])
 def test_nothing_overlaps_what_is_to_be_entered(shop: Shop, page: Page, size: str) -> None:
     """In the picture of two runs the words at the right lie beside the points, in every size."""
     page.set_viewport_size({"width": SIZES[size][0], "height": SIZES[size][1]})

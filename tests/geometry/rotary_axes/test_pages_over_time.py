@@ -5,7 +5,7 @@ import re
 import pytest
 
 from tests.geometry.rotary_axes.bench import TRUE, axis, protocol
-from tests.geometry.rotary_axes.walking import LAST_MONTH, QS, last_month, machine, take, words
+from tests.geometry.rotary_axes.walking import LAST_MONTH, QS, in_list, last_month, machine, take, words
 from tests.shop import Person, Shop
 
 
@@ -79,8 +79,7 @@ class TestDrift:
         assert alarm["kind"] == "kinematics_drift"
         shown = words(operator.open(machine(shop)))
         assert "EX0C C is offset in X: +12.3 µm , limit ±10 µm" in shown
-        row = operator.open("/kinematics").partition(f'id="machine-{shop.machine}"')[2].partition("</tr>")[0]
-        assert "beyond its limit" in row
+        assert "beyond its limit" in in_list(operator, shop)
 
     @pytest.mark.parametrize(
         ("fields", "said"),

@@ -4,7 +4,7 @@ import re
 from typing import Any
 
 from tests.geometry.rotary_axes.bench import protocol
-from tests.shop import Shop
+from tests.shop import Person, Shop
 
 QS = "0.01234567 -0.0123456 0.00123456 -0.0012345"
 LAST_MONTH = "0.00410000 -0.0075000 0.00190000 -0.0012000"
@@ -22,6 +22,12 @@ def runs(shop: Shop) -> list[Any]:
 
 def machine(shop: Shop) -> str:
     return f"/kinematics/machines/{shop.machine}"
+
+
+def in_list(person: Person, shop: Shop) -> str:
+    """The row of the machine in the list of all, which has pages; empty if there is none."""
+    page = person.open(f"/kinematics?after={shop.machine[:-1]}")
+    return page.partition(f'id="machine-{shop.machine}"')[2].partition("</tr>")[0]
 
 
 def words(page: str) -> str:

@@ -41,7 +41,8 @@ class TestAtThePanel:
             box
             for each in page.locator("main")
             .get_by_role("button")
-            .or_(page.locator("main input:visible, main select"))
+            .or_(page.locator("main input, main select"))
+            .filter(visible=True)
             .all()
             if (box := each.bounding_box()) and box["height"] < 48
         ]
@@ -116,8 +117,9 @@ class TestAtThePanel:
 
 
 class TestAVice:
-    def test_that_shifts_is_seen_and_raises_an_alarm(self, shop: Shop, page: Page, complaints: list[str]) -> None:
-        engineer = Person(shop.server, "engineer")
+    def test_that_shifts_is_seen_and_raises_an_alarm(
+        self, shop: Shop, engineer: Person, page: Page, complaints: list[str]
+    ) -> None:
         engineer.sign_in(page)
         for shift in (0.0, 0.012):
             page.goto("/work-zeros/new?kind=pocket&fixture=vice")
@@ -156,18 +158,18 @@ class TestAVice:
         page.goto(f"/work-zeros?machine={shop.machine}")
         expect(page.get_by_role("row").filter(has_text="Shifted too far")).to_contain_text("+50.0")
 
-    def test_its_zeros_become_readings(self, shop: Shop) -> None:
-        shop.add("vice-x", target=-306.01, tool_memory=0, average_memory=0, mode="measure_only")
-        operator = Person(shop.server, "operator")
+    def test_its_zeros_become_readings(self, shop: Shop, operator: Person) -> None:
+        vice = f"{shop.characteristic}-x"
+        shop.add(vice, target=-306.01, tool_memory=0, average_memory=0, mode="measure_only")
         sent: dict[str, Any] = {
             "machine": shop.machine,
             "kind": "pocket",
             "tip": "6",
             "work_offset": "G54",
-            "as_x": "vice-x",
+            "as_x": vice,
         }
         told = operator.send("/work-zeros/new", lines="-X -353.012\n+X -259.008", **sent)
-        assert "/characteristics/vice-x/readings/1" in told
+        assert f"/characteristics/{vice}/readings/1" in told
         told = operator.send("/work-zeros/new", 422, lines="-X -353.012\n+X -259.008", **(sent | {"as_x": "nowhere"}))
         assert "no characteristic" in told
 
@@ -191,12 +193,11 @@ class TestAgain:
         page.get_by_role("link", name=re.compile("work zero \\d+")).click()
         expect(page.get_by_role("link", name=re.compile("which replaces it"))).to_be_visible()
 
-    def test_a_viewer_only_looks(self, shop: Shop, operator: Person) -> None:
+    def test_a_viewer_only_looks(self, shop: Shop, operator: Person, viewer: Person) -> None:
         operator.send(
             "/work-zeros/new", machine=shop.machine, kind="pocket", tip="6", work_offset="G54", lines="-X -353\n+X -259"
         )
         (made,) = shop.call("GET", f"/work-zeros?machine={shop.machine}")["items"]
-        viewer = Person(shop.server, "viewer")
         for address in ("/work-zeros", f"/work-zeros/{made['id']}"):
             assert "Probe a" not in viewer.open(address)
             assert "Compute again" not in viewer.open(address)

@@ -16,6 +16,9 @@ from app.loop.readings.actions import push_results
 from tests.conftest import Server
 from tests.geometry.work_zero.bench import POCKET, moved, post
 from tests.shop import Shop
+from tests.waits import until
+
+LOCKED = "SELECT 1 FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND datname = current_database()"
 
 
 class TestImplausible:
@@ -198,13 +201,14 @@ class TestReadings:
                 assert client.get("/api/v1/machines").status_code == 200  # its key is known from now on
             holding.execute("LOCK TABLE machine IN ACCESS EXCLUSIVE MODE")
             waiting = [pool.submit(client.post, "/api/v1/work-zeros", json=given) for client in senders]
-            time.sleep(2)
+            with psycopg.connect(server.database.dsn, autocommit=True) as looking:
+                until(lambda: looking.execute(LOCKED).fetchone() is not None)
+            time.sleep(2)  # so long that all of them are there
             assert not any(each.done() for each in waiting)
             holding.rollback()
             assert {each.result().status_code for each in waiting} == {201}
 
-    def test_a_zero_becomes_readings(self, server: Server) -> None:
-        shop = Shop(server)
+    def test_a_zero_becomes_readings(self, shop: Shop) -> None:
         limits = {"tolerance_width": 0.02, "zero_range": 0.002, "averaging_limit": 0.006, "mode": "measure_only"}
         shop.add(f"{shop.characteristic}-x", target=-306.01, tool_memory=0, average_memory=0, **limits)
         named = {"x": f"{shop.characteristic}-x"}
@@ -217,8 +221,7 @@ class TestReadings:
         assert post(shop, 200, characteristics=named, key="twice", part="SN-7") == made
         assert len(shop.call("GET", f"/readings?characteristic={named['x']}")["items"]) == 1
 
-    def test_a_fixture_remembers_what_becomes_readings_and_their_alarms_are_raised(self, server: Server) -> None:
-        shop = Shop(server)
+    def test_a_fixture_remembers_what_becomes_readings_and_their_alarms_are_raised(self, shop: Shop) -> None:
         limits = {"tolerance_width": 0.02, "zero_range": 0.002, "averaging_limit": 0.006, "mode": "measure_only"}
         shop.add(f"{shop.characteristic}-y", target=-154.25, tool_memory=0, average_memory=0, **limits)
         post(shop, fixture="vice")
