@@ -10,11 +10,12 @@ from app.views.set_up.characteristic_pages import ON_PAGE
 from tests.conftest import Server
 from tests.shop import Person, Shop
 
+pytestmark = pytest.mark.own_server
 NAMES = ["Mill 10", "Mill 9", *(f"Lathe {letter}" for letter in "KJIHGFEDCBA")]
 
 
 @pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
+def hall(server: Server) -> Shop:
     """More machines than a screen is long, and characteristics of one."""
     shop = Shop(server)
     for number, name in enumerate(NAMES):
@@ -25,7 +26,7 @@ def shop(server: Server) -> Shop:
 
 
 @pytest.mark.browser
-def test_headers_sort_and_a_field_filters(shop: Shop, viewer: Person, page: Page) -> None:
+def test_headers_sort_and_a_field_filters(hall: Shop, viewer: Person, page: Page) -> None:
     viewer.sign_in(page)
     page.goto("/setup/machines")
     rows = page.locator("#machines tbody tr")
@@ -39,7 +40,7 @@ def test_headers_sort_and_a_field_filters(shop: Shop, viewer: Person, page: Page
     counts.get_by_role("button").focus()
     page.keyboard.press("Enter")
     page.keyboard.press("Enter")
-    expect(rows.first).to_contain_text(shop.machine)
+    expect(rows.first).to_contain_text(hall.machine)
     expect(name).not_to_have_attribute("aria-sort", re.compile(".*"))
     page.get_by_label("Show rows with").fill("mill 10")
     expect(page.locator("#machines tbody tr:visible")).to_have_count(1)
@@ -47,7 +48,7 @@ def test_headers_sort_and_a_field_filters(shop: Shop, viewer: Person, page: Page
     expect(page.locator("#machines tbody tr:visible")).to_have_count(len(NAMES) + 1)
 
 
-def test_the_server_filters_by_name_where_a_list_has_pages(shop: Shop, viewer: Person) -> None:
+def test_the_server_filters_by_name_where_a_list_has_pages(hall: Shop, viewer: Person) -> None:
     def listed(query: str) -> list[str]:
         return re.findall(r'<code class="quiet">([^<]+)</code>', viewer.open(f"/setup/characteristics?{query}"))
 
@@ -56,14 +57,14 @@ def test_the_server_filters_by_name_where_a_list_has_pages(shop: Shop, viewer: P
     assert listed("q=ring&sort=-name") == ["ring-b", "ring-a"]
     assert listed("q=ring&sort=no-column") == ["ring-a", "ring-b"]
     assert listed("q=_") == ["disc_c"]
-    assert listed(f"q=ring-b&machine={shop.machine}") == ["ring-b"]
+    assert listed(f"q=ring-b&machine={hall.machine}") == ["ring-b"]
     assert listed("q=ring&machine=sorted-0") == []
     assert listed("q=zzz") == []
 
 
-def test_the_server_sorts_a_list_of_several_pages_by_its_headers(shop: Shop, viewer: Person) -> None:
+def test_the_server_sorts_a_list_of_several_pages_by_its_headers(hall: Shop, viewer: Person) -> None:
     for number in range(ON_PAGE + 1):
-        shop.add(f"paged-{number:03}", tool_memory=0, average_memory=0, target=20.0 + number % 7)
+        hall.add(f"paged-{number:03}", tool_memory=0, average_memory=0, target=20.0 + number % 7)
     page = viewer.open("/setup/characteristics?q=paged&sort=-target")
     targets = [float(text) for text in re.findall(r"(2\d\.0000)", page)]
     assert targets == sorted(targets, reverse=True)
@@ -74,18 +75,18 @@ def test_the_server_sorts_a_list_of_several_pages_by_its_headers(shop: Shop, vie
     assert re.findall(r"(2\d\.0000)", viewer.open(on[1].replace("&amp;", "&"))) == ["20.0000"]
 
 
-def test_the_server_filters_lists_that_have_pages(shop: Shop, viewer: Person) -> None:
+def test_the_server_filters_lists_that_have_pages(hall: Shop, viewer: Person) -> None:
     """Notes and alarms that stand on a later page are found; what no row holds is said."""
     for number in range(NOTES_ON_PAGE + 1):
-        shop.call("POST", "/notes", 201, machine=shop.machine, text="A rare bird" if number == 0 else f"Note {number}")
+        hall.call("POST", "/notes", 201, machine=hall.machine, text="A rare bird" if number == 0 else f"Note {number}")
     assert "A rare bird" not in viewer.open("/notes")
     assert "A rare bird" in viewer.open("/notes?q=BIRD%20lathe")
     assert "No row holds" in viewer.open("/notes?q=no-such-word")
     assert "A rare bird" in viewer.open("/notes?q=%20%00bird")  # what cannot be stored is no word
     for key in ("worn", "small"):
-        shop.add(key, tool_memory=11, average_memory=0)
-    shop.read(350.0, "worn")
-    shop.read(-12.0, "small")
+        hall.add(key, tool_memory=11, average_memory=0)
+    hall.read(350.0, "worn")
+    hall.read(-12.0, "small")
     history = viewer.open("/alarms/history?q=tool%20worn")
     assert "Seat worn" in history
     assert "Seat small" not in history
@@ -107,15 +108,15 @@ def test_the_server_filters_lists_that_have_pages(shop: Shop, viewer: Person) ->
         "/work-zeros",
     ],
 )
-def test_a_filter_that_no_row_holds_says_so(shop: Shop, viewer: Person, path: str) -> None:
-    shop.read(0.0)
+def test_a_filter_that_no_row_holds_says_so(hall: Shop, viewer: Person, path: str) -> None:
+    hall.read(0.0)
     page = viewer.open(f"{path}?q=no-such-word")
     assert "No row holds “no-such-word”" in page
     assert 'value="no-such-word"' in page
 
 
 @pytest.mark.browser
-def test_all_ticks_only_what_the_filter_shows(shop: Shop, viewer: Person, page: Page) -> None:
+def test_all_ticks_only_what_the_filter_shows(hall: Shop, viewer: Person, page: Page) -> None:
     viewer.sign_in(page)
     page.goto("/reports")
     page.get_by_label("Show those with").fill("ring-a")
@@ -127,14 +128,14 @@ def test_all_ticks_only_what_the_filter_shows(shop: Shop, viewer: Person, page: 
 
 
 @pytest.mark.browser
-def test_a_choice_in_a_row_counts_by_what_is_chosen(server: Server, shop: Shop, page: Page) -> None:
+def test_a_choice_in_a_row_counts_by_what_is_chosen(server: Server, page: Page) -> None:
     for number in range(12):
         server.person(f"clerk-{number}", "viewer")
-    Person(server, "engineer")
+    server.person("foreman", "operator")
     Person(server, "admin").sign_in(page)
     page.goto("/setup/people")
     rows = page.locator("#all-people tbody tr:visible")
-    page.get_by_label("Show rows with").fill("engineer-")
+    page.get_by_label("Show rows with").fill("foreman")
     expect(rows).to_have_count(1)
     role = rows.get_by_role("combobox").evaluate("choice => choice.selectedOptions[0].text")
     page.get_by_label("Show rows with").fill(role)
@@ -143,8 +144,8 @@ def test_a_choice_in_a_row_counts_by_what_is_chosen(server: Server, shop: Shop, 
     expect(rows).to_have_count(3)  # clerk-1, clerk-10, clerk-11
 
 
-def test_the_record_of_changes_is_filtered_by_any_word_of_it(shop: Shop, engineer: Person) -> None:
-    shop.call("PATCH", f"/machines/{shop.machine}", name="Lathe renamed")
+def test_the_record_of_changes_is_filtered_by_any_word_of_it(hall: Shop, engineer: Person) -> None:
+    hall.call("PATCH", f"/machines/{hall.machine}", name="Lathe renamed")
     assert engineer.open("/setup/audit?q=MACHINE%20CHANGED").count("machine changed") == 1
     assert "machine changed" not in engineer.open("/setup/audit?q=ring-a")
     assert "characteristic/ring-a" in engineer.open("/setup/audit?q=ring-a")
