@@ -29,6 +29,7 @@ from app.core.ring import (
     SIZE,
     SLOT_SIZE,
     SLOTS,
+    STEPS,
     Answer,
     Block,
     BlockError,
@@ -36,6 +37,7 @@ from app.core.ring import (
     Register,
     Slot,
     Unit,
+    in_steps,
     mail_registers,
     read_block,
     slot_of,
@@ -52,6 +54,8 @@ WATCHED_WITH_MAIL = (Register.ANSWERED, Register.ANSWER)
 HEADS_EVERY = 10.0  # s: all heads are read again at the latest
 UNREADABLE_AFTER = 5.0  # s: no NC program writes that long at a slot which it has counted
 SLOTS_AT_ONCE = 4  # where registers are read one by one, so that a call does not take too long
+UNITS = {"mm": Unit.MM, "inch": Unit.INCH}
+HALF_A_STEP = 0.5 / max(STEPS.values())
 FRESH = 2.0  # polls: a reading that was not there so long ago was measured just now
 REFUSALS = {
     Answer.OFFSET_DIFFERS: "The control holds another offset than expected.",
@@ -199,7 +203,7 @@ class RegisterLink:
         except BlockError as error:
             self._heads = []
             raise Misconfigured(str(error)) from error
-        says = {Unit.MM: "mm", Unit.INCH: "inch"}.get(Unit(block.unit)) if block.unit in {1, 2} else None
+        says = {unit: name for name, unit in UNITS.items()}.get(Unit(block.unit)) if block.unit in {1, 2} else None
         if says != self.machine.unit:
             self._heads = []
             raise Misconfigured(
@@ -265,7 +269,7 @@ class RegisterLink:
             return
         if block.answered == wanted.number:
             return
-        content = mail_registers(self._mail(wanted))
+        content = mail_registers(self._mail(wanted), UNITS[self.machine.unit])
         # by its content: one from before a restart may have been converted by another mapping. “Check sum wrong” stays the
         # answer until the NC looks again: it says nothing of what lies there now
         if all(_same(self._numbers[place], value) for place, value in content):
@@ -287,8 +291,8 @@ class RegisterLink:
             location.tool,
             location.edge,
             self.parameter(location),
-            round(location.to_control(order.before, unit), 6),
-            round(location.to_control(order.after, unit), 6),
+            in_steps(location.to_control(order.before, unit), UNITS[unit]),
+            in_steps(location.to_control(order.after, unit), UNITS[unit]),
         )
 
     def parameter(self, location: Location) -> int:
@@ -301,14 +305,11 @@ class RegisterLink:
         if self._direct:
             return list(self._direct)
         block = self._block
-        if block is None or not block.answered or self.machine.corrections != "control":
+        if block is None or not block.answered or self.machine.corrections != "control" or not block.answer_holds:
             return []
         held = self._held_after(block)
-        later = block.answer in {
-            Answer.CHECK_WRONG,
-            Answer.ON_HOLD,
-        }  # said of mail behind the one that was answered last
-        if block.answer == Answer.APPLIED or (later and block.applied == block.answered):
+        # the last two are said of mail behind the one that was answered last
+        if block.answer in {Answer.APPLIED, Answer.CHECK_WRONG, Answer.ON_HOLD}:
             return [Outcome(block.answered, applied=True, offset=held)]
         if block.answer not in set(REFUSALS):
             return []
@@ -317,7 +318,7 @@ class RegisterLink:
 
     def _held_after(self, block: Block) -> float | None:
         """The offset after the last answer, if the mailbox still says which location it was about."""
-        if block.mail.number != block.answered:
+        if block.mail.number != block.answered or not block.mail_fits:
             return None
         for location in self.machine.location:
             same = (block.mail.tool, block.mail.edge) == (location.tool, location.edge)
@@ -415,5 +416,8 @@ class RegisterLink:
 
 
 def _same(found: float, written: float) -> bool:
-    """Tell if a register holds what was written: eight digits, six decimals. What is not a number is not the same."""
-    return abs(found - written) <= max(2e-6, 2e-7 * abs(written))
+    """Tell if a register holds what was written: less than half a step apart (`app.core.ring`), so the NC program reads the same.
+
+    What is not a number is not the same.
+    """
+    return abs(found - written) < HALF_A_STEP

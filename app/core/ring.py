@@ -7,6 +7,11 @@ absolute value to set, with the value that must be there before; the NC program 
 Every number is REAL, in the unit and the sense of the control. Registers count from 0, from a first register that the
 configuration names. Nothing here knows a protocol.
 
+A check sum forgives nothing. Each number is made whole first (lengths in steps of `STEPS`), on both sides alike, and what was
+summed is what counts afterwards: whatever fits is what was written, damaged in no more than digits that nobody uses. The sums
+are exact remainders by a prime, so a change of one register fits only if it is a multiple of `MODULUS`. The weights are the primes
+from 61 to 97: changes of any two registers by up to 60 each never cancel each other.
+
 What makes it safe:
 
 * a slot counts when its two sequence numbers agree and its check sum fits, so that a slot read while it is being written is
@@ -19,7 +24,7 @@ What makes it safe:
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from math import fmod, isfinite
+from math import floor, isfinite
 from typing import Final, NamedTuple
 
 SLOTS: Final = 8
@@ -27,17 +32,29 @@ SLOT_SIZE: Final = 10
 FIRST_SLOT: Final = 16
 SIZE: Final = FIRST_SLOT + SLOTS * SLOT_SIZE
 """Registers of the whole block."""
-LAYOUT: Final = 1
-"""Version of this layout, in register `Register.LAYOUT`; 0 there: the NC program has never set the block up."""
+LAYOUT: Final = 2
+"""Version of this layout, in register `Register.LAYOUT`; 0 there: the NC program has never set the block up.
+
+1: check sums that forgave differences, so that a damaged tool number passed; lengths with all their digits.
+"""
 HIGHEST_SEQUENCE: Final = 9_999_999
 """Seven digits: exact on controls that keep eight. After it the NC asks for a new epoch."""
 HIGHEST_EPOCH: Final = 999_999
-MODULUS: Final = 9973
-"""Of the check sums: the largest prime below 10,000."""
-RESOLUTION: Final = 10_000
-"""Lengths enter a check sum in steps of 1/10,000 of the control's unit."""
+MODULUS: Final = 99_991
+"""Of the check sums: the largest prime below 100,000. The largest weight times it has seven digits, which every control keeps."""
+SLOT_WEIGHTS: Final = {
+    "sequence": 61,
+    "measured": 67,
+    "part": 71,
+    "in_effect": 73,
+    "characteristic": 79,
+    "tool": 83,
+    "status": 89,
+    "time": 97,
+}
+MAIL_WEIGHTS: Final = {"number": 61, "value": 67, "expected": 71, "parameter": 73, "tool": 79, "edge": 83}
 LARGEST: Final = 1e12
-"""No number of a slot is as large: what is, or is no number, was never written by the NC program."""
+"""No number of a slot or of the mailbox is as large: what is, or is no number, was never written."""
 INCH: Final = 25.4
 """mm in an inch."""
 
@@ -83,6 +100,10 @@ class Unit(IntEnum):
 
     MM = 1
     INCH = 2
+
+
+STEPS: Final = {Unit.MM: 10_000, Unit.INCH: 100_000}
+"""Steps of a length in the control's unit: what a slot, the mailbox and a printed line carry, and what their check sums count."""
 
 
 class Answer(IntEnum):
@@ -143,7 +164,7 @@ class Mail:
 
 
 class Block(NamedTuple):
-    """The registers, read at once. slots: the complete ones, oldest first."""
+    """The registers, read at once. mail_fits: the mailbox fits its check sum. slots: the complete ones, oldest first."""
 
     ack: int
     epoch: int
@@ -154,37 +175,51 @@ class Block(NamedTuple):
     offset: float
     unit: int
     mail: Mail
-    mail_check: float
+    mail_fits: bool
     slots: tuple[Slot, ...]
 
-
-def slot_check(slot: Slot) -> float:
-    """The check sum of a slot: the remainder of a weighted sum by `MODULUS`, with the sign of the sum as FIX gives it."""
-    time = -1.0 if slot.time is None else slot.time
-    return fmod(
-        slot.sequence
-        + 3 * slot.characteristic
-        + 5 * slot.in_effect
-        + 7 * slot.part
-        + 11 * slot.tool
-        + 13 * slot.status
-        + 17 * time
-        + round(RESOLUTION * slot.measured),
-        MODULUS,
-    )
+    @property
+    def answer_holds(self) -> bool:
+        """Tell if the registers of the answer agree, which have no check sum: what was applied is noted in two of them."""
+        applied = self.answer in {Answer.APPLIED, Answer.CHECK_WRONG, Answer.ON_HOLD}
+        return not applied or self.applied == self.answered
 
 
-def mail_check(mail: Mail) -> float:
-    """The check sum of the mailbox."""
-    return fmod(
-        3 * mail.tool
-        + 5 * mail.edge
-        + 7 * mail.parameter
-        + round(RESOLUTION * mail.expected)
-        + 11 * round(RESOLUTION * mail.value)
-        + 13 * mail.number,
-        MODULUS,
-    )
+def in_steps(length: float, unit: Unit) -> float:
+    """A length as a ring carries it: whole steps, in the control's unit.
+
+    >>> in_steps(40.01234567, Unit.MM), in_steps(-0.00695, Unit.INCH)
+    (40.0123, -0.00695)
+    """
+    return round(length * STEPS[unit]) / STEPS[unit]
+
+
+def slot_check(slot: Slot, unit: Unit) -> int:
+    """The check sum of a slot: 0 to `MODULUS` - 1. An NC program writes the remainder with the sign of the sum."""
+    numbers = {
+        "sequence": slot.sequence,
+        "measured": round(slot.measured * STEPS[unit]),
+        "part": slot.part,
+        "in_effect": slot.in_effect,
+        "characteristic": slot.characteristic,
+        "tool": slot.tool,
+        "status": slot.status,
+        "time": -1 if slot.time is None else round(slot.time),
+    }
+    return sum(SLOT_WEIGHTS[name] * number for name, number in numbers.items()) % MODULUS
+
+
+def mail_check(mail: Mail, unit: Unit) -> int:
+    """The check sum of the mailbox: 0 to `MODULUS` - 1."""
+    numbers = {
+        "number": mail.number,
+        "value": round(mail.value * STEPS[unit]),
+        "expected": round(mail.expected * STEPS[unit]),
+        "parameter": mail.parameter,
+        "tool": mail.tool,
+        "edge": mail.edge,
+    }
+    return sum(MAIL_WEIGHTS[name] * number for name, number in numbers.items()) % MODULUS
 
 
 def slot_of(sequence: int) -> int:
@@ -192,22 +227,23 @@ def slot_of(sequence: int) -> int:
     return (sequence - 1) % SLOTS
 
 
-def slot_registers(slot: Slot) -> list[float]:
+def slot_registers(slot: Slot, unit: Unit = Unit.MM) -> list[float]:
     """A slot as the NC leaves it."""
     time = -1.0 if slot.time is None else slot.time
-    payload = (slot.characteristic, slot.measured, slot.in_effect, slot.part, slot.tool, slot.status, time)
-    return [float(value) for value in (slot.sequence, *payload, slot_check(slot), slot.sequence)]
+    measured = in_steps(slot.measured, unit)
+    payload = (slot.characteristic, measured, slot.in_effect, slot.part, slot.tool, slot.status, time)
+    return [float(value) for value in (slot.sequence, *payload, slot_check(slot, unit), slot.sequence)]
 
 
-def mail_registers(mail: Mail) -> list[tuple[Register, float]]:
+def mail_registers(mail: Mail, unit: Unit = Unit.MM) -> list[tuple[Register, float]]:
     """Registers of the mailbox with their values, in the order in which the bridge writes them: the number last."""
     return [
         (Register.MAIL_TOOL, float(mail.tool)),
         (Register.MAIL_EDGE, float(mail.edge)),
         (Register.MAIL_PARAMETER, float(mail.parameter)),
-        (Register.MAIL_EXPECTED, mail.expected),
-        (Register.MAIL_VALUE, mail.value),
-        (Register.MAIL_CHECK, mail_check(mail)),
+        (Register.MAIL_EXPECTED, in_steps(mail.expected, unit)),
+        (Register.MAIL_VALUE, in_steps(mail.value, unit)),
+        (Register.MAIL_CHECK, float(mail_check(mail, unit))),
         (Register.MAIL_NUMBER, float(mail.number)),
     ]
 
@@ -216,7 +252,7 @@ def _whole(value: float) -> int | None:
     return round(value) if isfinite(value) and abs(value - round(value)) < 1e-4 and value >= 0 else None
 
 
-def read_slot(registers: Sequence[float]) -> Slot | None:
+def read_slot(registers: Sequence[float], unit: Unit = Unit.MM) -> Slot | None:
     """The reading in a slot's ten registers; None while it is empty, half written, or its check sum does not fit."""
     sequence, again = _whole(registers[Field.SEQ]), _whole(registers[Field.SEQ2])
     if not sequence or sequence != again or not all(abs(value) < LARGEST for value in registers):
@@ -225,22 +261,33 @@ def read_slot(registers: Sequence[float]) -> Slot | None:
         _whole(registers[place])
         for place in (Field.CHARACTERISTIC, Field.IN_EFFECT, Field.PART, Field.TOOL, Field.STATUS)
     ]
-    if any(number is None for number in numbers):
+    time = registers[Field.TIME]
+    if any(number is None for number in numbers) or _whole(time + 1) is None:
         return None
     characteristic, in_effect, part, tool, status = (number or 0 for number in numbers)
-    time = registers[Field.TIME]
     slot = Slot(
         sequence,
         characteristic,
-        registers[Field.MEASURED],
+        in_steps(registers[Field.MEASURED], unit),
         in_effect,
         part,
         tool,
         status,
-        None if time < 0 else time,
+        None if time < 0 else float(round(time)),
     )
-    difference = abs(fmod(slot_check(slot) - registers[Field.CHECK], MODULUS))
-    return slot if min(difference, MODULUS - difference) <= 1.5 else None
+    return slot if (slot_check(slot, unit) - round(registers[Field.CHECK])) % MODULUS == 0 else None
+
+
+def read_mail(registers: Sequence[float], unit: Unit = Unit.MM) -> Mail | None:
+    """The mail in a block as the NC program takes it: each number made whole; None where the check sum does not fit."""
+    whole = (Register.MAIL_NUMBER, Register.MAIL_TOOL, Register.MAIL_EDGE, Register.MAIL_PARAMETER)
+    lengths = (Register.MAIL_EXPECTED, Register.MAIL_VALUE)
+    if not all(abs(registers[place]) < LARGEST for place in (*whole, *lengths, Register.MAIL_CHECK)):
+        return None
+    mail = Mail(
+        *(floor(registers[place] + 0.5) for place in whole), *(in_steps(registers[place], unit) for place in lengths)
+    )
+    return mail if (mail_check(mail, unit) - floor(registers[Register.MAIL_CHECK] + 0.5)) % MODULUS == 0 else None
 
 
 def read_block(registers: Sequence[float]) -> Block:
@@ -255,16 +302,24 @@ def read_block(registers: Sequence[float]) -> Block:
         raise BlockError(
             "The block is empty: the NC program has not set it up yet. Run the program that Inband has written once."
         )
+    if layout in range(1, LAYOUT):
+        raise BlockError(
+            f"The ring programs in the control are of an older Inband (layout {layout:g}, this one has {LAYOUT}): their check"
+            " sum lets damaged corrections pass. Nothing is fetched or corrected until they are written again and loaded:"
+            " Set-up, the characteristic, Program text, For the bridge, or “inband program write CHARACTERISTIC --ring”."
+            " How to: docs/how-to/ring-programs.md."
+        )
     if layout != LAYOUT:
         raise BlockError(
             f"Register +{Register.LAYOUT} holds {layout:g}, not {LAYOUT}: the first register is wrong, or the NC program"
-            " is of another version."
+            " is of a newer Inband than the bridge."
         )
     heads = [_whole(registers[place]) for place in range(Register.UNIT + 1) if place != Register.OFFSET]
     if any(number is None for number in heads):
         raise BlockError("The first registers of the block hold no whole numbers: the first register is wrong.")
     ack, epoch, written, applied, answered, answer, unit = (number or 0 for number in heads)
-    found = [read_slot(registers[first : first + SLOT_SIZE]) for first in range(FIRST_SLOT, SIZE, SLOT_SIZE)]
+    known = Unit(unit) if unit in set(Unit) else Unit.MM
+    found = [read_slot(registers[first : first + SLOT_SIZE], known) for first in range(FIRST_SLOT, SIZE, SLOT_SIZE)]
     slots = sorted((slot for slot in found if slot is not None), key=lambda slot: slot.sequence)
     mail = Mail(
         _whole(registers[Register.MAIL_NUMBER]) or 0,
@@ -274,10 +329,8 @@ def read_block(registers: Sequence[float]) -> Block:
         registers[Register.MAIL_EXPECTED],
         registers[Register.MAIL_VALUE],
     )
-    check = registers[Register.MAIL_CHECK]
-    return Block(
-        ack, epoch, written, applied, answered, answer, registers[Register.OFFSET], unit, mail, check, tuple(slots)
-    )
+    fits, offset = read_mail(registers, known) is not None, registers[Register.OFFSET]
+    return Block(ack, epoch, written, applied, answered, answer, offset, unit, mail, fits, tuple(slots))
 
 
 def to_fetch(block: Block, stored: int) -> tuple[Slot, ...]:

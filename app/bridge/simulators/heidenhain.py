@@ -247,7 +247,7 @@ class TncSimulator:
         tool, edge = (feature.tool, feature.edge) if feature else (0, 0)
         mail = Mail(int(number[1]), tool, edge, parameter, float(expected[2]), float(value[1]))
         if registers[Register.MAIL_NUMBER] != mail.number:
-            for place, content in mail_registers(mail):
+            for place, content in mail_registers(mail, Unit(self.model.unit)):
                 registers[place] = content
 
 

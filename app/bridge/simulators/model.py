@@ -26,8 +26,9 @@ from app.core.ring import (
     Slot,
     Status,
     Unit,
-    mail_check,
+    in_steps,
     read_block,
+    read_mail,
     slot_of,
     slot_registers,
 )
@@ -130,7 +131,7 @@ class Model:
         slot = Slot(
             sequence,
             characteristic,
-            round(measured, 6),
+            in_steps(measured, self.unit),
             self.in_effect.get(tool, 0),
             self.parts,
             tool,
@@ -138,7 +139,7 @@ class Model:
             self._time_of_day(),
         )
         first = FIRST_SLOT + SLOT_SIZE * slot_of(sequence)
-        content = slot_registers(slot)
+        content = slot_registers(slot, self.unit)
         self.registers[first + Field.SEQ] = 0.0
         yield
         for place in (*range(Field.CHARACTERISTIC, Field.CHECK), Field.CHECK, Field.SEQ2):
@@ -153,11 +154,11 @@ class Model:
     def take_correction(self) -> Steps:
         """Take the mailbox at a safe point. Whatever is answered is answered once; the number last."""
         block = read_block(self.registers)
-        mail = block.mail
-        if mail.number in {0, block.answered}:
+        if block.mail.number in {0, block.answered}:
             return
         yield
-        if abs(mail_check(mail) - block.mail_check) > 1.5:
+        mail = read_mail(self.registers, self.unit)
+        if mail is None:
             self.registers[Register.ANSWER] = Answer.CHECK_WRONG
             return
         if self.on_hold:

@@ -150,7 +150,7 @@ class MqttSimulator:
         feature = self._feature(first)
         parameter = -1 if feature is None else feature.parameter
         mail = Mail(first["number"], first["tool"], first["edge"], parameter, first["before"], first["after"])
-        for place, value in mail_registers(mail):
+        for place, value in mail_registers(mail, Unit(self.model.unit)):
             registers[place] = value
 
     def _feature(self, correction: dict[str, Any]) -> Feature | None:

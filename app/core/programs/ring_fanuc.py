@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from app.core.programs.ring_dialects import Dialect, RingText
 from app.core.programs.ring_settings import RingSettings
 from app.core.programs.ring_steps import Alarm, Do, If, Label, Let, RingProgram, Step
-from app.core.ring import SIZE
+from app.core.ring import LAYOUT, SIZE
 
 ALARMS = 90
 LETTERS = {
@@ -59,7 +59,7 @@ class Fanuc(Dialect):
         called = " ".join(f"{LETTERS[name][0]}={name.upper().replace('_', ' ')}" for name in program.arguments)
         head = [
             "%",
-            f"{self._number(at)} (INBAND {program.title})",
+            f"{self._number(at)} (INBAND {program.title}, LAYOUT {LAYOUT})",
             self.comment(f"G65 P{self.settings.first_program + at} {called}".strip()),
             *self._legend(program),
             self._remarked(f"#{self.names['first']}={self.settings.first_register}", f"FIRST OF {SIZE} REGISTERS"),

@@ -11,7 +11,7 @@ from app.core.programs.lines import written
 from app.core.programs.ring_dialects import Dialect, RingText
 from app.core.programs.ring_settings import TOOLS, RingSettings
 from app.core.programs.ring_steps import PAUSE, Alarm, Do, If, Label, Let, RingProgram, Step
-from app.core.ring import SIZE
+from app.core.ring import LAYOUT, SIZE
 
 ALARMS = 65_800
 WHOLE = frozenset({"count", "place", "tool", "edge"})
@@ -56,7 +56,7 @@ class Sinumerik(Dialect):
         where = "INBAND[0] TO [95], INBAND_EFFECT" if not first else f"R{first} TO R{first + SIZE - 1}"
         lines = [
             f"PROC {_called(program)}{f'({arguments})' if arguments else ''}",
-            f"; INBAND: {program.title}. BLOCK: {where}",
+            f"; INBAND: {program.title}. LAYOUT {LAYOUT}. BLOCK: {where}",
             *(f"DEF {_kind(name)} {self.name(name)}" for name in own),
             *steps,
         ]

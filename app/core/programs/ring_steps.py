@@ -26,10 +26,26 @@ from app.core.programs.ring_settings import (
     TOOLS,
     RingSettings,
 )
-from app.core.ring import FIRST_SLOT, HIGHEST_SEQUENCE, LAYOUT, MODULUS, RESOLUTION, SIZE, SLOT_SIZE, SLOTS
+from app.core.ring import (
+    FIRST_SLOT,
+    HIGHEST_SEQUENCE,
+    LAYOUT,
+    MAIL_WEIGHTS,
+    MODULUS,
+    SIZE,
+    SLOT_SIZE,
+    SLOT_WEIGHTS,
+    SLOTS,
+    STEPS,
+    Unit,
+)
 
 PAUSE = 0.5
 """Seconds between two looks at the acknowledgement."""
+MOST_STEPS = LONGEST_SIZE * STEPS[Unit.MM]
+"""Of a size: eight digits."""
+MOST_MAIL = 200_000
+"""No mail's tool, edge, parameter, lengths and check sum are together as much: nothing is calculated with what is damaged so."""
 
 
 class Remark(NamedTuple):
@@ -96,6 +112,7 @@ class Alarm(Enum):
     NEW_EPOCH = (5, "INBAND NEEDS A NEW EPOCH")
     IN_USE = (6, "INBAND REGISTERS IN USE")
     MIXED_UNIT = (7, "INBAND UNITS ARE MIXED")
+    NOT_FETCHED = (8, "INBAND OLD READINGS WAIT")
 
 
 class Stop(NamedTuple):
@@ -130,8 +147,21 @@ def programs(settings: RingSettings) -> tuple[RingProgram, ...]:
 
 
 def _reduced(name: str) -> Let:
-    """The remainder by the modulus. Done often, so that no number has more than eight digits."""
+    """The remainder by the modulus. Done often, so that no number has more than seven digits."""
     return Let(name, f"{name}-trunc({name}/{MODULUS})*{MODULUS}")
+
+
+def _summed(total: str, name: str, weight: int) -> Iterator[Let]:
+    """Add a weighted whole number of up to eight digits."""
+    yield Let(total, f"{total}+{weight}*({name}-trunc({name}/{MODULUS})*{MODULUS})")
+    yield _reduced(total)
+
+
+def _steps_of_unit() -> Iterator[Step]:
+    """A length is a whole number of steps, here and at the bridge: no two ways to round it."""
+    yield Let("steps", str(STEPS[Unit.MM]), "OF A LENGTH, IN 1 MM")
+    yield If("unit<1.5", "METRIC")
+    yield Let("steps", str(STEPS[Unit.INCH]), "IN 1 INCH")
 
 
 def _outside(name: str, highest: int, lowest: int = 0) -> Iterator[Step]:
@@ -161,6 +191,7 @@ def _setup() -> Iterator[Step]:
     yield from _outside("applied", MOST_PARTS)
     yield Do.SYNC
     yield If("abs(block[LAYOUT])<0.5", "CLEAR")
+    yield If(f"abs(block[LAYOUT]-{LAYOUT - 1})<0.5", "OLDER")
     yield If(f"abs(block[LAYOUT]-{LAYOUT})>0.5", "INUSE")
     yield Remark("SET UP BEFORE, AND ITS COUNTERS ARE THERE: NOTHING IS CHANGED")
     yield If("block[EPOCH]>0.5", "DONE")
@@ -190,8 +221,32 @@ def _setup() -> Iterator[Step]:
     yield Let("block[EPOCH]", "epoch")
     yield Do.SYNC
     yield Let("block[LAYOUT]", str(LAYOUT), "LAST: THE BLOCK CAN BE READ")
+    yield Goto("DONE")
+    yield from _older()
     yield Label("DONE")
-    yield from _stops(("INUSE", Alarm.IN_USE), ("MIXED", Alarm.MIXED_UNIT), ("WRONG", Alarm.WRONG_ARGUMENT))
+    yield from _stops(
+        ("INUSE", Alarm.IN_USE),
+        ("MIXED", Alarm.MIXED_UNIT),
+        ("WRONG", Alarm.WRONG_ARGUMENT),
+        ("WAITS", Alarm.NOT_FETCHED),
+    )
+
+
+def _older() -> Iterator[Step]:
+    """A block of the programs before these keeps its counters. Its readings have another check sum: none may wait."""
+    yield Label("OLDER")
+    yield Remark("SET UP BY OLDER PROGRAMS. ITS COUNTERS STAY, ITS READINGS MUST BE FETCHED")
+    yield If("block[EPOCH]<0.5", "INUSE")
+    yield If("abs(block[WRITTEN]-block[ACK])>0.5", "WAITS")
+    yield Let("count", "0")
+    yield Label("LEFT")
+    yield Let("place", f"{FIRST_SLOT}+{SLOT_SIZE}*count")
+    yield If("block[place+SEQ]-block[ACK]>0.5", "WAITS")
+    yield Let("count", "count+1")
+    yield If(f"count<{SLOTS}", "LEFT")
+    yield Let("block[MAIL_NUMBER]", "block[ANSWERED]")
+    yield Do.SYNC
+    yield Let("block[LAYOUT]", str(LAYOUT), "LAST")
 
 
 def _reading(settings: RingSettings) -> Iterator[Step]:
@@ -241,7 +296,9 @@ def _reading(settings: RingSettings) -> Iterator[Step]:
 def _arguments() -> Iterator[Step]:
     yield Missing("measured", "WRONG")
     yield Filled(("characteristic", "tool", "part", "in_effect", "status"))
-    yield If(f"abs(measured)>{LONGEST_SIZE}", "WRONG")
+    yield from _steps_of_unit()
+    yield Label("METRIC")
+    yield If(f"abs(measured)*steps>{MOST_STEPS}", "WRONG")
     yield from _outside("characteristic", MOST_CHARACTERISTICS, 1)
     yield from _outside("tool", TOOLS)
     yield from _outside("part", MOST_PARTS)
@@ -258,17 +315,18 @@ def _slot() -> Iterator[Step]:
     yield If("tool<0.5", "KNOWN")
     yield Let("in_effect", "effect[tool]")
     yield Label("KNOWN")
+    yield Let("size", "round(steps*measured)", "THE SIZE AS IT IS SENT")
+    yield Let("measured", "size/steps")
     for name in ("characteristic", "measured", "in_effect", "part", "tool", "status", "time"):
         yield Let(f"block[place+{name.upper()}]", name)
     yield Remark("CHECK SUM")
-    yield Let("check", f"round({RESOLUTION}*measured)")
-    yield _reduced("check")
-    yield Let("rest", "next")
-    for name in ("rest", "part", "in_effect"):
-        yield _reduced(name)
-    yield Let("check", "check+rest+3*characteristic+5*in_effect+7*part")
-    yield Let("check", "check+11*tool+13*status+17*time")
-    yield _reduced("check")
+    yield Let("check", "0")
+    for name, of in (("size", "measured"), ("next", "sequence"), ("part", "part"), ("in_effect", "in_effect")):
+        yield from _summed("check", name, SLOT_WEIGHTS[of])
+    small = "+".join(f"{SLOT_WEIGHTS[name]}*{name}" for name in ("characteristic", "tool", "status"))
+    for added in (small, f"{SLOT_WEIGHTS['time']}*time"):
+        yield Let("check", f"check+{added}")
+        yield _reduced("check")
     yield Let("block[place+CHECK]", "check")
     yield Do.SYNC
     yield Let("block[place+SEQ2]", "next")
@@ -282,22 +340,19 @@ def _correction(settings: RingSettings) -> Iterator[Step]:
     yield Do.SYNC
     yield If(f"abs(block[LAYOUT]-{LAYOUT})>0.5", "UNSET")
     yield Let("number", "block[MAIL_NUMBER]")
-    yield Remark("ANSWERED BEFORE, OR NO MAIL")
-    yield If("abs(number-block[ANSWERED])<0.5", "DONE")
+    yield Remark("NO MAIL, OR ANSWERED BEFORE")
     yield If("number<0.5", "DONE")
+    yield Let("answer", "2", "THE MAIL IS DAMAGED")
+    yield If(f"number>{HIGHEST_SEQUENCE}.5", "LATER")
+    yield Let("number", "round(number)")
+    yield If("abs(number-block[ANSWERED])<0.5", "DONE")
     yield Do.READ_UNIT
     yield If("abs(unit-block[UNIT])>0.5", "UNITS")
-    yield If("unit<1.5", "METRIC")
+    yield from _steps_of_unit()
     yield Let("step", f"step/{written(MM_PER_INCH)}")
     yield Let("near", written(TOLERANCE_INCH))
     yield Label("METRIC")
-    for name in ("tool", "edge", "parameter", "expected", "value", "check"):
-        yield Let(name, f"block[MAIL_{name.upper()}]")
-    yield Do.SYNC
-    yield Remark("IT IS BEING WRITTEN JUST NOW: NEXT TIME")
-    yield If("abs(block[MAIL_NUMBER]-number)>0.5", "DONE")
-    yield Let("offset", "0")
-    yield from _mail_check()
+    yield from _mail()
     yield Remark("IS THERE SUCH A TOOL, AND MAY THIS REGISTER BE SET")
     yield Let("answer", "3")
     yield If("tool<0.5", "REPLY")
@@ -309,6 +364,8 @@ def _correction(settings: RingSettings) -> Iterator[Step]:
     yield Label("HAVE")
     yield Do.FIND_TOOL
     yield Do.READ_WEAR
+    yield Let("value", "value/steps")
+    yield Let("expected", "expected/steps")
     yield Remark("IN ALREADY: THE POWER WENT BEFORE THE ANSWER")
     yield If("abs(block[APPLIED]-number)<0.5", "ISIN")
     yield If("abs(offset-value)<=near", "ISIN")
@@ -338,25 +395,30 @@ def _correction(settings: RingSettings) -> Iterator[Step]:
     yield from _stops(("UNSET", Alarm.NOT_SET_UP), ("UNITS", Alarm.OTHER_UNIT), ("MIXED", Alarm.MIXED_UNIT))
 
 
-def _mail_check() -> Iterator[Step]:
+def _mail() -> Iterator[Step]:
+    """The mail in numbers of the program's own, all of them whole. What is checked is what is used: nothing is forgiven."""
+    wholes, lengths = ("tool", "edge", "parameter"), ("expected", "value")
+    for names in (wholes, (*lengths, "check")):
+        sizes = "+".join(f"abs(block[MAIL_{name.upper()}])" for name in names)
+        yield Let("sum", f"sum+{sizes}" if names[-1] == "check" else sizes, "TOO LARGE IS DAMAGED")
+    yield If(f"sum<{MOST_MAIL}", "COPY")
+    yield Goto("LATER")
+    yield Label("COPY")
+    for name in (*wholes, "check"):
+        yield Let(name, f"round(block[MAIL_{name.upper()}])")
+    for name in lengths:
+        yield Let(name, f"round(steps*block[MAIL_{name.upper()}])")
+    yield Do.SYNC
+    yield Remark("IT IS BEING WRITTEN JUST NOW: NEXT TIME")
+    yield If("abs(block[MAIL_NUMBER]-number)>0.5", "DONE")
+    yield Let("offset", "0")
     yield Remark("CHECK SUM")
-    yield Let("sum", f"round({RESOLUTION}*value)")
-    yield _reduced("sum")
-    yield Let("sum", f"11*sum+round({RESOLUTION}*expected)")
-    yield _reduced("sum")
-    yield Let("rest", "number")
-    yield _reduced("rest")
-    yield Let("sum", "sum+13*rest+3*tool+5*edge+7*parameter-check")
-    yield _reduced("sum")
+    yield Let("sum", "0-check")
+    for name, weight in MAIL_WEIGHTS.items():
+        yield from _summed("sum", name, weight)
     yield Let("sum", "abs(sum)")
-    yield If(f"sum<{MODULUS // 2}", "SMALL")
-    yield Let("sum", f"{MODULUS}-sum")
-    yield Label("SMALL")
-    yield Remark("A HALF IS ROUNDED UP HERE AND DOWN THERE: 1 IN EXPECTED, 11 IN VALUE")
-    yield If("sum<1.5", "FITS")
-    yield Let("answer", "2")
-    yield If("sum<9.5", "LATER")
-    yield If("sum>12.5", "LATER")
+    yield If("sum<0.5", "FITS")
+    yield If(f"sum<{MODULUS - 1}.5", "LATER")
     yield Label("FITS")
 
 

@@ -67,6 +67,10 @@ class Machine:
     def put_wear(self, tool: int, value: float) -> None:
         raise NotImplementedError
 
+    def wears(self) -> dict[Any, float]:
+        """Every wear that is not 0, by what this control calls it."""
+        raise NotImplementedError
+
     def call(self, line: str) -> None:
         """A block of the part program that calls one of the programs."""
         raise NotImplementedError
@@ -169,6 +173,12 @@ class Sinumerik(Machine):
 
     def put_wear(self, tool: int, value: float) -> None:
         self.fields["TC_DP12"][tool, 1] = value
+
+    def wears(self) -> dict[Any, float]:
+        fields = {name: field for name, field in self.fields.items() if name.startswith("TC_DP")}
+        return {
+            (name, *place): value for name, field in fields.items() for place, value in field.values.items() if value
+        }
 
     def set_up(self, applied: int = 0) -> None:
         self.call(f"INBAND_SETUP({applied})")
@@ -311,6 +321,10 @@ class Fanuc(Machine):
     def put_wear(self, tool: int, value: float) -> None:
         self.variables[self.settings.wears[0].parameter + tool] = value
 
+    def wears(self) -> dict[Any, float]:
+        first = self.settings.first_register
+        return {place: value for place, value in self.variables.items() if value and not first <= place < first + 200}
+
     def set_up(self, applied: int = 0) -> None:
         self.call(f"G65 P9820 A{applied}.")
 
@@ -401,8 +415,9 @@ class Fanuc(Machine):
                 return self._variable(self._calculated(number))
             case ast.Call(func=ast.Name(id=name), args=[argument]):
                 value = self._calculated(argument) or 0.0
-                rounded = math.copysign(math.floor(abs(value) + 0.5), value)
-                return {"ABS": abs(value), "FIX": float(math.trunc(value)), "ROUND": rounded}[name]
+                if name == "ABS":
+                    return abs(value)
+                return float(math.trunc(value) if name == "FIX" else math.copysign(math.floor(abs(value) + 0.5), value))
             case ast.BinOp(left=left, op=op, right=right):
                 a, b = (self._calculated(left) or 0.0), (self._calculated(right) or 0.0)
                 calculate = {
