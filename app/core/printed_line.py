@@ -6,15 +6,18 @@ E epoch, N sequence, C characteristic, V measured size, I correction in effect, 
 unknown), U unit, K check sum; all but E, U and K as in a slot of `app.core.ring`. A control pads numbers with blanks, prints ``-``
 in front of the padding, and ends lines as its parameters say: only start word and end mark count.
 
-The check sum is the remainder by 97 of a weighted sum of the remainders. It finds every single wrong digit; one of a hundred lines
-that are wrong in several places may pass.
+The check sum is the remainder by 97 of a weighted sum of the remainders. It finds every single wrong digit, and any two that
+changed places. It cannot find a number that became exactly ten times as large, or a tenth, where 97 divides it. So the form
+counts too: one blank stands in front of each letter and of the end mark, and a size has 4 decimals in mm, 5 in inch; a blank that
+became 0, a 0 that became a blank, or a point that moved breaks it. One of a hundred lines that are wrong in several places, or
+have lost a digit, may pass.
 """
 
 import re
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from app.core.ring import Slot, Unit
+from app.core.ring import STEPS, Slot, Unit
 
 START: Final = "INBLINE"
 """No word that a control calculates with, and none that a program text contains by chance."""
@@ -24,10 +27,12 @@ LONGEST: Final = 240
 """Characters between start word and end mark."""
 LETTERS: Final = "ENCVIPTSHUK"
 WEIGHTS: Final = {"E": 1, "N": 3, "C": 5, "V": 1, "I": 7, "P": 11, "T": 13, "S": 17, "H": 19, "U": 23}
-STEPS: Final = {Unit.MM: 10_000, Unit.INCH: 100_000}
-"""Steps of a size in the check sum, and decimals of its print: 4 in mm, 5 in inch."""
-_NUMBER = r"(-?\s*\d*\.?\d*)"
-_FIELDS = re.compile(r"\s*".join(["", *(rf"{letter}\s*{_NUMBER}" for letter in LETTERS), ""]))
+DECIMALS: Final = {Unit.MM: 4, Unit.INCH: 5}
+"""Decimals of a size: a step of the check sum is one of the last."""
+_FIELDS = re.compile(
+    "".join(f" {letter}( *(?:- *)?{'[0-9]*[.][0-9]{4,5}' if letter == 'V' else '[0-9]+[.]?'})" for letter in LETTERS)
+    + " "
+)
 _FRAME = re.compile(rf"{START}((?:(?!{START})[ -~]){{1,{LONGEST}}}?){END}")
 _NEWEST = re.compile(rf"{START}[ -~]{{0,{LONGEST}}}\Z")
 
@@ -62,7 +67,7 @@ def check_of(printed: Printed) -> int:
 def line_of(printed: Printed) -> str:
     """A line as a control prints it that leaves out the padding."""
     slot = printed.slot
-    decimals = 4 if printed.unit is Unit.MM else 5
+    decimals = DECIMALS[printed.unit]
     time = -1 if slot.time is None else round(slot.time)
     return (
         f"{START} E{printed.epoch} N{slot.sequence} C{slot.characteristic} V{slot.measured:.{decimals}f} I{slot.in_effect}"
@@ -79,18 +84,17 @@ def read_line(text: str) -> Printed | None:
     found = _FIELDS.fullmatch(text)
     if found is None:
         return None
-    try:
-        values = {letter: float(re.sub(r"\s", "", part)) for letter, part in zip(LETTERS, found.groups(), strict=True)}
-    except ValueError:
-        return None
-    if any(value != round(value) for letter, value in values.items() if letter != "V"):
-        return None
-    whole = {letter: round(value) for letter, value in values.items() if letter != "V"}
+    parts = {letter: part.replace(" ", "") for letter, part in zip(LETTERS, found.groups(), strict=True)}
+    size = parts.pop("V")
+    whole = {letter: int(part.removesuffix(".")) for letter, part in parts.items()}
     if whole["U"] not in set(Unit) or min(whole["N"], whole["E"]) < 1 or any(whole[each] < 0 for each in "CIPTSK"):
+        return None
+    unit = Unit(whole["U"])
+    if whole["H"] < -1 or len(size.partition(".")[2]) != DECIMALS[unit]:
         return None
     time = None if whole["H"] < 0 else float(whole["H"])
     numbers = (whole["I"], whole["P"], whole["T"], whole["S"])
-    printed = Printed(whole["E"], Unit(whole["U"]), Slot(whole["N"], whole["C"], values["V"], *numbers, time))
+    printed = Printed(whole["E"], unit, Slot(whole["N"], whole["C"], float(size), *numbers, time))
     return printed if check_of(printed) == whole["K"] else None
 
 

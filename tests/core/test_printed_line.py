@@ -1,7 +1,10 @@
 """The line of DPRNT: whole lines are read whatever stands around them, damaged ones never."""
 
 import random
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 
 import pytest
 from hypothesis import given
@@ -9,6 +12,7 @@ from hypothesis import strategies as st
 
 from app.core.printed_line import END, START, LineReader, Printed, line_of, read_line
 from app.core.ring import Slot, Unit
+from tests.core.damage import with_neighbours_exchanged, with_one_bit_of_it_changed, with_one_digit_changed
 
 SLOT = Slot(12, 1, 40.0012, 3, 7, 3, 0, 43_200.0)
 LINE = line_of(Printed(481_516, Unit.MM, SLOT))
@@ -45,16 +49,70 @@ def test_padding_as_controls_print_it() -> None:
     assert read_line(padded) == printed
 
 
-@pytest.mark.parametrize("letter", list("ENCVIPTSHUK"))
-def test_no_wrong_digit_passes(letter: str) -> None:
-    at = body(LINE).index(letter)
-    for place in range(at + 1, len(body(LINE))):
-        digit = body(LINE)[place]
-        if digit == " ":
-            break
-        if digit.isdigit():
-            for other in "0123456789".replace(digit, ""):
-                assert read_line(body(LINE)[:place] + other + body(LINE)[place + 1 :]) is None
+def padded(printed: Printed) -> str:
+    """A line as a control prints it that fills every number up with blanks."""
+    digits = {"E": 6, "N": 7, "C": 4, "V": 9, "I": 7, "P": 7, "T": 4, "S": 1, "H": 5, "U": 1, "K": 2}
+    return re.sub(
+        r"([A-Z])(-?)([0-9.]+)(?= )",
+        lambda found: f"{found[1]}{found[2] or ' '}{found[3]:>{digits[found[1]]}}",
+        line_of(printed),
+    )
+
+
+def lines() -> Iterator[tuple[Printed, str]]:
+    """Readings whose every number 97 divides in turn, as what is ten times as large or a tenth has the same remainder then."""
+    ordinary = [
+        Printed(481_516, Unit.MM, SLOT),
+        Printed(7, Unit.INCH, replace(SLOT, measured=-0.5, time=None, sequence=9_999_999, status=3)),
+        Printed(1, Unit.MM, Slot(1, 1, 0.0, 0, 0, 0, 0, None)),
+        Printed(999_999, Unit.INCH, Slot(70_123, 9999, -999.99999, 9_999_999, 9_999_999, 9999, 1, 86_399.0)),
+    ]
+    divided = [Printed(97, Unit.MM, SLOT), Printed(9700, Unit.INCH, SLOT)]
+    for name, number in product(("sequence", "characteristic", "in_effect", "part", "tool"), (97, 970, 1940)):
+        divided.append(Printed(481_516, Unit.MM, replace(SLOT, **{name: number})))
+    sizes = [
+        Printed(481_516, unit, replace(SLOT, measured=measured + step / steps))
+        for unit, measured, steps in ((Unit.MM, 40.0, 10_000), (Unit.INCH, -0.5, 100_000))
+        for step in range(97)
+    ]
+    for printed in (*ordinary, *divided):
+        yield printed, padded(printed)
+    for printed in (*ordinary, *divided, *sizes):
+        yield printed, line_of(printed)
+
+
+def test_no_wrong_digit_passes() -> None:
+    for printed, line in lines():
+        assert read_line(body(line)) == printed, line
+        for wrong in with_one_digit_changed(body(line)):
+            assert read_line(wrong) is None, wrong
+
+
+@pytest.mark.parametrize("damaged", [with_neighbours_exchanged, with_one_bit_of_it_changed])
+def test_no_exchange_and_no_wrong_bit_passes(damaged: Callable[[str], Iterator[str]]) -> None:
+    """Or it says the same: a blank that moved, a 0 in front of a number."""
+    for printed, line in lines():
+        for wrong in damaged(body(line)):
+            assert read_line(wrong) in {None, printed}, wrong
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        LINE.replace("N12 ", "N12"),  # one blank, no more and no less
+        LINE.replace("N12 ", "N12  "),
+        LINE.replace(" FIN", "FIN"),
+        LINE.replace("E4", "  E4"),
+        LINE.replace("40.0012", "40.001200"),
+        LINE.replace("N12", "N1 2"),
+        LINE.replace("H43200", "H43200.0"),
+        LINE.replace("C1", "C"),
+        LINE.replace("C1", "C-"),
+    ],
+)
+def test_a_line_of_another_form_is_none(wrong: str) -> None:
+    assert read_line(body(LINE)) is not None
+    assert read_line(body(wrong)) is None
 
 
 def test_lines_are_found_among_everything_else_however_they_are_cut() -> None:

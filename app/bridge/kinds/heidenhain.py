@@ -23,15 +23,15 @@ from app.bridge.configuration import Location, Machine
 from app.bridge.links import Clock, ControlAway, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.moments import learn, measured_at
 from app.bridge.slots import printed_reading
-from app.core.printed_line import MODULUS, STEPS, LineReader, Printed
-from app.core.ring import Unit
+from app.core.printed_line import DECIMALS, MODULUS, LineReader, Printed
+from app.core.ring import STEPS, Unit
 
 NUMBERED = True
 LARGE = 500_000  # bytes: a file that is fetched whole each time it grows should be emptied now and then
 TOLERANCE = 0.0006  # mm: of the comparison that the TNC makes
 REGISTER = re.compile(r"QR([1-9]\d{1,2})")
 FIRST_REGISTER, LAST_REGISTER = 10, 499  # QR0 to QR9 are for the counters
-ANSWER = re.compile(r"INBANS N(\d+) A(\d) R(\d+) V(-?\d+\.\d+) U([12]) K(\d+) FIN")
+ANSWER = re.compile(r"INBANS N([0-9]+) A([0-9]) R([0-9]+) V(-?[0-9]+[.]([0-9]+)) U([12]) K([0-9]+) FIN")
 REASONS = {1: "The control holds another offset than expected.", 4: "The NC program refused the step (answer 4)."}
 T = TypeVar("T")
 for _name in ("LSV2 Client", "LSV2 TCP"):
@@ -79,9 +79,9 @@ def answer_check(answered: Answered) -> int:
 def answers_in(text: str) -> list[Answered]:
     """The answers in the text of a file, in their order; damaged ones are left out."""
     found = []
-    for number, answer, register, held, unit, check in ANSWER.findall(text):
+    for number, answer, register, held, decimals, unit, check in ANSWER.findall(text):
         one = Answered(int(number), int(answer), int(register), float(held), Unit(int(unit)))
-        if answer_check(one) == int(check):
+        if len(decimals) == DECIMALS[one.unit] and answer_check(one) == int(check):
             found.append(one)
     return found
 

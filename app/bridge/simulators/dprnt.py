@@ -10,7 +10,7 @@ import os
 import tty
 
 from app.bridge.simulators.model import Feature, Model
-from app.core.printed_line import END, START, Printed, check_of
+from app.core.printed_line import DECIMALS, END, START, Printed, check_of
 from app.core.ring import SLOTS, Register, Slot, Unit
 
 FEATURES = (Feature(),)
@@ -105,7 +105,7 @@ class PrintingSimulator:
     def text(self, epoch: int, slot: Slot) -> bytes:
         """A reading as the control prints it."""
         unit = Unit(self.model.unit)
-        decimals = 4 if unit is Unit.MM else 5
+        decimals = DECIMALS[unit]
         size = round(slot.measured, decimals)
         printed = Printed(epoch, unit, Slot(slot.sequence, slot.characteristic, size, *_rest(slot)))
         numbers = {

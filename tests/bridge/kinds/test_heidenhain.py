@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from app.bridge.configuration import ConfigurationError, Machine, configuration_from
-from app.bridge.kinds.heidenhain import Settings, TncLink, correction_program
+from app.bridge.kinds.heidenhain import Answered, Settings, TncLink, answer_check, answers_in, correction_program
 from app.bridge.links import ControlAway, LinkError, Order, Outcome, Position
 from app.bridge.simulators.heidenhain import CORRECTIONS, FEATURES, READINGS, TncSimulator, serve
 from app.bridge.simulators.model import Model
@@ -20,6 +20,7 @@ from app.bridge.unit import Unit as Tasks
 from app.core.printed_line import Printed, line_of
 from app.core.ring import Slot, Unit
 from tests.bridge.plant import controlled, machine, parts, store_in, until
+from tests.core.damage import with_neighbours_exchanged, with_one_bit_of_it_changed, with_one_digit_changed
 from tests.loops import run
 
 PLACE = (3, 1, "QR31")
@@ -97,6 +98,22 @@ def execute(text: str, registers: dict[str, float]) -> int:
         else:
             assert re.fullmatch(r"|LBL \d|(BEGIN|END) PGM CORR MM", line), line
     return answers
+
+
+def test_no_damaged_answer_counts() -> None:
+    """Each digit, each bit, each two neighbours; of numbers that 97 divides too."""
+    sizes = [(unit, steps / (10_000 if unit is Unit.MM else 100_000)) for unit in Unit for steps in range(-48, 49)]
+    answers = [Answered(number, 0, 31, -0.0123, Unit.MM) for number in (1, 97, 970, 9_999_999)]
+    answers += [Answered(18, answer, 97, held, unit) for answer in (0, 1) for unit, held in sizes]
+    for one in answers:
+        shown = f"{one.held:.{4 if one.unit is Unit.MM else 5}f}"
+        line = f"INBANS N{one.number} A{one.answer} R{one.register} V{shown} U{one.unit:d} K{answer_check(one)} FIN"
+        assert answers_in(line) == [one]
+        for wrong in with_one_digit_changed(line):
+            assert answers_in(wrong) == [], wrong
+        for damaged in (with_neighbours_exchanged, with_one_bit_of_it_changed):
+            for wrong in damaged(line):
+                assert answers_in(wrong) in ([], [one]), wrong
 
 
 @pytest.mark.parametrize(
