@@ -268,6 +268,12 @@ class RegisterLink:
                 await self._write(Register.MAIL_NUMBER, block.answered)
             return
         if block.answered == wanted.number:
+            if not block.answer_holds:
+                self.remark = (
+                    f"The control answers that correction {wanted.number} is applied (+{Register.ANSWERED}), but names"
+                    f" {block.applied} as the last one (+{Register.APPLIED}): it is not confirmed. Does another program write"
+                    " these registers?"
+                )
             return
         content = mail_registers(self._mail(wanted), UNITS[self.machine.unit])
         # by its content: one from before a restart may have been converted by another mapping. “Check sum wrong” stays the

@@ -274,6 +274,80 @@ def test_an_answer_counts_though_the_nc_has_looked_at_mail_behind_it(answer: Ans
     run(story())
 
 
+def test_an_answer_that_contradicts_itself_is_not_confirmed_and_is_said() -> None:
+    """The answer has no check sum; what is applied is said twice."""
+    model = Model()
+    made(model)
+    order = Order(18, 3, 0.0, 0.010)
+
+    async def story() -> None:
+        link, _ = link_of(model)
+        await link.fetch(Position())
+        await link.offer([order])
+        model.edit(PLACE, 0.05)
+        made(model)
+        assert model.registers[Register.ANSWER] == Answer.OFFSET_DIFFERS
+        model.registers[Register.ANSWER] = Answer.APPLIED  # one register damaged
+        await link.fetch(Position())
+        assert await link.outcomes() == []
+        await link.offer([order])
+        assert link.remark.startswith(
+            "The control answers that correction 18 is applied (+4), but names 0 as the last one (+3)"
+        )
+        model.registers[Register.ANSWER] = Answer.OFFSET_DIFFERS
+        await link.fetch(Position())
+        assert [(each.number, each.differs) for each in await link.outcomes()] == [(18, True)]
+        await link.offer([order])
+        assert link.remark == ""
+
+    run(story())
+
+
+@pytest.mark.parametrize("number", [18, 9_999_998])
+@pytest.mark.parametrize("place", range(Register.MAIL_TOOL, Register.MAIL_NUMBER + 1))
+def test_a_register_of_the_mailbox_that_is_one_off_is_written_again(number: int, place: int) -> None:
+    """Of the largest numbers too: two of ten millions used to be taken for the same."""
+    model = Model()
+    made(model)
+
+    async def story() -> None:
+        link, registers = link_of(model)
+        order = Order(number, 3, 0.0, 0.010)
+        await link.fetch(Position())
+        await link.offer([order])
+        content = model.registers[Register.MAIL_TOOL : Register.MAIL_NUMBER + 1]
+        model.registers[place] += 0.0001 if place in {Register.MAIL_EXPECTED, Register.MAIL_VALUE} else 1
+        registers.writes.clear()
+        for _ in range(3):
+            await link.fetch(Position())
+            await link.offer([order])
+        assert registers.writes
+        assert model.registers[Register.MAIL_TOOL : Register.MAIL_NUMBER + 1] == content
+
+    run(story())
+
+
+def test_an_acknowledgement_that_is_one_off_is_said() -> None:
+    """One more than was fetched would let the NC program write over a reading."""
+    model = Model()
+    made(model)
+    model.registers[Register.WRITTEN] = model.registers[Register.ACK] = 9_999_990.0
+
+    async def story() -> None:
+        link, registers = link_of(model)
+
+        async def one_off(place: int, value: float) -> None:
+            model.registers[place] = value + 1
+
+        registers.write = one_off  # type: ignore[method-assign]
+        made(model)
+        epoch = int(model.registers[Register.EPOCH])
+        with pytest.raises(ControlAway, match=r"Register \+0 \(ack\) holds"):
+            await link.fetch(Position(epoch, 9_999_991))
+
+    run(story())
+
+
 def test_an_offset_that_was_edited_is_not_overwritten() -> None:
     model = Model()
     made(model)
