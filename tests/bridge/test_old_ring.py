@@ -13,7 +13,6 @@ from app.bridge.simulators.model import Feature, Model
 from app.core.ring import LAYOUT, Register
 from tests.bridge.plant import ModelRegisters, bridge, machine, parts, store_in, unit_of, until
 from tests.bridge.test_checking import findings, table
-from tests.conftest import Server
 from tests.loops import run
 from tests.shop import Person, Shop
 
@@ -66,17 +65,16 @@ def test_the_check_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_the_page_and_the_log_say_it_and_new_programs_go_on(
-    shop: Shop, server: Server, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    shop: Shop, viewer: Person, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO, "app.bridge")
     model = Model((QUIET,))
-    key = shop.machine_client.headers["Authorization"].split()[1]
 
     async def story() -> None:
         store = store_in(tmp_path)
         registers = ModelRegisters(model)
         one = unit_of(model, store, registers, key=shop.machine, characteristics={"1": shop.characteristic})
-        async with bridge(shop.server.url, key, one, heartbeat=True):
+        async with bridge(shop, one, heartbeat=True):
             await parts(model, 1)
             await until(lambda: model.registers[Register.ACK] == 1, "the first reading")
             await until(lambda: model.registers[Register.MAIL_NUMBER], "the correction")
@@ -88,7 +86,7 @@ def test_the_page_and_the_log_say_it_and_new_programs_go_on(
                 return bool(shop.call("GET", f"/machines/{shop.machine}/connection")["state"] == "configuration")
 
             await until(shown, "the server has heard it")
-            page = Person(server, "viewer").open(f"/machines/{shop.machine}/connection")
+            page = viewer.open(f"/machines/{shop.machine}/connection")
             assert WRITE_AGAIN in page
             assert HOW in page
             assert len(registers.writes) == before
