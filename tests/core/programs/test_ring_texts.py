@@ -593,18 +593,24 @@ def of_layout_1(control: RingControl, readings: int = 0, acknowledged: int | Non
         (Register.LAYOUT, 1),
     ):
         made.write(place, value)
-    for place, value in mail_registers(mail(made, 18, 0.0, -0.01)):
-        made.write(place, value)
+    for register, number in mail_registers(mail(made, 18, 0.0, -0.01)):
+        made.write(register, number)
     return made
 
 
 @every_control
-@pytest.mark.parametrize("run", ["send", "take", "select"])
-def test_programs_of_this_layout_do_nothing_in_a_block_of_an_older_one(control: RingControl, run: str) -> None:
+@pytest.mark.parametrize(
+    "run",
+    [lambda made: made.send(40.0, 4), lambda made: made.take(), lambda made: made.select(3)],
+    ids=["send", "take", "select"],
+)
+def test_programs_of_this_layout_do_nothing_in_a_block_of_an_older_one(
+    control: RingControl, run: Callable[[Machine], None]
+) -> None:
     made = of_layout_1(control, readings=3)
     before = made.registers()
     with pytest.raises(Stopped, match="NOT SET UP"):
-        {"send": lambda: made.send(40.0, 4), "take": made.take, "select": lambda: made.select(3)}[run]()
+        run(made)
     assert (made.registers(), made.wears()) == (before, {})
 
 
