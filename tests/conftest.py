@@ -372,10 +372,17 @@ def run_server(new_database: NewDatabase, tmp_path_factory: pytest.TempPathFacto
 
 
 @pytest.fixture(scope="session")
-def common_server(run_server: RunServer) -> Iterator[Server]:
-    """The server that most files of a worker share. What a test makes there has names of its own: `unique`."""
-    with run_server() as running:
-        yield running
+def common_server(new_database: NewDatabase, run_server: RunServer) -> Iterator[Server]:
+    """The server that most files of a worker share. What a test makes there has names of its own: `unique`.
+
+    No periodic job begins by itself, which it would once a minute, in the middle of any test: `run_jobs`.
+    """
+    url = new_database()
+    with psycopg.connect(url, autocommit=True) as rounds:
+        rounds.execute("SELECT pg_advisory_lock(7291, 'job_run'::regclass::oid::int4)")  # app.jobs.runner takes it
+        with run_server(url) as running:
+            yield running
+    drop_database(url)
 
 
 @pytest.fixture(scope="module")
