@@ -225,7 +225,7 @@ class TestApproval:
     @pytest.fixture
     def asking(self, shop: Shop) -> Shop:
         """Each correction waits for a person."""
-        change = {"parameters": {"mode": "approval"}, "reason": "Try it out"}
+        change: dict[str, Any] = {"parameters": {"mode": "approval"}, "reason": "Try it out"}
         shop.call("PATCH", f"/characteristics/{shop.characteristic}", **change)
         return shop
 
