@@ -30,9 +30,11 @@ MARK = "TESTS_KEPT_BY"
 PROC = Path("/proc")
 PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36
 IN_ORDER = 6.0  # s that an interrupted run may take to end by itself
-BY_ITSELF = (
-    60.0  # s in which what a finished run has started ends by itself; on a busy computer a fork server takes some
-)
+# Seconds in which what a finished run has started ends by itself; on a busy computer a fork server takes some.
+BY_ITSELF = 60.0
+# PostgreSQL inherits no environment. Its cluster lies in a folder that is locked as long as the run lasts: pytest's, or one
+# of `tests.conftest.short_folder`.
+CLUSTER = re.compile(rb"postgres\0-D\0(/[^\0]*/(?:pytest-of-[^/\0]+/pytest-\d+|inband-test-[^/\0]+))/")
 # PostgreSQL waits for its clients at SIGTERM and ends at once at SIGQUIT.
 WAYS = ((signal.SIGTERM, 3.0), (signal.SIGQUIT, 2.0), (signal.SIGKILL, 3.0))
 
@@ -42,6 +44,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--long", action="store_true", help="run what is slow by nature, and chance with fresh seeds")
     if sys.platform == "linux" and MARK not in os.environ:
         keep()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(error: object | None) -> None:
+    """End the run with a worker that has crashed, in the middle of what the other workers do."""
+    if error:
+        for pid in _workers(os.getpid()):
+            _send(pid, signal.SIGINT)
 
 
 def keep() -> None:
@@ -54,13 +64,17 @@ def keep() -> None:
     keeper, run = os.getpid(), os.fork()
     if run:
         os._exit(_watched(run, heard))
-    prctl(PR_SET_CHILD_SUBREAPER, 1)
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores it for what runs in the background
     signal.signal(signal.SIGTERM, _keeper_was_killed)
     prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     signal.pthread_sigmask(signal.SIG_SETMASK, before)
     if os.getppid() != keeper:  # killed before it could be heard of
         os._exit(128 + signal.SIGTERM)
+
+
+def mark() -> dict[str, str]:
+    """Variable for a process that is started with an environment of its own: by it the next run knows what this one has left."""
+    return {name: value for name, value in os.environ.items() if name == MARK}
 
 
 def prctl(option: int, value: int) -> None:
@@ -78,33 +92,34 @@ def _watched(run: int, heard: set[signal.Signals]) -> int:
             if deadline is not None:
                 deadline = 0.0  # asked again: at once
             elif info.si_signo != signal.SIGINT or info.si_code <= 0:  # the terminal's Ctrl-C reaches the run as well
-                for pid in (run, *_children(run)):  # as the terminal would, the workers too
-                    os.kill(pid, signal.SIGINT)
+                for pid in (run, *_workers(run)):
+                    _send(pid, signal.SIGINT)
             deadline = time.monotonic() + IN_ORDER if deadline is None else deadline
         if deadline is not None and time.monotonic() >= deadline:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(run, signal.SIGKILL)
+            _send(run, signal.SIGKILL)
         ended = _reaped().get(run)
     status = os.waitstatus_to_exitcode(ended)
-    if deadline is None and status >= 0:
-        status = _finished(status)
+    if deadline is None and status == 0:
+        status = _finished()
     end(descendants)
     return status if status >= 0 else 128 - status
 
 
-def _finished(status: int) -> int:
-    """The exit status of a run that ended by itself: a failure if it left something behind."""
+def _finished() -> int:
+    """The exit status of a run that ended by itself and has not failed so far: it has if it left something behind."""
     deadline = time.monotonic() + BY_ITSELF
     while (left := descendants()) and time.monotonic() < deadline:
         time.sleep(0.05)
         _reaped()
     for pid in left:
         sys.stderr.write(f"left behind by the tests, and ended now: {pid} {_command(pid)}\n")
-    return status or int(bool(left))
+    return int(bool(left))
 
 
 def _keeper_was_killed(number: int, frame: FrameType | None) -> None:
-    end(descendants)
+    """End what the keeper would have ended: what this run has started, and the orphans that had come to the keeper."""
+    prctl(PR_SET_CHILD_SUBREAPER, 1)
+    end(lambda: [*descendants(), *abandoned()])
     os._exit(128 + number)
 
 
@@ -112,9 +127,8 @@ def end(find: Callable[[], list[int]]) -> None:
     """End the processes that `find` gives, also stopped ones and those that ignore a request."""
     for way, seconds in WAYS:
         for pid in find():
-            for number in (way, signal.SIGCONT):
-                with contextlib.suppress(ProcessLookupError, PermissionError):
-                    os.kill(pid, number)
+            _send(pid, way)
+            _send(pid, signal.SIGCONT)
         deadline = time.monotonic() + seconds
         while find() and time.monotonic() < deadline:
             time.sleep(0.02)
@@ -123,35 +137,56 @@ def end(find: Callable[[], list[int]]) -> None:
             return
 
 
-def descendants() -> list[int]:
-    """All that this process has started and that has not ended, and all that those have started."""
+def descendants(process: int | None = None) -> list[int]:
+    """All that a process, this one, has started and that has not ended, and all that those have started."""
     parents = {pid: parent for pid, state, parent in _processes() if state not in {"Z", "X"}}
-    found = [os.getpid()]
+    found = [os.getpid() if process is None else process]
     for pid in found:
         found += [child for child, parent in parents.items() if parent == pid]
     return found[1:]
 
 
-def _children(pid: int) -> list[int]:
-    return [child for child, _, parent in _processes() if parent == pid]
+def _workers(run: int) -> list[int]:
+    """The processes that Ctrl-C in a terminal would reach as well: those with no session of their own."""
+    workers = []
+    for child in (child for child, _, parent in _processes() if parent == run):
+        with contextlib.suppress(ProcessLookupError):
+            if os.getpgid(child) == os.getpgid(run):
+                workers.append(child)
+    return workers
+
+
+def _send(pid: int, number: signal.Signals) -> None:
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.kill(pid, number)
 
 
 def abandoned() -> list[int]:
-    """What a run left behind that was killed together with its keeper, and everything that belongs to this user."""
+    """What runs left behind that were killed together with their keepers."""
     return [pid for pid, state, _ in _processes() if state != "Z" and _is_abandoned(pid)]
 
 
 def _is_abandoned(pid: int) -> bool:
-    with contextlib.suppress(OSError):
-        mark = re.search(rb"(?:^|\0)%b=(\d+) (\d+)\0" % MARK.encode(), (PROC / str(pid) / "environ").read_bytes())
-        if mark is not None:
-            return _start(int(mark[1])) != int(mark[2])
-        # PostgreSQL inherits no environment. Its cluster lies in a folder that pytest locks as long as the run lasts.
-        folder = re.search(rb"postgres\0-D\0(/[^\0]*/pytest-of-[^/\0]+/pytest-\d+)/", _line(pid))
-        if folder is not None:
-            lock = Path(os.fsdecode(folder[1])) / ".lock"
-            return not lock.exists() or _start(int(lock.read_text() or 0)) is None
-    return False
+    if _is_elsewhere(pid):
+        return False
+    mark = re.search(rb"(?:^|\0)%b=(\d+) (\d+)\0" % MARK.encode(), _read(pid, "environ"))
+    if mark is not None:
+        return _start(int(mark[1])) != int(mark[2])
+    cluster = CLUSTER.search(_read(pid, "cmdline"))
+    if cluster is None:
+        return False
+    try:
+        return _start(int((Path(os.fsdecode(cluster[1])) / ".lock").read_text())) is None
+    except (OSError, ValueError):  # somebody else's
+        return False
+
+
+def _is_elsewhere(pid: int) -> bool:
+    """Tell if it lives in a container, where numbers and paths mean other things."""
+    try:
+        return (PROC / str(pid) / "ns/pid").readlink() != (PROC / "self/ns/pid").readlink()
+    except OSError:
+        return False
 
 
 def _reaped() -> dict[int, int]:
@@ -186,12 +221,13 @@ def _start(pid: int) -> int | None:
     return None if fields[0] == "Z" else int(fields[19])
 
 
-def _line(pid: int) -> bytes:
-    return (PROC / str(pid) / "cmdline").read_bytes()
+def _read(pid: int, file: str) -> bytes:
+    """One of the files of a process; empty where it has ended, or is not for this user to see."""
+    try:
+        return (PROC / str(pid) / file).read_bytes()
+    except OSError:
+        return b""
 
 
 def _command(pid: int) -> str:
-    try:
-        return _line(pid).replace(b"\0", b" ").decode(errors="replace")[:200]
-    except OSError:
-        return "(ended)"
+    return _read(pid, "cmdline").replace(b"\0", b" ").decode(errors="replace")[:200]
