@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -34,6 +35,7 @@ from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
 from tests import chance, quick_passwords  # noqa: F401 - the passwords replace what they are about
+from tests.db.first_program import make_first_program
 from tests.forked import Forked
 from tests.shop import Person, Shop
 
@@ -210,6 +212,37 @@ def database(new_database: NewDatabase) -> Iterator[Database]:
     drop_database(made.dsn)
 
 
+@pytest.fixture
+def empty_database(postgres: str) -> Iterator[str]:
+    """The URL of a database of this test alone in which there is nothing."""
+    name = f"empty_{os.environ.get('PYTEST_XDIST_WORKER', 'main')}"
+    url = in_database(postgres, name)
+    drop_database(url)
+    with psycopg.connect(postgres, autocommit=True) as connection:
+        connection.execute(f"CREATE DATABASE {name}")
+    yield url
+    drop_database(url)
+
+
+@pytest.fixture(scope="session")
+def first_program_template(new_database: NewDatabase) -> str:
+    """The name of a database as the first published program left it."""
+    url = new_database()
+    make_first_program(url)
+    return urlsplit(url).path[1:]
+
+
+@pytest.fixture
+def first_program(postgres: str, first_program_template: str) -> Iterator[str]:
+    """The URL of a database of this test alone as the first published program left it."""
+    url = in_database(postgres, f"{first_program_template}_copy")
+    drop_database(url)
+    with psycopg.connect(postgres, autocommit=True) as connection:
+        connection.execute(f"CREATE DATABASE {first_program_template}_copy TEMPLATE {first_program_template}")
+    yield url
+    drop_database(url)
+
+
 @pytest.fixture(scope="session")
 def rolled_back_database(new_database: NewDatabase) -> Iterator[Database]:
     made = Database(new_database(), pool_size=1)
@@ -228,6 +261,27 @@ def session(rolled_back_database: Database) -> Iterator[Session]:
         outer.rollback()
 
 
+# --- folders
+
+
+@contextmanager
+def short_folder() -> Iterator[Path]:
+    """A folder that nobody else may enter, with a path as short as that of a socket has to be.
+
+    A PostgreSQL that still runs in it is ended by its number. The folder is locked as pytest locks its own: see
+    `tests.keeper.CLUSTER`.
+    """
+    made = Path(mkdtemp(prefix="inband-test-"))
+    (made / ".lock").write_text(str(os.getpid()))
+    try:
+        yield made
+    finally:
+        for file in made.rglob("postmaster.pid"):
+            if (pid := EmbeddedServer(file.parent.parent).pid) is not None:
+                os.kill(pid, signal.SIGKILL)
+        shutil.rmtree(made)
+
+
 # --- the server
 
 TLS = ssl.create_default_context()
@@ -237,7 +291,7 @@ Process = subprocess.Popen[bytes] | Forked
 
 
 def begun(command: list[str], stderr: Path) -> Process:
-    """``inband …`` as everybody starts it."""
+    """``inband …`` that starts from nothing, as people start it."""
     with stderr.open("ab") as log:
         return subprocess.Popen(
             [sys.executable, "-m", "app", *command], cwd=HOUSE, stdout=log, stderr=log, stdin=subprocess.DEVNULL
@@ -338,13 +392,13 @@ RunServer = Callable[..., AbstractContextManager[Server]]
 
 @pytest.fixture(scope="session")
 def run_server(new_database: NewDatabase, tmp_path_factory: pytest.TempPathFactory) -> RunServer:
-    """``with run_server() as server``: a server on a fresh database; ``run_server(url, workers=2)`` on one that exists.
+    """``with run_server() as server``: a server on a fresh database; ``run_server(url, log_format="json")`` on one that exists.
 
-    With `workers`, also one, it is a program of its own, as a service manager starts it.
+    It has the environment of the moment at which it starts. With ``forked=False`` it starts from nothing, as people start it.
     """
 
     @contextmanager
-    def run(database_url: str | None = None, **options: object) -> Iterator[Server]:
+    def run(database_url: str | None = None, *, forked: bool = True, **options: object) -> Iterator[Server]:
         own = database_url is None
         url = new_database() if database_url is None else database_url
         stderr, port = tmp_path_factory.mktemp("server") / "stderr", free_port()
@@ -354,8 +408,7 @@ def run_server(new_database: NewDatabase, tmp_path_factory: pytest.TempPathFacto
             command += [f"--{option.replace('_', '-')}", str(value)]
 
         def start() -> Process:
-            program = "workers" in options
-            process = begun(command, stderr) if program else Forked(command, stderr, environment=dict(os.environ))
+            process = Forked(command, stderr) if forked else begun(command, stderr)
             wait_ready(f"http://127.0.0.1:{port}", process, stderr)
             return process
 

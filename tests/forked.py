@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
@@ -21,8 +22,10 @@ multiprocessing.get_context("forkserver").set_forkserver_preload(
 )
 
 
-def inband(*words: object, typed: str = "", limit: float = 120, **environment: str) -> subprocess.CompletedProcess[str]:
-    """A command as somebody types it: its exit status and what it said.
+def inband(
+    *words: object, typed: str = "", limit: float = 120, expect: int | None = None, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """A command as somebody types it: its exit status and what it said. Another status than ``expect`` fails the test.
 
     It has this process's folder and environment and ``environment``, and a data folder of its own if that names none.
     """
@@ -40,11 +43,15 @@ def inband(*words: object, typed: str = "", limit: float = 120, **environment: s
             raise
         finally:
             said = [each.read_bytes().decode() if each.exists() else "" for each in (out, err)]
+        assert expect in {None, status}, said[1]
         return subprocess.CompletedProcess(process.arguments, status, *said)
 
 
 class Forked(ForkServerProcess):
-    """``inband …`` with the words that `subprocess.Popen` has for a process; what it says goes to the end of a file."""
+    """``inband …`` with the words that `subprocess.Popen` has for a process; what it says goes to the end of a file.
+
+    It has the environment of the process that starts it, unless another one is given.
+    """
 
     def __init__(
         self,
@@ -56,7 +63,7 @@ class Forked(ForkServerProcess):
         environment: dict[str, str] | None = None,
     ) -> None:
         super().__init__()
-        self.arguments, self.environment, self.folder = arguments, environment, Path.cwd()
+        self.arguments, self.environment, self.folder = arguments, environment or dict(os.environ), Path.cwd()
         self.files = (keyboard or Path(os.devnull), out or log, log)
         self.start()
 
@@ -67,9 +74,9 @@ class Forked(ForkServerProcess):
         if sys.platform == "linux":
             prctl(PR_SET_PDEATHSIG, signal.SIGTERM)  # a worker that is killed takes its servers along
         os.chdir(self.folder)
-        if self.environment is not None:
-            os.environ.clear()
-            os.environ.update(self.environment)
+        os.environ.clear()
+        os.environ.update(self.environment)
+        time.tzset()
         for stream, file in enumerate(self.files):
             os.dup2(os.open(file, os.O_WRONLY | os.O_APPEND | os.O_CREAT if stream else os.O_RDONLY), stream)
         sys.stdin = open(0, encoding="utf-8", closefd=False)  # noqa: SIM115 - multiprocessing has closed it

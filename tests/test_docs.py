@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any
 
 import pytest
@@ -18,7 +17,7 @@ from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
 from app.settings import Settings, variable_of
 from docs import generate
-from tests.conftest import Server, begun, free_port, wait_ready
+from tests.conftest import Server, begun, free_port, short_folder, wait_ready
 from tests.shop import Shop
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -89,22 +88,21 @@ def parts_that_differ(said: Any, printed: Any, where: str = "") -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def second_example(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, Path]]:
+def second_example() -> Iterator[tuple[Server, Path]]:
     """A server on a data folder of its own, as `--data-dir ~/six-weeks` starts one, and the folder."""
-    home = Path(mkdtemp(prefix="inband-test-"))  # a socket's path is short
-    folder, stderr, port = home / "six-weeks", home / "stderr", free_port()
-    process = begun(["serve", "--port", str(port), "--data-dir", str(folder)], stderr)
-    try:
-        wait_ready(f"http://127.0.0.1:{port}", process, stderr)
-        database = Database(EmbeddedServer(folder).url, pool_size=1)
-        running = Server(f"http://127.0.0.1:{port}", database, process, lambda: process, stderr)
-        yield running, folder
-        database.close()
-        running.close()
-    finally:
-        if process.poll() is None:
-            process.kill()
-        shutil.rmtree(home)
+    with short_folder() as home:
+        folder, stderr, port = home / "six-weeks", home / "stderr", free_port()
+        process = begun(["serve", "--port", str(port), "--data-dir", str(folder)], stderr)
+        try:
+            wait_ready(f"http://127.0.0.1:{port}", process, stderr)
+            database = Database(EmbeddedServer(folder).url, pool_size=1)
+            running = Server(f"http://127.0.0.1:{port}", database, process, lambda: process, stderr)
+            yield running, folder
+            database.close()
+            running.close()
+        finally:
+            if process.poll() is None:
+                process.kill()
 
 
 class TestReadme:

@@ -103,7 +103,7 @@ def test_a_server_that_runs_as_a_program_has_it_and_people_sign_in(
 ) -> None:
     for name, value in TEMPTING.items():
         monkeypatch.setenv(name, value)
-    with run_server(workers=1) as server:
+    with run_server(forked=False) as server:
         made = server.client(server.key()).post("/api/v1/people/invitations", json={"role": "viewer"})
         invitation = urlsplit(made.json()["url"]).path
         typed = {"name": "Vesna", "password": PASSWORD, "again": PASSWORD}

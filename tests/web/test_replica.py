@@ -1,12 +1,9 @@
 """Charts, statistics, reports and searches read a standby, as long as it has what they must show."""
 
 import re
-import shutil
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any
 
 import httpx
@@ -15,7 +12,7 @@ import pytest
 from fastapi.routing import APIRoute
 
 from app.main import FROM_REPLICA
-from tests.conftest import RunServer, Server
+from tests.conftest import RunServer, Server, short_folder
 from tests.db.clusters import Cluster, cluster
 from tests.forked import inband
 from tests.loop.readings.record import rows
@@ -29,11 +26,8 @@ BEHIND = "X-Inband-Behind"
 @pytest.fixture(scope="module")
 def servers() -> Iterator[Cluster]:
     """One that is written to, and its standby."""
-    folder = Path(mkdtemp(prefix="inband-"))  # a short path: a socket's may not be long
-    folder.chmod(0o711)
-    with cluster(folder, ("one", "two")) as made:
+    with short_folder() as folder, cluster(folder, ("one", "two")) as made:
         yield made
-    shutil.rmtree(folder)
 
 
 @pytest.fixture(scope="module")
