@@ -1,21 +1,17 @@
 """`inband program`: read a text, write one, and the corrections."""
 
 import json
-import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 
-from app import HOUSE
+from tests import forked
 from tests.conftest import Server
 from tests.shop import Shop
 
 L15 = "L15\nN5 R103 R115 R240 R250\nN10 R33=0.001 R440.0053 R361 R370.3\nN12 R33=R50*2\nN15 R400 R41-0.016 R4240\nN20 L75\nN25 L93\nN30 M17\n"
 
 
-def inband(*words: object, expect: int = 0) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run([sys.executable, "-m", "app", *map(str, words)], cwd=HOUSE, capture_output=True, text=True)
-    assert done.returncode == expect, done.stderr
-    return done
+inband = partial(forked.inband, expect=0)
 
 
 def test_a_text_is_read_without_any_database(tmp_path: Path) -> None:

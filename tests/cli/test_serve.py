@@ -1,7 +1,6 @@
 import os
 import platform
 import re
-import shutil
 import signal
 import socket
 import subprocess
@@ -11,7 +10,6 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
-from tempfile import mkdtemp
 
 import httpx
 import psycopg
@@ -20,24 +18,15 @@ import pytest
 from app import HOUSE, __version__
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
-from tests.conftest import NewDatabase, RunServer, Server, free_port, in_database, wait_ready
-from tests.db.first_program import make_first_program
-
-
-def inband(*arguments: str, typed: str = "", **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "app", *arguments],
-        cwd=HOUSE, env=os.environ | environment, input=typed, capture_output=True, text=True, timeout=60,
-    )  # fmt: skip
+from tests.conftest import TLS, NewDatabase, RunServer, Server, free_port, in_database, short_folder, wait_ready
+from tests.db.clusters import wait_for
+from tests.forked import inband
 
 
 @pytest.fixture
 def data_dir() -> Iterator[Path]:
-    home = Path(mkdtemp(prefix="inband-test-"))
-    yield home / "data"
-    if (pid := EmbeddedServer(home / "data").pid) is not None:
-        os.kill(pid, signal.SIGKILL)
-    shutil.rmtree(home)
+    with short_folder() as home:
+        yield home / "data"
 
 
 def test_a_fresh_start_on_the_embedded_database(data_dir: Path, tmp_path: Path) -> None:
@@ -53,7 +42,7 @@ def test_a_fresh_start_on_the_embedded_database(data_dir: Path, tmp_path: Path) 
         wait_ready(f"http://127.0.0.1:{port}", process, stderr)
         link = re.search(r"http://127\.0\.0\.1:\d+/invitation/\S+", stderr.read_text())
         assert link is not None, "no administrator yet, so there is an invitation"
-        assert httpx.get(link.group(), follow_redirects=True).status_code == 200
+        assert httpx.get(link.group(), follow_redirects=True, timeout=60, verify=TLS).status_code == 200
 
         # both work while the server runs, and what is meant for programs is alone on standard output
         added = inband(
@@ -64,11 +53,12 @@ def test_a_fresh_start_on_the_embedded_database(data_dir: Path, tmp_path: Path) 
         key = inband("key", "add", "--role", "viewer", "--name", "a screen", *where)
         assert (key.returncode, key.stderr) == (0, "")
         headers = {"Authorization": f"Bearer {key.stdout.rstrip()}"}
-        assert httpx.get(f"http://127.0.0.1:{port}/api/v1/machines", headers=headers).json()["items"] == []
+        machines = httpx.get(f"http://127.0.0.1:{port}/api/v1/machines", headers=headers, timeout=60, verify=TLS)
+        assert machines.json()["items"] == []
 
         postgres = EmbeddedServer(data_dir).pid
         process.send_signal(signal.SIGTERM)
-        out, _ = process.communicate(timeout=30)
+        out, _ = process.communicate(timeout=60)
         assert (process.returncode, out) == (0, b"")
         assert postgres is not None
         assert EmbeddedServer(data_dir).pid is None
@@ -80,11 +70,11 @@ def test_a_fresh_start_on_the_embedded_database(data_dir: Path, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_it_ends_in_order(run_server: RunServer, workers: int, number: signal.Signals) -> None:
-    with run_server(workers=workers) as server:
+    with run_server(workers=workers, forked=workers == 1) as server:
         server.process.send_signal(number)
-        assert server.process.wait(20) == 0
+        assert server.process.wait(60) == 0
         assert "Traceback" not in server.stderr.read_text()
 
 
@@ -96,10 +86,14 @@ def test_open_live_pages_neither_delay_the_end_nor_leave_a_traceback(run_server:
             page = pages.enter_context(client.stream("GET", "/api/v1/events"))
             assert next(page.iter_lines()) == "retry: 2000"
         server.process.send_signal(signal.SIGINT)
-        assert server.process.wait(20) == 0
+        assert server.process.wait(60) == 0
         said = server.stderr.read_text()
         assert "Traceback" not in said
         assert "Cancel" not in said
+
+
+WAITING = """SELECT 1 FROM pg_locks JOIN pg_database ON pg_database.oid = database
+    WHERE datname = current_database() AND NOT granted"""
 
 
 def test_a_request_that_the_end_does_not_wait_for_is_told_so(run_server: RunServer) -> None:
@@ -108,13 +102,12 @@ def test_a_request_that_the_end_does_not_wait_for_is_told_so(run_server: RunServ
         holding.execute("LOCK TABLE machine")
         with ThreadPoolExecutor(1) as pool:
             asking = pool.submit(client.get, "/api/v1/machines")
-            while not holding.execute("SELECT count(*) FROM pg_locks WHERE NOT granted").fetchall()[0][0]:
-                time.sleep(0.02)
+            wait_for(lambda: holding.execute(WAITING).fetchone(), "the request waits")
             server.process.send_signal(signal.SIGTERM)
-            answer = asking.result(30)
+            answer = asking.result(60)
         assert (answer.status_code, answer.headers["Retry-After"]) == (503, "5")
         assert answer.json()["type"] == "urn:inband:problem:server-ending"
-        assert server.process.wait(20) == 0
+        assert server.process.wait(60) == 0
 
 
 STUBBORN = {
@@ -122,33 +115,36 @@ STUBBORN = {
     "a pool of threads": "asyncio.get_running_loop().run_in_executor(None, time.sleep, 3600)",
     "an end that does not come": "Writer.stop = lambda self: asyncio.sleep(3600)",
 }
+PROGRAM = """
+import asyncio, threading, time
+from app.cli import main
+from app.loop.readings.writer.group_commit import Writer
+start = Writer.start
+def stubborn(self):
+    {what}
+    start(self)
+Writer.start = stubborn
+if __name__ == "__main__":
+    main()
+"""
 
 
-@pytest.mark.parametrize("workers", ["1", "2"])
-@pytest.mark.parametrize("what", STUBBORN)
-def test_it_ends_whatever_works_on(data_dir: Path, tmp_path: Path, what: str, workers: str) -> None:
+@pytest.mark.parametrize(
+    ("what", "workers"),
+    [
+        pytest.param(
+            what, workers, marks=[] if (what, workers) == ("an end that does not come", 1) else pytest.mark.long
+        )
+        for what in STUBBORN
+        for workers in (1, 2)
+    ],
+)
+def test_it_ends_whatever_works_on(data_dir: Path, tmp_path: Path, what: str, workers: int) -> None:
     """And with it the database, in order."""
     program, port, stderr = tmp_path / "stubborn.py", free_port(), tmp_path / "stderr"
-    program.write_text(
-        "import asyncio, threading, time\n"
-        "from app.cli import main\n"
-        "from app.loop.readings.writer.group_commit import Writer\n"
-        "start = Writer.start\n"
-        f"def stubborn(self):\n    {STUBBORN[what]}\n    start(self)\n"
-        "Writer.start = stubborn\n"
-        "if __name__ == '__main__':\n    main()\n"
-    )
-    command = [
-        sys.executable,
-        str(program),
-        "serve",
-        "--port",
-        str(port),
-        "--data-dir",
-        str(data_dir),
-        "--workers",
-        workers,
-    ]
+    program.write_text(PROGRAM.format(what=STUBBORN[what]))
+    command = [sys.executable, str(program), "serve", "--port", str(port)]
+    command += ["--data-dir", str(data_dir), "--workers", str(workers)]
     with (
         stderr.open("wb") as log,
         subprocess.Popen(command, cwd=HOUSE, env=os.environ | {"PYTHONPATH": str(HOUSE)}, stderr=log) as process,
@@ -159,29 +155,19 @@ def test_it_ends_whatever_works_on(data_dir: Path, tmp_path: Path, what: str, wo
         process.send_signal(signal.SIGTERM)
         assert process.wait(60) == 0
     assert EmbeddedServer(data_dir).pid is None
-    if workers == "1" or "end" in what:  # a worker whose application has ended is ended by its signal
+    if workers == 1 or "end" in what:  # a worker whose application has ended is ended by its signal
         assert "still at work" in stderr.read_text()
 
 
-def test_workers_end_when_their_parent_is_killed(run_server: RunServer) -> None:
+def test_two_workers_serve_and_end_when_their_parent_is_killed(run_server: RunServer) -> None:
     with run_server(workers=2) as server:
+        assert server.client(server.key("viewer")).get("/api/v1/machines").status_code == 200
         server.kill()
-        port = int(server.url.rpartition(":")[2])
-        for _ in range(200):
-            try:
-                socket.create_connection(("127.0.0.1", port), timeout=0.1).close()
-            except OSError:
-                break
-            signal.sigtimedwait([], 0.05)
-        else:
-            pytest.fail("somebody still listens")
-        server.restart()
-
-
-def test_two_workers_serve(run_server: RunServer) -> None:
-    with run_server(workers=2) as server:
-        key = server.key("viewer")
-        assert server.client(key).get("/api/v1/machines").status_code == 200
+        where, deadline = ("127.0.0.1", int(server.url.rpartition(":")[2])), time.monotonic() + 60
+        with pytest.raises(OSError, match="refused"):
+            while time.monotonic() < deadline:
+                socket.create_connection(where, timeout=5).close()
+                time.sleep(0.05)
 
 
 NOBODY = ["there is no", "--data-dir", "--database-url", "inband serve"]
@@ -229,30 +215,26 @@ def test_a_database_without_inband_is_refused_and_stays_empty(postgres: str) -> 
         assert connection.execute("SELECT 1 FROM pg_tables WHERE schemaname = 'public'").fetchone() is None
 
 
-def test_an_older_schema_is_not_brought_up_to_date_by_the_way(new_database: NewDatabase) -> None:
+def test_an_older_schema_is_not_brought_up_to_date_by_the_way(first_program: str) -> None:
     """A server of that age may be running on it."""
-    url = new_database()
-    make_first_program(url)
-    done = inband("key", "add", "--role", "viewer", "--database-url", url)
+    done = inband("key", "add", "--role", "viewer", "--database-url", first_program)
     assert (done.returncode, done.stdout) == (1, "")
     assert "inband migrate" in done.stderr
-    assert migrate.current(url) == migrate.SQUASHED
-    done = inband("migrate", "--database-url", url)
-    assert (done.returncode, migrate.current(url)) == (0, migrate.head())
+    assert migrate.current(first_program) == migrate.SQUASHED
+    done = inband("migrate", "--database-url", first_program)
+    assert (done.returncode, migrate.current(first_program)) == (0, migrate.head())
 
 
-def test_an_older_program_gets_its_schema_back_when_somebody_says_what_may_be_lost(new_database: NewDatabase) -> None:
-    url = new_database()
-    make_first_program(url)
-    assert inband("migrate", "--database-url", url).returncode == 0
-    back = ["migrate", "--back-to", migrate.SQUASHED, "--database-url", url]
+def test_an_older_program_gets_its_schema_back_when_somebody_says_what_may_be_lost(first_program: str) -> None:
+    assert inband("migrate", "--database-url", first_program).returncode == 0
+    back = ["migrate", "--back-to", migrate.SQUASHED, "--database-url", first_program]
     asked = inband(*back)
     assert asked.returncode == 1
     assert "0103 Stations: devices bound to machines, PINs and badges of people: loses devices, PINs" in asked.stderr
     assert "make a backup" in asked.stderr
-    assert migrate.current(url) == migrate.head()
+    assert migrate.current(first_program) == migrate.head()
     done = inband(*back, "--yes")
-    assert (done.returncode, migrate.current(url)) == (0, migrate.SQUASHED), done.stderr
+    assert (done.returncode, migrate.current(first_program)) == (0, migrate.SQUASHED), done.stderr
     assert "undone: 0101 After the review" in done.stderr
 
 
@@ -278,7 +260,8 @@ def test_a_newer_schema_is_left_alone(new_database: NewDatabase) -> None:
 
 
 def test_the_version_is_told() -> None:
-    done = inband("--version")
+    """By the program as people start it."""
+    done = subprocess.run([sys.executable, "-m", "app", "--version"], cwd=HOUSE, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (
         0,
         f"inband {__version__} (Python {platform.python_version()}, schema {migrate.head()})\n",
