@@ -23,6 +23,7 @@ from app.db import migrate
 from app.db.binaries import binary
 from app.db.embedded import ENVIRONMENT, EmbeddedServer, _children, _is_postgres
 from app.db.run_as import PATH, give
+from tests import keeper
 from tests.db.clusters import wait_for
 
 EXAMPLE = HOUSE / "docs/how-to/patroni.yml"
@@ -91,7 +92,12 @@ class Member:
         command = [*self._server._as(self._server._owner()), "patroni", str(self.data_dir / "patroni.yml")]
         with self.log.open("ab") as log:
             self.process = subprocess.Popen(
-                command, env=ENVIRONMENT, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True
+                command,
+                env=ENVIRONMENT | keeper.mark(),
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
             )
 
     @property
@@ -150,7 +156,12 @@ class Managed:
         command += [f"--initial-cluster=etcd=http://{self._peer}"]
         with (self._folder / "etcd.log").open("ab") as log:
             self._etcd_process = subprocess.Popen(
-                command, env=ENVIRONMENT, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True
+                command,
+                env=ENVIRONMENT | keeper.mark(),
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
             )
         self.primary.start()
         wait_for(lambda: self.primary.leads, "the first server leads", 120)

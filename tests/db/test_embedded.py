@@ -1,6 +1,5 @@
 import os
 import pwd
-import shutil
 import signal
 import subprocess
 import sys
@@ -9,7 +8,6 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from tempfile import mkdtemp
 
 import psycopg
 import pytest
@@ -19,6 +17,7 @@ from app.db import binaries, embedded
 from app.db.binaries import BinariesError, binary
 from app.db.embedded import EmbeddedServer, EmbeddedServerError, _children
 from app.db.run_as import run_as
+from tests.conftest import short_folder
 
 AS_ROOT = os.geteuid() == 0
 USE = """
@@ -35,13 +34,30 @@ print(server.stop(), flush=True)
 
 @pytest.fixture
 def folder() -> Iterator[Path]:
-    """A short path in a home that nobody else may enter; whatever server still runs there is ended by its id."""
-    home = Path(mkdtemp(prefix="inband-test-"))
-    yield home
-    for cluster in home.rglob("postmaster.pid"):
-        if (pid := EmbeddedServer(cluster.parent.parent).pid) is not None:
-            os.kill(pid, signal.SIGKILL)
-    shutil.rmtree(home)
+    """A home that nobody else may enter."""
+    with short_folder() as home:
+        yield home
+
+
+@pytest.fixture(scope="module")
+def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data folder whose server has run and ended."""
+    server = EmbeddedServer(tmp_path_factory.mktemp("embedded") / "data", {"fsync": "off"})
+    server.start()
+    server.stop()
+    return server.data_dir
+
+
+@pytest.fixture
+def data(folder: Path, template: Path) -> Path:
+    """A copy of it: to make a cluster takes longer than to start a server."""
+    return copied(template, folder / "data")
+
+
+def copied(template: Path, data: Path) -> Path:
+    embedded.make_data_dir(data)
+    subprocess.run(["cp", "-a", template / "postgres", data], check=True)
+    return data
 
 
 def start(data_dir: Path, *before: str) -> subprocess.Popen[str]:
@@ -140,10 +156,10 @@ def test_an_ordinary_user_has_it_in_a_closed_home_of_their_own(folder: Path) -> 
     assert leave(again)
 
 
-def test_the_last_one_out_stops_it(folder: Path) -> None:
-    first = start(folder / "data")
+def test_the_last_one_out_stops_it(data: Path) -> None:
+    first = start(data)
     url, pid = url_and_pid(first)
-    second = EmbeddedServer(folder / "data")
+    second = EmbeddedServer(data)
     assert second.start() == url
     assert second.pid == pid
     assert not leave(first)
@@ -153,8 +169,8 @@ def test_the_last_one_out_stops_it(folder: Path) -> None:
     assert not second.stop()
 
 
-def test_a_server_that_was_stopped_by_a_signal_is_ended_all_the_same(folder: Path) -> None:
-    server = start(folder / "data")
+def test_a_server_that_was_stopped_by_a_signal_is_ended_all_the_same(data: Path) -> None:
+    server = start(data)
     _url, pid = url_and_pid(server)
     for process in (*_children(pid), pid):
         os.kill(process, signal.SIGSTOP)
@@ -170,23 +186,23 @@ def test_two_first_starts_at_once_make_one_cluster(folder: Path) -> None:
     assert sorted(map(leave, both)) == [False, True]
 
 
-def test_a_killed_app_leaves_a_server_that_the_next_one_uses(folder: Path) -> None:
-    killed = start(folder / "data")
+def test_a_killed_app_leaves_a_server_that_the_next_one_uses(data: Path) -> None:
+    killed = start(data)
     url, pid = url_and_pid(killed)
     with psycopg.connect(url, autocommit=True) as connection:
         connection.execute("CREATE TABLE kept ()")
     killed.kill()
     killed.communicate()
     assert runs(pid)
-    server = EmbeddedServer(folder / "data")
+    server = EmbeddedServer(data)
     with server as again, psycopg.connect(again) as connection:
         assert server.pid == pid
         connection.execute("SELECT FROM kept")
     assert not runs(pid)
 
 
-def test_a_killed_server_recovers_at_the_next_start(folder: Path) -> None:
-    killed = start(folder / "data")
+def test_a_killed_server_recovers_at_the_next_start(data: Path) -> None:
+    killed = start(data)
     url, pid = url_and_pid(killed)
     with psycopg.connect(url, autocommit=True) as connection:
         connection.execute("CREATE TABLE kept ()")
@@ -194,14 +210,14 @@ def test_a_killed_server_recovers_at_the_next_start(folder: Path) -> None:
     killed.communicate()
     os.kill(pid, signal.SIGKILL)
     assert until(lambda: not runs(pid))
-    assert (folder / "data/postgres/postmaster.pid").exists()
-    with EmbeddedServer(folder / "data") as again, psycopg.connect(again) as connection:
+    assert (data / "postgres/postmaster.pid").exists()
+    with EmbeddedServer(data) as again, psycopg.connect(again) as connection:
         connection.execute("SELECT FROM kept")
 
 
-def test_a_server_that_dies_while_it_is_used_comes_back(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_that_dies_while_it_is_used_comes_back(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(embedded, "LOOK_EVERY", 0.1)
-    server = EmbeddedServer(folder / "data")
+    server = EmbeddedServer(data)
     with server as url:
         with psycopg.connect(url) as connection:
             connection.execute("CREATE TABLE kept AS SELECT 1 AS one")
@@ -219,12 +235,12 @@ def test_a_server_that_dies_while_it_is_used_comes_back(folder: Path, monkeypatc
 
 
 def test_the_log_of_a_server_that_runs_on_does_not_outgrow_the_disk(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
+    data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(embedded, "LOOK_EVERY", 0.02)
     monkeypatch.setattr(embedded, "MOST_LOG", 20_000)
-    server = EmbeddedServer(folder, {"fsync": "off"})
-    older = folder / "postgres.log.1"
+    server = EmbeddedServer(data, {"fsync": "off"})
+    older = data / "postgres.log.1"
     with server as url, psycopg.connect(url, autocommit=True) as connection:
         for _error in range(5000):  # half a kilobyte each
             with pytest.raises(psycopg.errors.DivisionByZero):
@@ -239,16 +255,14 @@ def test_the_log_of_a_server_that_runs_on_does_not_outgrow_the_disk(
         assert older.stat().st_mode & 0o077 == 0
 
 
-def test_a_pid_file_whose_number_now_belongs_to_another_program_is_stale(folder: Path) -> None:
-    with EmbeddedServer(folder / "data"):
-        pass
-    (folder / "data/postgres/postmaster.pid").write_text(f"{os.getpid()}\n{folder}/data/postgres\n0\n5432\n")
-    with EmbeddedServer(folder / "data") as url:
+def test_a_pid_file_whose_number_now_belongs_to_another_program_is_stale(data: Path) -> None:
+    (data / "postgres/postmaster.pid").write_text(f"{os.getpid()}\n{data}/postgres\n0\n5432\n")
+    with EmbeddedServer(data) as url:
         psycopg.connect(url).close()
 
 
-def test_children_of_a_killed_server_may_not_write_beside_the_next_one(folder: Path) -> None:
-    killed = start(folder / "data")
+def test_children_of_a_killed_server_may_not_write_beside_the_next_one(data: Path) -> None:
+    killed = start(data)
     url, pid = url_and_pid(killed)
     connection = psycopg.connect(url, autocommit=True)
     child = connection.info.backend_pid
@@ -258,16 +272,16 @@ def test_children_of_a_killed_server_may_not_write_beside_the_next_one(folder: P
     os.kill(pid, signal.SIGKILL)
     assert until(lambda: not runs(pid))
     threading.Timer(0.8, os.kill, [child, signal.SIGKILL]).start()
-    with EmbeddedServer(folder / "data") as again:
+    with EmbeddedServer(data) as again:
         assert not runs(child)
-        assert "pre-existing shared memory block" in (folder / "data/postgres.log").read_text()
+        assert "pre-existing shared memory block" in (data / "postgres.log").read_text()
         psycopg.connect(again).close()
     connection.close()
 
 
-def test_ctrl_c_in_the_terminal_does_not_reach_the_server(folder: Path) -> None:
-    with EmbeddedServer(folder / "data") as _:
-        server = EmbeddedServer(folder / "data").pid
+def test_ctrl_c_in_the_terminal_does_not_reach_the_server(data: Path) -> None:
+    with EmbeddedServer(data) as _:
+        server = EmbeddedServer(data).pid
         assert server is not None
         assert os.getsid(server) != os.getsid(0)
         assert os.getpgid(server) != os.getpgid(0)
@@ -282,8 +296,8 @@ def test_an_initdb_killed_half_way_is_begun_anew(folder: Path) -> None:
     assert not half.exists()
 
 
-def test_a_long_path_has_its_socket_elsewhere(folder: Path) -> None:
-    server = EmbeddedServer(folder / ("deep" * 20) / "data")
+def test_a_long_path_has_its_socket_elsewhere(folder: Path, template: Path) -> None:
+    server = EmbeddedServer(copied(template, folder / ("deep" * 20) / "data"))
     with server as url:
         psycopg.connect(url).close()
         elsewhere = server._socket_dir()
@@ -318,13 +332,11 @@ def test_a_full_disk_is_told_before_anything_is_made(folder: Path, monkeypatch: 
     assert not (folder / "data/postgres").exists()
 
 
-def test_a_server_that_does_not_start_says_why(folder: Path) -> None:
-    with EmbeddedServer(folder / "data"):
-        pass
-    with (folder / "data/postgres/postgresql.conf").open("a") as conf:
+def test_a_server_that_does_not_start_says_why(data: Path) -> None:
+    with (data / "postgres/postgresql.conf").open("a") as conf:
         conf.write("shared_buffers = 'a lot'\n")
     with pytest.raises(EmbeddedServerError, match="shared_buffers"):
-        EmbeddedServer(folder / "data").start()
+        EmbeddedServer(data).start()
 
 
 def test_the_wheel_s_own_python_is_never_imported() -> None:
@@ -355,8 +367,8 @@ print(server.pid)
 """
 
 
-def test_a_living_server_is_not_taken_for_dead_where_no_file_can_be_opened(folder: Path) -> None:
-    command = [sys.executable, "-c", WATCHED, str(folder / "data")]
+def test_a_living_server_is_not_taken_for_dead_where_no_file_can_be_opened(data: Path) -> None:
+    command = [sys.executable, "-c", WATCHED, str(data)]
     done = subprocess.run(command, cwd=HOUSE, capture_output=True, text=True)
     # The other user has not stopped it: the watcher still holds its lock. The last one out does.
     assert done.stdout == "True True False\nNone\n", done.stderr
@@ -409,11 +421,9 @@ class TestPrograms:
         monkeypatch.setattr(binaries, "SYSTEM_FOLDERS", (system,))
         assert binaries.binaries().origin == "wheel"
 
-    def test_a_named_folder_runs_the_server(self, system: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        with EmbeddedServer(folder / "data"):
-            pass
+    def test_a_named_folder_runs_the_server(self, system: Path, data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv("INBAND_POSTGRES_BIN", str(system))
-        with EmbeddedServer(folder / "data") as url, psycopg.connect(url) as connection:
+        with EmbeddedServer(data) as url, psycopg.connect(url) as connection:
             assert connection.info.server_version // 10_000 == 18
             assert binaries.binaries().origin == "INBAND_POSTGRES_BIN"
 

@@ -1,20 +1,17 @@
 """The server that is written to is killed, and a standby takes its place: what was answered is in the record, once."""
 
-import shutil
 from collections.abc import Iterator
-from pathlib import Path
-from tempfile import mkdtemp
 
 import psycopg
 import pytest
 
 from app.core.parameters import read
 from bench import failover
-from tests.conftest import RunServer, Server
+from tests.conftest import RunServer, Server, short_folder
 from tests.db.clusters import Cluster, cluster
 from tests.loop.readings.record import history, must_hold, must_replay, rows
 from tests.loop.readings.writer.test_broken import push, until
-from tests.shop import PARAMETERS, Shop
+from tests.shop import PARAMETERS, Shop, unique
 
 PATIENCE = "1"  # s
 WAITING = "FROM pg_stat_activity WHERE wait_event = 'SyncRep' AND application_name LIKE 'inband%'"
@@ -29,11 +26,8 @@ def _impatient() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def three() -> Iterator[Cluster]:
-    folder = Path(mkdtemp(prefix="inband-"))  # a short path: a socket's may not be long
-    folder.chmod(0o711)
-    with cluster(folder) as made:
+    with short_folder() as folder, cluster(folder) as made:
         yield made
-    shutil.rmtree(folder)
 
 
 @pytest.fixture
@@ -45,31 +39,34 @@ def servers(three: Cluster) -> Iterator[Cluster]:
 
 @pytest.fixture(scope="module")
 def inband(three: Cluster, run_server: RunServer) -> Iterator[Server]:
-    with run_server(three.url, workers=1) as running:
+    with run_server(three.url) as running:
         yield running
 
 
 @pytest.fixture(scope="module")
 def other(three: Cluster, run_server: RunServer) -> Iterator[Server]:
     """A second process on the same database."""
-    with run_server(three.url, workers=1) as running:
+    with run_server(three.url) as running:
         yield running
 
 
-@pytest.mark.parametrize("quorum", [True, False])
+@pytest.mark.parametrize(
+    ("quorum", "rounds"),
+    [(True, 1), pytest.param(True, 2, marks=pytest.mark.long), pytest.param(False, 2, marks=pytest.mark.long)],
+)
 def test_killed_under_load_nothing_that_was_answered_is_lost_or_doubled(
-    servers: Cluster, inband: Server, other: Server, quorum: bool
+    servers: Cluster, inband: Server, other: Server, quorum: bool, rounds: int
 ) -> None:
     """Without a quorum, a machine that sees its numbers go back sends again what was answered."""
     servers.ask_for(quorum=quorum)
-    run = "q" if quorum else "a"
-    result = failover.play(servers, [inband.url, other.url], 2, at_work=0.5, run=run)
-    assert len({each.promoted for each in result.rounds}) == 2
+    result = failover.play(servers, [inband.url, other.url], rounds, at_work=0.5, run=unique("m"))
+    assert len({each.promoted for each in result.rounds}) == rounds
     assert result.answered == result.stored > 0
     assert result.corrections > 0
     assert (result.lost == 0) == quorum
 
 
+@pytest.mark.long
 class TestHole:
     """A commit that was seen on a server which is gone."""
 

@@ -1,4 +1,3 @@
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -8,29 +7,21 @@ from sqlalchemy.exc import DBAPIError
 
 from app.db import migrate
 from app.db.migrate import MigrationError
-from tests.conftest import NewDatabase, RunServer, drop_database, in_database
-from tests.db.first_program import ADMIN_KEY, ANA, MACHINE_KEY, make_first_program, move
-
-
-@pytest.fixture
-def empty(postgres: str, request: pytest.FixtureRequest) -> str:
-    name = f"empty_{abs(hash(request.node.nodeid))}"
-    with psycopg.connect(postgres, autocommit=True) as connection:
-        connection.execute(f"CREATE DATABASE {name}")
-    return in_database(postgres, name)
+from tests.conftest import NewDatabase, RunServer
+from tests.db.first_program import ADMIN_KEY, ANA, MACHINE_KEY, move
 
 
 def test_tables_and_migrations_say_the_same(new_database: NewDatabase) -> None:
     assert migrate.differences(new_database()) == []
 
 
-def test_an_empty_database_is_brought_to_the_head(empty: str) -> None:
-    todo = migrate.pending(empty)
+def test_an_empty_database_is_brought_to_the_head(empty_database: str) -> None:
+    todo = migrate.pending(empty_database)
     assert todo
-    assert migrate.current(empty) is None
-    assert migrate.upgrade(empty) == todo
-    assert migrate.current(empty) == migrate.head()
-    assert migrate.pending(empty) == migrate.upgrade(empty) == []
+    assert migrate.current(empty_database) is None
+    assert migrate.upgrade(empty_database) == todo
+    assert migrate.current(empty_database) == migrate.head()
+    assert migrate.pending(empty_database) == migrate.upgrade(empty_database) == []
 
 
 STATIONS = "0103 Stations: devices bound to machines, PINs and badges of people"
@@ -75,14 +66,6 @@ ADDED_TABLES = {
 }
 
 
-@pytest.fixture
-def first_program(new_database: NewDatabase) -> Iterator[str]:
-    url = new_database()
-    make_first_program(url)
-    yield url
-    drop_database(url)
-
-
 def rows_of(url: str) -> Rows:
     """Every row of every table as JSON; of outlooks without the reading they were made of, for they are made anew."""
     with psycopg.connect(url) as connection:
@@ -125,7 +108,7 @@ def test_a_database_of_the_first_program_is_brought_to_the_head_with_its_rows(fi
     assert after == {table: [row | ADDED.get(table, {}) for row in rows] for table, rows in before.items()}
 
 
-def test_the_first_program_gets_its_database_back(first_program: str, new_database: NewDatabase) -> None:
+def test_the_first_program_gets_its_database_back(first_program: str) -> None:
     before = rows_of(first_program)
     migrate.upgrade(first_program)
     move(first_program, "0100")
@@ -243,11 +226,11 @@ def test_a_database_of_an_earlier_revision_is_left_alone(new_database: NewDataba
     assert migrate.current(url) == "0017"
 
 
-def test_of_processes_that_start_together_one_migrates(empty: str) -> None:
+def test_of_processes_that_start_together_one_migrates(empty_database: str) -> None:
     with ThreadPoolExecutor(4) as pool:
-        done = list(pool.map(migrate.upgrade, [empty] * 4))
+        done = list(pool.map(migrate.upgrade, [empty_database] * 4))
     assert sorted(map(len, done)) == [0, 0, 0, len(max(done))]
-    assert migrate.current(empty) == migrate.head()
+    assert migrate.current(empty_database) == migrate.head()
 
 
 def test_a_database_of_a_newer_program_is_left_alone(new_database: NewDatabase) -> None:

@@ -1,7 +1,5 @@
 """A fact cannot be altered or removed by the role that serves, whatever it sends."""
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,12 +7,11 @@ import psycopg
 import pytest
 from sqlalchemy import make_url
 
-from app import HOUSE
 from app.db import migrate
 from app.db.base import whole_metadata
 from app.db.rights import APPEND_ONLY, WITH_A_LIFE, rights_of
 from tests.conftest import NewDatabase, RunServer, Server, drop_database
-from tests.db.first_program import make_first_program
+from tests.forked import inband
 from tests.shop import Shop
 
 ROLE = "inband_serving"
@@ -120,8 +117,7 @@ def test_a_correction_keeps_its_amount_and_stays_closed(server: Server) -> None:
 
 def test_check_says_what_the_role_may_and_what_is_not_protected(server: Server, owned: str, serving: str) -> None:
     def check(url: str) -> tuple[int, str]:
-        command = [sys.executable, "-m", "app", "check", "--database-url", url]
-        done = subprocess.run(command, cwd=HOUSE, capture_output=True, text=True)
+        done = inband("check", "--database-url", url)
         return done.returncode, " ".join(done.stderr.split())
 
     status, said = check(serving)
@@ -141,13 +137,12 @@ def test_check_says_what_the_role_may_and_what_is_not_protected(server: Server, 
     assert f"{ROLE} lacks INSERT on exclusion" in said
 
 
-def test_who_may_not_migrate_is_told_who_may(new_database: NewDatabase, serving: str) -> None:
-    url = new_database()
-    make_first_program(url)
-    with psycopg.connect(url, autocommit=True) as connection:
+def test_who_may_not_migrate_is_told_who_may(first_program: str, serving: str) -> None:
+    with psycopg.connect(first_program, autocommit=True) as connection:
         connection.execute(GRANTS)
     with pytest.raises(migrate.MigrationError, match=f"role {ROLE} may not"):
-        migrate.upgrade(make_url(serving).set(database=make_url(url).database).render_as_string(hide_password=False))
-    assert migrate.current(url) == migrate.SQUASHED
-    assert migrate.upgrade(url)
-    drop_database(url)
+        migrate.upgrade(
+            make_url(serving).set(database=make_url(first_program).database).render_as_string(hide_password=False)
+        )
+    assert migrate.current(first_program) == migrate.SQUASHED
+    assert migrate.upgrade(first_program)

@@ -54,7 +54,7 @@ def way(ours: EmbeddedServer) -> Iterator[Way]:
 
 @pytest.fixture(scope="module")
 def inband(way: Way, run_server: RunServer) -> Iterator[Server]:
-    with run_server(f"postgresql://inband@127.0.0.1:{way.port}/inband", workers=1) as running:
+    with run_server(f"postgresql://inband@127.0.0.1:{way.port}/inband") as running:
         yield running
 
 
@@ -88,10 +88,9 @@ def swallowed(_ours: EmbeddedServer, way: Way) -> Iterator[None]:
 
 
 Silence = Callable[[EmbeddedServer, Way], Any]
-silences = pytest.mark.parametrize("silence", [stopped, swallowed])
 
 
-@silences
+@pytest.mark.parametrize("silence", [swallowed, pytest.param(stopped, marks=pytest.mark.long)])
 def test_everybody_is_answered_503_and_served_again_afterwards(
     inband: Server, ours: EmbeddedServer, way: Way, silence: Silence
 ) -> None:
@@ -126,7 +125,7 @@ def test_everybody_is_answered_503_and_served_again_afterwards(
     must_hold(ours.url)
 
 
-@silences
+@pytest.mark.parametrize("silence", [stopped, pytest.param(swallowed, marks=pytest.mark.long)])
 def test_live_events_end_so_that_no_page_calls_itself_live(
     inband: Server, ours: EmbeddedServer, way: Way, silence: Silence
 ) -> None:
@@ -139,7 +138,7 @@ def test_live_events_end_so_that_no_page_calls_itself_live(
         assert any(b"event: reading" in part for part in stream.iter_bytes())
 
 
-@silences
+@pytest.mark.parametrize("silence", [swallowed, pytest.param(stopped, marks=pytest.mark.long)])
 def test_the_server_ends_in_order_while_the_database_says_nothing(
     inband: Server, ours: EmbeddedServer, way: Way, silence: Silence
 ) -> None:
@@ -176,6 +175,7 @@ def test_a_commit_that_waits_for_its_standby_is_not_waited_for_and_not_cancelled
     must_hold(ours.url)
 
 
+@pytest.mark.long
 class TestStandby:
     """Two servers, each behind a way of its own: one that is written to, and its synchronous standby."""
 
@@ -209,7 +209,7 @@ class TestStandby:
                 connection.execute("SELECT pg_reload_conf()")
                 until(lambda: rows(ours.url, "SELECT 1 FROM pg_stat_replication WHERE sync_state = 'sync'"))
             url = f"postgresql://inband@127.0.0.1:{first.port},127.0.0.1:{second.port}/inband"
-            server = stack.enter_context(run_server(url, workers=1))
+            server = stack.enter_context(run_server(url))
             shop = Shop(server)
             senders = crew(shop, server)
 
