@@ -4,7 +4,6 @@ import os
 import pwd
 import re
 import shutil
-import signal
 import stat
 import subprocess
 import sys
@@ -13,7 +12,6 @@ import tarfile
 import venv
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from tempfile import mkdtemp
 from zipfile import ZipFile
 
 import httpx
@@ -25,7 +23,8 @@ from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
 from app.db.run_as import run_as
-from tests.conftest import Process, Server, free_port, wait_ready
+from tests import keeper
+from tests.conftest import Process, Server, free_port, short_folder, wait_ready
 from tests.shop import Shop
 
 NAME = f"inband-{__version__}"
@@ -43,8 +42,14 @@ def build(tree: Path, folder: Path, *targets: str) -> Path:
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a wheel and the source beside it."""
-    return build(HOUSE, tmp_path_factory.mktemp("dist"), "wheel", "sdist")
+    """The folder of a wheel."""
+    return build(HOUSE, tmp_path_factory.mktemp("dist"), "wheel")
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The sources that are published beside the wheel."""
+    return build(HOUSE, tmp_path_factory.mktemp("source"), "sdist") / f"{NAME}.tar.gz"
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +81,7 @@ def programs(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
 def bare(**more: str) -> dict[str, str]:
     """The environment of somebody who has set nothing, and has no home."""
-    return {"PATH": os.environ["PATH"], "LANG": "C.UTF-8", "HOME": "/nonexistent"} | more
+    return {"PATH": os.environ["PATH"], "LANG": "C.UTF-8", "HOME": "/nonexistent"} | keeper.mark() | more
 
 
 def run(command: Sequence[object], folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -99,38 +104,39 @@ class Installed(Server):
 
 @pytest.fixture(scope="module")
 def installed(programs: Path) -> Iterator[Installed]:
-    home = Path(mkdtemp(prefix="inband-test-"))  # a socket's path is short
-    empty, stderr, port = home / "empty", home / "stderr", free_port()
-    home.chmod(0o755)
-    empty.mkdir()
-    (home / "mine").mkdir()
-    become: list[str] = []
-    if os.geteuid() == 0:
-        nobody = pwd.getpwnam("nobody")
-        os.chown(home / "mine", nobody.pw_uid, nobody.pw_gid)
-        become = run_as(nobody, reads=[Path(sys.executable).resolve(), Path(sysconfig.get_path("purelib"))], enters=[])
-    data_dir = home / "mine" / "data"
-    command: list[str | Path] = [*become, programs / "inband", "serve", "--port", str(port), "--data-dir", data_dir]
+    with short_folder() as home:
+        empty, stderr, port = home / "empty", home / "stderr", free_port()
+        home.chmod(0o755)
+        empty.mkdir()
+        (home / "mine").mkdir()
+        become: list[str] = []
+        if os.geteuid() == 0:
+            nobody = pwd.getpwnam("nobody")
+            os.chown(home / "mine", nobody.pw_uid, nobody.pw_gid)
+            become = run_as(
+                nobody, reads=[Path(sys.executable).resolve(), Path(sysconfig.get_path("purelib"))], enters=[]
+            )
+        data_dir = home / "mine" / "data"
+        command: list[str | Path] = [*become, programs / "inband", "serve", "--port", str(port), "--data-dir", data_dir]
 
-    def start() -> Process:
-        with stderr.open("ab") as log:
-            process = subprocess.Popen(command, cwd=empty, env=bare(), stdin=subprocess.DEVNULL, stdout=log, stderr=log)
-        wait_ready(f"http://127.0.0.1:{port}", process, stderr)
-        return process
+        def start() -> Process:
+            with stderr.open("ab") as log:
+                process = subprocess.Popen(
+                    command, cwd=empty, env=bare(), stdin=subprocess.DEVNULL, stdout=log, stderr=log
+                )
+            wait_ready(f"http://127.0.0.1:{port}", process, stderr)
+            return process
 
-    process = start()
-    database = Database(EmbeddedServer(data_dir).url, pool_size=1)
-    server = Installed(f"http://127.0.0.1:{port}", database, process, start, stderr)
-    server.data_dir = data_dir
-    try:
-        yield server
-    finally:
-        server.close()
-        database.close()
-        if (pid := EmbeddedServer(data_dir).pid) is not None:
-            os.kill(pid, signal.SIGKILL)
-        assert list(empty.iterdir()) == []
-        shutil.rmtree(home)
+        process = start()
+        database = Database(EmbeddedServer(data_dir).url, pool_size=1)
+        server = Installed(f"http://127.0.0.1:{port}", database, process, start, stderr)
+        server.data_dir = data_dir
+        try:
+            yield server
+        finally:
+            server.close()
+            database.close()
+            assert list(empty.iterdir()) == []
 
 
 def compiled_in(data_dir: Path) -> dict[Path, int]:
@@ -160,15 +166,17 @@ class TestContent:
         assert b"inband = app.__main__:main" in wheel.read(f"{NAME}.dist-info/entry_points.txt")
         assert f"\nVersion: {__version__}\n" in wheel.read(f"{NAME}.dist-info/METADATA").decode()
 
-    def test_the_source_builds_the_same_wheel(self, built: Path, tmp_path: Path) -> None:
-        with tarfile.open(built / f"{NAME}.tar.gz") as source:
-            source.extractall(tmp_path, filter="data")
+    @pytest.mark.long
+    def test_the_source_builds_the_same_wheel(self, built: Path, source: Path, tmp_path: Path) -> None:
+        with tarfile.open(source) as archive:
+            archive.extractall(tmp_path, filter="data")
         again = build(tmp_path / NAME, tmp_path / "dist", "wheel")
         assert (again / WHEEL).read_bytes() == (built / WHEEL).read_bytes()
 
-    def test_the_source_holds_what_is_kept_and_nothing_that_was_made(self, built: Path) -> None:
-        with tarfile.open(built / f"{NAME}.tar.gz") as source:
-            names = {name.removeprefix(f"{NAME}/") for name in source.getnames()}
+    @pytest.mark.long
+    def test_the_source_holds_what_is_kept_and_nothing_that_was_made(self, source: Path) -> None:
+        with tarfile.open(source) as archive:
+            names = {name.removeprefix(f"{NAME}/") for name in archive.getnames()}
         assert names >= {"Makefile", "constraints.txt", "CHANGELOG.md", "Dockerfile", "docker-compose.yml", "LICENSE"}
         assert names >= {"tests/conftest.py", "docs/how-to/upgrade.md", "frontend/static/css/base.css"}
         assert [
@@ -176,6 +184,7 @@ class TestContent:
         ] == []
 
 
+@pytest.mark.long
 class TestProgram:
     def test_it_runs_from_the_wheel_and_says_its_version(self, programs: Path, tmp_path: Path) -> None:
         where = run([programs / "python", "-c", "import app; print(app.__file__); print(app.HOUSE)"], tmp_path)
@@ -241,6 +250,7 @@ class TestProgram:
 
 
 class TestContainer:
+    @pytest.mark.long
     def test_the_dockerfile_builds_the_same_wheel_from_what_it_copies(self, built: Path, tmp_path: Path) -> None:
         first = (HOUSE / "Dockerfile").read_text().split("\nFROM ")[1]
         for line in re.findall(r"^COPY (.+)$", first, re.MULTILINE):

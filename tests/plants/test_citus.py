@@ -3,13 +3,10 @@
 Run where `INBAND_TEST_CITUS` names the folder of PostgreSQL's programs with the extension citus built for them.
 """
 
-import shutil
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, contextmanager
-from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any
 
 import httpx
@@ -24,7 +21,7 @@ from app.db.connections import in_schema
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
 from app.errors import Invalid, NotFound
-from tests.conftest import RunServer, Server
+from tests.conftest import TLS, RunServer, Server, short_folder
 from tests.db.clusters import kill, wait_for
 from tests.loop.readings.load import Sender, all_at_once, scattered
 from tests.loop.readings.record import history, must_replay
@@ -37,11 +34,10 @@ needs_citus = pytest.mark.skipif(not PROGRAMS, reason="INBAND_TEST_CITUS names n
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[list[EmbeddedServer]]:
     """A coordinator and two workers."""
-    folder = Path(mkdtemp(prefix="inband-"))  # a socket's path is short
-    folder.chmod(0o711)
-    with nodes(folder, options={"fsync": "off"}) as made:
-        yield made
-    shutil.rmtree(folder)
+    with short_folder() as folder:
+        folder.chmod(0o711)
+        with nodes(folder, options={"fsync": "off"}) as made:
+            yield made
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +78,8 @@ def client_of(server: Server, coordinator: str, plant: str) -> httpx.Client:
 
 def machines_at(server: Server, client: httpx.Client) -> int:
     """Status of the same caller's request to the plant `far` at another server."""
-    return httpx.get(f"{server.url}/p/far/api/v1/machines", headers=client.headers, timeout=60).status_code
+    url = f"{server.url}/p/far/api/v1/machines"
+    return httpx.get(url, headers=client.headers, timeout=60, verify=TLS).status_code
 
 
 def key_of(coordinator: str, plant: str, *, role: str | None = None, machine: str | None = None) -> str:
@@ -143,6 +140,7 @@ def push(client: httpx.Client, micrometres: float) -> int:
 
 
 @needs_citus
+@pytest.mark.long
 class TestPlantOnANode:
     def test_readings_are_decided_and_summarised_there(self, client: httpx.Client, coordinator: str) -> None:
         assert [push(client, number % 7) for number in range(140)] == list(range(1, 141))

@@ -1,7 +1,5 @@
 """Several plants in one installation: each with tables, people, keys and events of its own."""
 
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,7 +13,6 @@ import pytest
 from playwright.sync_api import Page, expect
 from sqlalchemy.orm import Session
 
-from app import HOUSE
 from app.access import actions as people
 from app.access.keys import add_key
 from app.cli import plants as commands
@@ -24,12 +21,13 @@ from app.db.connections import in_schema
 from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from app.plants import registry
-from tests.conftest import NewDatabase, RunServer, Server, drop_database
+from tests.conftest import TLS, NewDatabase, RunServer, Server, drop_database
+from tests.forked import inband
 from tests.pages.test_accessibility import violations
 from tests.shop import PARAMETERS
 
 PASSWORD = "correct horse battery"
-get = partial(httpx.get, timeout=60)
+get = partial(httpx.get, timeout=60, verify=TLS)
 
 
 @pytest.fixture(scope="module")
@@ -212,7 +210,7 @@ class TestOverview:
         expect(page.locator("header .brand").last).to_have_text("North")
 
     def test_a_wrong_password_is_refused_and_recorded(self, server: Server) -> None:
-        answer = httpx.post(f"{server.url}/plants/sign-in", data={"name": "Mira", "password": "guessed"}, timeout=60)
+        answer = server.client().post("/plants/sign-in", data={"name": "Mira", "password": "guessed"})
         assert answer.status_code == 401
         assert "Wrong name or password" in answer.text
         assert "set-cookie" not in answer.headers
@@ -259,7 +257,7 @@ def test_one_server_for_one_schema(
 ) -> None:
     monkeypatch.setenv("INBAND_SCHEMA", "plant_east")
     url = new_database()
-    with run_server(url, log_level="info") as server:
+    with run_server(url) as server:
         with in_plant(server, "plant_east") as session:
             secret = add_key(session, role="admin", machine=None, name="tests", actor="tests").secret
         client = server.client(secret)
@@ -284,23 +282,18 @@ def test_migrate_and_check_look_at_every_plant(new_database: NewDatabase) -> Non
             )
         migrate.downgrade(in_schema(url, "west"), "0109")
         connection.execute("UPDATE east.alembic_version SET version_num = '9999'")
-    pending, checked = migrate.pending(in_schema(url, "west"))[0], inband("check", url)
+    pending, checked = migrate.pending(in_schema(url, "west"))[0], inband("check", "--database-url", url)
     assert checked.returncode == 1
     assert "wrong plant east: the database is at revision 9999, which this Inband does not know" in checked.stderr
     assert f"ok    plant north: migrations: at {migrate.head()}, none to run" in checked.stderr
     assert f"wrong plant west: 1 migration(s) to run: {pending}." in checked.stderr
-    migrated = inband("migrate", url)
+    migrated = inband("migrate", "--database-url", url)
     assert migrated.returncode == 1
     assert "plant east: the database is at revision 9999, which this Inband does not know" in migrated.stderr
     assert f"plant north: nothing to do: the database is at {migrate.head()}" in migrated.stderr
     assert f"plant west: migrated: {pending}" in migrated.stderr
     assert [migrate.current(in_schema(url, schema)) for schema in ("west", "public")] == [migrate.head(), None]
     drop_database(url)
-
-
-def inband(command: str, url: str) -> subprocess.CompletedProcess[str]:
-    words = [sys.executable, "-m", "app", command, "--database-url", url]
-    return subprocess.run(words, cwd=HOUSE, capture_output=True, text=True)
 
 
 class TestList:

@@ -1,16 +1,13 @@
 """Several plants with a standby: each reads its own tables there, and sees its own changes."""
 
 import re
-import shutil
 from collections.abc import Iterator
-from pathlib import Path
-from tempfile import mkdtemp
 
 import httpx
 import pytest
 
 from app.access import actions as people
-from tests.conftest import RunServer, Server
+from tests.conftest import RunServer, Server, short_folder
 from tests.db.clusters import Cluster, cluster
 from tests.plants.test_plants import PASSWORD, add, client_of, get, in_plant, read, set_up, until
 from tests.shop import PARAMETERS
@@ -22,11 +19,8 @@ KEYS = ("north", "south")
 @pytest.fixture(scope="module")
 def servers() -> Iterator[Cluster]:
     """One that is written to, and its standby."""
-    folder = Path(mkdtemp(prefix="inband-"))
-    folder.chmod(0o711)
-    with cluster(folder, ("one", "two")) as made:
+    with short_folder() as folder, cluster(folder, ("one", "two")) as made:
         yield made
-    shutil.rmtree(folder)
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +28,7 @@ def server(servers: Cluster, run_server: RunServer) -> Iterator[Server]:
     """Two plants, beside the one at the root."""
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("INBAND_READ_DATABASE_URL", servers.nodes[1].url)
-        with run_server(servers.nodes[0].url, workers=1) as running:
+        with run_server(servers.nodes[0].url) as running:
             for key in KEYS:
                 add(running, key)
                 with in_plant(running, key) as session:
@@ -62,6 +56,7 @@ def test_each_reads_its_own_tables_there(server: Server) -> None:
         assert "s behind" in ready["replica"]
 
 
+@pytest.mark.long
 def test_a_person_sees_their_own_change_in_the_plant_where_they_made_it(server: Server, servers: Cluster) -> None:
     set_up(client_of(server, "north"))
     browser = server.client()
