@@ -4,7 +4,6 @@ import asyncio
 import math
 import threading
 import time
-from collections.abc import Callable, Coroutine
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,6 @@ from app.bridge.unit import Guided, Unit
 from app.loop.connections.touch_tests.pages import TOO_SOON
 from tests.bridge.kinds.test_opcua import machine as opcua_machine
 from tests.bridge.plant import ModelRegisters, bridge, controlled, parts, store_in, unit_of, until
-from tests.conftest import Server
 from tests.loops import run
 from tests.shop import Person, Shop
 
@@ -114,16 +112,14 @@ async def running(shop: Shop, one: Unit) -> Any:
         yield Guide(shop)
 
 
-def scenario(work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    run(work())
-
-
 async def proof(one: Unit) -> str | None:
     known = (await one.store.known(one.machine.key)).get(3)
     return known.proved if known else None
 
 
-def test_a_location_is_proved_at_the_page(shop: Shop, server: Server, model: Model, page: Page, tmp_path: Path) -> None:
+def test_a_location_is_proved_at_the_page(
+    shop: Shop, operator: Person, model: Model, page: Page, tmp_path: Path
+) -> None:
     """The page in a browser, the bridge, and a simulated SINUMERIK; the browser has this thread, the bridge another."""
     enough = asyncio.Event()
     loop: dict[str, asyncio.AbstractEventLoop] = {}
@@ -148,7 +144,7 @@ def test_a_location_is_proved_at_the_page(shop: Shop, server: Server, model: Mod
     thread = threading.Thread(target=lambda: asyncio.run(plant()))
     thread.start()
     try:
-        Person(server, "operator").sign_in(page)
+        operator.sign_in(page)
         page.goto(f"/machines/{shop.machine}/connection")
         page.get_by_role("button", name="Touch test of tool 3").click()
         part = page.locator("#touch-test")
@@ -202,7 +198,7 @@ def test_a_no_proves_nothing_and_takes_back(shop: Shop, model: Model, tmp_path: 
             assert await proof(one) is None
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 def test_a_person_stops_it_and_it_is_taken_back(shop: Shop, model: Model, tmp_path: Path) -> None:
@@ -222,7 +218,7 @@ def test_a_person_stops_it_and_it_is_taken_back(shop: Shop, model: Model, tmp_pa
             await guide.ask()  # the next one may begin
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 def test_after_a_crash_the_next_start_takes_back(shop: Shop, model: Model, tmp_path: Path) -> None:
@@ -244,7 +240,7 @@ def test_after_a_crash_the_next_start_takes_back(shop: Shop, model: Model, tmp_p
         assert await noted(store, shop.machine) is None
         store.close()
 
-    scenario(work)
+    run(work())
 
 
 def test_an_offset_that_somebody_else_has_set_is_left_alone_after_a_crash(
@@ -262,7 +258,7 @@ def test_an_offset_that_somebody_else_has_set_is_left_alone_after_a_crash(
         assert model.offsets[PLACE] == 0.5
         store.close()
 
-    scenario(work)
+    run(work())
 
 
 def test_while_the_server_is_away_the_time_limit_takes_back(
@@ -285,7 +281,7 @@ def test_while_the_server_is_away_the_time_limit_takes_back(
             assert "No answer came" in over["detail"]
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 def test_a_control_that_lets_nothing_be_written_ends_the_test(shop: Shop, model: Model, tmp_path: Path) -> None:
@@ -302,7 +298,7 @@ def test_a_control_that_lets_nothing_be_written_ends_the_test(shop: Shop, model:
             assert model.offsets[PLACE] == BEFORE
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 def test_taking_back_waits_for_a_control_that_is_away(shop: Shop, model: Model, tmp_path: Path) -> None:
@@ -322,7 +318,7 @@ def test_taking_back_waits_for_a_control_that_is_away(shop: Shop, model: Model, 
             assert model.offsets[PLACE] == pytest.approx(BEFORE)
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 def test_no_correction_is_offered_and_no_edit_reported_meanwhile(shop: Shop, model: Model, tmp_path: Path) -> None:
@@ -350,7 +346,7 @@ def test_no_correction_is_offered_and_no_edit_reported_meanwhile(shop: Shop, mod
         one.store.close()
         assert shop.alarms() == []
 
-    scenario(work)
+    run(work())
 
 
 def test_what_is_refused(shop: Shop, model: Model, tmp_path: Path) -> None:
@@ -373,7 +369,7 @@ def test_what_is_refused(shop: Shop, model: Model, tmp_path: Path) -> None:
             await until(lambda: one.test is None, "the end")
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 @pytest.mark.parametrize(
@@ -396,7 +392,7 @@ def test_the_bridge_refuses_by_itself(
         assert said in one.test.end[1]
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 @pytest.mark.parametrize(
@@ -422,7 +418,7 @@ def test_a_test_that_the_store_knows_nothing_of_says_nothing_that_may_be_false(
         assert said in one.test.end[1]
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 def test_a_go_that_is_old_writes_nothing(shop: Shop, model: Model, tmp_path: Path) -> None:
@@ -444,7 +440,7 @@ def test_a_go_that_is_old_writes_nothing(shop: Shop, model: Model, tmp_path: Pat
         assert model.offsets[PLACE] == BEFORE
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 class Unreadable(ModelRegisters):
@@ -464,7 +460,7 @@ def test_an_offset_that_cannot_be_read_ends_the_test_and_holds_up_no_reading(
             assert one.state == "online"
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 def test_a_program_that_runs_again_is_named_while_the_offset_is_not_taken_back(
@@ -487,11 +483,11 @@ def test_a_program_that_runs_again_is_named_while_the_offset_is_not_taken_back(
             assert model.offsets[PLACE] == pytest.approx(BEFORE)
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 def test_the_page_says_what_to_set_by_hand_while_the_bridge_is_waited_for(
-    shop: Shop, server: Server, model: Model, tmp_path: Path
+    shop: Shop, operator: Person, model: Model, tmp_path: Path
 ) -> None:
     async def work() -> None:
         one = unit(shop, model, store_in(tmp_path))
@@ -501,16 +497,15 @@ def test_the_page_says_what_to_set_by_hand_while_the_bridge_is_waited_for(
         # the computer of the bridge is off
         await guide.says("after")
         await guide.says("size")
-        person = Person(server, "operator")
         path = f"/machines/{shop.machine}/touch-tests/{guide.number}"
-        assert "set that by hand" not in await asyncio.to_thread(person.open, path)
+        assert "set that by hand" not in await asyncio.to_thread(operator.open, path)
         await asyncio.to_thread(asked_before, shop, 60)
-        page = await asyncio.to_thread(person.open, path)
+        page = await asyncio.to_thread(operator.open, path)
         assert "the screen showed 0.0000 mm in wear_length_1 of tool 3, edge 1" in page
         assert "set that by hand" in page
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 def test_the_end_of_the_program_takes_back(shop: Shop, model: Model, tmp_path: Path) -> None:
@@ -523,7 +518,7 @@ def test_the_end_of_the_program_takes_back(shop: Shop, model: Model, tmp_path: P
             assert model.offsets[PLACE] == pytest.approx(BEFORE)
         one.store.close()
 
-    scenario(work)
+    run(work())
 
 
 def test_the_end_of_the_bridge_takes_back_what_is_just_being_written(
