@@ -62,12 +62,15 @@ class Guide:
             self.shop.call, method, f"/machines/{self.shop.machine}/touch-tests{path}", status, **body
         )
 
-    async def ask(self, status: int = 201, **body: Any) -> Any:
+    async def bridge_is_online(self) -> None:
         async def heard() -> bool:
             answer = await asyncio.to_thread(self.shop.admin.get, f"/api/v1/machines/{self.shop.machine}/connection")
             return answer.status_code == 200 and answer.json()["state"] == "online"
 
         await until(heard, "a heartbeat")
+
+    async def ask(self, status: int = 201, **body: Any) -> Any:
+        await self.bridge_is_online()
         made = await self.call("POST", "", status, **{"tool_memory": 3} | body)
         self.number = made.get("id", 0)
         return made
@@ -144,6 +147,7 @@ def test_a_location_is_proved_at_the_page(
     thread = threading.Thread(target=lambda: asyncio.run(plant()))
     thread.start()
     try:
+        run(Guide(shop).bridge_is_online())
         operator.sign_in(page)
         page.goto(f"/machines/{shop.machine}/connection")
         page.get_by_role("button", name="Touch test of tool 3").click()
