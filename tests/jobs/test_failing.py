@@ -7,7 +7,7 @@ from sqlalchemy import text
 
 from app.jobs.actions import run_jobs
 from app.quality.control_charts.signals_actions import JOB
-from tests.cli.test_serve import inband
+from tests.forked import inband
 from tests.quality.control_charts.line import Line
 from tests.quality.control_charts.rows import frozen
 from tests.shop import Shop
