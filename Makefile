@@ -11,6 +11,8 @@
 SHELL := /bin/sh
 .SHELLFLAGS := -eu -c
 .DELETE_ON_ERROR:
+# Where it is set, each of some hundred processes compiles the whole program again.
+unexport PYTHONDONTWRITEBYTECODE
 .PHONY: run test test-long lint bench messages wheel clean
 
 VENV := .venv
