@@ -219,7 +219,7 @@ def fixtures(session: Session, only: int | None = None) -> list[FixtureRow]:
         counted = counted.where(WorkZero.machine_id == only)
     rows = [
         _fixture_row(session, session.get_one(Machine, machine_id), key or "", count)
-        for machine_id, key, count in session.execute(counted).tuples()
+        for machine_id, key, count in session.execute(counted)
     ]
     return sorted(rows, key=lambda row: (row.machine.key, row.key))
 

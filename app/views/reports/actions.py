@@ -59,7 +59,7 @@ def _keys(session: Session, bundle: Bundle) -> list[str]:
     """The keys of all characteristics that were named, and of all machines, each once, in order."""
     named, machines = list(dict.fromkeys(bundle.characteristics)), list(dict.fromkeys(bundle.machines))
     existing = set(session.scalars(select(Characteristic.key).where(Characteristic.key.in_(named))))
-    known = dict(session.execute(select(Machine.key, Machine.id).where(Machine.key.in_(machines))).tuples().all())
+    known = dict(session.execute(select(Machine.key, Machine.id).where(Machine.key.in_(machines))).all())
     errors = [
         FieldError("characteristics", _("there is no characteristic {key}").format(key=repr(key)))
         for key in named

@@ -86,7 +86,7 @@ def count_by_machine(session: Session) -> dict[int, int]:
         select(ParameterProposal.machine_id).where(ParameterProposal.status == "open"),
     ).subquery()
     query = select(waiting.c.machine_id, func.count()).group_by(waiting.c.machine_id)
-    return dict(session.execute(query).tuples().all())
+    return dict(session.execute(query).all())
 
 
 def tasks(session: Session, machine: Machine | None = None, caller: Caller | None = None) -> list[Task]:
