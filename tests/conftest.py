@@ -526,17 +526,17 @@ def screen() -> dict[str, Any]:
     return {"viewport": {"width": 1280, "height": 800}}
 
 
-@pytest.fixture
-def page(browser: Browser, server: Server, complaints: list[str], screen: dict[str, Any]) -> Iterator[Page]:
-    """A page of the server; console errors and requests to any other host fail the test."""
-    host = urlsplit(server.url).netloc
+@contextmanager
+def new_page(browser: Browser, url: str, complaints: list[str], **screen: Any) -> Iterator[Page]:
+    """A page of the server at `url`, in a context of its own; console errors and requests to any other host are complaints."""
+    host = urlsplit(url).netloc
 
     def look(request: Request) -> None:
         parts = urlsplit(request.url)
         if parts.scheme not in {"data", "blob", "about"} and parts.netloc != host:
             complaints.append(f"request to a foreign host: {request.url}")
 
-    context = browser.new_context(base_url=server.url, locale="en-GB", **screen)
+    context = browser.new_context(base_url=url, locale="en-GB", **screen)
     context.on("request", look)
     opened = context.new_page()
     opened.set_default_timeout(15_000)
@@ -549,4 +549,11 @@ def page(browser: Browser, server: Server, complaints: list[str], screen: dict[s
     )
     yield opened
     context.close()
+
+
+@pytest.fixture
+def page(browser: Browser, server: Server, complaints: list[str], screen: dict[str, Any]) -> Iterator[Page]:
+    """A page of the server; what it complains about fails the test."""
+    with new_page(browser, server.url, complaints, **screen) as opened:
+        yield opened
     assert not complaints, "\n".join(complaints)

@@ -23,7 +23,7 @@ from app.errors import Conflict, Invalid, NotFound
 from app.plants import registry
 from tests.conftest import TLS, NewDatabase, RunServer, Server, drop_database
 from tests.forked import inband
-from tests.pages.test_accessibility import violations
+from tests.pages.looks import violations
 from tests.shop import PARAMETERS
 
 PASSWORD = "correct horse battery"
