@@ -17,8 +17,6 @@ from pydantic import BaseModel, TypeAdapter
 from app.loop.readings.answers import ReadingAnswer
 from app.loop.readings.api import BatchCounts
 from app.loop.readings.schemas import ReadingIn
-from app.main import create_plant
-from app.settings import Settings
 from app.web.api_docs import _kind, curl, prose
 from app.web.openapi import EXAMPLES, example_of, operations, resolve
 from tests.conftest import Server
@@ -29,6 +27,9 @@ ROLES = ("viewer", "operator", "engineer", "admin")
 
 @pytest.fixture(scope="module")
 def app() -> FastAPI:
+    from app.main import create_plant
+    from app.settings import Settings
+
     return create_plant(Settings(database_url="postgresql://nobody@localhost/none")).app
 
 
