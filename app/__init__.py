@@ -67,7 +67,12 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
     settings.py      every setting with its meaning; unsafe values are refused
 """
 
+import os
 from pathlib import Path
+
+# The matrices here are small. Threads of the linear algebra would take longer, and the processors from PostgreSQL. Set before
+# NumPy is imported; who sets it themselves keeps it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 __version__ = "0.1.0"
 

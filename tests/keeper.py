@@ -25,6 +25,8 @@ from types import FrameType
 
 import pytest
 
+import app  # noqa: F401 - what it sets has to be set before a plugin imports NumPy
+
 MARK = "TESTS_KEPT_BY"
 """Variable that everything started by a run inherits: process number and start of its keeper."""
 PROC = Path("/proc")
