@@ -4,7 +4,9 @@ What a test of `make test-long` did is repeated with the seed of its run, which 
 """
 
 import random
+from math import sqrt
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 USUAL = 100
@@ -37,6 +39,16 @@ def _long() -> bool:
 def examples(number: int) -> settings:
     """So many examples of Hypothesis in `make test`, ten times as many in `make test-long`."""
     return settings(max_examples=number * MORE if _long() else number)
+
+
+def runs(few: int, many: int) -> pytest.MarkDecorator:
+    """Parametrise a test by how often it tries: seldom in `make test`, often in `make test-long`."""
+    return pytest.mark.parametrize("runs", [few, pytest.param(many, marks=pytest.mark.long)])
+
+
+def by_chance(share: float, runs: int) -> float:
+    """By how much a share may seem to differ after so many runs: three standard deviations, five where the seed is fresh."""
+    return (5 if _long() else 3) * sqrt(share * (1 - share) / runs)
 
 
 def seed(number: int) -> int:

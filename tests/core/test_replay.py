@@ -111,7 +111,7 @@ def traces(draw: st.DrawFn) -> tuple[ProcessTrace, Policy]:
 
 
 @given(traces())
-@examples(500)
+@examples(100)
 def test_the_compiled_loop_is_decide_in_closed_loop_bit_for_bit(given_: tuple[ProcessTrace, Policy]) -> None:
     trace, policy = given_
     policy = Policy(
@@ -137,7 +137,7 @@ def test_the_compiled_loop_is_decide_in_closed_loop_bit_for_bit(given_: tuple[Pr
 
 
 @given(st.one_of(st.floats(-1000, 1000), st.integers(-(10**12), 10**12).map(lambda n: (n + 0.5) / 1e9)))
-@examples(2000)
+@examples(500)
 def test_rounding_is_pythons(value: float) -> None:
     for near in (value, np.nextafter(value, np.inf), np.nextafter(value, -np.inf)):
         assert _rounded(float(near)) == round(float(near), 9) + 0.0

@@ -17,6 +17,7 @@ from app.core.geometry.circle import fit_circle, fit_circle_in_space
 from app.core.geometry.line import distances, fit_line
 from app.core.geometry.plane import fit_plane
 from app.core.geometry.points import Degenerate, Floats, Reason
+from tests.chance import examples
 
 seeds = st.integers(0, 2**32 - 1)
 places = st.floats(-5000, 5000)
@@ -51,6 +52,7 @@ class TestReferencePairs:
         assert found.radius == pytest.approx(radius, abs=1e-9)
         assert found.residuals == pytest.approx(off, abs=1e-9)
 
+    @examples(40)
     @given(seeds, st.floats(60, 320), st.floats(1, 500))
     def test_a_circle_from_an_arc(self, seed: int, arc: float, radius: float) -> None:
         random = np.random.default_rng(seed)

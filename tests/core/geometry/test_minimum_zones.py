@@ -69,6 +69,7 @@ def narrowest_ring(points: Floats) -> float:
 
 
 class TestExhaustively:
+    @examples(50)
     @given(seeds, st.integers(3, 12))
     def test_a_strip(self, seed: int, count: int) -> None:
         random = np.random.default_rng(seed)
@@ -104,6 +105,7 @@ class TestExhaustively:
             turns = np.sort(np.arctan2([p[1] for p in on], [p[0] for p in on]))
             assert np.diff(turns, append=turns[0] + 2 * np.pi).max() <= np.pi + 1e-9
 
+    @examples(50)
     @given(seeds)
     def test_the_largest_circle_among_them_rests_on_three_round_it(self, seed: int) -> None:
         points = lobed(np.random.default_rng(seed), 9, 0.05)
@@ -119,6 +121,7 @@ class TestAxis:
         zone = minimum_zone_axis([(0.0, 0.0, 0.0), (0.01, 0.0, 10.0), (0.0, 0.0, 20.0)])
         assert 2 * zone.radius == pytest.approx(0.01, abs=1e-9)
 
+    @examples(25)
     @given(seeds)
     def test_no_straight_line_nearby_has_a_narrower_cylinder(self, seed: int) -> None:
         random = np.random.default_rng(seed)
@@ -131,6 +134,7 @@ class TestAxis:
             reach = np.linalg.norm(about - np.outer(about @ bent, bent), axis=1).max()
             assert reach >= zone.radius * (1 - 1e-5)
 
+    @examples(20)
     @given(seeds, st.floats(-5000, 5000))
     def test_zones_do_not_mind_being_moved(self, seed: int, far: float) -> None:
         random = np.random.default_rng(seed)

@@ -11,6 +11,7 @@ from app.core.programs import fanuc
 from app.core.programs.correction_forms import Form
 from app.core.programs.corrections import PendingCorrection, steps, write
 from app.core.programs.lines import LineVerdict, Program, ProgramError, ProgramKind, ProgramText
+from tests.chance import examples
 from tests.core.programs.conftest import parameter_sets
 
 # The modules of the source, as it prints them.
@@ -269,6 +270,7 @@ def test_roughing_and_finishing_cycles_are_no_unit() -> None:
 VALUES = st.dictionaries(st.sampled_from(["#500", "#501", "#502", "#503", "#504"]), st.floats(-999, 999))
 
 
+@examples(50)
 @given(parameter_sets(), VALUES)
 def test_a_characteristic_survives_its_macro_text(parameters: Parameters, values: dict[str, float]) -> None:
     text = fanuc.write_measuring(parameters, {"characteristic": "bore-d40", "name": "Bore (Ø40); 100 %"}, values)

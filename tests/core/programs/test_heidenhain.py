@@ -10,6 +10,7 @@ from app.core.programs import heidenhain
 from app.core.programs.lines import LineVerdict, Note, Program, ProgramError, ProgramKind
 from app.core.rotary.axis import AXES
 from app.core.rotary.measuring_plan import AxisPlan, MeasuringPlan, faults, plan_of, positions, warnings
+from tests.chance import examples
 
 CALL = """0 BEGIN PGM HEAD MM
 11 TOOL CALL "TOUCH_PROBE" Z
@@ -157,6 +158,7 @@ def plans(draw: st.DrawFn) -> MeasuringPlan:
     )
 
 
+@examples(50)
 @given(plans(), st.integers(0, 99))
 def test_a_plan_survives_its_program(plan: MeasuringPlan, memory: int) -> None:
     text = heidenhain.write_plan(plan, memory)
@@ -193,6 +195,7 @@ def test_a_plan_is_checked() -> None:
     assert _checks(AxisPlan("A", -30.0, 90.0, 0.0, 4, teeth=3.0), retract_height=50.0) == (["moved_to_teeth"], [])
 
 
+@examples(50)
 @given(
     st.one_of(
         st.text(), st.text('QTCHPROBE 45012=+-.,~;"\n'), st.integers(0, len(CALL)).map(lambda at: CALL[at:] + CALL[:at])

@@ -10,6 +10,7 @@ from app.core.parameters import Parameters, read
 from app.core.programs import sinumerik
 from app.core.programs.lines import LineVerdict, ProgramError, ProgramKind, ProgramText, written
 from app.core.programs.sinumerik_writing import Calibration, write_calibration, write_measuring
+from tests.chance import examples
 from tests.core.programs.conftest import parameter_sets
 
 # Domain §10, with values in place of the xx of the source.
@@ -318,6 +319,7 @@ def test_what_is_no_program_text_is_refused(text: str, code: str) -> None:
 # --- writing and reading
 
 
+@examples(50)
 @given(parameter_sets(), st.text(st.characters(exclude_categories=["Cc", "Cs"]), max_size=40))
 def test_a_characteristic_survives_its_program_text(parameters: Parameters, name: str) -> None:
     name = name.strip()
@@ -332,6 +334,7 @@ def test_a_characteristic_survives_its_program_text(parameters: Parameters, name
     assert write_measuring(again, found.program.about) == text
 
 
+@examples(50)
 @given(parameter_sets(), st.floats(0.001, 1000), st.booleans(), st.booleans())
 def test_a_calibration_survives_its_program_text(
     parameters: Parameters, gauge: float, free: bool, radial: bool

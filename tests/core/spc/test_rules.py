@@ -30,7 +30,7 @@ from app.core.spc.rules import (
 )
 from app.core.spc.shewhart import Chart
 from app.core.spc.shewhart import given as standard
-from tests.chance import examples
+from tests.chance import by_chance, examples, runs, seed
 
 # Quarters reach every limit exactly, and equal neighbours come up often.
 POINTS = st.lists(st.integers(-14, 14).map(lambda quarter: quarter / 4), min_size=1, max_size=80)
@@ -210,22 +210,24 @@ class TestChance:
     def test_runs_on_one_side_are_as_tosses_of_a_coin(self) -> None:
         assert average_run_length([RULES[RuleName.NELSON_2]]) == pytest.approx(2**9 - 1)
 
+    @runs(20_000, 200_000)
     @pytest.mark.parametrize("rule", NELSON, ids=lambda rule: rule.name.value)
-    def test_a_window_shows_a_pattern_as_often_as_it_is_counted(self, rule: Rule) -> None:
-        windows = np.random.default_rng(11).normal(size=(60_000, rule.n))
+    def test_a_window_shows_a_pattern_as_often_as_it_is_counted(self, rule: Rule, runs: int) -> None:
+        windows = np.random.default_rng(seed(11)).normal(size=(runs, rule.n))
         if rule.kind is RuleKind.BEYOND:
             beyond = [(side * windows > rule.limit).sum(axis=1) >= rule.k for side in (1, -1)]
             seen = float((beyond[0] | beyond[1]).mean())
         else:
             seen = float(np.mean([len(signals(window, [rule]).runs[rule.name]) > 0 for window in windows]))
         share = per_window(rule)
-        assert seen == pytest.approx(share, abs=5 * (share / 60_000) ** 0.5)
+        assert seen == pytest.approx(share, abs=by_chance(share, runs))
 
+    @runs(400, 5_000)
     @pytest.mark.parametrize("rule", [*NELSON[1:6], WESTERN_ELECTRIC[3]], ids=lambda rule: rule.name.value)
-    def test_the_first_signal_comes_as_late_as_it_is_counted(self, rule: Rule) -> None:
-        chain = np.random.default_rng(5).normal(size=(1500, 12_000))
-        firsts = []
-        for z in chain:
+    def test_the_first_signal_comes_as_late_as_it_is_counted(self, rule: Rule, runs: int) -> None:
+        random, firsts = np.random.default_rng(seed(5)), []
+        for _ in range(runs):
+            z = random.normal(size=12_000)
             rows = signals(z, [rule]).runs[rule.name]
             assert len(rows)
             # The run's first firing: with the n-th point of a plain run; of "k of n" with the k-th point beyond.
@@ -236,7 +238,7 @@ class TestChance:
             else:
                 firsts.append(start + rule.n)
         length = chance(rule).average_run_length
-        assert np.mean(firsts) == pytest.approx(length, abs=5 * length / len(firsts) ** 0.5)
+        assert np.mean(firsts) == pytest.approx(length, rel=5 / runs**0.5)
 
     def test_the_reference_prints_what_is_computed(self) -> None:
         text = (HOUSE / "docs" / "reference" / "statistics.md").read_text(encoding="utf-8")
