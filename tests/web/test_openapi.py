@@ -21,6 +21,8 @@ from app.web.api_docs import _kind, curl, prose
 from app.web.openapi import EXAMPLES, example_of, operations, resolve
 from tests.conftest import Server
 
+pytestmark = pytest.mark.own_server  # the examples name machines and characteristics
+
 Json = dict[str, Any]
 ROLES = ("viewer", "operator", "engineer", "admin")
 
