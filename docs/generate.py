@@ -21,7 +21,8 @@ PART = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTA
 
 def documents() -> list[Path]:
     """Every Markdown file of the project."""
-    return [HOUSE / "README.md", HOUSE / "CHANGELOG.md", *sorted((HOUSE / "docs").rglob("*.md"))]
+    names = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
+    return [*(HOUSE / name for name in names), *sorted((HOUSE / "docs").rglob("*.md"))]
 
 
 def renewed(text: str) -> str:
