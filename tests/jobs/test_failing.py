@@ -3,6 +3,7 @@
 from datetime import UTC, datetime, timedelta
 
 import httpx
+import pytest
 from sqlalchemy import text
 
 from app.jobs.actions import run_jobs
@@ -11,6 +12,8 @@ from tests.forked import inband
 from tests.quality.control_charts.line import Line
 from tests.quality.control_charts.rows import frozen
 from tests.shop import Shop
+
+pytestmark = pytest.mark.own_server  # it counts what fails in the whole plant
 
 
 def broken(shop: Shop, line: Line) -> None:

@@ -145,7 +145,7 @@ class Count:
         return PeriodicJob("count", whole, lambda _session, _unit: self.done.append(name))
 
 
-async def _until(true: object, seconds: float = 10) -> None:
+async def _until(true: object, seconds: float = 60) -> None:
     deadline = time.monotonic() + seconds
     while not true():  # type: ignore[operator]
         assert time.monotonic() < deadline
@@ -235,7 +235,7 @@ def test_stopping_waits_for_the_unit_that_is_being_done_and_begins_no_other(data
     def slow(session: Session, _unit: Unit) -> None:
         session.execute(ADD, {"key": "whole"})
         begun.set()
-        assert go_on.wait(10)
+        assert go_on.wait(60)
 
     async def stopped() -> None:
         runner = JobRunner(
@@ -247,7 +247,7 @@ def test_stopping_waits_for_the_unit_that_is_being_done_and_begins_no_other(data
         await asyncio.sleep(0.05)
         assert not ending.done()
         go_on.set()
-        await asyncio.wait_for(ending, 10)
+        await asyncio.wait_for(ending, 60)
 
     run(stopped())
     with database.begin() as session:

@@ -17,7 +17,6 @@ from app.core.spc.stability import of_readings, stability
 from app.core.spc.uncompensated import scatter, uncompensated
 from tests.chance import examples
 
-RNG = np.random.default_rng(20261121)
 N = 1000
 PLACE = np.arange(N)
 
@@ -73,7 +72,8 @@ def test_the_model_knows_no_unit_and_no_mirror(seed: int, shift: float, scale: f
 
 
 def test_squares_add_up() -> None:
-    groups = [RNG.normal(size=size) + size for size in (3, 5, 4, 7)]
+    random = np.random.default_rng(20261121)
+    groups = [random.normal(size=size) + size for size in (3, 5, 4, 7)]
     parts = decompose(groups, [1, 2, 4, 8])
     every = np.concatenate(groups)
     assert parts.between + parts.within == pytest.approx(((every - every.mean()) ** 2).sum())
