@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.parameters import MachineType
@@ -28,6 +28,7 @@ from app.core.ring import (
     to_fetch,
     went_back,
 )
+from tests.chance import examples
 from tests.core.damage import SIXTY, with_one_bit_changed
 from tests.core.programs.controls import Stopped
 from tests.core.programs.ring_machines import Fanuc, Machine, PowerLost, Sinumerik, machine
@@ -140,7 +141,7 @@ def test_setting_up_again_changes_nothing(control: RingControl) -> None:
 
 
 @every_control
-@settings(max_examples=20)
+@examples(20)
 @given(blocks=st.integers(1, 620))
 def test_a_set_up_that_was_cut_off_is_done_again_with_another_epoch(control: RingControl, blocks: int) -> None:
     made = machine(control)
@@ -181,7 +182,7 @@ def test_registers_of_somebody_else_are_not_cleared(control: RingControl) -> Non
 
 
 @every_control
-@settings(max_examples=40)
+@examples(40)
 @given(
     measured=sizes,
     part=st.integers(0, 9_999_999),
@@ -260,7 +261,7 @@ def test_the_power_may_go_at_any_block_of_a_reading(control: RingControl) -> Non
 
 
 @every_control
-@settings(max_examples=10)
+@examples(10)
 @given(
     cuts=st.lists(st.tuples(st.integers(1, 110), st.sampled_from(["look", "fetch", "none"])), min_size=12, max_size=20)
 )
@@ -378,7 +379,7 @@ def test_nothing_runs_before_the_set_up_or_in_another_unit(control: RingControl,
     assert (block(made).written, block(made).answered) == (0, 0)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(measured=sizes, part=st.integers(0, 9_999_999), written=st.integers(0, 9_999_998))
 def test_seven_digits_are_enough_for_the_check_sum(measured: float, part: int, written: int) -> None:
     """Older controls calculate with single precision: whole numbers are exact up to 16,777,216 only."""
@@ -396,7 +397,7 @@ def test_seven_digits_are_enough_for_the_check_sum(measured: float, part: int, w
 
 
 @every_control
-@settings(max_examples=40)
+@examples(40)
 @given(
     expected=st.integers(-20_000, 20_000).map(lambda n: n / 10_000),
     step=st.integers(-100_000, 100_000).map(lambda n: n / 1_000_000),
@@ -423,7 +424,7 @@ def _watch(made: Machine, seen: set[float]) -> Callable[[], None]:
 
 
 @every_control
-@settings(max_examples=15)
+@examples(15)
 @given(data=st.data())
 def test_the_power_may_go_at_any_block_of_a_correction(control: RingControl, data: st.DataObject) -> None:
     made, bridge = ready(control)
@@ -555,7 +556,7 @@ def test_a_tool_number_off_is_refused_where_that_tool_is_there(control: RingCont
 
 
 @every_control
-@settings(max_examples=15)
+@examples(15)
 @given(
     number=st.integers(1, 9_999_999),
     value=st.integers(-90, 90),
