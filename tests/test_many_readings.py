@@ -6,6 +6,7 @@ import io
 import json
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -29,12 +30,14 @@ from app.loop.summaries.queries import history, history_of, window_of
 from app.loop.summaries.queries.window import Window
 from app.loop.tables.readings import ResultReading
 from bench.plant import PARAMETERS
-from tests.conftest import MANY, RunServer, Server, drop_database, in_database
+from tests.conftest import MANY, RunServer, drop_database, in_database
 from tests.forked import inband
 from tests.loop.readings.importing.test_history import set_up
 from tests.loops import in_thread, run
 
 KEY = "long"
+SOME_OR_ALL = [20_000, pytest.param(MANY, marks=pytest.mark.long)]
+"""Numbers of readings where each of them takes its time; the smaller one is larger than what is taken at once anywhere."""
 
 
 def borders(chunk: int) -> list[int]:
@@ -43,16 +46,12 @@ def borders(chunk: int) -> list[int]:
 
 
 @pytest.fixture(scope="module")
-def server(many_readings: Database, run_server: RunServer) -> Iterator[Server]:
+def client(many_readings: Database, run_server: RunServer) -> Iterator[httpx.Client]:
+    """Of a server on that database."""
     with run_server(many_readings.dsn) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def client(server: Server) -> httpx.Client:
-    made = server.client(server.key())
-    made.timeout = httpx.Timeout(60)
-    return made
+        made = running.client(running.key())
+        made.timeout = httpx.Timeout(60)
+        yield made
 
 
 def answered(client: httpx.Client, path: str, **query: Any) -> httpx.Response:
@@ -93,34 +92,46 @@ def stored(database: Database, columns: str, key: str = KEY) -> list[tuple[Any, 
         ).fetchall()
 
 
+def first_of_them(database: Database, count: int) -> Iterator[dict[str, Any]]:
+    """The first readings, as they are exported."""
+    with database.begin() as session:
+        entry = queries.entry_of(session, KEY)
+        assert entry is not None
+        yield from islice(exporting.rows(session, entry), count)
+
+
 class TestImport:
-    def test_what_was_exported_comes_back_and_comes_once(self, many_readings: Database, tmp_path: Path) -> None:
+    @pytest.mark.parametrize("count", SOME_OR_ALL)
+    def test_what_was_exported_comes_back_and_comes_once(
+        self, many_readings: Database, tmp_path: Path, count: int
+    ) -> None:
+        key = f"again-{count}"
         with many_readings.begin() as session:
             parameters = PARAMETERS | {"tool_memory": 3}
-            added = CharacteristicIn(key="again", name="Again", machine="lathe-long", parameters=parameters)
+            added = CharacteristicIn(key=key, name="Again", machine="lathe-long", parameters=parameters)
             characteristics.add_characteristic(session, added, "tests")
         file = tmp_path / "long.csv"
-        with many_readings.begin() as session, file.open("w") as target:
-            entry = queries.entry_of(session, KEY)
-            assert entry is not None
-            exporting.write_csv(exporting.rows(session, entry), target)
+        with file.open("w") as target:
+            exporting.write_csv(first_of_them(many_readings, count), target)
         layout = look(file, Wishes())
-        summary = import_readings(many_readings, "again", file, layout, actor="tests")
-        assert (summary.stored, summary.first_sequence, summary.last_sequence) == (MANY, 1, MANY)
+        summary = import_readings(many_readings, key, file, layout, actor="tests")
+        assert (summary.stored, summary.first_sequence, summary.last_sequence) == (count, 1, count)
         same = "sequence, part, measured, measured_at, zone"
-        assert stored(many_readings, same, "again") == stored(many_readings, same)
-        again = import_readings(many_readings, "again", file, layout, actor="tests", dry_run=True)
-        assert (again.stored, again.repeated) == (0, MANY)
+        assert stored(many_readings, same, key) == stored(many_readings, same)[:count]
+        again = import_readings(many_readings, key, file, layout, actor="tests", dry_run=True)
+        assert (again.stored, again.repeated) == (0, count)
 
 
 class TestReplay:
-    def test_every_line_is_decided(self, many_readings: Database, tmp_path: Path) -> None:
+    @pytest.mark.parametrize("count", SOME_OR_ALL)
+    def test_every_line_is_decided(self, many_readings: Database, tmp_path: Path, count: int) -> None:
         file, parameters = tmp_path / "long.ndjson", tmp_path / "parameters.json"
-        inband("export", "--characteristic", KEY, "-o", file, INBAND_DATABASE_URL=many_readings.dsn)
+        with file.open("w") as target:
+            exporting.write_ndjson(first_of_them(many_readings, count), target)
         parameters.write_text(json.dumps(PARAMETERS))
         done = inband("replay", file, "--parameters", parameters)
         assert done.returncode == 0, done.stderr
-        assert [json.loads(line)["sequence"] for line in done.stdout.splitlines()] == list(range(1, MANY + 1))
+        assert [json.loads(line)["sequence"] for line in done.stdout.splitlines()] == list(range(1, count + 1))
 
 
 class TestBackup:
@@ -195,15 +206,16 @@ class TestWriters:
 
 
 class TestPages:
+    @pytest.mark.parametrize("count", SOME_OR_ALL)
     @pytest.mark.parametrize("limit", [999, 1000])
-    def test_every_reading_is_on_one_page(self, client: httpx.Client, limit: int) -> None:
+    def test_every_reading_is_on_one_page(self, client: httpx.Client, limit: int, count: int) -> None:
         numbers: list[int] = []
-        after: int | None = 0
+        after: int | None = MANY - count
         while after is not None:
             page = answered(client, "/api/v1/readings", characteristic=KEY, after=after, limit=limit).json()
             numbers += [row["sequence"] for row in page["items"]]
             after = page["next"]
-        assert numbers == list(range(1, MANY + 1))
+        assert numbers == list(range(MANY - count + 1, MANY + 1))
 
     @pytest.mark.parametrize("left", borders(10))
     def test_the_last_page_says_that_it_is_the_last(self, client: httpx.Client, left: int) -> None:
@@ -260,11 +272,23 @@ class TestEverythingOverAllOfThem:
         report = answered(client, f"/api/v1/characteristics/{KEY}/report.{form}", **WHOLE)
         assert len(report.content) > 1000
 
-    @pytest.mark.parametrize("page", ["", "/control", "/capability", "/what-if", "/report", "/rules"])
+    @pytest.mark.parametrize(
+        "page",
+        [
+            "",
+            "/control",
+            "/capability",
+            pytest.param(
+                "/what-if", marks=pytest.mark.long
+            ),  # its figure and its numbers are asked for above and below
+            "/report",
+            "/rules",
+        ],
+    )
     def test_pages(self, client: httpx.Client, page: str) -> None:
         assert "Long" in answered(client, f"/characteristics/{KEY}{page}", last="all").text
 
-    @pytest.mark.parametrize("form", ["csv", "pdf"])
+    @pytest.mark.parametrize("form", ["csv", pytest.param("pdf", marks=pytest.mark.long)])
     def test_a_report_by_the_command(self, many_readings: Database, tmp_path: Path, form: str) -> None:
         file = tmp_path / f"long.{form}"
         done = inband("report", KEY, "--last", MANY, "-o", file, INBAND_DATABASE_URL=many_readings.dsn)
