@@ -100,7 +100,9 @@ def shared_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def postgres(shared_dir: Path) -> Iterator[str]:
     """The server of this run; the URL of a database that no test uses."""
-    server = EmbeddedServer(shared_dir / "inband", {"fsync": "off"})  # no test pulls the plug
+    server = EmbeddedServer(
+        shared_dir / "inband", {"fsync": "off", "max_connections": "500"}
+    )  # no test pulls the plug; servers of several workers, each with its pool
     url = server.start()
     try:
         with (shared_dir / "template.lock").open("w") as lock:

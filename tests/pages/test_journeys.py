@@ -13,6 +13,8 @@ from playwright.sync_api import Locator, Page, expect
 from tests.conftest import Server
 from tests.shop import Person, Shop
 
+pytestmark = pytest.mark.own_server  # everybody begins at the plant page, which shows a plant and no crowd
+
 PART = "SN-2041"  # the part of the last reading
 PLACE_OF_LAST = """(chart) => {
   const plot = chart.querySelector(".plot"), box = plot.getBoundingClientRect(), { xaxis, yaxis } = plot._fullLayout;
