@@ -43,7 +43,7 @@ for name in [name for name in os.environ if name.startswith(("INBAND_", "PG")) a
     del os.environ[name]  # no test may meet a real installation
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # hundreds of servers start; each would compile the whole house anew
 
-expect.set_options(timeout=20_000)  # ms; what is expected comes at once where the computer has nothing else to do
+expect.set_options(timeout=60_000)  # ms; what is expected comes at once where the computer has nothing else to do
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
@@ -541,7 +541,7 @@ def new_page(browser: Browser, url: str, complaints: list[str], **screen: Any) -
     context = browser.new_context(base_url=url, locale="en-GB", **screen)
     context.on("request", look)
     opened = context.new_page()
-    opened.set_default_timeout(15_000)
+    opened.set_default_timeout(60_000)
     opened.on("pageerror", lambda error: complaints.append(f"uncaught in {opened.url}: {error}"))
     opened.on(
         "console",

@@ -5,6 +5,7 @@ import csv
 import io
 import json
 from collections.abc import Iterator
+from contextlib import closing
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
@@ -97,7 +98,8 @@ def first_of_them(database: Database, count: int) -> Iterator[dict[str, Any]]:
     with database.begin() as session:
         entry = queries.entry_of(session, KEY)
         assert entry is not None
-        yield from islice(exporting.rows(session, entry), count)
+        with closing(exporting.rows(session, entry)) as rows:
+            yield from islice(rows, count)
 
 
 class TestImport:

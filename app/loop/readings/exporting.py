@@ -1,7 +1,7 @@
 """Readings into files, row by row out of a server-side cursor: however many there are, few are in memory."""
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from datetime import datetime
 from typing import Any, TextIO
 
@@ -56,7 +56,7 @@ def rows(
     since: datetime | None = None,
     until: datetime | None = None,
     last: int | None = None,
-) -> Iterator[dict[str, Any]]:
+) -> Generator[dict[str, Any], None, None]:
     """Readings in the order of their arrival: measured from `since` on and before `until`, of the last `last`."""
     hand = by_hand.latest_of_each()
     here = (Reading.machine_id == entry.machine_id, Reading.characteristic_id == entry.characteristic_id)
@@ -116,14 +116,17 @@ def rows(
     # Whoever reads the file may be slow.
     session.execute(text("SET LOCAL idle_in_transaction_session_timeout = 0"))
     targets: dict[int, float] = {}
-    fetched = session.execute(query.execution_options(yield_per=AT_ONCE))
-    for *values, good, touches, context in fetched:
-        row = dict(zip(COLUMNS, (*values, verdict_of(good)), strict=True)) | {"touches": touches, "context": context}
-        version = row["parameters_version"]
-        if version not in targets:
-            targets[version] = parameters_of(session, entry.machine_id, entry.characteristic_id, version).target
-        # Target + deviation, mm: the size as the drawing counts it.
-        yield row | {"corrected_size": round(targets[version] + row["deviation"], DECIMALS)}
+    with session.execute(query.execution_options(yield_per=AT_ONCE)) as fetched:  # closed too where the file is cut off
+        for *values, good, touches, context in fetched:
+            row = dict(zip(COLUMNS, (*values, verdict_of(good)), strict=True)) | {
+                "touches": touches,
+                "context": context,
+            }
+            version = row["parameters_version"]
+            if version not in targets:
+                targets[version] = parameters_of(session, entry.machine_id, entry.characteristic_id, version).target
+            # Target + deviation, mm: the size as the drawing counts it.
+            yield row | {"corrected_size": round(targets[version] + row["deviation"], DECIMALS)}
 
 
 def write_csv(readings: Iterator[dict[str, Any]], file: TextIO) -> int:
