@@ -9,6 +9,8 @@ from playwright.sync_api import Page, expect
 
 from tests.shop import PARAMETERS, Person, Shop
 
+pytestmark = pytest.mark.own_server  # begins at the plant page, which shows every alarm of the plant
+
 PLOT = "document.querySelector('plotly-chart.zones .plot')"
 XSS = """<b>"Кључ" d'Ø</b>"""
 
