@@ -98,12 +98,12 @@ class TestOnePlantKnowsNothingOfAnother:
     def test_the_same_keys_mean_other_things(self, server: Server) -> None:
         root, north, south = (client_of(server, key) for key in (None, "north", "south"))
         for client in (root, north, south):
-            set_up(client)
-        assert [read(north, 2)["sequence"] for _ in range(3)] == [1, 2, 3]
-        assert [read(south, 4)["sequence"] for _ in range(2)] == [1, 2]
-        assert read(root, 7)["sequence"] == 1
+            set_up(client, "seat")
+        assert [read(north, 2, "seat")["sequence"] for _ in range(3)] == [1, 2, 3]
+        assert [read(south, 4, "seat")["sequence"] for _ in range(2)] == [1, 2]
+        assert read(root, 7, "seat")["sequence"] == 1
         counts = [
-            len(client.get("/api/v1/readings", params={"characteristic": "shaft"}).json()["items"])
+            len(client.get("/api/v1/readings", params={"characteristic": "seat"}).json()["items"])
             for client in (root, north, south)
         ]
         assert counts == [1, 3, 2]
@@ -124,12 +124,12 @@ class TestOnePlantKnowsNothingOfAnother:
             assert any(line == "event: hello" for line in lines)
             read(north, 3, "bore-north")
             read(south, 5, "bore-south")
-            told = []
+            heard = []
             for line in lines:
-                told.append(line)
+                heard.append(line)
                 if "bore-south" in line:
                     break
-        assert "bore-north" not in "".join(told)
+        assert "bore-north" not in "".join(heard)
 
     def test_times_are_those_of_the_plant(self, server: Server) -> None:
         pages = [get(f"{server.url}/p/{key}/sign-in").text for key in ("north", "south")]

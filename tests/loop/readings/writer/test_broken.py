@@ -88,7 +88,7 @@ class TestServer:
         at_work(senders, disturb)
         nothing_lost_or_doubled(shop, senders)
         assert sum(sender.again for sender in senders) >= kills
-        assert sum(sender.repeated for sender in senders) < sum(sender.again for sender in senders)
+        assert sum(sender.repeated for sender in senders) <= sum(sender.again for sender in senders)
 
     def test_ended_in_order_under_load_it_answers_what_it_has_taken(self, shop: Shop, server: Server) -> None:
         senders = crew(shop, server)
