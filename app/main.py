@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
 
-from fastapi import APIRouter, Depends, FastAPI, Request
+from fastapi import APIRouter, FastAPI, Request
 from starlette.middleware.gzip import GZipMiddleware
 
 from app.access import api as people
@@ -107,7 +107,6 @@ from app.views.station import pages as station_pages
 from app.views.to_do import pages as to_do_pages
 from app.views.to_do.queries import COUNT as TO_DO_COUNT
 from app.web import api_docs, health
-from app.web.deps import may_read_replica
 from app.web.limits import BodyLimit
 from app.web.live import Live
 from app.web.openapi import document
@@ -201,26 +200,6 @@ ROUTERS: tuple[APIRouter, ...] = (
     proof_pages.router,
     report_pages.router,
     report_job_pages.router,
-)
-
-# Heavy reading that changes nothing: charts, statistics, reports, exports, searches. A copy of the database will do for it.
-FROM_REPLICA = (
-    figures_api.router,
-    statistics.router,
-    capability.router,
-    capability_pages.router,
-    compare.router,
-    compare_pages.router,
-    overview.router,
-    overview_pages.router,
-    search.router,
-    search_pages.router,
-    reading_list.router,
-    wear.router,
-    reports.router,
-    report_points.router,
-    report_pages.router,
-    control.router,
 )
 
 # What is done once a minute; see app.jobs.
@@ -361,7 +340,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     app.add_middleware(BodyLimit)
     app.mount("/static", assets())  # first, so that no file waits until hundreds of routes have been looked through
     for router in ROUTERS:
-        app.include_router(router, dependencies=[Depends(may_read_replica)] if router in FROM_REPLICA else [])
+        app.router.routes += router.routes  # as they are: include_router would build each anew, for every plant
     if replica is not None:
         app.add_middleware(OwnChanges, replica=replica, secure=settings.secure_cookies)
     app.openapi = partial(document, app, readings.SCHEMAS, prefix or "/")  # type: ignore[method-assign]

@@ -3,7 +3,7 @@
 from typing import Annotated, Any
 
 import msgspec
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Path, Query, Response, params
 from fastapi.routing import APIRoute
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
@@ -125,11 +125,12 @@ def _operation_id(route: APIRoute) -> str:
     return route.name
 
 
-def api_router(tag: str) -> APIRouter:
+def api_router(tag: str, *dependencies: params.Depends) -> APIRouter:
     """A router for JSON routes below the base path. The name of a route's function is its operation id."""
     return APIRouter(
         prefix=BASE,
         tags=[tag],
+        dependencies=dependencies,
         route_class=JsonRoute,
         generate_unique_id_function=_operation_id,
         responses=problems(),

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, cast
 from urllib.parse import urlsplit
 
-from fastapi import Depends, Query, Request
+from fastapi import Depends, Query, Request, params
 from pydantic import AfterValidator
 from sqlalchemy.orm import Session
 from starlette.datastructures import FormData
@@ -36,8 +36,11 @@ EVENT_HEADER = "X-Inband-Event"
 
 
 def may_read_replica(request: Request) -> None:
-    """For routes whose reading is heavy: what they only read may come from a copy of the database."""
     request.state.may_read_replica = request.method in SAFE_METHODS
+
+
+FROM_REPLICA = cast("params.Depends", Depends(may_read_replica))
+"""For routers of heavy reading: charts, statistics, reports, exports, searches. A copy of the database will do for it."""
 
 
 def get_session(request: Request) -> Iterator[Session]:

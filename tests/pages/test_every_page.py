@@ -94,14 +94,8 @@ def pages_of_the_house() -> set[str]:
 
     from app.main import ROUTERS
 
-    def routes_of(router: Any) -> Iterator[APIRoute]:
-        for route in router.routes:
-            if isinstance(route, APIRoute):
-                yield route
-            elif hasattr(route, "original_router"):
-                yield from routes_of(route.original_router)
-
-    found = {route.path for router in ROUTERS for route in routes_of(router) if "GET" in (route.methods or ())}
+    routes = [route for router in ROUTERS for route in router.routes if isinstance(route, APIRoute)]
+    found = {route.path for route in routes if "GET" in (route.methods or ())}
     return {path for path in found if not path.startswith(("/api/v1/", "/health/", "/metrics"))}
 
 

@@ -11,10 +11,10 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import queries
 from app.web.api import CharacteristicKey, api_router, problems
 from app.web.choice import check_order
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.fields import LARGEST_ID, Moment, answer_from
 
-router = api_router("statistics")
+router = api_router("statistics", FROM_REPLICA)
 
 
 class StatisticsOut(BaseModel):

@@ -12,9 +12,9 @@ from app.quality.capability.queries import Study
 from app.quality.capability.request import StudyRequestDep, study_of
 from app.quality.capability.schemas import CapabilityOut, capability_out
 from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 
-router = api_router("statistics")
+router = api_router("statistics", FROM_REPLICA)
 
 
 def drawn(study: Study) -> CapabilityChart:

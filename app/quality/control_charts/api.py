@@ -33,10 +33,10 @@ from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import Marks
 from app.web.api import FIGURE, CharacteristicKey, Limit, Theme, api_router, chart_answer, problems, sent_again
 from app.web.choice import Chosen
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Page, page_of
 
-router = api_router("control charts")
+router = api_router("control charts", FROM_REPLICA)
 
 Version = Annotated[
     int, Path(ge=1, le=LARGEST_SERIAL, description="Version of the baseline; counts per characteristic.", examples=[3])

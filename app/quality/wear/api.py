@@ -13,10 +13,10 @@ from app.quality.wear.chart import chart_of
 from app.quality.wear.figures import wear_figure
 from app.quality.wear.schemas import WearOut
 from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.fields import LARGEST_ID
 
-router = api_router("wear")
+router = api_router("wear", FROM_REPLICA)
 
 
 @router.get("/characteristics/{characteristic}/wear", responses=problems(404))

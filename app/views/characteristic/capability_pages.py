@@ -23,11 +23,11 @@ from app.quality.gauge_studies import queries as gauges
 from app.quality.gauge_studies import wording as gauge_wording
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.forms import by_field
 from app.web.templates import page
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, dependencies=[FROM_REPLICA])
 RUNS = ("125", "500", "1000", "5000", "all")
 
 

@@ -16,10 +16,10 @@ from app.views.characteristic.chart import chart_of, results_of, run_of
 from app.views.characteristic.figures import counting_edges, histogram_figure, result_figure, run_figure, zone_chart
 from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
 from app.web.choice import Choice, Chosen
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.fields import LARGEST_ID
 
-router = api_router("characteristics")
+router = api_router("characteristics", FROM_REPLICA)
 
 ResultName = Literal["run_out", "out_of_roundness", "taper", "repeat_range", "repeat_deviation"]
 Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]

@@ -11,9 +11,9 @@ from app.views.compare.figures import compare_figure
 from app.views.compare.series import SeriesBy, compared
 from app.web.api import FIGURE, Theme, api_router, chart_answer, problems
 from app.web.choice import Chosen
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 
-router = api_router("statistics")
+router = api_router("statistics", FROM_REPLICA)
 Of = Annotated[list[str], Query(max_length=12, description="Characteristics.", examples=["shaft-d40"])]
 ByQuery = Annotated[SeriesBy, Query(description="What differs: characteristics, or versions, tools, periods of each.")]
 

@@ -13,11 +13,11 @@ from app.quality.capability import wording as capability
 from app.views.compare.chart import row_of
 from app.views.compare.series import MOST, SeriesBy, compared
 from app.web.choice import ChosenOnPage
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.paging import address
 from app.web.templates import page
 
-router = APIRouter(include_in_schema=False, dependencies=[require("viewer")])
+router = APIRouter(include_in_schema=False, dependencies=[FROM_REPLICA, require("viewer")])
 
 
 @router.get("/compare")

@@ -9,9 +9,9 @@ from app.views.overview import queries
 from app.views.overview.queries import By
 from app.views.overview.schemas import Overview
 from app.web.api import api_router, problems
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 
-router = api_router("overview")
+router = api_router("overview", FROM_REPLICA)
 
 
 @router.get("/overview", responses=problems(404), dependencies=[require("viewer")])

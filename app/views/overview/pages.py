@@ -16,11 +16,11 @@ from app.views.characteristic.wording import state_word
 from app.views.overview import queries, wording
 from app.views.overview.queries import By
 from app.views.overview.ranking import CAPABLE
-from app.web.deps import SessionDep, Sought
+from app.web.deps import FROM_REPLICA, SessionDep, Sought
 from app.web.paging import address, holds, slice_of
 from app.web.templates import page
 
-router = APIRouter(include_in_schema=False, dependencies=[require("viewer")])
+router = APIRouter(include_in_schema=False, dependencies=[FROM_REPLICA, require("viewer")])
 
 ON_PAGE = 50
 

@@ -17,11 +17,11 @@ from app.loop.characteristics import queries as characteristics
 from app.views.reports import queries
 from app.views.reports.request import EVERYTHING, ReportRequest, SectionName, section_names
 from app.web.api import CharacteristicKey, api_router, problems
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.downloads import download
 from app.web.fields import Moment
 
-router = api_router("reports")
+router = api_router("reports", FROM_REPLICA)
 
 FILE: dict[int | str, dict[str, Any]] = {
     200: {

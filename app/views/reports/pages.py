@@ -19,12 +19,12 @@ from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.views.reports import queries
 from app.views.reports.request import EVERYTHING, LAST, ReportRequest, SectionName, typed
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.forms import by_field
 from app.web.period import with_preset
 from app.web.templates import page
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, dependencies=[FROM_REPLICA])
 RUNS = ("200", "1000", "5000", "all")
 FIELDS = ("from", "to", "last", "timezone", "paper")
 

@@ -18,11 +18,11 @@ from app.quality.control_charts import charts, queries
 from app.quality.control_charts.charts import View
 from app.web.api import CharacteristicKey, api_router, problems
 from app.web.choice import Chosen
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.downloads import download
 from app.web.fields import LARGEST_SERIAL
 
-router = api_router("reports")
+router = api_router("reports", FROM_REPLICA)
 COLUMNS = (
     "chart",
     "baseline",

@@ -9,9 +9,9 @@ from app.access.deps import Viewer
 from app.views.search import queries
 from app.views.search.parts import Part
 from app.web.api import api_router, problems
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 
-router = api_router("search")
+router = api_router("search", FROM_REPLICA)
 
 
 class SearchHit(BaseModel):

@@ -11,11 +11,11 @@ from app.views.search import parts, queries
 from app.views.search.parts import Part, part_path
 from app.views.search.readings import Filters, cursor_of
 from app.views.search.readings_api import CURSOR
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.paging import Part as PageOfList
 from app.web.templates import page
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, dependencies=[FROM_REPLICA])
 ON_PAGE = 100
 
 

@@ -14,10 +14,10 @@ from app.views.search import readings
 from app.views.search.parts import Part
 from app.web.api import Limit, MachineFilter, api_router, problems
 from app.web.choice import check_order
-from app.web.deps import SessionDep
+from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.fields import Moment, Page
 
-router = api_router("readings")
+router = api_router("readings", FROM_REPLICA)
 CURSOR = r"^[0-9]{1,19}(-[0-9]{1,19}){0,3}$"
 
 

@@ -14,7 +14,7 @@ from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID
 from app.web.paging import address, part_of
 
-router = APIRouter()
+router = APIRouter(include_in_schema=False)
 SHOWN = 100
 
 

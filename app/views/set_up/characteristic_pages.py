@@ -28,7 +28,7 @@ from app.web.deps import FormDep, SessionDep, Sought
 from app.web.forms import by_field, parsed
 from app.web.paging import Order, address, part_of
 
-router = APIRouter()
+router = APIRouter(include_in_schema=False)
 ON_PAGE = 200
 LOOKED_BACK = 100  # readings from which a plausible jump is suggested
 

@@ -8,7 +8,7 @@ from app.jobs.wording import job_word, link_of
 from app.views.set_up.frame import setup_page
 from app.web.deps import SessionDep
 
-router = APIRouter()
+router = APIRouter(include_in_schema=False)
 
 
 @router.get("/setup/jobs")

@@ -21,7 +21,7 @@ from app.views.set_up.frame import setup_page
 from app.web.deps import AddressDep, FormDep, SessionDep
 from app.web.forms import by_field, length, parsed, whole
 
-router = APIRouter()
+router = APIRouter(include_in_schema=False)
 NUMBERS = (
     "signal_delay",
     "signal_jitter",

@@ -21,7 +21,7 @@ from app.views.set_up.frame import setup_page
 from app.web.deps import SessionDep, texts
 from app.web.paging import address
 
-router = APIRouter()
+router = APIRouter(include_in_schema=False)
 MOST = 2000  # characteristics on the page
 
 

@@ -33,4 +33,4 @@ for part in (
     audit_pages,
     job_pages,
 ):
-    router.include_router(part.router)
+    router.routes += part.router.routes

@@ -15,7 +15,7 @@ from app.views.set_up.frame import setup_page
 from app.web.deps import AddressDep, FormDep, SessionDep
 from app.web.forms import by_field
 
-router = APIRouter()
+router = APIRouter(include_in_schema=False)
 DONE = {"disable": "disabled", "enable": "enabled", "role": "role"}
 
 

@@ -30,7 +30,7 @@ from app.views.set_up.frame import setup_page
 from app.web.deps import SessionDep, texts
 from app.web.forms import by_field
 
-router = APIRouter()
+router = APIRouter(include_in_schema=False)
 VERDICTS = tuple(verdict.value for verdict in (LineVerdict.NOT_UNDERSTOOD, LineVerdict.UNDERSTOOD, LineVerdict.IGNORED))
 
 

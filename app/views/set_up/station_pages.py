@@ -14,7 +14,7 @@ from app.views.set_up.frame import setup_page
 from app.web.deps import AddressDep, FormDep, SessionDep
 from app.web.forms import by_field, whole
 
-router = APIRouter()
+router = APIRouter(include_in_schema=False)
 
 
 @router.get("/setup/stations")
