@@ -6,6 +6,7 @@ hundredths of a second; a test that only looks at what a transaction does takes 
 """
 
 import fcntl
+import gc
 import itertools
 import os
 import shutil
@@ -53,6 +54,11 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 def pytest_configure(config: pytest.Config) -> None:
     chance.load(long=config.getoption("--long"))
+
+
+def pytest_collection_finish() -> None:
+    """Thousands of tests were collected to stay; no round of garbage collection need look at them again."""
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:

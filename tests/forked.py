@@ -14,12 +14,9 @@ import time
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
-from app.cli import PARTS
 from tests.keeper import PR_SET_PDEATHSIG, prctl
 
-multiprocessing.get_context("forkserver").set_forkserver_preload(
-    ["app.main", *PARTS, "tests.quick_passwords", "tests.forked"]
-)
+multiprocessing.get_context("forkserver").set_forkserver_preload(["tests.preloaded", "tests.forked"])
 
 
 def inband(

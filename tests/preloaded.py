@@ -1,0 +1,18 @@
+"""What a server needs in its first minute, read and compiled once for all that are forked: see `tests.forked`."""
+
+import gc
+import importlib
+import pkgutil
+
+import app
+from app.loop.readings.writer.columnar import compile_now
+from app.web.templates import environment
+from tests import quick_passwords  # noqa: F401 - the passwords replace what they are about
+
+for module in pkgutil.walk_packages(app.__path__, "app."):
+    if not module.name.endswith("__main__"):
+        importlib.import_module(module.name)
+compile_now()
+for name in environment().list_templates():
+    environment().get_template(name)
+gc.freeze()
