@@ -46,8 +46,8 @@ PAGES = {
         "/characteristics/{characteristic}-empty/control",
     ],
     "/characteristics/{characteristic}/control/freeze": [
-        "/characteristics/{characteristic}-empty/control/freeze",
         "/characteristics/{characteristic}-watched/control/freeze?last=200",
+        "/characteristics/{characteristic}-empty/control/freeze",
         "/characteristics/{characteristic}-watched/control/freeze?first_sequence=1&last_sequence=60&excluded=7%20chip",
     ],
     "/characteristics/{characteristic}/rules": [

@@ -72,6 +72,9 @@ SAMPLE = {
 """Pages that axe sees in all states, and with its own rules of colours, also in the short run."""
 
 
+USUAL = {addresses[0] for addresses in PAGES.values()} | BESIDE_THE_MACHINE | SAMPLE
+"""Addresses that are looked at in the short run: each page once, and what is worked with gloves."""
+
 ALIKE = "details.operation ~ details.operation"
 """What there is in hundreds on the page of the API, so that axe takes half a minute: it sees one of each group in the short run."""
 
@@ -125,9 +128,10 @@ def visitor(browser: Browser, server: Server, admin: Person) -> Iterator[tuple[P
 
 
 @pytest.mark.parametrize(
-    "looks", [pytest.param(SHORT, id="short"), pytest.param(WHOLE, id="whole", marks=pytest.mark.long)]
+    ("address", "looks"),
+    [pytest.param(address, SHORT, id=f"{address}-short") for address in sorted(USUAL)]
+    + [pytest.param(address, WHOLE, id=f"{address}-whole", marks=pytest.mark.long) for address in ADDRESSES],
 )
-@pytest.mark.parametrize("address", ADDRESSES)
 def test_a_page_is_in_order(
     visitor: tuple[Page, list[str]], values: dict[str, Any], address: str, looks: Looks
 ) -> None:
