@@ -34,10 +34,12 @@ test-long: $(VENV)/browser
 lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check --quiet
 	@$(BIN)/ruff format --check --quiet
-	@$(BIN)/mypy --no-error-summary
-	@$(BIN)/python -m tests.style
-	@$(BIN)/djlint --lint --quiet frontend/templates > $(VENV)/djlint.txt || { cat $(VENV)/djlint.txt; exit 1; }
-	@$(BIN)/lint-imports > $(VENV)/lint-imports.txt || { cat $(VENV)/lint-imports.txt; exit 1; }
+	@$(BIN)/mypy --no-error-summary & types=$$!; \
+	{ $(BIN)/python -m tests.style \
+		&& { $(BIN)/djlint --lint --quiet frontend/templates > $(VENV)/djlint.txt || { cat $(VENV)/djlint.txt; false; }; } \
+		&& { $(BIN)/lint-imports > $(VENV)/lint-imports.txt || { cat $(VENV)/lint-imports.txt; false; }; }; \
+	} || { kill $$types; exit 1; }; \
+	wait $$types
 
 bench: $(VENV)/installed-dev $(VENV)/browser
 	@for each in cli single batch chart memory spc history replay pages; do $(BIN)/python -m bench.$$each; done
