@@ -4,20 +4,11 @@ from typing import Any
 import pytest
 
 from app.core.parameters import Parameters, read
+from bench.plant import PARAMETERS
 
-SHAFT: dict[str, Any] = {
-    "tool_memory": 3,
-    "average_memory": 5,
-    "nominal": 40.0,
-    "upper_deviation": 0.0,
-    "lower_deviation": -0.016,
-    "zero_range": 0.001,
-    "averaging_limit": 0.0053,
-    "wear_limit": 0.3,
-    "confidence_limit": 1.0,
-    "weighting_factor": 2,
-    "factor": -1,
-}
+SHAFT: dict[str, Any] = PARAMETERS | {"tool_memory": 3, "average_memory": 5}
+"""The bearing seat of the contract, on a tool and an average."""
+SEAT = read(SHAFT)[0]
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from app.core.compiled import plain
 from app.core.effect import FEWEST_CORRECTIONS, FEWEST_READINGS, LONGEST, Effect, _missed, measured_effect
 from app.core.replay import Policy, ReplayedCharacteristic, run, without_events
 from app.core.spc.refusal import Reason, Refused
-from tests.core.test_replay import SHAFT
+from tests.core.conftest import SEAT
 
 Values = NDArray[np.float64]
 LIFE = 520
@@ -25,7 +25,7 @@ def loop(effect: float, delay: int, seed: int, count: int = 1500) -> tuple[Value
     trace.marks[::LIFE] = 1
     begins = int((trace.marks > 0).sum())
     trace = trace._replace(offset=np.zeros(begins), pending=np.zeros(begins), averages=np.zeros((begins, 1)))
-    course, _figures = run(trace, Policy((ReplayedCharacteristic(replace(SHAFT, zero_range=0.002), effect),), delay))
+    course, _figures = run(trace, Policy((ReplayedCharacteristic(replace(SEAT, zero_range=0.002), effect),), delay))
     return course.deviation, course.offset, trace.marks > 0
 
 

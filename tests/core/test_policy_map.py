@@ -2,7 +2,7 @@
 
 from app.core.policy_map import Criterion, best_region, in_order, with_settings
 from app.core.replay import Figures
-from tests.core.test_replay import SHAFT
+from tests.core.conftest import SEAT
 
 
 def cell(**numbers: float | None) -> Figures:
@@ -38,7 +38,7 @@ def test_of_settings_as_good_as_the_best_one_corrects_least() -> None:
 
 
 def test_settings_out_of_order_are_told() -> None:
-    assert in_order(SHAFT)
-    assert not in_order(with_settings(SHAFT, zero_range=0.0053))
-    assert not in_order(with_settings(SHAFT, averaging_limit=0.0081))
-    assert with_settings(SHAFT, weighting_factor=3).weighting_factor == 3
+    assert in_order(SEAT)
+    assert not in_order(with_settings(SEAT, zero_range=0.0053))
+    assert not in_order(with_settings(SEAT, averaging_limit=0.0081))
+    assert with_settings(SEAT, weighting_factor=3).weighting_factor == 3

@@ -23,19 +23,9 @@ from app.core.replay import (
 )
 from bench.replay import followed
 from tests.chance import examples
+from tests.core.conftest import SEAT
 
-SHAFT = Parameters(
-    target=39.992,
-    tolerance_width=0.016,
-    zero_range=0.001,
-    averaging_limit=0.0053,
-    wear_limit=0.3,
-    confidence_limit=1.0,
-    weighting_factor=2,
-    tool_memory=3,
-    average_memory=5,
-)
-EXAMPLE = replace(SHAFT, target=10, tolerance_width=0.04, zero_range=0.004, averaging_limit=0.0133)
+EXAMPLE = replace(SEAT, target=10, tolerance_width=0.04, zero_range=0.004, averaging_limit=0.0133)
 
 
 def micrometres(*values: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -57,7 +47,7 @@ def parameter_sets(draw: st.DrawFn) -> Parameters:
     r34 = draw(st.integers(r33 + 1, 8000))
     half = draw(st.integers(r34, 12_000))
     return replace(
-        SHAFT,
+        SEAT,
         zero_range=r33 / 1e6,
         averaging_limit=r34 / 1e6,
         tolerance_width=2 * half / 1e6,
@@ -164,7 +154,7 @@ def test_the_worked_example_of_the_cycles() -> None:
 )
 def test_a_step_by_hand(delay: int, deviations: list[float], amounts: list[float]) -> None:
     result, figures = run(
-        without_events(micrometres(7, 7, 7, 7, 7)), Policy((ReplayedCharacteristic(SHAFT, 1.0),), delay)
+        without_events(micrometres(7, 7, 7, 7, 7)), Policy((ReplayedCharacteristic(SEAT, 1.0),), delay)
     )
     assert (result.deviation * 1000).round(6).tolist() == deviations
     assert (result.amount * 1000).round(6).tolist() == amounts
@@ -173,7 +163,7 @@ def test_a_step_by_hand(delay: int, deviations: list[float], amounts: list[float
 
 def test_wear_by_hand() -> None:
     # 1 µm a part, R33 = 2, k = 1: corrected by 3 at each third part.
-    policy = Policy((ReplayedCharacteristic(replace(SHAFT, zero_range=0.002, weighting_factor=1), 1.0),))
+    policy = Policy((ReplayedCharacteristic(replace(SEAT, zero_range=0.002, weighting_factor=1), 1.0),))
     result, figures = run(without_events(np.arange(13) / 1000), policy)
     assert (result.deviation * 1000).round(6).tolist() == [0, 1, 2, 3, 1, 2, 3, 1, 2, 3, 1, 2, 3]
     assert (result.offset * 1000).round(6).tolist() == [0, 0, 0, 0, -3, -3, -3, -6, -6, -6, -9, -9, -9]
@@ -184,7 +174,7 @@ def test_wear_by_hand() -> None:
 
 
 def test_the_wrong_sign_runs_away_to_where_a_person_is_asked() -> None:
-    wrong = Policy((ReplayedCharacteristic(replace(SHAFT, factor=1.0), 1.0),))
+    wrong = Policy((ReplayedCharacteristic(replace(SEAT, factor=1.0), 1.0),))
     result, figures = run(without_events(np.full(40, 0.006)), wrong)
     assert result.deviation[:4].tolist() == [0.006, 0.012, 0.024, 0.048]
     assert (figures.worn, figures.held) == (34, 34)
@@ -193,7 +183,7 @@ def test_the_wrong_sign_runs_away_to_where_a_person_is_asked() -> None:
 def test_what_is_held_waits_for_the_release_of_then() -> None:
     trace = without_events(np.full(5, 0.4))
     trace.marks[3] = Mark.RELEASED
-    result, figures = run(trace, Policy((ReplayedCharacteristic(SHAFT, 1.0),)))
+    result, figures = run(trace, Policy((ReplayedCharacteristic(SEAT, 1.0),)))
     assert result.deviation.tolist() == [0.4, 0.4, 0.4, 0.0, 0.0]
     assert (figures.held, figures.corrections) == (3, 0)
 
@@ -203,8 +193,8 @@ def test_two_characteristics_of_one_tool_share_what_is_corrected() -> None:
     trace = without_events(micrometres(7, 1, 7, 1, 7, 1))._replace(lane=lane, part=parts_of(lane))
     both = Policy(
         (
-            ReplayedCharacteristic(SHAFT, 1.0),
-            ReplayedCharacteristic(replace(SHAFT, zero_range=0.002), 1.0, counts=False),
+            ReplayedCharacteristic(SEAT, 1.0),
+            ReplayedCharacteristic(replace(SEAT, zero_range=0.002), 1.0, counts=False),
         )
     )
     result, figures = run(trace, both)
@@ -227,7 +217,7 @@ def test_taking_the_corrections_out_and_running_the_same_policy_gives_what_was(
 ) -> None:
     chance = np.random.default_rng(seed)
     trace = without_events(np.arange(300) * wear + chance.normal(0, 0.001, 300).round(6))
-    policy = Policy((ReplayedCharacteristic(replace(SHAFT, factor=factor), -effect / factor),), delay)
+    policy = Policy((ReplayedCharacteristic(replace(SEAT, factor=factor), -effect / factor),), delay)
     then, figures = run(trace, policy)
     free = rebuilt(then.deviation, then.offset, factor, effect)
     again, same = run(trace._replace(free=free), policy)
@@ -239,7 +229,7 @@ def test_taking_the_corrections_out_and_running_the_same_policy_gives_what_was(
 def test_figures_by_hand() -> None:
     trace = without_events(micrometres(1, -1, 9, -9, 400, 1200, 0.5, -0.5))
     trace.marks[7] |= Mark.LEFT_OUT
-    _result, figures = run(trace, Policy((ReplayedCharacteristic(replace(SHAFT, mode=Mode.MEASURE_ONLY), 1.0),)))
+    _result, figures = run(trace, Policy((ReplayedCharacteristic(replace(SEAT, mode=Mode.MEASURE_ONLY), 1.0),)))
     assert (figures.readings, figures.inner, figures.rejects) == (7, 5, 3)
     assert (figures.oversize, figures.undersize, figures.worn, figures.faults, figures.alarms) == (1, 1, 1, 1, 4)
     assert figures.spread == pytest.approx(np.std(micrometres(1, -1, 9, -9, 0.5), ddof=1))
@@ -251,7 +241,7 @@ def test_ppk_is_that_of_the_statistics() -> None:
     from app.core.spc.capability import Limits, capability
 
     free = np.random.default_rng(3).normal(0.001, 0.002, 400)
-    quiet = Policy((ReplayedCharacteristic(replace(SHAFT, mode=Mode.MEASURE_ONLY), 1.0),))
+    quiet = Policy((ReplayedCharacteristic(replace(SEAT, mode=Mode.MEASURE_ONLY), 1.0),))
     result, figures = run(without_events(free), quiet)
     expected = capability(result.deviation, Limits(-0.008, 0.008))
     assert figures.ppk == pytest.approx(expected.ppk.value, rel=1e-9)
@@ -259,7 +249,7 @@ def test_ppk_is_that_of_the_statistics() -> None:
 
 
 def test_equal_readings_have_no_ppk() -> None:
-    _result, figures = run(without_events(np.full(50, 0.0004)), Policy((ReplayedCharacteristic(SHAFT, 1.0),)))
+    _result, figures = run(without_events(np.full(50, 0.0004)), Policy((ReplayedCharacteristic(SEAT, 1.0),)))
     assert (figures.ppk, figures.corrections) == (None, 0)
     assert figures.spread == pytest.approx(0, abs=1e-12)
 
@@ -269,7 +259,7 @@ def test_agreement_of_nothing_is_not_a_number() -> None:
 
 
 def test_a_way_without_readings_amounts_to_nothing() -> None:
-    _result, figures = run(without_events(np.zeros(0)), Policy((ReplayedCharacteristic(SHAFT, 1.0),)))
+    _result, figures = run(without_events(np.zeros(0)), Policy((ReplayedCharacteristic(SEAT, 1.0),)))
     assert (figures.readings, figures.mean, figures.spread, figures.ppk, figures.largest) == (0, None, None, None, None)
     assert figures_of(without_events(np.zeros(0)), []) == []
     assert len(ReplayResult.room(0).deviation) == 0

@@ -56,7 +56,7 @@ class Hands:
 
 
 @pytest.fixture(scope="module")
-def shop(server: Server) -> Shop:
+def floor(server: Server) -> Shop:
     """A characteristic with readings of last week, of yesterday and of now, the last one corrected; two corrections that
     wait for approval, and one alarm, each on a tool of its own."""
     made = Shop(server)
@@ -88,13 +88,13 @@ def at_the_plant(page: Page, person: Person) -> Hands:
     return Hands(page)
 
 
-def line(page: Page, shop: Shop, more: str = "") -> Locator:
+def line(page: Page, floor: Shop, more: str = "") -> Locator:
     """The line of a characteristic on the plant page."""
-    return page.locator(f"[id='c-{shop.characteristic}{more}']")
+    return page.locator(f"[id='c-{floor.characteristic}{more}']")
 
 
-def name(page: Page, shop: Shop) -> Locator:
-    return line(page, shop).get_by_role("link", name=f"Seat {shop.characteristic}", exact=True)
+def name(page: Page, floor: Shop) -> Locator:
+    return line(page, floor).get_by_role("link", name=f"Seat {floor.characteristic}", exact=True)
 
 
 class TestByTouch:
@@ -104,18 +104,18 @@ class TestByTouch:
     def screen(self) -> dict[str, Any]:
         return {"viewport": {"width": 800, "height": 1280}, "has_touch": True}
 
-    def test_acknowledge_an_alarm(self, page: Page, shop: Shop, operator: Person) -> None:
+    def test_acknowledge_an_alarm(self, page: Page, floor: Shop, operator: Person) -> None:
         hands = at_the_plant(page, operator)
-        hands.tap(line(page, shop, "-oversize").get_by_role("link", name="1 alarm"))
+        hands.tap(line(page, floor, "-oversize").get_by_role("link", name="1 alarm"))
         hands.tap(page.get_by_role("link", name="Noted"))
         hands.tap(page.get_by_role("dialog").get_by_role("button", name="Noted"))
         expect(page.get_by_role("status").filter(has_text="Oversize")).to_contain_text("Noted")
-        assert shop.alarms() == []
+        assert floor.alarms() == []
         assert hands.count == 3
 
-    def test_approve_a_correction(self, page: Page, shop: Shop, operator: Person) -> None:
+    def test_approve_a_correction(self, page: Page, floor: Shop, operator: Person) -> None:
         hands = at_the_plant(page, operator)
-        hands.tap(line(page, shop, "-approval").get_by_role("link", name="−6.0 µm awaiting approval"))
+        hands.tap(line(page, floor, "-approval").get_by_role("link", name="−6.0 µm awaiting approval"))
         hands.tap(page.get_by_role("link", name="Approve"))
         dialog = page.get_by_role("dialog")
         hands.tap(dialog.get_by_role("radio", name="As expected"))
@@ -123,10 +123,10 @@ class TestByTouch:
         expect(page.get_by_role("status").filter(has_text="approved")).to_be_visible()
         assert hands.count == 4
 
-    def test_approve_a_correction_from_the_list_of_what_waits(self, page: Page, shop: Shop, operator: Person) -> None:
+    def test_approve_a_correction_from_the_list_of_what_waits(self, page: Page, floor: Shop, operator: Person) -> None:
         operator.sign_in(page)
         page.goto("/todo")
-        hands, about = Hands(page), f"Seat {shop.characteristic}-to-do"
+        hands, about = Hands(page), f"Seat {floor.characteristic}-to-do"
         hands.tap(page.get_by_role("row").filter(has_text=about).get_by_role("link", name="Approve"))
         dialog = page.get_by_role("dialog")
         hands.tap(dialog.get_by_role("radio", name="As expected"))
@@ -135,9 +135,9 @@ class TestByTouch:
         expect(page.get_by_role("row").filter(has_text=about)).to_have_count(0)
         assert hands.count == 3
 
-    def test_report_a_tool_change(self, page: Page, shop: Shop, operator: Person) -> None:
+    def test_report_a_tool_change(self, page: Page, floor: Shop, operator: Person) -> None:
         hands = at_the_plant(page, operator)
-        hands.tap(line(page, shop).get_by_role("link", name="T3"))
+        hands.tap(line(page, floor).get_by_role("link", name="T3"))
         hands.tap(page.get_by_role("link", name="Tool changed"))
         dialog = page.get_by_role("dialog")
         hands.tap(dialog.locator(".chip").first)
@@ -145,9 +145,9 @@ class TestByTouch:
         expect(page.locator("main")).to_contain_text("starts a new life")
         assert hands.count == 4
 
-    def test_why_was_it_corrected_last(self, page: Page, shop: Shop, operator: Person) -> None:
+    def test_why_was_it_corrected_last(self, page: Page, floor: Shop, operator: Person) -> None:
         hands = at_the_plant(page, operator)
-        hands.tap(name(page, shop))
+        hands.tap(name(page, floor))
         chart = page.locator("plotly-chart.zones")
         expect(chart).to_have_attribute("tabindex", "0")
         chart.scroll_into_view_if_needed()
@@ -159,7 +159,7 @@ class TestByTouch:
 class TestAtTheDesk:
     """An engineer with a mouse and a keyboard."""
 
-    def test_find_a_part(self, page: Page, shop: Shop, engineer: Person) -> None:
+    def test_find_a_part(self, page: Page, floor: Shop, engineer: Person) -> None:
         hands = at_the_plant(page, engineer)
         hands.press("/")
         hands.type(PART)
@@ -170,37 +170,37 @@ class TestAtTheDesk:
         expect(page.locator("#of-part")).to_contain_text("corrected in full")
         assert hands.count == 4
 
-    def test_look_at_yesterday(self, page: Page, shop: Shop, engineer: Person) -> None:
+    def test_look_at_yesterday(self, page: Page, floor: Shop, engineer: Person) -> None:
         hands = at_the_plant(page, engineer)
-        hands.click(name(page, shop))
+        hands.click(name(page, floor))
         hands.click(page.locator(".period-picker summary").first)
         hands.click(page.get_by_role("link", name="Yesterday"))
         page.wait_for_url(lambda url: "from=" in url)
-        counted = f"/characteristics/{shop.characteristic}/statistics?{urlsplit(page.url).query}"
-        expect(page.locator("#numbers dd").first).to_have_text(str(shop.call("GET", counted)["count"]))
+        counted = f"/characteristics/{floor.characteristic}/statistics?{urlsplit(page.url).query}"
+        expect(page.locator("#numbers dd").first).to_have_text(str(floor.call("GET", counted)["count"]))
         assert hands.count == 3
 
-    def test_see_the_capability(self, page: Page, shop: Shop, engineer: Person) -> None:
+    def test_see_the_capability(self, page: Page, floor: Shop, engineer: Person) -> None:
         hands = at_the_plant(page, engineer)
-        hands.click(name(page, shop))
+        hands.click(name(page, floor))
         hands.click(page.get_by_role("link", name="Capability", exact=True))
         expect(page.locator("#indices")).to_contain_text("Ppk")
         assert hands.count == 2
 
-    def test_change_r33_with_a_reason(self, page: Page, shop: Shop, engineer: Person) -> None:
+    def test_change_r33_with_a_reason(self, page: Page, floor: Shop, engineer: Person) -> None:
         hands = at_the_plant(page, engineer)
-        hands.click(name(page, shop))
+        hands.click(name(page, floor))
         hands.click(page.get_by_role("link", name="Parameters in Set-up"))
         hands.type("0.0015", page.locator("#f-zero_range"))
         hands.type("Half as many corrections", page.get_by_label("Reason for the change"))
         hands.click(page.get_by_role("button", name="Save"))
         expect(page.locator("#versions")).to_contain_text("Half as many corrections")
-        assert shop.call("GET", f"/characteristics/{shop.characteristic}")["parameters"]["zero_range"] == 0.0015
+        assert floor.call("GET", f"/characteristics/{floor.characteristic}")["parameters"]["zero_range"] == 0.0015
         assert hands.count == 5
 
-    def test_report_last_week_on_paper(self, page: Page, shop: Shop, engineer: Person) -> None:
+    def test_report_last_week_on_paper(self, page: Page, floor: Shop, engineer: Person) -> None:
         hands = at_the_plant(page, engineer)
-        hands.click(name(page, shop))
+        hands.click(name(page, floor))
         hands.click(page.get_by_role("link", name="Report", exact=True))
         hands.click(page.get_by_role("button", name="Last week"))
         hands.click(page.get_by_role("button", name="Show"))
@@ -209,15 +209,15 @@ class TestAtTheDesk:
         assert got.value.path().read_bytes().startswith(b"%PDF-")
         assert hands.count == 5
 
-    def test_add_a_characteristic_like_another(self, page: Page, shop: Shop, engineer: Person) -> None:
+    def test_add_a_characteristic_like_another(self, page: Page, floor: Shop, engineer: Person) -> None:
         hands = at_the_plant(page, engineer)
-        hands.click(name(page, shop))
+        hands.click(name(page, floor))
         hands.click(page.get_by_role("link", name="Parameters in Set-up"))
         hands.click(page.get_by_role("link", name="Add one like it"))
         hands.type("Seat of the other end", page.get_by_label("Name"))
         hands.type("other-end", page.get_by_label("Key"))
         hands.click(page.get_by_role("button", name="Add characteristic"))
         expect(page.get_by_role("heading", level=1)).to_have_text("Seat of the other end")
-        made = shop.call("GET", "/characteristics/other-end")
+        made = floor.call("GET", "/characteristics/other-end")
         assert made["parameters"]["averaging_limit"] == 0.005
         assert hands.count == 6

@@ -216,7 +216,7 @@ class TestExamples:
 
 
 @pytest.fixture(scope="module")
-def shop(server: Server, made: Json) -> Json:
+def plant(server: Server, made: Json) -> Json:
     """A server where the things stand that the document's examples name: lathe-1, shaft-d40, corrections, an alarm."""
     clients = {role: server.client(server.key(role)) for role in ROLES}
     engineer = clients["engineer"]
@@ -395,19 +395,19 @@ def test_a_page_asks_for_the_role_that_the_api_asks_for(app: FastAPI, made: Json
 
 
 class TestAgainstTheServer:
-    def test_answers_to_readings_are_as_described(self, shop: Json) -> None:
-        machine = shop["clients"]["machine"]
-        first = machine.post("/api/v1/readings", json=shop["reading"] | {"key": "one"})
-        again = machine.post("/api/v1/readings", json=shop["reading"] | {"key": "one"})
+    def test_answers_to_readings_are_as_described(self, plant: Json) -> None:
+        machine = plant["clients"]["machine"]
+        first = machine.post("/api/v1/readings", json=plant["reading"] | {"key": "one"})
+        again = machine.post("/api/v1/readings", json=plant["reading"] | {"key": "one"})
         assert (first.status_code, again.status_code) == (201, 200)
         assert first.json() == again.json()
         assert first.json().keys() == ReadingAnswer.model_fields.keys()
         ReadingAnswer.model_validate(first.json())
-        batch = machine.post("/api/v1/readings/batch?decisions=true", json=[shop["reading"] | {"key": "two"}])
+        batch = machine.post("/api/v1/readings/batch?decisions=true", json=[plant["reading"] | {"key": "two"}])
         assert batch.json().keys() == BatchCounts.model_fields.keys()
         BatchCounts.model_validate(batch.json())
 
-    def test_the_examples_work_and_the_roles_are_true(self, server: Server, shop: Json, made: Json) -> None:
+    def test_the_examples_work_and_the_roles_are_true(self, server: Server, plant: Json, made: Json) -> None:
         """Every operation with the examples as they stand: refused below its role, taken (or not found) with it."""
         clients = {role: server.client(server.key(role)) for role in ROLES}  # others' keys are revoked by examples
         clients["machine"] = server.client(server.key(machine="lathe-1"))
@@ -426,13 +426,13 @@ class TestAgainstTheServer:
         assert wrong == []
 
     def test_what_is_answered_to_an_example_has_the_fields_of_the_example_of_an_answer(
-        self, shop: Json, made: Json
+        self, plant: Json, made: Json
     ) -> None:
         answered = 0
         for method, path, operation in operations(made):
             if operation["operationId"] == "events" or operation.get("security") == []:
                 continue
-            answer = send(shop["clients"]["admin"], method, path, operation, number=999_999)
+            answer = send(plant["clients"]["admin"], method, path, operation, number=999_999)
             if answer.is_success and answer.headers.get("content-type") == "application/json":
                 described = resolve(made, operation["responses"][str(answer.status_code)])
                 assert answer.json().keys() == described["content"]["application/json"]["example"].keys(), path
@@ -449,9 +449,9 @@ class TestAgainstTheServer:
                 assert answer.status_code == 401, path
                 assert answer.headers["content-type"] == "application/problem+json"
 
-    def test_every_status_that_is_answered_is_described(self, shop: Json, made: Json) -> None:
+    def test_every_status_that_is_answered_is_described(self, plant: Json, made: Json) -> None:
         """With names and numbers that nobody has: in the path, and in each query parameter alone."""
-        admin, undescribed = shop["clients"]["admin"], set()
+        admin, undescribed = plant["clients"]["admin"], set()
         for method, path, operation in operations(made):
             if operation["operationId"] == "events":
                 continue
@@ -468,8 +468,8 @@ class TestAgainstTheServer:
                     undescribed.add(f"{method} {path} {query}: {answer.status_code}")
         assert sorted(undescribed) == []
 
-    def test_numbers_beyond_what_is_stored_are_named(self, shop: Json, made: Json) -> None:
-        admin, wrong = shop["clients"]["admin"], []
+    def test_numbers_beyond_what_is_stored_are_named(self, plant: Json, made: Json) -> None:
+        admin, wrong = plant["clients"]["admin"], []
         for method, path, operation in operations(made):
             if method != "get" or operation["operationId"] == "events":
                 continue

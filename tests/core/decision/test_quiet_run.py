@@ -10,26 +10,16 @@ from app.core.decision.decide import LoopState, decide
 from app.core.decision.limits import ZONES
 from app.core.decision.loops import FARTHEST, Quiet, Series, quiet_run, rows_of
 from app.core.decision.step import CODES, Action, deviation_of
-from app.core.parameters import Mode, Parameters
+from app.core.parameters import Mode
 from tests.chance import examples
+from tests.core.conftest import SEAT
 
-SHAFT = Parameters(
-    target=39.992,
-    tolerance_width=0.016,
-    zero_range=0.001,
-    averaging_limit=0.0053,
-    wear_limit=0.3,
-    confidence_limit=1.0,
-    weighting_factor=2,
-    tool_memory=3,
-    average_memory=5,
-)
 SERIES = [
-    Series(SHAFT, 0.0, 0.0, 0, 0),
-    Series(replace(SHAFT, weighting_factor=3.3), 0.0007, -0.0031, 1, 0),  # shares the memory of the first
-    Series(replace(SHAFT, average_memory=0), 0.0, 0.0, 2, 1),
-    Series(replace(SHAFT, mode=Mode.MEASURE_ONLY, weighting_factor=1), 0.0, 0.0012345, 0, 2),
-    Series(replace(SHAFT, zero_range=0.0, weighting_factor=1), 0.0, 0.0, 3, 3),
+    Series(SEAT, 0.0, 0.0, 0, 0),
+    Series(replace(SEAT, weighting_factor=3.3), 0.0007, -0.0031, 1, 0),  # shares the memory of the first
+    Series(replace(SEAT, average_memory=0), 0.0, 0.0, 2, 1),
+    Series(replace(SEAT, mode=Mode.MEASURE_ONLY, weighting_factor=1), 0.0, 0.0012345, 0, 2),
+    Series(replace(SEAT, zero_range=0.0, weighting_factor=1), 0.0, 0.0, 3, 3),
 ]
 
 SIZES = st.one_of(
@@ -46,7 +36,7 @@ SIZES = st.one_of(
 )
 @examples(400)
 def test_what_it_decides_is_what_decide_decides(readings: list[tuple[float, int]], begun: list[float]) -> None:
-    measured = np.array([SHAFT.target + size for size, _lane in readings])
+    measured = np.array([SEAT.target + size for size, _lane in readings])
     lane = np.array([lane for _size, lane in readings], dtype=np.int64)
     sequences, averages, out = np.arange(10, 14), np.array(begun), Quiet.room(len(readings))
     end = quiet_run(0, measured, lane, rows_of(SERIES), sequences, averages, out)
