@@ -78,7 +78,7 @@ def test_it_ends_in_order(run_server: RunServer, workers: int, number: signal.Si
         assert "Traceback" not in server.stderr.read_text()
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_open_live_pages_neither_delay_the_end_nor_leave_a_traceback(run_server: RunServer, workers: int) -> None:
     with run_server(workers=workers) as server, ExitStack() as pages:
         client = server.client(server.key("viewer"))
@@ -116,7 +116,8 @@ STUBBORN = {
     "an end that does not come": "Writer.stop = lambda self: asyncio.sleep(3600)",
 }
 PROGRAM = """
-import asyncio, threading, time
+import asyncio, importlib, threading, time
+importlib.import_module("app.cli.serve").END_WITHIN = 1.0
 from app.cli import main
 from app.loop.readings.writer.group_commit import Writer
 start = Writer.start
