@@ -204,11 +204,12 @@ class Line:
 
     def _reading(self, probe: Probe, *, past: bool = False) -> Reading:
         # In the past the tools are changed now, whatever time it has: only the corrections say what was cut when.
+        moment = self.pace.moment(probe.measured_at)
         return Reading(
             characteristic=probe.feature.key,
             measured=None if probe.touches else probe.size,
             touches=probe.touches or None,
-            measured_at=self.pace.moment(probe.measured_at),
+            measured_at=min(moment, datetime.now(UTC)) if past else moment,  # it may take longer than rehearsed
             machined_at=None if past else self.pace.moment(probe.part.cut_at),
             part=f"{self._run}-{probe.part.serial:04d}",
             key=f"{self._run}:{self.key}:{probe.part.serial}:{probe.feature.key}",
