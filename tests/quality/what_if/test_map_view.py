@@ -10,8 +10,8 @@ from app.core.policy_map import Criterion, best_region
 from app.core.replay import Figures
 from app.quality.what_if import form_reader, map_axes, wording
 from app.quality.what_if.map_view import _edges
+from tests.core.conftest import SEAT
 from tests.core.test_policy_map import cell
-from tests.core.test_replay import SHAFT
 
 
 def test_the_edge_of_the_region_runs_round_it() -> None:
@@ -36,7 +36,7 @@ def test_every_edge_has_a_cell_on_either_side_that_differs(inside: list[bool]) -
     st.floats(1, 40).map(lambda k: round(k, 3)),
 )
 def test_todays_setting_is_on_the_grid(zero_range: float, k: float) -> None:
-    today = replace(SHAFT, zero_range=zero_range, averaging_limit=0.007, weighting_factor=k)
+    today = replace(SEAT, zero_range=zero_range, averaging_limit=0.007, weighting_factor=k)
     ks, r33s = map_axes.weighting_factors(today), map_axes.zero_ranges(today, 0.007)
     assert map_axes.place(ks, k) is not None
     assert map_axes.place(r33s, zero_range) is not None
