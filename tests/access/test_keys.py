@@ -10,11 +10,15 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
+from sqlalchemy.orm import Session
 
 from app.access import actions
-from app.access.keys import KEPT, KeyRing
+from app.access.keys import KEPT, KeyRing, MachineOfKey
+from app.access.new_keys import digest
 from app.db.engine import Database
+from app.errors import NotFound
 from app.loop.machines.keys import caller_of_key
+from app.loop.tables.machines import Machine
 from app.main import create_plant
 from app.settings import Settings
 from tests.loops import run
@@ -76,6 +80,23 @@ def test_revoked_here_at_once_and_elsewhere_within_a_second(database: Database, 
         assert await elsewhere.lookup(secret) is None
 
     run(look())
+
+
+def test_a_key_is_revoked_by_whose_it_is(session: Session) -> None:
+    """Who may revoke the keys of a machine may not revoke one with a role, nor the key of another machine."""
+    lathe, mill = (Machine(key=key, name=key, control="other") for key in ("lathe-1", "mill-1"))
+    session.add_all([lathe, mill])
+    session.flush()
+    of_role = actions.add_key(session, name="night report", role="admin", actor="tests")
+    of_lathe = actions.add_key(session, name="cell", machine="lathe-1", actor="tests")
+    for key, owner in ((of_role, lathe), (of_lathe, mill), (of_lathe, None)):
+        with pytest.raises(NotFound):
+            actions.revoke_key(session, key.id, "tests", None if owner is None else MachineOfKey(owner.id, owner.key))
+        assert caller_of_key(session, digest(key.secret)) is not None
+    actions.revoke_key(session, of_role.id, "tests")
+    actions.revoke_key(session, of_lathe.id, "tests", MachineOfKey(lathe.id, lathe.key))
+    for key in (of_role, of_lathe):
+        assert caller_of_key(session, digest(key.secret)) is None
 
 
 def test_without_a_database_a_key_is_not_taken_for_unknown(secret: str) -> None:

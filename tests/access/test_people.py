@@ -8,12 +8,14 @@ from typing import Any
 
 import httpx
 import pytest
+from sqlalchemy import func, update
 from sqlalchemy.orm import Session
 
 from app.access import actions, queries
 from app.access.audit.queries import entries
 from app.access.callers import Caller
-from app.access.sign_in import sign_in
+from app.access.sign_in import begin_session, sign_in
+from app.access.tables import Invitation
 from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from tests.shop import unique
@@ -177,6 +179,14 @@ class TestInvitations:
             with pytest.raises(NotFound):
                 actions.accept_invitation(session, link, "Bojan", PASSWORD)
 
+    def test_an_old_link_does_not(self, session: Session) -> None:
+        token = actions.create_invitation(session, "admin", "Ana")
+        session.execute(update(Invitation).values(expires_at=func.now()))
+        assert queries.open_invitation(session, token) is None
+        assert queries.open_invitations(session) == []
+        with pytest.raises(NotFound, match="too old"):
+            actions.accept_invitation(session, token, "Bojan", PASSWORD)
+
     def test_two_at_once_make_one_person(self, database: Database) -> None:
         with database.begin() as session:
             token = actions.create_invitation(session, "admin")
@@ -240,6 +250,20 @@ def test_a_new_password_needs_the_old_one(session: Session) -> None:
     assert refused.value.errors[0].field == "old"
     actions.change_password(session, caller, PASSWORD, "another good one", None)
     actions.change_password(session, caller, "another good one", PASSWORD, None)
+
+
+def test_the_right_password_forgets_the_wrong_ones(session: Session) -> None:
+    person = add(session, "Ana")
+    caller, token = (
+        Caller("person", "Ana", role="viewer", person_id=person.id),
+        begin_session(session, person.id, 12).token,
+    )
+    for _round in range(2):
+        for _guess in range(actions.GUESSES - 1):
+            with pytest.raises(Invalid):
+                actions.check_password(session, caller, "not it at all", token, "old")
+        assert actions.check_password(session, caller, PASSWORD, token, "old") is person
+    assert queries.signed_in(session, token, {}) is not None
 
 
 @pytest.fixture(scope="module")

@@ -5,15 +5,21 @@ import threading
 from typing import Any
 
 import httpx
+import psycopg
 import pytest
 from playwright.sync_api import Page, expect
+from sqlalchemy import func, update
 
 from app.access import actions, passwords
+from app.access.new_keys import digest
+from app.access.queries import still_granted
 from app.access.sign_in import SignInRefused, sign_in
-from app.access.tables import LoginFailure
+from app.access.tables import BrowserSession, LoginFailure
 from app.db.engine import Database
 from app.errors import TooManyRequests
+from app.web.live import Access
 from app.web.problems import local_path
+from tests.loops import run
 
 PASSWORD = "correct horse battery"
 
@@ -61,6 +67,24 @@ def test_signing_out_ends_the_session_not_only_the_cookie(people: Any) -> None:
     assert client.post("/sign-out", data={"csrf": csrf}).headers["location"] == "/sign-in"
     thief = people.client(Cookie=f"inband_session={stolen}")
     assert thief.get("/api/v1/machines").status_code == 401
+
+
+def test_a_session_ends_by_itself(people: Any) -> None:
+    client = signed_in(people, "Viewer")
+    assert client.get("/api/v1/machines").status_code == 200
+    own = Access(digest(client.cookies["inband_session"]), None, "viewer")
+
+    async def listens() -> bool:
+        async with await psycopg.AsyncConnection.connect(people.database.dsn) as connection:
+            return own in await still_granted(connection, [own])
+
+    assert run(listens())
+    with people.database.begin() as session:
+        ended = update(BrowserSession).where(BrowserSession.token_hash == own.session)
+        session.execute(ended.values(expires_at=func.now()))
+    assert client.get("/api/v1/machines").status_code == 401
+    assert client.get("/setup").headers["location"].startswith("/sign-in")
+    assert not run(listens()), "and what it listens to"
 
 
 @pytest.mark.browser
@@ -164,6 +188,32 @@ class TestSlowingDown:
             for _attempt in range(4):
                 assert self.refused(database, "Ana") is None
             assert sign_in(database, "Ana", PASSWORD, "10.0.0.1", 12).token
+
+    def test_a_right_password_elsewhere_forgets_nothing_here(self, database: Database) -> None:
+        self.add(database)
+        for _attempt in range(5):
+            assert self.refused(database, "Ana") is None
+        assert sign_in(database, "Ana", PASSWORD, "10.0.0.2", 12).token
+        assert self.refused(database, "Ana") is not None
+
+    def test_a_right_password_forgets_the_failures_of_a_known_browser(self, database: Database) -> None:
+        self.add(database)
+        device = sign_in(database, "Ana", PASSWORD, "10.0.0.1", 12).device
+        for _round in range(3):
+            for _attempt in range(4):
+                with pytest.raises(SignInRefused):
+                    sign_in(database, "Ana", "wrong", "10.0.0.1", 12, device)
+            assert sign_in(database, "Ana", PASSWORD, "10.0.0.1", 12, device).token
+
+    def test_a_place_is_known_of_who_was_there(self, database: Database) -> None:
+        """Whoever guesses from where a colleague signs in waits as anywhere; the colleague does not."""
+        self.add(database)
+        self.add(database, "Bojan")
+        assert sign_in(database, "Bojan", PASSWORD, "10.0.0.1", 12).token
+        with database.begin() as session:
+            session.add_all(LoginFailure(name=f"name {number}", address="10.0.0.1") for number in range(20))
+        assert self.refused(database, "Ana", PASSWORD) is not None
+        assert sign_in(database, "Bojan", PASSWORD, "10.0.0.1", 12).token
 
     def test_one_address_trying_many_names(self, database: Database) -> None:
         waits = [self.refused(database, f"name {number}") for number in range(22)]

@@ -1,0 +1,86 @@
+"""Who acts at a station: by PIN or badge, and slowed down where it is guessed. In the database, as any process counts."""
+
+import pytest
+from sqlalchemy import select
+
+from app.access import actions
+from app.access.callers import Caller
+from app.access.devices import Device
+from app.access.identification import (
+    FREE,
+    FREE_ON_DEVICE,
+    NotIdentified,
+    Shown,
+    add_badge,
+    identify,
+    set_pin,
+)
+from app.access.tables import LoginFailure
+from app.db.engine import Database
+from app.errors import TooManyRequests
+
+PASSWORD, PIN, BADGE = "correct horse battery", "2746", "0004711882"
+HERE, ELSEWHERE = (Device(number, f"Tablet {number}", 1, "lathe-1", "") for number in (1, 2))
+
+
+@pytest.fixture
+def ana(database: Database) -> int:
+    """The number of an operator with a PIN and a badge."""
+    with database.begin() as session:
+        person = actions.add_person(session, name="Ana", role="operator", password=PASSWORD, actor="tests")
+        caller = Caller("person", person.name, role="operator", person_id=person.id)
+        set_pin(session, caller, PASSWORD, PIN, None)
+        add_badge(session, person.id, BADGE, "tests")
+        return person.id
+
+
+def seen(database: Database, shown: Shown, device: Device = HERE) -> str:
+    """Who it is, or why not."""
+    try:
+        return identify(database, device, shown).name
+    except (NotIdentified, TooManyRequests) as error:
+        return error.kind
+
+
+def wrong(database: Database, number: int, name: str = "Ana", device: Device = HERE) -> list[str]:
+    return [seen(database, Shown(name, "9999"), device) for _attempt in range(number)]
+
+
+def test_by_pin_or_badge_and_who_has_no_access_any_more_by_neither(database: Database, ana: int) -> None:
+    for shown in (Shown("ana", PIN), Shown(badge=f" {BADGE[:4]} {BADGE[4:]} ")):
+        assert seen(database, shown) == "Ana"
+    with database.begin() as session:
+        actions.disable_person(session, ana, "tests")
+    for shown in (Shown("Ana", PIN), Shown(badge=BADGE)):
+        assert seen(database, shown) == "not-identified"
+
+
+def test_a_name_is_locked_in_any_spelling_and_on_one_device(database: Database, ana: int) -> None:
+    spellings = ["Ana", "ANA", "ana", "aNa", "anA"]
+    assert [wrong(database, 1, name) for name in spellings] == [["not-identified"]] * FREE
+    assert seen(database, Shown("AnA", PIN)) == "too-many-requests"
+    assert seen(database, Shown("Ana", PIN), ELSEWHERE) == "Ana"
+    assert seen(database, Shown("Ana", PIN)) == "too-many-requests", "what was right elsewhere frees nothing here"
+
+
+def test_the_right_pin_forgets_the_wrong_ones(database: Database, ana: int) -> None:
+    for _round in range(2):
+        assert wrong(database, FREE - 1) == ["not-identified"] * (FREE - 1)
+        assert seen(database, Shown("Ana", PIN)) == "Ana"
+    with database.begin() as session:
+        assert session.scalars(select(LoginFailure)).all() == []
+
+
+def test_badges_are_locked_together(database: Database, ana: int) -> None:
+    for number in range(FREE):
+        assert seen(database, Shown(badge=f"770011223{number}")) == "not-identified"
+    assert seen(database, Shown(badge=BADGE)) == "too-many-requests"
+    assert seen(database, Shown("Ana", PIN)) == "Ana", "a PIN is counted apart"
+
+
+@pytest.mark.parametrize(("failed", "answer"), [(FREE_ON_DEVICE - 1, "Ana"), (FREE_ON_DEVICE, "too-many-requests")])
+def test_guessing_many_names_locks_the_device(database: Database, ana: int, failed: int, answer: str) -> None:
+    with database.begin() as session:
+        session.add_all(LoginFailure(name=f"name {number}", address="station 1") for number in range(failed))
+    assert seen(database, Shown("Ana", PIN)) == answer
+    assert seen(database, Shown("Ana", PIN), ELSEWHERE) == "Ana"
