@@ -75,6 +75,13 @@ def test_accepting_what_follows_leaves_nothing_beyond_the_averaging_limit(
             assert abs(again.deviation) < 1e-8
 
 
+def test_a_touch_on_the_edge_of_the_window_is_inside() -> None:
+    gauge = Gauge(25.0, 0.001, 0.01, 1.0)
+    assert calibrate(gauge, [26.0, 24.0], empirical_value=0.0).outcome is Outcome.WITHIN_ZERO_RANGE
+    refused = calibrate(gauge, [26.0, 23.999999], empirical_value=0.0)
+    assert (refused.outcome, refused.repeat) == (Outcome.WINDOW, 2)
+
+
 def test_no_touch_is_no_calibration() -> None:
     with pytest.raises(TouchError) as wrong:
         calibrate(Gauge(25, 0.001, 0.01, 1.0), [], empirical_value=0.0)

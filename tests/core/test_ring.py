@@ -105,6 +105,13 @@ def test_readings_are_fetched_in_order_until_the_first_that_is_not_complete() ->
     assert [slot.sequence for slot in to_fetch(read_block(registers), 12)] == [13, 14, 15]
 
 
+def test_a_slot_that_the_counter_does_not_say_yet_waits() -> None:
+    """After a power loss between the two, the NC program writes another reading under that number."""
+    registers = block_of(*(reading(sequence) for sequence in range(9, 13)), written=11)
+    assert [slot.sequence for slot in to_fetch(read_block(registers), 8)] == [9, 10, 11]
+    assert to_fetch(read_block(registers), 11) == ()
+
+
 @pytest.mark.parametrize(
     ("heads", "stored", "epoch", "words"),
     [

@@ -124,6 +124,8 @@ def test_measure_only_runs_the_average_and_alarms_but_never_corrects(shaft: Made
         assert (decision.action, decision.amount, decision.code) == (Action.NONE, None, Code.MEASURE_ONLY)
         assert decision.average_after == pytest.approx(0.0045)
         assert decision.alarms == (ReadingAlarm.OVERSIZE,)
+        broken = decide(parameters, LoopState(0.0012), 0.4)
+        assert (broken.action, broken.average_after) == (Action.NONE, 0.0012), "the wear zone leaves the average"
 
 
 def test_wear_may_be_released_at_once(shaft: Made) -> None:
@@ -155,6 +157,14 @@ def test_beyond_max_total_the_tool_is_not_corrected_any_more(shaft: Made) -> Non
     assert back.action is Action.CORRECT
     lowered = decide(parameters, LoopState(total=-0.05), -0.0061)
     assert lowered.action is Action.CORRECT, "towards zero is allowed even from beyond"
+
+
+def test_what_max_total_refuses_leaves_the_average_as_without_a_correction(shaft: Made) -> None:
+    """In the averaging zone it goes on; in full, nothing of the reading is in it."""
+    for deviation, after in ((0.005, 0.0045), (0.0061, 0.004)):
+        decision = decide(shaft(max_total=0.001), LoopState(0.004), deviation)
+        assert decision.code is Code.OFFSET_LIMIT
+        assert decision.average_after == pytest.approx(after)
 
 
 @given(
@@ -204,11 +214,21 @@ def test_a_probe_fault_is_told_by_the_raw_deviation(shaft: Made) -> None:
     assert (decision.zone, decision.action) == (Zone.PROBE_FAULT, Action.STOP)
 
 
-def test_a_part_of_the_tool_before_says_nothing_about_this_one(shaft: Made) -> None:
-    for deviation in (0.0061, 0.009, 0.4):
-        decision = decide(shaft(), LoopState(0.0012), deviation, previous_tool=True)
-        assert (decision.action, decision.amount, decision.average_after) == (Action.NONE, None, 0.0012)
-        assert decision.code is Code.BEFORE_TOOL_CHANGE
+@pytest.mark.parametrize(
+    ("deviation", "signals"),
+    [
+        (0.0061, ()),
+        (0.009, (ReadingAlarm.OVERSIZE,)),
+        (0.4, (ReadingAlarm.OVERSIZE,)),  # the worn tool is gone; the part is scrap all the same
+        (-0.4, (ReadingAlarm.UNDERSIZE,)),
+    ],
+)
+def test_a_part_of_the_tool_before_says_nothing_about_this_one(
+    shaft: Made, deviation: float, signals: tuple[ReadingAlarm, ...]
+) -> None:
+    decision = decide(shaft(), LoopState(0.0012), deviation, previous_tool=True)
+    assert (decision.action, decision.amount, decision.average_after) == (Action.NONE, None, 0.0012)
+    assert (decision.code, decision.alarms) == (Code.BEFORE_TOOL_CHANGE, signals)
 
 
 def test_a_rejected_part_corrects_nothing_unless_it_may(shaft: Made) -> None:

@@ -73,11 +73,29 @@ def test_what_remembers_goes_on_where_it_stopped(values: list[float], cut: int) 
     whole = ewma(baseline, values)
     later = ewma(baseline, values[cut:], start=float(whole.points[cut - 1]))
     assert later.points.tolist() == whole.points[cut:].tolist()
+    later = ewma(baseline, values[cut:], start=float(whole.points[cut - 1]), seen=cut)
+    for name in ("lower", "upper"):
+        assert getattr(later, name) == pytest.approx(getattr(whole, name)[cut:], abs=1e-12)
     first = cusum(baseline, values[:cut], headstart=2.5)
     rest = cusum(baseline, values[cut:], state=(float(first.above[-1]), float(first.below[-1])))
     together = cusum(baseline, values, headstart=2.5)
     assert [*first.above, *rest.above] == pytest.approx(together.above.tolist(), abs=1e-12)
     assert [*first.below, *rest.below] == pytest.approx(together.below.tolist(), abs=1e-12)
+
+
+def test_an_average_of_nobody_knows_how_many_has_the_limits_of_very_many() -> None:
+    chart = ewma(shewhart.given(10.0, 2.0), [10.5, 11.0], 0.2, start=10.4)
+    assert (chart.lower, chart.upper) == pytest.approx((8.0, 12.0))  # 10 ± 3 x 2 x sqrt(0.2 / 1.8)
+
+
+def test_the_probable_mean_lies_on_the_side_of_the_sum() -> None:
+    """Montgomery's example, and its mirror: 1.25 above the target of 10, or below."""
+    away = np.array([0.90, -0.67, 2.29, 1.50, 0.60, 1.08, 0.38, 1.62, 1.31])
+    baseline = shewhart.given(10, 1)
+    above = cusum(baseline, 10 + away, state=(0.34, 0.0))
+    below = cusum(baseline, 10 - away, state=(0.0, 0.34))
+    assert (above.new_mean(8), below.new_mean(8)) == pytest.approx((11.25, 8.75), abs=0.005)
+    assert below.new_mean(0) is None
 
 
 @pytest.mark.parametrize(("n", "tabled"), [(50, 4.498), (100, 5.015), (200, 5.492), (500, 6.073), (1000, 6.483)])
