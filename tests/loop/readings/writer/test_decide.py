@@ -1,6 +1,6 @@
 """Deciding in memory, without web and database: properties of a sequence of readings."""
 
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import hypothesis.strategies as st
@@ -142,6 +142,14 @@ def test_with_nothing_confirmed_the_corrections_never_add_up_beyond_what_was_see
         if verdict.correction is not None and verdict.correction.status == "pending":
             total += verdict.correction.amount
             assert abs(total) <= largest + 1e-9
+
+
+def test_late_is_what_was_measured_before_the_newest_of_all() -> None:
+    pending = pending_writes()
+    minutes = [60, 0, 30, 60, 61]
+    decided(pending, [ReadingIn("shaft", measured=40.0, measured_at=NOW + timedelta(minutes=each)) for each in minutes])
+    assert [verdict.late for verdict in pending.verdicts] == [False, True, True, False, False]
+    assert pending.stream(1).last_measured_at == NOW + timedelta(minutes=61)
 
 
 def test_a_key_that_is_known_is_compared_by_value_only() -> None:
