@@ -1,5 +1,6 @@
 """The next calibration that is due, and its alarm, raised once."""
 
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import psycopg
@@ -85,6 +86,14 @@ def test_by_days(shop: Shop) -> None:
     days_pass(shop, 1)
     assert (place(shop)["state"], go_round(shop)) == ("overdue", 1)
     assert "for 7 days" in shop.alarms()[0]["text"]
+
+
+def test_one_that_comes_late_does_not_make_the_last_one_older(shop: Shop) -> None:
+    plan(shop, due_days=7.0)
+    now = datetime.now(UTC)
+    calibrate(shop, touches=[199.852], calibrated_at=now.isoformat())
+    calibrate(shop, touches=[199.852], calibrated_at=(now - timedelta(days=8)).isoformat())
+    assert (place(shop)["state"], go_round(shop)) == ("calibrated", 0)
 
 
 def test_a_refused_calibration_does_not_count(shop: Shop) -> None:
