@@ -298,9 +298,11 @@ class TestChange:
     def test_another_tool_counts_its_own_parts(self, server: Any) -> None:
         common_shop = Shop(server)
         for _part in range(3):
-            common_shop.read(0.0)
+            common_shop.read(0.9)
+        assert common_shop.average() > 0
         change(common_shop, tool_memory=7)
         assert common_shop.tool(7)["parts"] == 0
+        assert common_shop.average() == 0, "it was the average of the other tool"
         common_shop.read(0.0)
         assert common_shop.tool(7)["parts"] == 1
 

@@ -165,6 +165,7 @@ class TestSister:
         assert (new["parts"], new["characteristics"]) == (1, sorted([shop.characteristic, other]))
         shop.call("POST", path(shop, "/change"), reason="new insert")
         assert shop.call("GET", path(shop, "/lives"))["lives"][1]["parts"] == 3
+        assert shop.tool(3)["parts"] == 0, "the new insert has cut nothing yet"
 
     def test_parts_cut_before_say_nothing_about_the_sister(self, shop: Shop) -> None:
         shop.call("PATCH", path(shop), sister=13)

@@ -55,6 +55,17 @@ class TestOffsetDiffers:
         shop.add(f"{shop.characteristic}-c", average_memory=7, tool_memory=4)
         assert shop.read(20.0, f"{shop.characteristic}-c")["action"] == "correct"  # another one
 
+    def test_each_tool_asks_for_itself(self, shop: Shop) -> None:
+        key = shop.another("bore", average_memory=6, tool_memory=4)
+        first = reported_otherwise(shop)
+        shop.correction(shop.read(6.0, key)["correction"]["number"], "applied", offset_after=0.02)
+        second = next(alarm for alarm in shop.alarms() if alarm["id"] != first["id"])
+        assert [(each["tool_memory"], each["count"]) for each in (first, second)] == [(3, 1), (4, 1)]
+        assert [shop.tool(number)["paused_by"] for number in (3, 4)] == [first["id"], second["id"]]
+        shop.acknowledge(second["id"], "noted")
+        assert [shop.tool(number)["paused_by"] for number in (3, 4)] == [first["id"], None]
+        assert [alarm["id"] for alarm in shop.alarms()] == [first["id"]]
+
     @pytest.mark.parametrize(("true", "offset"), [("reported", 0.01), ("expected", -0.006), (None, 0.003)])
     def test_the_true_offset_is_a_manual_edit(self, shop: Shop, true: str | None, offset: float) -> None:
         shop.read(0.8)
