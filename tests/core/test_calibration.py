@@ -166,6 +166,16 @@ def test_pairs_that_agree_with_the_value_in_effect_suggest_nothing() -> None:
     differences = [0.0008, 0.0015, 0.0011, 0.0009, 0.0012]
     assert compare(differences, empirical_value=0.001).suggested is None
     assert compare(differences, empirical_value=0.0).suggested == 0.0011
+    known = compare(differences, empirical_value=0.0)
+    assert known.low is not None
+    assert known.high is not None
+    for value, suggested in (
+        (known.low, None),
+        (known.high, None),
+        (known.low - 1e-6, 0.0011),
+        (known.high + 1e-6, 0.0011),
+    ):
+        assert compare(differences, empirical_value=value).suggested == suggested, "an end of the interval agrees"
 
 
 @given(st.lists(micrometres, min_size=2, max_size=30))
