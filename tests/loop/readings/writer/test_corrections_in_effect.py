@@ -5,10 +5,11 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from app.core.parameters import read
+from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
-from app.loop.readings.writer.corrections_in_effect import CorrectionsInEffect, corrections_in_effect
-from app.loop.readings.writer.pending import PendingTool, PendingWrites
-from app.loop.readings.writer.snapshot import LoadedCorrection, Snapshot
+from app.loop.readings.writer.corrections_in_effect import CorrectionsInEffect, confirm, corrections_in_effect
+from app.loop.readings.writer.pending import PendingStream, PendingTool, PendingWrites
+from app.loop.readings.writer.snapshot import LoadedCorrection, NamedCorrection, Snapshot
 from tests.shop import PARAMETERS
 
 TEN = datetime(2026, 11, 22, 10, tzinfo=UTC)
@@ -45,5 +46,14 @@ def test_a_part_cut_from_the_change_on_is_the_new_tools(machined_at: datetime, p
     assert list(found.outstanding) == [6], "what was applied before the change went out with the tool"
 
 
-def test_what_was_applied_at_the_moment_of_the_change_went_out_too() -> None:
-    assert list(in_effect(TEN, reset_at=TEN).outstanding) == [6]
+@pytest.mark.parametrize("waits", ["awaiting_approval", "held"])
+def test_a_reading_applies_nothing_that_a_person_has_not_let_go(waits: str) -> None:
+    """2 was approved, and the reading names it; 1 lies before it and still waits."""
+    corrections = [LoadedCorrection(1, -0.006, waits), LoadedCorrection(2, -0.007, "pending", decided_at=TEN)]
+    tool = PendingTool(1, 3, 0.0, 0.0, None, corrections=[*corrections])
+    pending = PendingWrites(Snapshot(named={(1, 2): NamedCorrection(None, TEN)}))
+    stream = PendingStream(Entry(1, "lathe-1", 1, "shaft"), 0, 1, read(PARAMETERS)[0], None, tool, None, None)
+    confirm(pending, stream, tool, 2, TEN + SECOND)
+    assert [each.status for each in tool.corrections] == [waits, "applied"]
+    assert (tool.offset, tool.total) == (-0.007, -0.007)
+    assert [each.correction for each in pending.offset_changes] == [2]
