@@ -188,6 +188,15 @@ def test_what_is_held_waits_for_the_release_of_then() -> None:
     assert (figures.held, figures.corrections) == (3, 0)
 
 
+def test_what_is_held_is_released_once() -> None:
+    """What was released then a second time was another one, which this policy has not held."""
+    trace = without_events(np.full(6, 0.4))
+    trace.marks[[2, 4]] = Mark.RELEASED
+    result, figures = run(trace, Policy((ReplayedCharacteristic(SHAFT, 1.0),)))
+    assert result.deviation.tolist() == [0.4, 0.4, 0.0, 0.0, 0.0, 0.0]
+    assert (figures.held, figures.corrections) == (2, 0)
+
+
 def test_two_characteristics_of_one_tool_share_what_is_corrected() -> None:
     lane = np.array([0, 1, 0, 1, 0, 1])
     trace = without_events(micrometres(7, 1, 7, 1, 7, 1))._replace(lane=lane, part=parts_of(lane))
