@@ -1,5 +1,6 @@
 """Permissions: every set-up route with every kind of caller."""
 
+import re
 from typing import Any
 
 import httpx
@@ -79,6 +80,36 @@ def test_a_machine_sees_itself_alone_in_lists(common_shop: Shop, callers: dict[s
     assert [machine["key"] for machine in machines] == [shop.machine]
     characteristics = callers["machine"].get("/api/v1/characteristics").json()["items"]
     assert {characteristic["machine"] for characteristic in characteristics} == {shop.machine}
+
+
+def test_the_key_of_another_machine_sees_nothing_of_this_one(server: Server, callers: dict[str, httpx.Client]) -> None:
+    """Every address that shows something of a machine, as far as there is something: the number of what is asked is right."""
+    shop = Shop(server)
+    key = shop.another("bore", max_total=0.5, tool_memory=4, average_memory=6)
+    number = shop.read(12.0, key)["correction"]["number"]
+    shop.call("POST", f"/readings/{key}/1/by-hand", 201, measured=40.01)
+    shop.call("POST", f"/machines/{shop.machine}/heartbeat", version="1", state="online", waiting=0)
+    note = shop.call("POST", "/notes", 201, text="Chips", machine=shop.machine)["id"]
+    known = {"machine": shop.machine, "characteristic": key, "tool": 4, "location": 6, "version": 1, "sequence": 1}
+    known |= {"alarm": shop.alarms()[0]["id"], "note": note, "number": number}
+    asked = {
+        f"{path.format(**known)}{query}"
+        for path, methods in shop.admin.get("/api/v1/openapi.json").json()["paths"].items()
+        if "get" in methods
+        and path.startswith("/api/v1/")
+        and "/events" not in path
+        and set(re.findall(r"{(\w+)}", path)) <= set(known)
+        for query in ("", f"?machine={shop.machine}", f"?characteristic={key}", f"?of={key}", f"?q={key}")
+        if not query or "{" not in path
+    }
+    of_it = re.compile(rf"\b({shop.machine}|{key})\b")
+    shown = [path for path in sorted(asked) if of_it.search(path) or of_it.search(shop.admin.get(path).text)]
+    shown += [f"/api/v1/alarms/{known['alarm']}", f"/api/v1/notes/{note}"]
+    assert len(shown) > 40
+    for path in shown:
+        answer = callers["other machine"].get(path)
+        told = answer.status_code < 400 and (of_it.search(answer.text) or (of_it.search(path) and "?" not in path))
+        assert not told, f"{path}: {answer.text}"
 
 
 @pytest.mark.parametrize(
