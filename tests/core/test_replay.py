@@ -192,7 +192,7 @@ def test_what_is_held_is_released_once() -> None:
     """What was released then a second time was another one, which this policy has not held."""
     trace = without_events(np.full(6, 0.4))
     trace.marks[[2, 4]] = Mark.RELEASED
-    result, figures = run(trace, Policy((ReplayedCharacteristic(SHAFT, 1.0),)))
+    result, figures = run(trace, Policy((ReplayedCharacteristic(SEAT, 1.0),)))
     assert result.deviation.tolist() == [0.4, 0.4, 0.0, 0.0, 0.0, 0.0]
     assert (figures.held, figures.corrections) == (2, 0)
 

@@ -343,6 +343,7 @@ WHOLE = (
     b'{"reason": "x"} {"reason": "y"}',
     b"{'reason': 'x'}",
 )
+CALLED = ("text/plain", "application/x-www-form-urlencoded", "multipart/form-data; boundary=x", "", "json")
 BAD_NUMBERS = ("0", "-1", "x", "1.5", "%00", "9" * 30, "%D9%A3", "1e3", "NaN", "0x10", "%20")
 BAD_KEYS = (
     "nowhere",
@@ -661,34 +662,32 @@ def bad_parameters(operation: Operation, place: Place) -> Complaints:
         yield complaint(place.send(operation, text), str(unfit), range(422, 423))
 
 
-def no_body(operation: Operation, place: Place) -> Complaints:
-    """What is no body at all, a good one that is called something else, and one that is not compressed as it says."""
+def no_body(operation: Operation, place: Place, of: int) -> Complaints:
+    """One in so many of what is no body at all, a good one that is called something else, and one that is not compressed
+    as it says."""
     optional = not operation.declared["requestBody"].get("required")
-    for content in WHOLE:
+    turn = list(BODIES).index(operation.name)
+    for content in WHOLE[turn % of :: of]:
         if (content in {b"", b"null"} and optional) or (content == b"[]" and operation.path.endswith("/batch")):
             continue  # nothing to do is no mistake
         yield complaint(place.send(operation, content), repr(content))
     if operation.name not in DOORS:  # these read what a machine sends whatever it is called
         good = as_text(operation, place.body(operation))
-        for kind in (
-            "text/plain",
-            "application/x-www-form-urlencoded",
-            "multipart/form-data; boundary=x",
-            "",
-            "json",
-        ):
+        for kind in CALLED[turn % of :: of]:
             yield complaint(place.send(operation, good, **{"Content-Type": kind}), f"as {kind!r}")
     yield complaint(place.send(operation, b"\x1f\x8b\x08\x00", **{"Content-Encoding": "gzip"}), "compressed")
 
 
-def bad_addresses(operation: Operation, place: Place) -> Complaints:
-    """Every name and number of the address in turn as something that there is not, or that is no name and no number."""
+def bad_addresses(operation: Operation, place: Place, of: int) -> Complaints:
+    """Every name and number of the address in turn as something that there is not, or that is no name and no number: one
+    in so many of these."""
     content = as_text(operation, place.body(operation)) if operation.name in BODIES else None
-    for parameter in operation.declared.get("parameters", ()):
+    for turn, parameter in enumerate(operation.declared.get("parameters", ()), len(operation.name)):
         if parameter["in"] != "path":
             continue
         name = parameter["name"]
-        for value in BAD_NUMBERS if resolved(parameter["schema"]).get("type") == "integer" else BAD_KEYS:
+        bad = BAD_NUMBERS if resolved(parameter["schema"]).get("type") == "integer" else BAD_KEYS
+        for value in bad[turn % of :: of]:
             answer = place.shop.admin.request(
                 operation.method,
                 operation.path.format(**(place.values | {name: value})),
@@ -814,19 +813,21 @@ def test_bad_parameters(name: str, place: Place) -> None:
     refused_and_nothing_stored(bad_parameters, [operation_named(name)], place)
 
 
+@some_or_all
 @pytest.mark.parametrize("name", BODIES)
-def test_what_is_no_body(name: str, place: Place) -> None:
-    refused_and_nothing_stored(no_body, [operation_named(name)], place)
+def test_what_is_no_body(name: str, place: Place, of: int) -> None:
+    refused_and_nothing_stored(partial(no_body, of=of), [operation_named(name)], place)
 
 
 @some_or_all
 @pytest.mark.parametrize("share", range(SHARES))
-def test_bad_queries(share: int, place: Place, of: int) -> None:
-    refused_and_nothing_stored(partial(bad_queries, of=of), operations()[share::SHARES], place)
+@pytest.mark.parametrize("attempt", [bad_addresses, bad_queries])
+def test_bad_addresses_and_queries(attempt: Callable[..., Complaints], share: int, place: Place, of: int) -> None:
+    refused_and_nothing_stored(partial(attempt, of=of), operations()[share::SHARES], place)
 
 
 @pytest.mark.parametrize("share", range(SHARES))
-@pytest.mark.parametrize("attempt", [bad_addresses, no_key, wrong_methods])
+@pytest.mark.parametrize("attempt", [no_key, wrong_methods])
 def test_at_every_operation(attempt: Try, share: int, place: Place) -> None:
     refused_and_nothing_stored(attempt, operations()[share::SHARES], place)
 
@@ -836,10 +837,10 @@ def test_it_is_the_same_through_a_socket(server: Server) -> None:
     place = Place(server)
     for attempt, name in (
         (partial(bad_fields, of=4), "POST /api/v1/readings"),
-        (no_body, "POST /api/v1/readings"),
+        (partial(no_body, of=4), "POST /api/v1/readings"),
         (partial(bad_fields, of=4), "PUT /api/v1/machines/{machine}/tools/{tool}"),
-        (no_body, "PUT /api/v1/machines/{machine}/tools/{tool}"),
-        (bad_addresses, "GET /api/v1/corrections/{machine}/{number}"),
+        (partial(no_body, of=4), "PUT /api/v1/machines/{machine}/tools/{tool}"),
+        (partial(bad_addresses, of=4), "GET /api/v1/corrections/{machine}/{number}"),
         (partial(bad_queries, of=4), "GET /api/v1/readings"),
         (no_key, "GET /api/v1/readings"),
         (wrong_methods, "GET /api/v1/readings"),
