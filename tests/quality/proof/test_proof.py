@@ -188,6 +188,7 @@ def request_of(path: str) -> Request:
 class TestPage:
     def test_it_shows_every_example_with_its_source(self, viewer: Person, page: Page) -> None:
         viewer.sign_in(page)
+        page.goto("/account")
         page.get_by_role("link", name="Proof").click()
         expect(page.get_by_role("heading", level=1)).to_have_text("Proof")
         expect(page.get_by_role("status").filter(has_text="all as published")).to_be_visible()
