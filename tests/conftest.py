@@ -38,7 +38,7 @@ from app.db.engine import Database
 from tests import chance, quick_passwords  # noqa: F401 - the passwords replace what they are about
 from tests.db.first_program import make_first_program
 from tests.forked import Forked
-from tests.shop import ACTOR, Person, Shop
+from tests.shop import KEY, Person, Shop
 
 for name in [name for name in os.environ if name.startswith(("INBAND_", "PG")) and name != "INBAND_TEST_CITUS"]:
     del os.environ[name]  # no test may meet a real installation
@@ -330,7 +330,7 @@ class Server:
         from app.access.keys import add_key
 
         with self.database.begin() as session:
-            return add_key(session, role=None if machine else role, machine=machine, name=ACTOR, actor="tests").secret
+            return add_key(session, role=None if machine else role, machine=machine, name=KEY, actor="tests").secret
 
     def person(self, name: str, role: str, password: str = "correct horse battery") -> str:
         """A new person who may sign in; the answer is the password."""

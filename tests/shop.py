@@ -28,7 +28,8 @@ PARAMETERS: dict[str, Any] = {
     "weighting_factor": 2,
     "factor": -1,
 }
-ACTOR = "a test's key"
+KEY = "a test's key"
+ACTOR = f"key {KEY}"
 _names = itertools.count(1)
 
 
