@@ -251,7 +251,8 @@ class TestInABrowser:
         for path in ("/calibration", place(shop), probe(shop)):
             page.goto(path)
             assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-            heights = page.locator("main .button, main .row-name, .nav a").evaluate_all(
-                "all => all.map((one) => one.getBoundingClientRect().height)"
+            heights = page.evaluate(  # all at one moment: the calibration has the page fetch its parts again
+                "[...document.querySelectorAll('main .button, main .row-name, .nav a')]"
+                ".map((one) => one.getBoundingClientRect().height)"
             )
             assert min(heights) >= 48

@@ -142,25 +142,25 @@ def test_it_is_read_from_two_metres(page: Page, shop: Shop, operator: Person, si
     shop.read(deviation)
     operator.sign_in(page)
     page.goto(f"/station/{shop.machine}")
-    value = page.locator(".station-deviation .value")
     for part, least in (
         (".station-deviation .value", 120),
         (".station-now .badge", 59),
         (".station-action", 59),
         (".station-alarm h2", 59),
-    ):  # asked of the page as it is at that moment: the alarm has it fetch its parts again
+    ):
         page.wait_for_function(LETTERS, arg=[part, least])
-    box = value.bounding_box()
-    assert box is not None
-    assert box["x"] + box["width"] <= size["width"]
+    assert boxes(page, ".station-deviation .value")[0]["right"] <= size["width"]
     assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
-    first = page.locator(".station-alarm").first.bounding_box()
-    assert first is not None
-    assert first["y"] < size["height"] * 0.75  # seen without scrolling
-    for button in page.locator(".actions .button").all():
-        place = button.bounding_box()
-        assert place is not None
-        assert place["height"] >= 64
+    assert boxes(page, ".station-alarm")[0]["top"] < size["height"] * 0.75  # seen without scrolling
+    assert min(box["height"] for box in boxes(page, ".actions .button")) >= 64
+
+
+def boxes(page: Page, parts: str) -> list[dict[str, float]]:
+    """Where these are, all at one moment: an alarm that was raised a moment ago has the page fetch its parts again."""
+    found: list[dict[str, float]] = page.evaluate(
+        "parts => [...document.querySelectorAll(parts)].map(part => part.getBoundingClientRect().toJSON())", parts
+    )
+    return found
 
 
 @pytest.mark.parametrize("size", [ACROSS, pytest.param(UPRIGHT, marks=pytest.mark.long)], ids=["across", "upright"])
@@ -173,10 +173,8 @@ def test_alarms_and_corrections_that_wait_stand_one_below_the_other(
     shop.read(12.5)
     operator.sign_in(page)
     page.goto(f"/station/{shop.machine}")
-    boxes = [card.bounding_box() for card in page.locator(".station-alarm").all()]
-    assert len(boxes) == 2
-    alarm, correction = (box for box in boxes if box is not None)
-    assert alarm["y"] + alarm["height"] <= correction["y"]
+    alarm, correction = boxes(page, ".station-alarm")
+    assert alarm["bottom"] <= correction["top"]
 
 
 def test_by_touch_live_with_two_touches(page: Page, shop: Shop, operator: Person) -> None:
