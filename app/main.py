@@ -340,7 +340,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     app.add_middleware(BodyLimit)
     app.mount("/static", assets())  # first, so that no file waits until hundreds of routes have been looked through
     for router in ROUTERS:
-        app.router.routes += router.routes  # as they are: include_router would build each anew, for every plant
+        app.router.routes += router.routes  # as they are: include_router would build each again, for every plant
     if replica is not None:
         app.add_middleware(OwnChanges, replica=replica, secure=settings.secure_cookies)
     app.openapi = partial(document, app, readings.SCHEMAS, prefix or "/")  # type: ignore[method-assign]
