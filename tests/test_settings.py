@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from app.cli.base import SERVED, as_served, remember_address
 from app.settings import Settings
 
 
@@ -87,3 +88,14 @@ def test_an_address_of_a_database_that_cannot_be_is_refused_without_its_password
 def test_the_public_address_is_an_origin(url: str) -> None:
     with pytest.raises(ValidationError, match="without a path"):
         Settings(public_url=url)
+
+
+def test_commands_print_the_address_at_which_the_server_listens(tmp_path: Path) -> None:
+    assert as_served(Settings(data_dir=tmp_path)).address == "http://127.0.0.1:8000"
+    remember_address(Settings(data_dir=tmp_path, host="0.0.0.0", port=8765, allow_plain_http=True))
+    assert as_served(Settings(data_dir=tmp_path)).address == "http://127.0.0.1:8765"
+    assert as_served(Settings(data_dir=tmp_path, port=9000)).address == "http://127.0.0.1:9000"
+    remember_address(Settings(data_dir=tmp_path, public_url="https://inband.example"))
+    assert as_served(Settings(data_dir=tmp_path)).address == "https://inband.example"
+    (tmp_path / SERVED).write_text("not JSON")
+    assert as_served(Settings(data_dir=tmp_path)).port == 8000

@@ -12,7 +12,7 @@ from app.access.identification import LONGEST_PIN, SHORTEST_PIN, set_pin
 from app.access.passwords import SHORTEST
 from app.access.sign_in import SignedIn, begin_session, sign_in, sign_out
 from app.db.engine import Database
-from app.errors import InbandError, Invalid
+from app.errors import InbandError, Invalid, NotAllowed
 from app.language.i18n import _
 from app.web.deps import SESSION_COOKIE, FormDep, SessionDep, SettingsDep, from_this_site
 from app.web.forms import by_field
@@ -92,7 +92,11 @@ def send_sign_in(request: Request, form: FormDep, settings: SettingsDep) -> Resp
 
 @router.post("/sign-out")
 def send_sign_out(request: Request, session: SessionDep, caller: AnyCaller) -> Response:
-    assert caller.kind == "person"
+    if caller.kind != "person":
+        raise NotAllowed(
+            _("A key is not signed in, so it cannot be signed out."),
+            _("Who wants to end it revokes it: Set-up, Keys, or the page of its machine."),
+        )
     sign_out(session, request.cookies.get(SESSION_COOKIE, ""), caller.name)
     answer = RedirectResponse("/sign-in", 303)
     answer.delete_cookie(SESSION_COOKIE, httponly=True, samesite="lax")

@@ -1,8 +1,9 @@
 """Common parts of all commands: settings from options and environment, their database, their output."""
 
+import json
 import platform
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -71,6 +72,31 @@ def settings_from(**options: Any) -> "Settings":
     from app.settings import Settings
 
     return Settings(**{name: value for name, value in options.items() if value is not None})
+
+
+SERVED = "served.json"
+"""In the data folder: where the server that was begun last listens."""
+
+
+def remember_address(settings: "Settings") -> None:
+    """Keep the address of this server for commands that print it. A folder that cannot be written keeps none."""
+    from app.db.embedded import EmbeddedServerError, make_data_dir
+
+    said = {"host": settings.host, "port": settings.port, "public_url": settings.public_url}
+    with suppress(EmbeddedServerError, OSError):
+        make_data_dir(settings.data_dir)
+        (settings.data_dir / SERVED).write_text(json.dumps(said))
+
+
+def as_served(settings: "Settings") -> "Settings":
+    """The settings with the address of the server of this data folder, where none is said to this command."""
+    if settings.model_fields_set & {"host", "port", "public_url"}:
+        return settings
+    with suppress(OSError, ValueError):
+        said = json.loads((settings.data_dir / SERVED).read_text())
+        known = {name: said[name] for name in ("host", "port", "public_url") if name in said}
+        return settings.model_copy(update=known)
+    return settings
 
 
 @contextmanager

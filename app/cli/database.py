@@ -12,6 +12,7 @@ from app import __version__
 from app.cli.base import (
     DatabaseUrl,
     DataDir,
+    as_served,
     cli,
     explain,
     opened,
@@ -111,7 +112,7 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
     try:
         settings = settings_from(data_dir=data_dir, database_url=database_url)
         _well("Inband", f"{__version__}, Python {platform.python_version()}")
-        _well("configuration", f"{settings.address}, {settings.workers} worker(s)")
+        _well("configuration", f"{as_served(settings).address}, {settings.workers} worker(s)")
         _well("time zone", f"{settings.timezone}; INBAND_TIMEZONE names another")
         refuse_nothing_there(settings)
         with reachable(settings) as url:

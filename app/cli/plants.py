@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli.base import DatabaseUrl, DataDir, cli, reachable, refuse_nothing_there, say, settings_from
+from app.cli.base import DatabaseUrl, DataDir, as_served, cli, reachable, refuse_nothing_there, say, settings_from
 from app.cli.people import Role, actor
 from app.errors import Conflict, Invalid, NotFound
 
@@ -232,7 +232,7 @@ def migrate_all(url: str, settings: "Settings") -> "list[Plant]":
 
 
 def _settings(data_dir: "DataDir", database_url: "DatabaseUrl") -> "Settings":
-    settings = settings_from(data_dir=data_dir, database_url=database_url)
+    settings = as_served(settings_from(data_dir=data_dir, database_url=database_url))
     if settings.schema_name is not None:
         raise Invalid(
             "INBAND_SCHEMA names the schema of one plant.",

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app import __version__, core, logs
-from app.cli.base import DatabaseUrl, DataDir, cli, opened, reachable, say, settings_from
+from app.cli.base import DatabaseUrl, DataDir, cli, opened, reachable, remember_address, say, settings_from
 from app.cli.plants import migrate_all
 from app.db.disk import watch
 from app.errors import InbandError
@@ -126,6 +126,7 @@ def run(
         _log_start(database, settings)
         database.close()
         database.connections.stop()
+        remember_address(settings)
         watch(settings.data_dir)
         if beside is not None:
             threading.Thread(target=_once_ready, args=(settings, beside), daemon=True).start()

@@ -69,6 +69,11 @@ def test_signing_out_ends_the_session_not_only_the_cookie(people: Any) -> None:
     assert thief.get("/api/v1/machines").status_code == 401
 
 
+def test_a_key_is_not_signed_out(people: Any) -> None:
+    refused = people.client(people.key()).post("/sign-out")
+    assert (refused.status_code, "revokes it" in refused.text) == (403, True)
+
+
 def test_a_session_ends_by_itself(people: Any) -> None:
     client = signed_in(people, "Viewer")
     assert client.get("/api/v1/machines").status_code == 200

@@ -10,10 +10,11 @@ _WHO = ("K0014", "K0006", "K0053", "K0007")
 
 
 class Keys:
-    """The keys of one file. Values that are alike in everything are counted, in the order of the file."""
+    """The keys of one file. Values that are alike in everything are counted, wherever in the file they stand."""
 
     def __init__(self) -> None:
-        self._same: dict[int, tuple[datetime, Counter[str]]] = {}
+        self._seen: set[int] = set()  # 8 bytes of each name: a file has millions
+        self._again: Counter[int] = Counter()
 
     def of(self, value: Value, identity: tuple[str, str, str], measured: float, at: datetime) -> str:
         """The key of a value. identity: part, number and name of its characteristic. measured: mm. at: as the file has it."""
@@ -21,10 +22,9 @@ class Keys:
         if not fields["K0007"].strip("0"):  # some programs write every field, others none that says nothing
             fields["K0007"] = ""
         text = "|".join([*identity, repr(round(measured, 9)), at.isoformat(), *fields.values()])
-        name = hashlib.blake2b(text.encode(), digest_size=10).hexdigest()
-        then, same = self._same.get(value.characteristic, (None, Counter[str]()))
-        if then != at:
-            same = Counter()
-            self._same[value.characteristic] = (at, same)
-        same[name] += 1
-        return f"aqdef:{name}:{same[name]}"
+        name = hashlib.blake2b(text.encode(), digest_size=10)
+        short = int.from_bytes(name.digest()[:8])
+        if short in self._seen:
+            self._again[short] += 1
+        self._seen.add(short)
+        return f"aqdef:{name.hexdigest()}:{self._again[short] + 1}"

@@ -106,6 +106,14 @@ def test_the_same_file_again_and_a_longer_one_store_nothing_twice(plant: Databas
     assert (longer.stored, longer.repeated, scalar(plant, "SELECT count(*) FROM exclusion")) == (1, 3, 1)
 
 
+def test_like_parts_of_one_second_are_all_stored_wherever_they_stand(plant: Database, tmp_path: Path) -> None:
+    like, other = row(0, "39.991"), row(1, "39.992")
+    lines = [*HEAD, like, like, other, like, row(0, "39.993"), like]
+    assert run(plant, written(tmp_path / "a.dfq", lines)).stored == 6
+    again = run(plant, written(tmp_path / "b.dfq", [*lines, like]))
+    assert (again.stored, again.repeated) == (1, 6)
+
+
 def test_a_value_that_another_program_writes_in_another_way_is_the_same(plant: Database, tmp_path: Path) -> None:
     head = [*HEAD[:3], "K2001/1 shaft-d40", "K2002/1 Seat", "K2142/1 mm"]
     first = run(plant, written(tmp_path / "a.dfq", [*head, f"39.991{F}0{F}02.03.2026/06:00:00{F}{F}#7"]))
