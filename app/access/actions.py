@@ -2,7 +2,7 @@
 
 import secrets
 from datetime import UTC, datetime, timedelta
-from typing import cast
+from typing import NamedTuple, cast
 
 from sqlalchemy import delete, func, select, update
 from sqlalchemy.orm import Session
@@ -122,20 +122,31 @@ def accept_invitation(session: Session, token: str, name: str, password: str) ->
     return add_person(session, name=name, role=role, password=password, actor=f"{names.seen(name)} (invitation)")
 
 
-def change_password(session: Session, caller: Caller, old: str, new: str, keep_token: str | None) -> None:
-    """Somebody changes their own password; their other browsers are signed out.
+def change_password(session: Session, caller: Caller, old: str, new: str, keep_token: str | None) -> bool:
+    """Somebody changes their own password; their other browsers are signed out, and their PIN ends.
 
-    Raises `Invalid` when the old password is wrong or the new one cannot be used. Who was wrong `GUESSES` times has lost
+    Returns if there was a PIN. Badges stay: `app.access.identification.remove_badges`. Raises `Invalid` when the old password is wrong or the new one cannot be used. Who was wrong `GUESSES` times has lost
     the session: `SessionEnded`, which must not take the transaction back.
     """
     person = check_password(session, caller, old, keep_token, "old")
     acceptable(new, person.name, "new")
     person.password_hash = hashed(new)
+    had_pin = _end_pin(session, person, caller.name)
     own_token = digest(keep_token) if keep_token else b""
     session.execute(
         delete(BrowserSession).where(BrowserSession.person_id == person.id, BrowserSession.token_hash != own_token)
     )
     record(session, caller.name, "password changed", f"person/{person.name}")
+    return had_pin
+
+
+def _end_pin(session: Session, person: Person, actor: str) -> bool:
+    """Remove the PIN with the password that it was set with; tell if there was one."""
+    if person.pin_hash is None:
+        return False
+    person.pin_hash = None
+    record(session, actor, "PIN removed", f"person/{person.name}", {"pin": True}, {"pin": False})
+    return True
 
 
 def check_password(session: Session, caller: Caller, password: str, token: str | None, field: str) -> Person:
@@ -176,17 +187,25 @@ def _count_guess(session: Session, own: BrowserSession, person: Person) -> None:
         raise SessionEnded
 
 
-def reset_password(session: Session, person_id: int, actor: str) -> tuple[str, str]:
-    """Give somebody who has forgotten theirs a new password, told this once, and sign them out everywhere.
+class NewPassword(NamedTuple):
+    """A password to be handed over. had_pin: their PIN has ended. badges: those that still identify them at stations."""
 
-    Returns their name and the password.
-    """
+    person_id: int
+    name: str
+    password: str
+    had_pin: bool
+    badges: int
+
+
+def reset_password(session: Session, person_id: int, actor: str) -> NewPassword:
+    """Give somebody who has forgotten theirs a new password, shown this once; sign them out everywhere and end their PIN."""
     person = _person(session, person_id)
     password = "-".join(secrets.token_hex(2) for _part in range(4))
     person.password_hash = hashed(password)
     session.execute(delete(BrowserSession).where(BrowserSession.person_id == person.id))
     record(session, actor, "password reset", f"person/{person.name}")
-    return person.name, password
+    had_pin = _end_pin(session, person, actor)
+    return NewPassword(person.id, person.name, password, had_pin, queries.badges(session, person.id))
 
 
 def change_role(session: Session, person_id: int, role: str, actor: str) -> Person:

@@ -1,21 +1,26 @@
 """Attempts to sign in or to identify oneself: noted before the secret is looked at, and slowed down when too many have failed.
 
 They are counted in the database, so that all server processes count together. An attempt is struck out when it was right: a
-hundred attempts at once are a hundred failures, not one.
+hundred attempts at once are a hundred failures, not one. A place where a person has been right before is remembered: strangers
+who guess there keep nobody out who belongs there.
 """
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime, timedelta
 from math import ceil
 from typing import NamedTuple
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import delete, func, select, update
+from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.orm import Session
 
 from app.access import queries
 from app.access.queries import Failed, Failures
-from app.access.tables import LoginFailure
+from app.access.tables import KnownPlace, LoginFailure
+
+PLACES = 50
+"""Places kept of a person, the latest."""
 
 
 class Wait(NamedTuple):
@@ -49,6 +54,28 @@ def note_attempt(
 def strike_out(session: Session, name: str, address: str) -> None:
     """Forget the failures with this name from this address: the secret was right."""
     session.execute(delete(LoginFailure).where(LoginFailure.name == name, LoginFailure.address == address))
+
+
+def strike_out_one(session: Session, attempt: int) -> None:
+    """Forget this attempt alone: it was right, and says nothing about the others."""
+    session.execute(delete(LoginFailure).where(LoginFailure.id == attempt))
+
+
+def count_once(session: Session, attempt: int, name: str, address: str) -> None:
+    """Count this attempt and all earlier ones with this name from this address as one."""
+    strike_out(session, name, address)
+    session.execute(update(LoginFailure).where(LoginFailure.id == attempt).values(name=name))
+
+
+def remember(session: Session, person_id: int, places: Sequence[str]) -> None:
+    """Keep where a person has been right."""
+    row = insert(KnownPlace).values([{"person_id": person_id, "place": place} for place in places])
+    session.execute(
+        row.on_conflict_do_update(index_elements=["person_id", "place"], set_={"last_at": row.excluded.last_at})
+    )
+    of_person = KnownPlace.person_id == person_id
+    latest = select(KnownPlace.place).where(of_person).order_by(KnownPlace.last_at.desc()).limit(PLACES)
+    session.execute(delete(KnownPlace).where(of_person, KnownPlace.place.not_in(latest)))
 
 
 def _lock_number(text: str) -> int:

@@ -1,10 +1,15 @@
 """Identification at a station: by PIN or by badge, for one action.
 
 A PIN is short, so that it can be typed with gloves; it opens nothing elsewhere. Who guesses it is slowed down by person and
-device: after `FREE` wrong ones within a day it is locked there for a minute, and twice as long with each further one.
+device: after `FREE` wrong ones within a day it is locked there for a minute, and twice as long with each further one. Who has
+identified themselves on the device before is kept out by their own wrong PINs alone.
+
+A wrong badge names nobody, so different unknown badges are counted by device: after `FREE_BADGES` all badges are locked on it,
+and a name with its PIN still works. The same unknown badge counts once, however often it is scanned; a right one takes back no
+other's failures.
 """
 
-from datetime import timedelta
+from datetime import datetime, timedelta
 from functools import partial
 from itertools import pairwise
 from typing import NamedTuple, cast
@@ -14,7 +19,7 @@ from sqlalchemy.orm import Session
 
 from app.access import names, queries
 from app.access.actions import check_password
-from app.access.attempts import Wait, note_attempt, strike_out
+from app.access.attempts import Wait, count_once, note_attempt, remember, strike_out, strike_out_one
 from app.access.audit.actions import Acting, record
 from app.access.callers import Caller, Role
 from app.access.devices import Device
@@ -28,12 +33,9 @@ from app.language.times import MINUTES, written
 SHORTEST_PIN, LONGEST_PIN = 4, 12
 SHORTEST_BADGE, LONGEST_BADGE = 6, 100
 COUNTED = timedelta(days=1)
-FREE, FREE_ON_DEVICE = 5, 60
-"""Wrong ones before one must wait: of a name (or of badges) on a device, of all together on it."""
+FREE, FREE_ON_DEVICE, FREE_BADGES = 5, 60, 20
+"""Wrong ones before one must wait: PINs of a name on a device, of all names on it, different badges on it."""
 WAIT = Wait(first=60.0, longest=4 * 3600.0)
-BADGES = (
-    "badge"  # under which wrong badges are counted; no person is called so, as it stands with the address of a device
-)
 
 
 class NotIdentified(InbandError):
@@ -58,11 +60,7 @@ def identify(database: Database, device: Device, shown: Shown) -> Caller:
     Runs transactions of its own, because a failure must be kept although the request fails.
     Raises `NotIdentified`, or `TooManyRequests` while the PIN is locked.
     """
-    name = names.as_stored(shown.name.replace("\0", "")[:400].encode(errors="replace").decode())
-    counted_as, place = (BADGES if shown.badge else name.casefold()[:200]), f"station {device.id}"
-    with database.begin() as session:
-        note_attempt(session, counted_as, place, COUNTED, partial(_refuse, badge=bool(shown.badge)))
-    person = _by_badge(database, shown.badge) if shown.badge else _by_pin(database, name, shown.pin)
+    person = _by_badge(database, device, shown.badge) if shown.badge else _by_pin(database, device, shown)
     if person is None:
         with database.begin() as session:
             subject = f"machine/{device.machine}/stations/{device.id}"
@@ -74,42 +72,78 @@ def identify(database: Database, device: Device, shown: Shown) -> Caller:
             if shown.badge
             else _("Type both again. Everybody sets their own PIN on the page of their account."),
         )
-    with database.begin() as session:
-        strike_out(session, counted_as, place)
     return Caller("person", person.name, role=cast("Role", person.role), person_id=person.id)
 
 
-def _refuse(failures: queries.Failures, *, badge: bool) -> None:
-    """Raises `TooManyRequests` while it is locked."""
-    left = max(WAIT.left(failures.pair, FREE, failures.now), WAIT.left(failures.address, FREE_ON_DEVICE, failures.now))
-    if left > 0:
-        until = written(failures.now + timedelta(seconds=left), MINUTES)
-        wrong = (
-            _("Badges are locked on this device until {until}.")
-            if badge
-            else _("The PIN is locked on this device until {until}.")
-        )
-        raise TooManyRequests(
-            wrong.format(until=until), _("Sign in on another device for what cannot wait."), retry_after=left
-        )
-
-
-def _by_pin(database: Database, name: str, pin: str) -> Person | None:
+def _by_pin(database: Database, device: Device, shown: Shown) -> Person | None:
+    """Return who has this name and PIN. Raises `TooManyRequests` while it is locked."""
+    name = names.as_stored(shown.name.replace("\0", "")[:400].encode(errors="replace").decode())
+    counted_as, place = name.casefold()[:200], _place(device)
     with database.begin() as session:
         person = queries.person_named(session, name)
+        known = person is not None and queries.known_place(session, person.id, place)
+        note_attempt(session, counted_as, place, COUNTED, partial(_refuse_pin, known=known))
     usable = person is not None and person.disabled_at is None
-    right = matches(pin[: LONGEST_PIN + 1], person.pin_hash if person is not None and usable else None)
-    return person if right else None
+    right = matches(shown.pin[: LONGEST_PIN + 1], person.pin_hash if person is not None and usable else None)
+    if person is None or not right:
+        return None
+    with database.begin() as session:
+        strike_out(session, counted_as, place)
+        remember(session, person.id, [place])
+    return person
 
 
-def _by_badge(database: Database, code: str) -> Person | None:
+def _by_badge(database: Database, device: Device, code: str) -> Person | None:
+    """Return whose badge this is. Raises `TooManyRequests` while badges are locked."""
+    place = f"{_place(device)} badges"
+    with database.begin() as session:
+        attempt = note_attempt(session, place, place, COUNTED, _refuse_badge)
     code_hash = looked_up(_badge_code(code)[: LONGEST_BADGE + 1])
     with database.begin() as session:
-        return session.scalars(
+        person = session.scalars(
             select(Person)
             .join(Badge, Badge.person_id == Person.id)
             .where(Badge.code_hash == code_hash, Person.disabled_at.is_(None))
         ).one_or_none()
+        if person is None:
+            count_once(session, attempt, code_hash.hex(), place)
+        else:
+            strike_out_one(session, attempt)
+            remember(session, person.id, [_place(device)])
+        return person
+
+
+def _place(device: Device) -> str:
+    return f"station {device.id}"
+
+
+def _refuse_pin(failures: queries.Failures, *, known: bool) -> None:
+    """Raises `TooManyRequests` while the PIN is locked. known: this person has identified themselves here before."""
+    left = WAIT.left(failures.pair, FREE, failures.now)
+    if not known:
+        left = max(left, WAIT.left(failures.address, FREE_ON_DEVICE, failures.now))
+    if left > 0:
+        raise TooManyRequests(
+            _("The PIN is locked on this device until {until}.").format(until=_until(failures.now, left)),
+            _("Scan your badge, or sign in on another device for what cannot wait."),
+            retry_after=left,
+        )
+
+
+def _refuse_badge(failures: queries.Failures) -> None:
+    """Raises `TooManyRequests` while badges are locked."""
+    left = WAIT.left(failures.address, FREE_BADGES, failures.now)
+    if left > 0:
+        raise TooManyRequests(
+            _("Badges are locked on this device until {until}.").format(until=_until(failures.now, left)),
+            _("Type your name and PIN, or sign in on another device for what cannot wait."),
+            retry_after=left,
+        )
+
+
+def _until(now: datetime, left: int) -> str:
+    """The first full minute after the wait."""
+    return written(now + timedelta(seconds=left + 59), MINUTES)
 
 
 def set_pin(session: Session, caller: Caller, password: str, pin: str, keep_token: str | None) -> None:

@@ -4,11 +4,12 @@ import logging
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Request, Response
+from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access import actions, queries
 from app.access.deps import AnyCaller, Caller
-from app.access.identification import LONGEST_PIN, SHORTEST_PIN, set_pin
+from app.access.identification import LONGEST_PIN, SHORTEST_PIN, remove_badges, set_pin
 from app.access.passwords import SHORTEST
 from app.access.sign_in import SignedIn, begin_session, sign_in, sign_out
 from app.db.engine import Database
@@ -149,8 +150,8 @@ def send_invitation(
 
 
 @router.get("/account")
-def account_page(request: Request, caller: AnyCaller, done: str = "") -> Response:
-    return _account(request, caller, {}, done=done)
+def account_page(request: Request, session: SessionDep, caller: AnyCaller, done: str = "") -> Response:
+    return _account(request, session, caller, {}, done=done)
 
 
 @router.post("/account/password")
@@ -161,7 +162,9 @@ def send_password(request: Request, session: SessionDep, caller: AnyCaller, form
     else:
         try:
             token = request.cookies.get(SESSION_COOKIE)
-            actions.change_password(session, caller, form.get("old", ""), form.get("new", ""), token)
+            had_pin = actions.change_password(session, caller, form.get("old", ""), form.get("new", ""), token)
+            if form.get("remove_badges") and caller.person_id is not None:
+                remove_badges(session, caller.person_id, caller.name)
         except actions.SessionEnded:  # answered here, so that what was counted stays
             answer = RedirectResponse("/sign-in?ended=password", 303)
             answer.delete_cookie(SESSION_COOKIE, httponly=True, samesite="lax")
@@ -171,8 +174,8 @@ def send_password(request: Request, session: SessionDep, caller: AnyCaller, form
                 raise
             errors = by_field(error)
         else:
-            return RedirectResponse("/account?done=password", 303)
-    return _account(request, caller, errors, status=422)
+            return RedirectResponse(f"/account?done={'password-pin' if had_pin else 'password'}", 303)
+    return _account(request, session, caller, errors, status=422)
 
 
 @router.post("/account/pin")
@@ -193,11 +196,11 @@ def send_pin(request: Request, session: SessionDep, caller: AnyCaller, form: For
             errors = by_field(error)
         else:
             return RedirectResponse(f"/account?done={'pin' if pin else 'no-pin'}", 303)
-    return _account(request, caller, errors, status=422)
+    return _account(request, session, caller, errors, status=422)
 
 
 def _account(
-    request: Request, caller: Caller, errors: dict[str, str], *, done: str = "", status: int = 200
+    request: Request, session: Session, caller: Caller, errors: dict[str, str], *, done: str = "", status: int = 200
 ) -> Response:
     return page(
         request,
@@ -206,6 +209,7 @@ def _account(
         me=caller,
         errors=errors,
         done=done,
+        badges=queries.badges(session, caller.person_id) if caller.person_id is not None else 0,
         shortest=SHORTEST,
         pin_lengths=(SHORTEST_PIN, LONGEST_PIN),
     )

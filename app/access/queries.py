@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from app.access.callers import Caller, Role
 from app.access.new_keys import digest
-from app.access.tables import ApiKey, BrowserSession, Invitation, KnownPlace, LoginFailure, Person
+from app.access.tables import ApiKey, Badge, BrowserSession, Invitation, KnownPlace, LoginFailure, Person
 from app.web.live import Access
 
 PLACE_KEPT = timedelta(days=180)
@@ -87,6 +87,11 @@ def known_place(session: Session, person_id: int, place: str) -> bool:
 
 def person(session: Session, person_id: int) -> Person | None:
     return session.get(Person, person_id)
+
+
+def badges(session: Session, person_id: int) -> int:
+    """Number of badges that identify this person."""
+    return session.scalar(select(func.count()).where(Badge.person_id == person_id)) or 0
 
 
 class PersonRow(NamedTuple):

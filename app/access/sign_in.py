@@ -5,22 +5,20 @@ only the failures with that name from that place count. All other places share w
 """
 
 import secrets
-from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from ipaddress import IPv6Address, ip_address
 from typing import NamedTuple
 
-from sqlalchemy import delete, func, select
-from sqlalchemy.dialects.postgresql import insert
+from sqlalchemy import delete, func
 from sqlalchemy.orm import Session
 
 from app.access import names, queries
-from app.access.attempts import Wait, note_attempt, strike_out
+from app.access.attempts import Wait, note_attempt, remember, strike_out
 from app.access.audit.actions import Acting, record
 from app.access.new_keys import digest
 from app.access.passwords import LONGEST, matches
-from app.access.tables import BrowserSession, KnownPlace, Person
+from app.access.tables import BrowserSession, Person
 from app.db.engine import Database
 from app.errors import InbandError, TooManyRequests
 from app.language.i18n import _
@@ -32,8 +30,6 @@ FREE = {"pair": 5, "address": 20, "name": 50, "name anywhere": 500}
 `OWN_FAILURES`, and for every place from which nobody of that name has signed in before."""
 OWN_FAILURES = 3
 WAIT = Wait(first=5.0, longest=300.0)
-PLACES = 50
-"""Places kept of a person, the latest."""
 
 
 class SignInRefused(InbandError):
@@ -80,7 +76,7 @@ def sign_in(database: Database, name: str, password: str, address: str, hours: i
     with database.begin() as session:
         strike_out(session, counted_as, counted_at)
         new_device = "" if counted_at == here else secrets.token_urlsafe(32)
-        _remember(session, person, [place, f"device {digest(new_device).hex()}" if new_device else here])
+        remember(session, person.id, [place, f"device {digest(new_device).hex()}" if new_device else here])
         by = Acting(person_id=person.id)
         record(session, person.name, "signed in", f"person/{person.name}", after={"address": address}, by=by)
         return begin_session(session, person.id, hours)._replace(device=new_device)
@@ -112,16 +108,6 @@ def _place(address: str) -> str:
             return str(parsed.ipv4_mapped)
         return f"{IPv6Address(int(parsed) >> 64 << 64)}/64"
     return str(parsed)
-
-
-def _remember(session: Session, person: Person, places: Sequence[str]) -> None:
-    row = insert(KnownPlace).values([{"person_id": person.id, "place": place} for place in places])
-    session.execute(
-        row.on_conflict_do_update(index_elements=["person_id", "place"], set_={"last_at": row.excluded.last_at})
-    )
-    of_person = KnownPlace.person_id == person.id
-    latest = select(KnownPlace.place).where(of_person).order_by(KnownPlace.last_at.desc()).limit(PLACES)
-    session.execute(delete(KnownPlace).where(of_person, KnownPlace.place.not_in(latest)))
 
 
 def begin_session(session: Session, person_id: int, hours: int) -> SignedIn:

@@ -134,13 +134,13 @@ def page(
     **context: Any,
 ) -> HTMLResponse:
     """A whole page, or the part of one, as an answer. Pages show the state of now, so nobody keeps them."""
+    headers = dict(headers or {})
     if status >= HTTPStatus.BAD_REQUEST:
         for refusal in context.values():
             if isinstance(refusal, InbandError):
                 note_reason(request.scope, refusal)
+                headers |= refusal.headers  # when to try again
     else:
         named = request.query_params.get("machine")
         context = {"chosen_machine": machine_of(request.url.path, named), **context}
-    return HTMLResponse(
-        render(request, template, **context), status, headers={"Cache-Control": "no-store", **(headers or {})}
-    )
+    return HTMLResponse(render(request, template, **context), status, headers={"Cache-Control": "no-store", **headers})

@@ -31,7 +31,7 @@ def ask(session: Session, bundle: Bundle, caller: Caller) -> ReportJob:
     if queries.count_open(session) >= MOST_WAITING:
         raise TooManyRequests(
             _("{n} requests for reports are waiting already.").format(n=MOST_WAITING),
-            _("Wait until some of them are done, or cancel some."),
+            _("Wait a minute, until some of them are done, or cancel some."),
             retry_after=60,
         )
     job = ReportJob(

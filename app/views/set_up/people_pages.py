@@ -73,8 +73,7 @@ def send_revoke_key(session: SessionDep, caller: Admin, key: int) -> Response:
 @router.post("/setup/people/{person}/password")
 def send_new_password(request: Request, session: SessionDep, caller: Admin, person: int) -> Response:
     """The answer shows the password, this once, so it is no redirect."""
-    name, password = actions.reset_password(session, person, caller.name)
-    return _people(request, session, caller, new_password=(name, password))
+    return _people(request, session, caller, new_password=actions.reset_password(session, person, caller.name))
 
 
 @router.post("/setup/people/{person}/{what}")

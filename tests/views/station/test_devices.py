@@ -41,6 +41,7 @@ class Tablet:
         assert found is not None
         answer = self.browser.post(self.here + path, data={"csrf": found[1], **fields})
         assert answer.status_code == status, answer.text
+        assert ("retry-after" in answer.headers) is (status == 429)
         return answer.text
 
     def acknowledge(self, status: int = 303, **who: str) -> str:
@@ -266,6 +267,30 @@ class TestSecrets:
         assert "The PIN is removed" in person.send("/account/pin", password=PASSWORD, remove="true")
         tablet.shop.read(12.0)
         tablet.acknowledge(401, other_name=person.name, pin="8351")
+
+    def test_a_new_password_ends_the_pin_and_asks_about_badges(self, server: Server, admin: Person) -> None:
+        person = Person(server, "operator")
+        number = _number(server, person)
+        form: Any = {"old": PASSWORD, "new": "battery horse correct", "again": "battery horse correct"}
+        person.send("/account/pin", password=PASSWORD, pin="8351")
+        assert "my badges" not in person.open("/account")
+        for code in ("7700112244", "7700112255"):
+            admin.send("/setup/stations/badges", person=number, code=code)
+        text = person.send("/account/password", **form)
+        assert "PIN for the stations of machines has been removed" in text
+        assert "Remove my badges too" in text
+        text = admin.send(f"/setup/people/{number}/password")
+        assert "2 badges still identify" in text
+        assert "PIN" not in text.partition("<main")[2], "it has none any more"
+        assert f"/setup/stations/badges/{number}/remove" in text
+
+    def test_badges_are_removed_with_the_old_password(self, server: Server, admin: Person, tablet: Tablet) -> None:
+        person = Person(server, "operator")
+        admin.send("/setup/stations/badges", person=_number(server, person), code="7700112266")
+        form: Any = {"old": PASSWORD, "new": "battery horse correct", "again": "battery horse correct"}
+        assert "Remove my badges too" not in person.send("/account/password", **form, remove_badges="true")
+        tablet.shop.read(12.0)
+        tablet.acknowledge(401, badge="7700112266")
 
     def test_a_badge_is_of_one_person(self, server: Server, admin: Person, milica: Person, tablet: Tablet) -> None:
         other = Person(server, "operator")
