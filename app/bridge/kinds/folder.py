@@ -2,13 +2,14 @@
 
 The folder is looked at again and again: shares tell nobody of a new file. A file is read when two looks find it the same. It is
 moved when all its readings are stored durably, into the folder of done files or, with a text that says why, of failed
-ones. It is never deleted. Nothing goes back to the machine.
+ones. It is never deleted. Nothing goes back to the machine. Links are not followed: whoever may write into the folder would have
+the bridge read what only the bridge may.
 """
 
 import asyncio
 import hashlib
 import logging
-import shutil
+import os
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -22,6 +23,7 @@ from app.bridge.configuration import Machine
 from app.bridge.file_content import NAMES, NOT_ALONE, Content, Fault, Settings, read_content
 from app.bridge.links import Clock, ControlAway, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.moments import learn_ahead
+from app.bridge.plain_files import NotPlain, is_plain, read_plain, write_new
 
 __all__ = ["Folder", "Settings", "link"]
 log = logging.getLogger(__name__)
@@ -66,6 +68,7 @@ class Folder:
         self.machine = machine
         self.settings: Settings = machine.settings
         self.clock = Clock()
+        self.remark = ""
         self.path = Path(self.settings.path)
         self._known: dict[str, _Known] = {}
         self._locked: dict[str, tuple[float, str]] = {}
@@ -88,7 +91,7 @@ class Folder:
         try:
             next(self.path.iterdir(), None)
             identity = self.path / IDENTITY
-            return identity.read_text(encoding="utf-8").strip() if identity.exists() else str(self.path)
+            return read_plain(identity)[0].decode().strip() if os.path.lexists(identity) else str(self.path)
         except (OSError, UnicodeDecodeError) as error:
             raise Misconfigured(
                 f"The folder {self.path} cannot be read: {error}. The bridge needs the right."
@@ -193,20 +196,28 @@ class Folder:
         """Files, and pairs of AQDEF, that are there."""
         pattern = (self.settings.names or NAMES[self.settings.format]).lower()
         groups: dict[str, list[Path]] = {}
+        links = []
         try:
             for path in self.path.iterdir():
                 name = path.name.lower()
                 hidden = name.startswith((".", "~")) or name.endswith(UNFINISHED) or name == IDENTITY
-                if not hidden and fnmatch(name, pattern.lower()) and path.is_file():
+                if hidden or not fnmatch(name, pattern.lower()):
+                    continue
+                if path.is_symlink():
+                    links.append(path.name)
+                elif path.is_file():
                     pair = self.settings.format == "aqdef" and path.suffix.lower() in {".dfd", ".dfx"}
                     groups.setdefault(f"{path.stem.lower()}.df" if pair else path.name, []).append(path)
         except FileNotFoundError:
             raise ControlAway(f"The folder {self.path} is gone: is the share mounted?") from None
+        self.remark = (
+            f"{min(links)} is a link, which is not followed: put the file itself into {self.path}." if links else ""
+        )
         found = []
         for paths in groups.values():
             try:
                 ordered = tuple(sorted(paths, key=lambda path: path.suffix.lower()))
-                stats = [path.stat() for path in ordered]
+                stats = [path.lstat() for path in ordered]
             except FileNotFoundError:
                 continue  # renamed or taken away meanwhile
             found.append(Seen(ordered, tuple((stat.st_size, stat.st_mtime_ns) for stat in stats)))
@@ -232,11 +243,19 @@ class Folder:
             return content
         try:
             with tempfile.TemporaryDirectory(prefix="inband-") as folder:
-                copies = tuple(Path(shutil.copyfile(path, Path(folder, path.name))) for path in seen.paths)
+                copies = []
+                for path, state in zip(seen.paths, seen.state, strict=True):
+                    held, about = read_plain(path)
+                    if (about.st_size, about.st_mtime_ns) != state:
+                        return None
+                    copies.append(Path(folder, path.name))
+                    copies[-1].write_bytes(held)
                 if not self._is_as_seen(seen):
                     return None
                 self._reading = seen.name
-                content = read_content(self.machine, copies, f"{seen.name}\0{seen.state}", self._grown.get(seen.name))
+                content = read_content(
+                    self.machine, tuple(copies), f"{seen.name}\0{seen.state}", self._grown.get(seen.name)
+                )
         except FileNotFoundError:
             return None
         except OSError as error:
@@ -251,7 +270,7 @@ class Folder:
         return content
 
     def _is_as_seen(self, seen: Seen) -> bool:
-        stats = [path.stat() for path in seen.paths]
+        stats = [path.lstat() for path in seen.paths if is_plain(path)]
         return tuple((stat.st_size, stat.st_mtime_ns) for stat in stats) == seen.state
 
     def _move_stored(self) -> None:
@@ -277,13 +296,15 @@ class Folder:
 
     def _move(self, seen: Seen, content: Content) -> None:
         folder = self.path / (self.settings.failed if content.faults else self.settings.done)
+        if folder.parent == self.path and folder.is_symlink():
+            raise NotPlain(0, f"{folder} is a link; make it a folder, or name the other place in the configuration")
         folder.mkdir(parents=True, exist_ok=True)
         count = 1
         while any((folder / _numbered(path, count)).exists() for path in seen.paths):
             count += 1
         if content.faults:
             text = folder / f"{_numbered(seen.paths[-1], count)}.why.txt"
-            text.write_text(_why(seen, content, self.path), encoding="utf-8")
+            write_new(text, _why(seen, content, self.path).encode())
             log.warning("%s: file %s has failed: %s", self.machine.key, seen.name, content.faults[0])
         for path in seen.paths:
             path.rename(folder / _numbered(path, count))

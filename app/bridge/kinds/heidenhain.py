@@ -22,6 +22,7 @@ from msgspec import Meta
 from app.bridge.configuration import Location, Machine
 from app.bridge.links import Clock, ControlAway, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.moments import learn, measured_at
+from app.bridge.plain_files import read_plain, write_new
 from app.bridge.slots import printed_reading
 from app.core.printed_line import DECIMALS, MODULUS, LineReader, Printed
 from app.core.ring import STEPS, Unit
@@ -159,10 +160,10 @@ class FolderFiles:
     def read(self) -> bytes | None:
         """The file of readings if it has changed."""
         try:
-            about = self.readings.stat()
+            about = self.readings.lstat()
             if self._known == (about.st_size, about.st_mtime_ns):
                 return None
-            content = self.readings.read_bytes()
+            content, about = read_plain(self.readings)
         except FileNotFoundError:
             self.open()
             changed, self._known = self._known != (0, 0), (0, 0)
@@ -176,7 +177,7 @@ class FolderFiles:
         """Replace the program of corrections."""
         new = self.corrections.with_suffix(".new")
         try:
-            new.write_bytes(text.encode("cp1252"))
+            write_new(new, text.encode("cp1252"))
             new.replace(self.corrections)
         except OSError as error:
             raise ControlAway(

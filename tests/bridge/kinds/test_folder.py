@@ -523,6 +523,76 @@ def test_files_that_cannot_be_moved_hold_up_no_others_and_are_told(tmp_path: Pat
     run(work())
 
 
+SECRET = "inband_the-key-of-the-machine;x\nmore;of it\n"
+
+
+def test_links_are_neither_read_nor_quoted_and_files_beside_them_are_taken(tmp_path: Path) -> None:
+    async def work() -> None:
+        watched = tmp_path / "watched"
+        watched.mkdir()
+        secret = write(tmp_path / "m.key", SECRET)
+        (watched / "p_k.csv").symlink_to(secret)
+        (watched / "inband-identity.txt").symlink_to(secret)
+        os.mkfifo(watched / "pipe.csv")
+        write(watched / "a.csv", HEAD + LINE)
+        link = Folder(machine(watched))
+        with pytest.raises(Misconfigured) as caught:
+            await link.connect()
+        assert "inband_" not in str(caught.value)
+        (watched / "inband-identity.txt").unlink()
+        await link.connect()
+        received = await fetched(link)
+        assert [each.body["part"] for each in received] == ["P1"]
+        assert "p_k.csv is a link, which is not followed" in link.remark
+        await link.acknowledge(received)
+        assert [path.name for path in (watched / "done").iterdir()] == ["a.csv"]
+        assert (watched / "p_k.csv").is_symlink()
+        await link.close()
+
+    run(work())
+
+
+@pytest.mark.parametrize("other", ["link", "pipe"])
+def test_a_file_that_becomes_a_link_or_a_pipe_before_it_is_opened_is_not_read(tmp_path: Path, other: str) -> None:
+    secret = write(tmp_path / "m.key", SECRET)
+    watched = tmp_path / "watched"
+    watched.mkdir()
+    file = write(watched / "a.csv", HEAD + LINE)
+    link = Folder(machine(watched))
+    [seen] = link._files()
+    file.unlink()
+    if other == "link":
+        file.symlink_to(secret)
+    else:
+        os.mkfifo(file)
+    assert link._read(seen, unchanged=1000.0) is None
+
+
+def test_the_reason_of_a_failed_file_is_not_written_through_a_link(tmp_path: Path) -> None:
+    async def work() -> None:
+        watched = tmp_path / "watched"
+        (watched / "failed").mkdir(parents=True)
+        victim = write(tmp_path / "victim", "untouched")
+        (watched / "failed" / "a.csv.why.txt").symlink_to(victim)
+        write(watched / "a.csv", HEAD + LINE.replace("40,0123", "x"))
+        link = Folder(machine(watched))
+        await link.connect()
+        await link.acknowledge(await fetched(link))
+        assert "'x' is not a number" in (watched / "failed" / "a.csv.why.txt").read_text()
+        assert victim.read_text() == "untouched"
+        (watched / "failed" / "a.csv").unlink()
+        (watched / "failed").rename(tmp_path / "elsewhere")
+        (watched / "failed").symlink_to(tmp_path / "elsewhere")
+        write(watched / "b.csv", HEAD + LINE.replace("40,0123", "y"))
+        await link.acknowledge(await fetched(link))
+        assert (watched / "b.csv").exists()
+        with pytest.raises(Misconfigured, match=r"failed is a link"):
+            await fetched(link)
+        await link.close()
+
+    run(work())
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read every file")
 def test_a_locked_file_is_told_after_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.bridge.kinds.folder.LOCKED_FOR", 0.0)

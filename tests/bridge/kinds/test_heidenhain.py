@@ -250,6 +250,27 @@ def test_a_folder_serves_in_place_of_lsv2(tmp_path: Path) -> None:
     run(work())
 
 
+def test_links_in_a_folder_are_neither_read_nor_written_through(tmp_path: Path) -> None:
+    async def work() -> None:
+        folder = tmp_path / "share"
+        folder.mkdir()
+        victim = tmp_path / "victim"
+        victim.write_text("untouched")
+        (folder / "corr.new").symlink_to(victim)
+        (folder / "corr.h").symlink_to(victim)
+        link = TncLink(tnc(Settings(folder=str(folder))))
+        await link.connect()
+        await link.offer([ORDER])
+        assert "QR31 = -0.010000" in (folder / "corr.h").read_text(encoding="cp1252")
+        assert victim.read_text() == "untouched"
+        (folder / "readings.txt").symlink_to(victim)
+        with pytest.raises(ControlAway, match="is a link"):
+            await link.fetch(Position())
+        await link.close()
+
+    run(work())
+
+
 def test_mistakes_are_said(tmp_path: Path) -> None:
     async def work() -> None:
         async with control() as simulator:
