@@ -42,6 +42,19 @@ def resize(page: Page, size: str) -> None:
     page.set_viewport_size({"width": width, "height": height})
 
 
+def boxes(page: Page, parts: str) -> list[dict[str, float]]:
+    """Where those that are seen are, all at one moment: what has just happened may have the page fetch its parts again.
+
+    A locator would not do: what it finds may have been replaced when it is measured.
+    """
+    found: list[dict[str, float]] = page.evaluate(
+        "parts => [...document.querySelectorAll(parts)].filter((part) => part.checkVisibility())"
+        ".map((part) => part.getBoundingClientRect().toJSON())",
+        parts,
+    )
+    return found
+
+
 TOO_WIDE = """async (limit) => {
   const more = () => document.documentElement.scrollWidth - document.documentElement.clientWidth;
   const end = performance.now() + limit;

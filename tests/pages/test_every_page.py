@@ -205,10 +205,11 @@ def test_contrast_themes_of_the_system_show_what_is_chosen(page: Page, house: Sh
     page.emulate_media(forced_colors="active")
     admin.sign_in(page)
     opened(page, f"/characteristics/{house.characteristic}")
-    for choice in page.locator("nav.choice").all():
-        grounds = choice.locator("a").evaluate_all(
-            "links => links.map((link) => getComputedStyle(link).backgroundColor + (link.ariaCurrent ? ' chosen' : ''))"
-        )
-        assert len(set(grounds)) == 2, grounds
+    choices = page.locator("nav.choice").evaluate_all(
+        "all => all.map((one) => [...one.querySelectorAll('a')].map("
+        "(link) => getComputedStyle(link).backgroundColor + (link.ariaCurrent ? ' chosen' : '')))"
+    )
+    assert choices
+    assert {len(set(grounds)) for grounds in choices} == {2}, choices
     chart = page.locator("plotly-chart").first  # marks and bands on their own ground
     assert chart.evaluate("chart => getComputedStyle(chart).forcedColorAdjust") == "none"

@@ -5,6 +5,7 @@ from typing import Any
 
 from playwright.sync_api import Page, expect
 
+from tests.pages.looks import boxes
 from tests.shop import Person, Shop
 
 SLOW = 20_000  # ms, for charts on a busy computer
@@ -37,16 +38,8 @@ class TestAtThePanel:
         page.get_by_role("textbox", name="Z at contact").fill("-201.5")
         page.get_by_role("textbox", name="Feeler gauge").fill("0,1")
         page.get_by_role("textbox", name="Tool length").fill("98.25")
-        small = [
-            box
-            for each in page.locator("main")
-            .get_by_role("button")
-            .or_(page.locator("main input, main select"))
-            .filter(visible=True)
-            .all()
-            if (box := each.bounding_box()) and box["height"] < 48
-        ]
-        assert small == []
+        targets = "main button, main [role=button], main input, main select"
+        assert min(box["height"] for box in boxes(page, targets)) >= 48
         page.get_by_role("button", name="Compute the zero and save").click()
         expect(page.get_by_role("heading", level=1)).to_contain_text("G54 Pocket")
         for value in ("−306.010", "−154.250", "−299.850", "100.004", "60.008"):

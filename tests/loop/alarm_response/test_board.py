@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.pages.looks import boxes
 from tests.shop import Person, Shop
 
 
@@ -177,17 +178,13 @@ class TestTwoTouches:
         page.get_by_role("link", name="Tool replaced").click()
         dialog = page.get_by_role("dialog")
         expect(dialog).to_be_visible()
-        for target in [
-            *page.locator(".alarm-actions a").all(),
-            *dialog.locator(".chip, .actions .button, input:visible:not([type=radio])").all(),
-        ]:
-            box = target.bounding_box()
-            assert box is not None
-            assert box["height"] >= 48
-            assert box["width"] >= 48
-        confirm = dialog.get_by_role("button", name="Tool replaced").bounding_box()
-        assert confirm is not None
-        assert confirm["y"] + confirm["height"] < 1280
+        for targets in (
+            ".alarm-actions a",
+            "dialog .chip, dialog .actions .button, dialog input:not([type=radio])",
+        ):
+            assert min(min(box["height"], box["width"]) for box in boxes(page, targets)) >= 48
+        confirm = boxes(page, "dialog .actions button")[0]
+        assert confirm["bottom"] < 1280
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
     def test_the_keyboard_will_do(self, shop: Shop, operator: Person, page: Page) -> None:

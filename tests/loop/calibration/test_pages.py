@@ -6,6 +6,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.loop.calibration.test_calibrations import RING, calibrate, ring
+from tests.pages.looks import boxes
 from tests.shop import Person, Shop
 
 GAUGE: dict[str, Any] = {
@@ -251,8 +252,5 @@ class TestInABrowser:
         for path in ("/calibration", place(shop), probe(shop)):
             page.goto(path)
             assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-            heights = page.evaluate(  # all at one moment: the calibration has the page fetch its parts again
-                "[...document.querySelectorAll('main .button, main .row-name, .nav a')]"
-                ".map((one) => one.getBoundingClientRect().height)"
-            )
-            assert min(heights) >= 48
+            targets = "main .button, main .row-name, .nav a"
+            assert min(box["height"] for box in boxes(page, targets)) >= 48

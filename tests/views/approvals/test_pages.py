@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.pages.looks import boxes
 from tests.shop import Person, Shop
 
 
@@ -126,9 +127,5 @@ class TestInABrowser:
         for address in (f"/corrections?machine={shop.machine}", f"/machines/{shop.machine}/tools/3"):
             page.goto(address)
             assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-            for target in page.locator(
-                ".approval-verbs a, .card-head .button, .page-head .button, main form button"
-            ).all():
-                box = target.bounding_box()
-                assert box is not None
-                assert box["height"] >= 48
+            targets = ".approval-verbs a, .card-head .button, .page-head .button, main form button"
+            assert min(box["height"] for box in boxes(page, targets)) >= 48

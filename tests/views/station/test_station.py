@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.pages.looks import boxes
 from tests.shop import Person, Shop
 
 UPRIGHT: Any = {"width": 800, "height": 1280}
@@ -153,14 +154,6 @@ def test_it_is_read_from_two_metres(page: Page, shop: Shop, operator: Person, si
     assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
     assert boxes(page, ".station-alarm")[0]["top"] < size["height"] * 0.75  # seen without scrolling
     assert min(box["height"] for box in boxes(page, ".actions .button")) >= 64
-
-
-def boxes(page: Page, parts: str) -> list[dict[str, float]]:
-    """Where these are, all at one moment: an alarm that was raised a moment ago has the page fetch its parts again."""
-    found: list[dict[str, float]] = page.evaluate(
-        "parts => [...document.querySelectorAll(parts)].map(part => part.getBoundingClientRect().toJSON())", parts
-    )
-    return found
 
 
 @pytest.mark.parametrize("size", [ACROSS, pytest.param(UPRIGHT, marks=pytest.mark.long)], ids=["across", "upright"])
