@@ -10,6 +10,7 @@ and an operator edits the offset by hand. At the end what the control has writte
 import argparse
 import asyncio
 import contextlib
+import json
 import os
 import random
 import signal
@@ -532,13 +533,21 @@ class Campaign:
             self._until(settled, "corrections are confirmed", 15)
         assert len(set(numbers)) == len(numbers), f"applied twice: {sorted(n for n in numbers if numbers.count(n) > 1)}"
         known = self._corrections()
+        merged = self._merged()
         for number, before, after in model.applied:
-            step, wanted = scale * (after - before), known[number]["amount"]
+            together = [*merged.get(number, []), number]
+            step, wanted = scale * (after - before), sum(known[each]["amount"] for each in together)
             assert abs(step - wanted) < scale * TOLERANCE, (
                 f"correction {number} was {wanted}, the offset went by {step}"
             )
         _no_edit_overwritten(model)
         self._until(lambda: abs(self._told() - control.offset) < TOLERANCE, f"the offset {control.offset} is told", 30)
+
+    def _merged(self) -> dict[int, list[int]]:
+        """By number of an order: the earlier corrections that it took along."""
+        with contextlib.closing(sqlite3.connect(self.folder / "inband-bridge.sqlite3")) as store:
+            rows = store.execute("SELECT number, merged FROM intent WHERE machine = ?", (self.machine,)).fetchall()
+        return {number: json.loads(merged) for number, merged in rows}
 
     def _told(self) -> float:
         return float(self.call("GET", f"/machines/{self.machine}/tools/{TOOL}")["offset"])

@@ -15,7 +15,7 @@ import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
-from app.bridge import server_side
+from app.bridge import offering, server_side
 from app.bridge.configuration import configuration_from
 from app.bridge.links import Position, Received
 from app.bridge.program import link_of
@@ -103,8 +103,8 @@ async def measure(table: dict[str, object], port: int, folder: Path) -> dict[str
         await store.sent("m0", [row.id for row in rows])
 
     async def full() -> None:
-        await server_side._tell(unit, client)  # noqa: SLF001 - the steps of the task
-        await server_side._ask(unit, client)  # noqa: SLF001
+        await offering.tell(unit, client)
+        await offering.ask(unit, client)
 
     async def beat() -> None:
         await client.heartbeat("m0", **await server_side.heartbeat(unit))

@@ -55,7 +55,7 @@ async def _connected(unit: Unit) -> None:
         unit.identity = await link.connect()
     look_who_answers(unit.identity, machine.identity)
     position = await store.position(machine.key)
-    answered: int | None = None
+    answered: set[int] = set()
     offsets_at = full_at = 0.0
     full = False
     while True:
@@ -85,13 +85,17 @@ async def _connected(unit: Unit) -> None:
                 await link.acknowledge(received)
         async with asyncio.timeout(machine.patience):
             for outcome in await link.outcomes():
-                offered = any(order.number == outcome.number for order in unit.orders)
-                if (offered or outcome.number != answered) and await store.answered(machine.key, outcome):
-                    unit.to_tell = True
-                    unit.news.set()
-                answered = outcome.number
-                # not once more, however long the server is away: somebody may have set the offset of before by hand
-                unit.orders = tuple(order for order in unit.orders if order.number != outcome.number)
+                order = next((each for each in unit.orders if each.number == outcome.number), None)
+                memory = order and order.tool_memory
+                if order is not None or outcome.number not in answered:
+                    if noted := await store.answered(machine.key, outcome):
+                        memory = noted
+                        unit.to_tell = True
+                        unit.news.set()
+                    answered.add(outcome.number)
+                # nor another order for this location, however long the server is away: it begins at the offset of before
+                unit.taken.add(memory or 0)
+                unit.orders = tuple(each for each in unit.orders if each.tool_memory != memory)
             await link.offer(unit.offered)
         if time.monotonic() >= offsets_at:
             async with asyncio.timeout(machine.patience):
@@ -106,6 +110,6 @@ async def _connected(unit: Unit) -> None:
         waits = unit.test.waits if unit.test is not None else ""
         unit.say(
             "held" if unit.held else "online",
-            " ".join(filter(None, (waits, *unit.held_back, remark, wrong_date(link.clock)))),
+            " ".join(filter(None, (waits, remark, wrong_date(link.clock)))),
         )
         await asyncio.sleep(_until_next(machine.interval))

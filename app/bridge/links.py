@@ -3,8 +3,9 @@
 Lengths are mm in Inband's sense on this side: a kind, or `app.bridge.registers` for it, converts by the location's mapping.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
 
@@ -87,12 +88,23 @@ class Received:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """A correction that the control is to take: absolute offsets before and after it, mm."""
+    """All that the control is to take at one location: absolute offsets before and after, mm.
+
+    number: of the last correction in it. merged: those of earlier ones of this location that it takes along, ascending. until: when
+    it is too old, by the monotonic clock.
+    """
 
     number: int
     tool_memory: int
     before: float
     after: float
+    merged: tuple[int, ...] = ()
+    until: float = field(default=math.inf, compare=False)
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Every correction in it, in their order."""
+        return (*self.merged, self.number)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +147,10 @@ class Link(Protocol):
         """Say that these are stored durably."""
 
     async def offer(self, orders: Sequence[Order]) -> None:
-        """Make these known to the control, oldest first, and no others. Offering the same again changes nothing."""
+        """Make these known to the control, one for each location, the one that waits longest first; and no others.
+
+        Offering the same again changes nothing.
+        """
 
     async def outcomes(self) -> Sequence[Outcome]:
         """The answers that the control has given last. They may repeat themselves."""

@@ -108,7 +108,7 @@ class RegisterLink:
         self._block: Block | None = None
         self._numbers: list[float] = []  # those that the block was made of
         self._polled: tuple[datetime, int] | None = None
-        self._direct: list[Outcome] = []
+        self._direct: dict[int, Outcome] = {}
         self._heads: list[float] = []
         self._heads_at = 0.0
         self._acknowledged = False  # since the last poll
@@ -118,7 +118,7 @@ class RegisterLink:
     async def connect(self) -> str:
         """Connect, and answer the control's identity."""
         self._block = self._polled = None
-        self._direct = []
+        self._direct = {}
         self._heads = []
         identity = await self.registers.connect()
         with suppress(LinkError, TimeoutError):  # a control that does not tell its date works all the same
@@ -251,12 +251,11 @@ class RegisterLink:
     # --- corrections
 
     async def offer(self, orders: Sequence[Order]) -> None:
-        """Put the oldest order into the mailbox, or write it directly; take back what is no longer wanted."""
+        """Put the order that waits longest into the mailbox, or write all directly; take back what is no longer wanted."""
         if self.machine.corrections == "none":
             return
         if self.machine.corrections == "direct":
-            for order in orders[:1]:
-                await self._set_directly(order)
+            await self._set_directly(orders)
             return
         block = self._block
         if block is None:
@@ -309,7 +308,7 @@ class RegisterLink:
     async def outcomes(self) -> Sequence[Outcome]:
         """The NC program's last answer, or those of direct writes."""
         if self._direct:
-            return list(self._direct)
+            return list(self._direct.values())
         block = self._block
         if block is None or not block.answered or self.machine.corrections != "control" or not block.answer_holds:
             return []
@@ -332,31 +331,53 @@ class RegisterLink:
                 return location.from_control(block.offset, self.machine.unit)
         return None
 
-    async def _set_directly(self, order: Order) -> None:
-        """Compare and set: the offset before becomes the one after; anything else is left alone and reported.
+    async def _set_directly(self, orders: Sequence[Order]) -> None:
+        """Compare and set: each offset before becomes the one after; anything else is left alone and reported.
 
-        Run again after a crash it reads first: an offset that is already the one after is only reported.
+        Run again after a crash it reads first: an offset that is already the one after is only reported. Where one must not be
+        written now, or fails, the others are written all the same.
         """
-        if any(outcome.number == order.number for outcome in self._direct):
-            return
-        location = location_of(self.machine, order.tool_memory)
-        assert location is not None  # the guards have seen to it
-        before, after = (location.to_control(value, self.machine.unit) for value in (order.before, order.after))
-        tolerance = abs(location.to_control(self.machine.tolerance, self.machine.unit))
-        held = await self._offset_of(location)
-        if abs(held - before) <= tolerance < abs(held - after):
-            if await self.registers.against_writing(location):
-                return
-            await self.registers.write_offset(location, round(after, 6))
+        self._direct = {order.number: outcome for order in orders if (outcome := self._direct.get(order.number))}
+        written: list[Order] = []
+        for order in orders:
+            if order.number in self._direct:
+                continue
+            try:
+                if await self._compare_and_set(order):
+                    written.append(order)
+            except Misconfigured as error:
+                self.remark = str(error)
+        if written:
             await asyncio.sleep(self.machine.interval)  # a control shows a new value only after its next sampling tick
-            held = await self._offset_of(location)
+        for order in written:
+            await self._note_direct(order, await self._offset_of(self._location(order.tool_memory)))
+
+    async def _compare_and_set(self, order: Order) -> bool:
+        """Tell if the offset was written."""
+        location = self._location(order.tool_memory)
+        before, after = (location.to_control(value, self.machine.unit) for value in (order.before, order.after))
+        held = await self._offset_of(location)
+        if self._near(location, held, after) or not self._near(location, held, before):
+            await self._note_direct(order, held)
+            return False
+        if await self.registers.against_writing(location):
+            return False
+        await self.registers.write_offset(location, round(after, 6))
+        return True
+
+    def _near(self, location: Location, held: float, wanted: float) -> bool:
+        return abs(held - wanted) <= abs(location.to_control(self.machine.tolerance, self.machine.unit))
+
+    async def _note_direct(self, order: Order, held: float) -> None:
+        location = self._location(order.tool_memory)
+        before, after = (location.to_control(value, self.machine.unit) for value in (order.before, order.after))
         offset = location.from_control(held, self.machine.unit)
-        if abs(held - after) <= tolerance:
+        if self._near(location, held, after):
             await self._write(Register.APPLIED, order.number)
-            self._direct = [Outcome(order.number, applied=True, offset=offset)]
+            self._direct[order.number] = Outcome(order.number, applied=True, offset=offset)
         else:
             reason = f"The control holds {held:.4f}, expected was {before:.4f}."
-            self._direct = [Outcome(order.number, False, offset, reason, differs=True)]
+            self._direct[order.number] = Outcome(order.number, False, offset, reason, differs=True)
 
     # --- offsets
 

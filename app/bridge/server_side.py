@@ -4,46 +4,39 @@ import asyncio
 import contextlib
 import json
 import logging
-import math
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
 from app import __version__
-from app.bridge import guided_test
+from app.bridge import guided_test, offering
 from app.bridge.configuration import Server
-from app.bridge.guards import against
-from app.bridge.links import Order
+from app.bridge.offering import MOST_REASON, REFUSED, line, not_from_inband
 from app.bridge.offset_change import writes_offsets
 from app.bridge.store import StoreError
-from app.bridge.store_tables import Intent, Waiting
+from app.bridge.store_tables import Waiting
 from app.bridge.unit import Unit
 from inband_client import (
     AsyncClient,
-    Conflict,
-    Correction,
     Decision,
     Forbidden,
     Invalid,
-    NotFound,
     ProblemError,
-    TooLarge,
     Unauthorized,
     Unavailable,
     Untrusted,
 )
 
 log = logging.getLogger(__name__)
-REFUSED = (Conflict, Invalid, NotFound, TooLarge)
 SHORTEST_PAUSE, LONGEST_PAUSE = 1.0, 30.0  # s
 AWAY = (Unauthorized, Forbidden, Unavailable, Untrusted)
 TRUST = "Look at server.url; if it is right, name the authority that signed the certificate in server.ca."
 TOGETHER = 100  # readings of a backlog in one request
-MOST_DETAIL, MOST_REASON, MOST_NAME = 1000, 500, 200  # characters
+MOST_DETAIL, MOST_HELD_BACK = 1000, 100  # characters; tools
 MOST_CLOCK = 1e9  # s: a control whose battery is empty may say 1980; the server takes no more
 MOST_OFFSET = 100_000.0  # mm: as much as the server takes; more is what a wrong register holds
-NOTICED = 0.0005  # mm: what an offset may differ by without being told
+LOCATIONS_EVERY = 30.0  # s: as long as a characteristic may go on counting for the location that it had
 
 
 async def run(unit: Unit, client: AsyncClient, server: Server) -> None:
@@ -118,7 +111,7 @@ def _concerns(decision: Decision) -> bool:
 async def _push_all(unit: Unit, client: AsyncClient, rows: Sequence[Waiting]) -> Sequence[Decision]:
     if len(rows) > 1:
         try:
-            batch = await client.push_many([row.body | {"key": row.key} for row in rows])
+            batch = await client.push_many([await _told(unit, client, row) for row in rows])
         except (*REFUSED, Forbidden):
             pass  # one of them: each by itself, below
         else:
@@ -129,9 +122,9 @@ async def _push_all(unit: Unit, client: AsyncClient, rows: Sequence[Waiting]) ->
 
 async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | None:
     try:
-        decision = await client.push(row.body | {"key": row.key})
+        decision = await client.push(await _told(unit, client, row))
     except REFUSED as error:
-        if _not_from_inband(error):
+        if not_from_inband(error):
             raise
         reason = str(error)
     except Forbidden:
@@ -147,9 +140,33 @@ async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | Non
     return None
 
 
-def _not_from_inband(error: ProblemError) -> bool:
-    """Tell if it is not Inband's: a proxy without a server behind it may answer 404, which says nothing of what was sent."""
-    return not error.kind
+async def _told(unit: Unit, client: AsyncClient, row: Waiting) -> dict[str, Any]:
+    """A reading as the server takes it: with the correction in effect of its own tool location.
+
+    A control keeps one number for all locations, which do not get their corrections in the order of the numbers.
+    """
+    body = row.body | {"key": row.key}
+    number = body.get("correction_in_effect")
+    if not number:
+        return body
+    memory = await _tool_memory(unit, client, str(body.get("characteristic")))
+    known = await unit.store.in_effect(unit.machine.key, memory, int(number)) if memory else None
+    if known is None:
+        del body["correction_in_effect"]
+    else:
+        body["correction_in_effect"] = known
+    return body
+
+
+async def _tool_memory(unit: Unit, client: AsyncClient, characteristic: str) -> int | None:
+    """The location of a characteristic; None where the server knows none."""
+    if time.monotonic() > unit.locations_at + LOCATIONS_EVERY:
+        unit.tool_memories = {
+            each["key"]: each["parameters"].get("tool_memory")
+            async for each in client.items("/characteristics", machine=unit.machine.key, limit=1000)
+        }
+        unit.locations_at = time.monotonic()
+    return unit.tool_memories.get(characteristic)
 
 
 async def _key_is_right(unit: Unit, client: AsyncClient) -> bool:
@@ -161,142 +178,7 @@ async def _key_is_right(unit: Unit, client: AsyncClient) -> bool:
     return True
 
 
-# --- corrections
-
-
-async def _tell(unit: Unit, client: AsyncClient) -> None:
-    """The control's answers, and offsets that somebody has changed at the control. One that is refused holds up no other."""
-    key = unit.machine.key
-    refused: ProblemError | None = None
-    for intent in await unit.store.intents(key, "answered"):
-        try:
-            await _tell_one(unit, client, intent)
-        except REFUSED as error:
-            refused = refused or error
-        else:
-            await unit.store.set_intent(key, intent.order.number, "told")
-    for tool_memory, offset in (await unit.store.untold(key, NOTICED)).items():
-        try:
-            await client.report_offset(key, tool_memory, round(offset, 6), none_applied=True)
-        except REFUSED as error:
-            refused = refused or error
-        else:
-            await unit.store.told(key, tool_memory, offset)
-    if refused is not None:
-        raise refused
-
-
-async def _tell_one(unit: Unit, client: AsyncClient, intent: Intent) -> None:
-    key, order, outcome = unit.machine.key, intent.order, intent.outcome
-    assert outcome is not None  # it is answered
-    held = None if outcome.offset is None else round(outcome.offset, 6)
-    try:
-        if outcome.applied:
-            await client.confirm(key, order.number, offset_after=held, mapping=intent.mapping)
-            return
-        if not outcome.differs:
-            await client.reject(key, order.number, _line(outcome.reason, MOST_REASON) or "The control has refused it.")
-            return
-    except (
-        Conflict,
-        NotFound,
-    ) as error:  # superseded while the control took it, told before, or forgotten by a restored server
-        if _not_from_inband(error):
-            raise
-        said = "is in the offset" if outcome.applied else "was refused by the control"
-        log.warning("%s: correction %d %s, but %s", key, order.number, said, error)
-    if held is not None:
-        await client.report_offset(key, order.tool_memory, held, none_applied=True)
-
-
-async def _ask(unit: Unit, client: AsyncClient) -> None:
-    """The pending corrections, through the guards; what the control may have, and why others wait."""
-    machine, store = unit.machine, unit.store
-    if machine.corrections == "none":
-        return
-    if unit.test is not None and unit.test.holds:
-        unit.held_back = (guided_test.holds(unit.test),)
-        await _intend(unit, [])
-        return
-    pending = await client.pending(machine.key)
-    told = {intent.order.number: intent for intent in await store.intents(machine.key, "told")} if pending else {}
-    known = await store.known(machine.key)
-    await unit.look_if_held()
-    orders: list[Order] = []
-    waiting: list[str] = []
-    until = math.inf
-    now = datetime.now(UTC)
-    answered: set[int] = set()  # tool memories whose later corrections lead to another offset now
-    for correction in pending:
-        if correction.tool_memory in answered:
-            unit.to_tell = True  # asked again at once
-            unit.news.set()
-            break
-        if correction.offset_expected is None:
-            waiting.append(f"Correction {correction.number} waits: the server does not say which offset it leads to.")
-            break
-        order = _order(correction, correction.offset_expected)
-        if earlier := told.get(correction.number):
-            await _tell_again(unit, client, order, earlier)
-            answered.add(order.tool_memory)
-            continue
-        issued = correction.created_at or now
-        verdict = against(order, issued, now, machine, known, unit.held)
-        if verdict is None:
-            if not orders:
-                until = time.monotonic() + machine.largest_age - (now - issued).total_seconds()
-            orders.append(order)
-        elif verdict.final:
-            answered.add(order.tool_memory)
-            await _reject(unit, client, order.number, verdict.reason)
-        else:
-            waiting.append(verdict.reason)
-            break  # the order of corrections is theirs: what stands behind waits too
-    unit.held_back = tuple(waiting)
-    await _intend(unit, orders, until)
-
-
-async def _intend(unit: Unit, orders: Sequence[Order], until: float = math.inf) -> None:
-    """Note what is offered before the control hears of it, and what is taken back."""
-    key = unit.machine.key
-    wanted = {order.number for order in orders}
-    for intent in await unit.store.intents(key, "open"):
-        if intent.order.number not in wanted:
-            await unit.store.set_intent(key, intent.order.number, "withdrawn")
-    offered: list[Order] = []
-    for order in orders[:1]:
-        location = next(place for place in unit.machine.location if place.tool_memory == order.tool_memory)
-        if await unit.store.intend(key, order, unit.machine.mapping_hash(location)):
-            offered.append(order)
-    unit.orders, unit.orders_until = tuple(offered), until
-
-
-async def _tell_again(unit: Unit, client: AsyncClient, order: Order, earlier: Intent) -> None:
-    """A correction waits whose answer the server has heard: the answer was lost when the server went back in time, or the
-    control has refused it, or the number was given anew to another correction.
-    """
-    same = abs(order.after - earlier.order.after) <= NOTICED and order.tool_memory == earlier.order.tool_memory
-    if same and earlier.outcome is not None and earlier.outcome.applied:
-        await _tell_one(unit, client, earlier)
-        return
-    reason = "The control has refused this correction; its offset was reported."
-    if not same:
-        reason = "The control has had another correction with this number, before the server went back in time."
-    await _reject(unit, client, order.number, reason)
-
-
-async def _reject(unit: Unit, client: AsyncClient, number: int, reason: str) -> None:
-    try:
-        await client.reject(unit.machine.key, number, reason)
-    except Conflict as error:  # somebody was quicker; what was offered before must not stay on offer for that
-        log.info("%s: correction %d: %s", unit.machine.key, number, error)
-
-
-def _order(correction: Correction, after: float) -> Order:
-    return Order(correction.number, correction.tool_memory, round(after - correction.amount, 6), round(after, 6))
-
-
-STEPS: tuple[Callable[[Unit, AsyncClient], Awaitable[bool | None]], ...] = (_tell, _forward, _ask)
+STEPS: tuple[Callable[[Unit, AsyncClient], Awaitable[bool | None]], ...] = (offering.tell, _forward, offering.ask)
 
 
 # --- heartbeat
@@ -345,16 +227,16 @@ async def heartbeat(unit: Unit) -> dict[str, Any]:
         "version": __version__,
         "kind": machine.kind,
         "state": unit.state,
-        "detail": _line(unit.detail or unit.trouble or (unit.context.summary() if unit.context else ""), MOST_DETAIL),
+        "detail": line(_detail(unit), MOST_DETAIL),
         "sent_at": datetime.now(UTC),
         "waiting": counts.waiting,
         "oldest_waiting_at": _moment(counts.oldest),
         "quarantined": counts.quarantined,
         "quarantine": [
             {
-                "key": _line(each.key) or "?",
-                "characteristic": _line(each.body.get("characteristic")),
-                "reason": _line(each.reason, MOST_REASON) or "",
+                "key": line(each.key) or "?",
+                "characteristic": line(each.body.get("characteristic")),
+                "reason": line(each.reason, MOST_REASON) or "",
                 "at": _moment(each.at),
             }
             for each in quarantine
@@ -363,15 +245,19 @@ async def heartbeat(unit: Unit) -> dict[str, Any]:
         "started_at": unit.started_at,
         "mapping": machine.mapping_hash(),
         "hold_all": unit.held,
-        "identity": _line(unit.identity),
+        "held_back": [
+            {"tool_memory": each.tool_memory, "number": each.number, "reason": line(each.reason, MOST_REASON)}
+            for each in unit.held_back[:MOST_HELD_BACK]
+            if each.number is not None
+        ],
+        "identity": line(unit.identity),
         "locations": locations,
     }
 
 
-def _line(text: object, most: int = MOST_NAME) -> str | None:
-    """Words as the server takes them, whatever a control or a file has sent: one line of signs that can be read, or None."""
-    seen = "".join(sign if sign.isprintable() else " " for sign in str("" if text is None else text))
-    return " ".join(seen.split())[:most].strip() or None
+def _detail(unit: Unit) -> str:
+    said = " ".join(filter(None, (unit.detail, *(each.reason for each in unit.held_back))))
+    return said or unit.trouble or (unit.context.summary() if unit.context else "")
 
 
 def _sensible(offset: float | None) -> float | None:

@@ -21,7 +21,7 @@ from typing import Any, Final, TypeVar
 
 from app.bridge.guards import Known
 from app.bridge.links import Order, Outcome, Position, Received
-from app.bridge.store_tables import SCHEMA, Counts, Intent, Quarantined, Waiting
+from app.bridge.store_tables import LATER_COLUMNS, SCHEMA, Counts, Intent, Quarantined, Waiting, in_effect
 
 T = TypeVar("T")
 Job = tuple[Callable[[sqlite3.Connection], Any], Future[Any]]
@@ -64,6 +64,9 @@ class Store:
             self._database.execute("PRAGMA journal_mode=WAL")
             self._database.execute("PRAGMA synchronous=FULL")
             self._database.executescript(SCHEMA)
+            for table, column, kind in LATER_COLUMNS:
+                with suppress(sqlite3.OperationalError):  # it is there
+                    self._database.execute(f"ALTER TABLE {table} ADD COLUMN {column} {kind}")
         except (OSError, sqlite3.Error) as error:
             raise _in_words(error, file, "opened") from error
         self._thread = threading.Thread(target=self._work, name="store", daemon=True)
@@ -258,7 +261,7 @@ class Store:
     # --- corrections
 
     async def intend(self, machine: str, order: Order, mapping: str) -> bool:
-        """Note a correction before the control hears of it; whether it may: not when the control has answered it.
+        """Note an order before the control hears of it; whether it may: not when the control has answered it.
 
         One that was withdrawn may be offered again, and one that is open may be about something else by now: by another
         mapping, or at a server that gives the number anew.
@@ -266,13 +269,16 @@ class Store:
 
         def write(database: sqlite3.Connection) -> bool:
             database.execute(
-                "INSERT INTO intent (machine, number, tool_memory, before, after, mapping, state, at)"
-                " VALUES (?, ?, ?, ?, ?, ?, 'open', ?) ON CONFLICT (machine, number) DO UPDATE SET state = 'open',"
+                "INSERT INTO intent (machine, number, tool_memory, before, after, mapping, merged, state, at)"
+                " VALUES (?, ?, ?, ?, ?, ?, ?, 'open', ?) ON CONFLICT (machine, number) DO UPDATE SET state = 'open',"
                 " tool_memory = excluded.tool_memory, before = excluded.before, after = excluded.after,"
-                " mapping = excluded.mapping WHERE state = 'withdrawn' OR (state = 'open' AND"
-                " (tool_memory, before, after, mapping)"
-                " IS NOT (excluded.tool_memory, excluded.before, excluded.after, excluded.mapping))",
-                (machine, order.number, order.tool_memory, order.before, order.after, mapping, time.time()),
+                " mapping = excluded.mapping, merged = excluded.merged WHERE state = 'withdrawn' OR (state = 'open' AND"
+                " (tool_memory, before, after, mapping, merged) IS NOT"
+                " (excluded.tool_memory, excluded.before, excluded.after, excluded.mapping, excluded.merged))",
+                (
+                    *(machine, order.number, order.tool_memory, order.before, order.after, mapping),
+                    *(json.dumps(order.merged), time.time()),
+                ),
             )
             [state] = database.execute(
                 "SELECT state FROM intent WHERE machine = ? AND number = ?", (machine, order.number)
@@ -281,15 +287,19 @@ class Store:
 
         return await self._run(write)
 
-    async def answered(self, machine: str, outcome: Outcome) -> bool:
-        """Note the control's answer; whether it is a new one. What it holds now is known from here on."""
+    async def answered(self, machine: str, outcome: Outcome) -> int | None:
+        """Note the control's answer; the tool memory that it is about if it is a new one.
 
-        def write(database: sqlite3.Connection) -> bool:
+        What the control holds there is known from here on.
+        """
+
+        def write(database: sqlite3.Connection) -> int | None:
             changed = database.execute(
-                "UPDATE intent SET state = 'answered', applied = ?, held = ?, differs = ?, reason = ?"
-                " WHERE machine = ? AND number = ? AND state IN ('open', 'withdrawn')",
-                (outcome.applied, outcome.offset, outcome.differs, outcome.reason, machine, outcome.number),
-            ).rowcount
+                "UPDATE intent SET state = 'answered', applied = ?, held = ?, differs = ?, reason = ?,"
+                " turn = (SELECT coalesce(max(turn), 0) + 1 FROM intent WHERE machine = ?)"
+                " WHERE machine = ? AND number = ? AND state IN ('open', 'withdrawn') RETURNING tool_memory",
+                (outcome.applied, outcome.offset, outcome.differs, outcome.reason, machine, machine, outcome.number),
+            ).fetchone()
             if changed and outcome.offset is not None:
                 database.execute(
                     "INSERT INTO location (machine, tool_memory, held, told)"
@@ -297,7 +307,7 @@ class Store:
                     " ON CONFLICT (machine, tool_memory) DO UPDATE SET held = excluded.held, told = excluded.held",
                     (machine, outcome.number),
                 )
-            return bool(changed)
+            return changed[0] if changed else None
 
         return await self._run(write)
 
@@ -311,23 +321,30 @@ class Store:
         )
 
     async def intents(self, machine: str, state: str) -> list[Intent]:
-        """Corrections in a state, oldest number first."""
+        """Orders in a state: answered ones in the order of their answers, others by their number."""
         rows = await self._run(
             lambda database: database.execute(
-                "SELECT number, tool_memory, before, after, state, mapping, applied, held, differs, reason FROM intent"
-                " WHERE machine = ? AND state = ? ORDER BY number",
+                "SELECT number, tool_memory, before, after, merged, state, mapping, applied, held, differs, reason FROM intent"
+                " WHERE machine = ? AND state = ? ORDER BY turn, number",
                 (machine, state),
             ).fetchall()
         )
         return [
             Intent(
-                Order(number, memory, before, after),
+                Order(number, memory, before, after, tuple(json.loads(merged or "[]"))),
                 found,
                 mapping,
                 None if applied is None else Outcome(number, bool(applied), held, reason or "", bool(differs)),
             )
-            for number, memory, before, after, found, mapping, applied, held, differs, reason in rows
+            for number, memory, before, after, merged, found, mapping, applied, held, differs, reason in rows
         ]
+
+    async def in_effect(self, machine: str, tool_memory: int, number: int) -> int | None:
+        """The last correction of a location that was in its offset when ``number``, of any location, was the control's last one.
+
+        None where nothing is known of it: corrections of several locations are not applied in the order of their numbers.
+        """
+        return await self._run(lambda database: in_effect(database, machine, tool_memory, number))
 
     # --- locations and facts
 

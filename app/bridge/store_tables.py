@@ -1,5 +1,6 @@
 """Tables of the store, and what is read out of them."""
 
+import sqlite3
 from typing import Any, Final, NamedTuple
 
 from app.bridge.links import Order, Outcome
@@ -18,14 +19,20 @@ CREATE TABLE IF NOT EXISTS ring (
 CREATE TABLE IF NOT EXISTS intent (
     machine TEXT NOT NULL, number INTEGER NOT NULL, tool_memory INTEGER NOT NULL, before REAL NOT NULL, after REAL NOT NULL,
     mapping TEXT NOT NULL, state TEXT NOT NULL CHECK (state IN ('open', 'answered', 'told', 'withdrawn')),
-    applied INTEGER, held REAL, differs INTEGER, reason TEXT, at REAL NOT NULL, PRIMARY KEY (machine, number)
+    applied INTEGER, held REAL, differs INTEGER, reason TEXT, at REAL NOT NULL, merged TEXT, turn INTEGER,
+    PRIMARY KEY (machine, number)
 );
+CREATE INDEX IF NOT EXISTS intent_location ON intent (machine, tool_memory);
 CREATE TABLE IF NOT EXISTS location (
     machine TEXT NOT NULL, tool_memory INTEGER NOT NULL, held REAL, told REAL, proved TEXT, proved_at REAL,
     PRIMARY KEY (machine, tool_memory)
 );
 CREATE TABLE IF NOT EXISTS fact (machine TEXT NOT NULL, name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (machine, name));
 """
+
+
+LATER_COLUMNS: Final = (("intent", "merged", "TEXT"), ("intent", "turn", "INTEGER"))
+"""Those that a store of an older bridge does not have. merged: numbers that an order takes along; turn: answers in their order."""
 
 
 class Waiting(NamedTuple):
@@ -61,3 +68,24 @@ class Intent(NamedTuple):
     state: str
     mapping: str
     outcome: Outcome | None
+
+
+def in_effect(database: sqlite3.Connection, machine: str, tool_memory: int, number: int) -> int | None:
+    """See `Store.in_effect`."""
+    row = database.execute(
+        "SELECT CASE WHEN state IN ('answered', 'told') THEN coalesce(turn, 0) ELSE 1e18 END, tool_memory FROM intent"
+        " WHERE machine = ? AND number = ? AND applied IS NOT 0",
+        (machine, number),
+    ).fetchone()
+    if row is None:
+        return None
+    if row[1] == tool_memory:
+        return number
+    place = (machine, tool_memory, row[0], number)
+    applied = "FROM intent WHERE machine = ? AND tool_memory = ? AND applied = 1 AND (coalesce(turn, 0), number)"
+    [last] = database.execute(f"SELECT max(number) {applied} <= (?, ?)", place).fetchone()
+    if last is not None:
+        return int(last)
+    merged = "min(coalesce(json_extract(merged, '$[0]'), number))"
+    [first] = database.execute(f"SELECT {merged} {applied} > (?, ?)", place).fetchone()
+    return None if first is None else int(first) - 1

@@ -7,6 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from typing import NamedTuple
 
 from app.bridge.configuration import Machine
 from app.bridge.kinds.mtconnect import Context
@@ -15,6 +16,14 @@ from app.bridge.offset_change import Change
 from app.bridge.store import Store
 
 log = logging.getLogger(__name__)
+
+
+class HeldBack(NamedTuple):
+    """A sentence why the corrections of a location wait. number: of the first of them, None where nobody needs to hear of it."""
+
+    tool_memory: int
+    number: int | None
+    reason: str
 
 
 @dataclass(slots=True)
@@ -55,11 +64,13 @@ class Guided:
 class Unit:
     """One machine.
 
-    hold_all: by the configuration; held: by that or by command. orders: corrections that passed the guards; the control side
-    offers them, until orders_until (of the monotonic clock), when the oldest is too old. news: something waits for the server;
-    to_tell: an answer of the control is among it. state and detail: the control's side, as the heartbeat tells it. held_back:
-    sentences why corrections wait. trouble: the server's side, None while it answers. context: what an MTConnect agent tells of the machine. test: the touch test that is open; no
-    correction is offered meanwhile; test_open: there is one. beat_now: the heartbeat waits no longer.
+    hold_all: by the configuration; held: by that or by command. orders: those that passed the guards, one for each location; the
+    control side offers them until they are too old. taken: tool memories that the control has answered an order for since the
+    server was asked last. news: something waits for the server; to_tell: an answer of the control is among it. state and
+    detail: the control's side, as the heartbeat tells it. held_back: why corrections wait. tool_memories: by characteristic, as
+    the server said at locations_at (of the monotonic clock). trouble: the server's side, None while it answers. context: what an
+    MTConnect agent tells of the machine. test: the touch test that is open; no correction is offered meanwhile; test_open: there
+    is one. beat_now: the heartbeat waits no longer.
     """
 
     machine: Machine
@@ -69,12 +80,14 @@ class Unit:
     held: bool = False
     identity: str | None = None
     orders: Sequence[Order] = ()
-    orders_until: float = math.inf
+    taken: set[int] = field(default_factory=set)
     news: asyncio.Event = field(default_factory=asyncio.Event)
     to_tell: bool = False
     state: str = "starting"
     detail: str = ""
-    held_back: tuple[str, ...] = ()
+    held_back: tuple[HeldBack, ...] = ()
+    tool_memories: dict[str, int | None] = field(default_factory=dict)
+    locations_at: float = -math.inf
     trouble: str | None = None
     started_at: datetime = field(default_factory=lambda: datetime.now(UTC))
     polls: int = 0
@@ -86,8 +99,10 @@ class Unit:
     @property
     def offered(self) -> Sequence[Order]:
         """The corrections that the control may have now; without a server too a hold and an age count."""
-        waits = self.held or (self.test is not None and self.test.holds) or time.monotonic() > self.orders_until
-        return () if waits else self.orders
+        if self.held or (self.test is not None and self.test.holds):
+            return ()
+        now = time.monotonic()
+        return tuple(order for order in self.orders if now <= order.until)
 
     async def look_if_held(self) -> None:
         """Look whether corrections are on hold, by the configuration or by command. Raises `StoreError`."""

@@ -106,7 +106,7 @@ async def parts(model: Model, count: int) -> None:
     for _ in range(count):
         for _ in model.part():
             full = model.registers[Register.WRITTEN] - model.registers[Register.ACK] >= 8
-            await asyncio.sleep(0.01 if full else 0)
+            await asyncio.sleep(0.01 if full or model.idle else 0)
 
 
 async def until(met: Callable[[], Awaitable[Any] | Any], what: str) -> None:

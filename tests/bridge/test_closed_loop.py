@@ -64,3 +64,54 @@ def test_a_size_comes_back_to_its_target(shop: Shop, tmp_path: Path, feature: Fe
     assert correction["status"] == "applied"
     assert correction["offset_after"] == pytest.approx(-0.006, abs=within)
     assert shop.call("GET", "/alarms?state=active&machine=" + shop.machine)["items"] == []
+
+
+@pytest.mark.parametrize("mode", ["control", "direct"])
+def test_one_program_run_takes_the_corrections_of_every_tool(shop: Shop, tmp_path: Path, mode: str) -> None:
+    """Six tools are 6 µm off, one of them has no location: the five others are right from the next part on."""
+    features = tuple(replace(QUIET, number=tool, tool=tool) for tool in range(1, 7))
+    keys = [shop.another("shaft", tool_memory=tool, average_memory=tool) for tool in range(1, 7)]
+    model = Model(features, mail_wait=5.0)
+
+    async def loop() -> None:
+        store = store_in(tmp_path)
+        one = unit_of(
+            model,
+            store,
+            key=shop.machine,
+            characteristics={str(tool): key for tool, key in enumerate(keys, 1)},
+            location=tuple(location(feature, feature.tool) for feature in features[:2] + features[3:]),
+            corrections=mode,
+        )
+
+        async def all_sent() -> bool:
+            return not (await store.counts(shop.machine)).waiting and not await store.intents(shop.machine, "answered")
+
+        async with bridge(shop, one):
+            await parts(model, 1)
+            if mode == "direct":
+                await until(lambda: sum(1 for value in model.offsets.values() if value) == 5, "five offsets")
+            else:
+                await until(lambda: len(one.orders) == 5 and model.registers[Register.MAIL_NUMBER], "corrections")
+            model.mail_wait = 0.3
+            await parts(model, 2)
+            await until(all_sent, "everything at the server")
+            await until(lambda: one.held_back, "the third tool is held back")
+            assert [each.tool_memory for each in one.held_back] == [3]
+        store.close()
+
+    run(loop())
+    for tool, key in enumerate(keys, 1):
+        readings = shop.call("GET", f"/readings?characteristic={key}")["items"]
+        sizes = [round(1000 * reading["deviation"]) for reading in readings]
+        assert sizes == ([6, 6, 6] if tool == 3 else [6, 0, 0])
+        assert [reading["action"] for reading in readings][:2] == [
+            "correct",
+            "none" if tool != 3 else readings[1]["action"],
+        ]
+    statuses = [
+        (each["tool_memory"], each["status"])
+        for each in shop.call("GET", f"/machines/{shop.machine}/corrections")["items"]
+    ]
+    assert sorted(set(statuses)) == [(tool, "pending" if tool == 3 else "applied") for tool in range(1, 7)]
+    assert shop.call("GET", "/alarms?state=active&machine=" + shop.machine)["items"] == []

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ async def held_for_one_machine(unit: Unit) -> None:
 
 
 async def too_old(unit: Unit) -> None:
-    unit.orders_until = time.monotonic()
+    unit.orders = tuple(replace(order, until=time.monotonic()) for order in unit.orders)
 
 
 async def held_while_the_store_is_full(unit: Unit) -> None:

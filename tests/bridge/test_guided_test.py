@@ -335,7 +335,7 @@ def test_no_correction_is_offered_and_no_edit_reported_meanwhile(shop: Shop, mod
 
             async def waits() -> bool:
                 pending = await asyncio.to_thread(shop.call, "GET", f"/machines/{shop.machine}/corrections")
-                return bool(pending["items"]) and "touch test" in " ".join(one.held_back)
+                return bool(pending["items"]) and "touch test" in " ".join(each.reason for each in one.held_back)
 
             await until(waits, "a correction that waits")
             assert await one.store.intents(one.machine.key, "open") == []

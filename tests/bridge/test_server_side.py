@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import count
@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import pytest
 
-from app.bridge import server_side
+from app.bridge import offering, server_side
 from app.bridge.configuration import Server
 from app.bridge.links import Order, Outcome, Position, Received
 from app.bridge.simulators.model import Feature, Model
@@ -21,7 +21,7 @@ from app.loop.connections.schemas import HeartbeatIn
 from app.loop.tools.schemas import RejectionIn
 from inband_client import AsyncClient, Batch, Conflict, Correction, Decision, Forbidden, Invalid, NotFound, Reason
 from inband_client.calls import plain
-from tests.bridge.plant import location, store_in, unit_of, until
+from tests.bridge.plant import location, machine, store_in, unit_of, until
 from tests.loops import run
 
 M = "lathe-1"
@@ -50,6 +50,8 @@ class Scripted:
     def __init__(self, *pending: Correction) -> None:
         self.waiting = list(pending)
         self.own = True
+        self.characteristics: dict[str, int] = {}
+        self.pushed: list[dict[str, Any]] = []
         self.heard: list[tuple[Any, ...]] = []
         self.refuses: Callable[[dict[str, Any]], Exception | None] = lambda _reading: None
         self.confirming: Exception | None = None
@@ -71,10 +73,15 @@ class Scripted:
         if not self.own:
             raise Forbidden(f"GET {path}", "another machine's key", status=403)
 
+    async def items(self, path: str, **_query: Any) -> AsyncIterator[dict[str, Any]]:
+        for key, memory in self.characteristics.items():
+            yield {"key": key, "parameters": {"tool_memory": memory}}
+
     async def push(self, reading: dict[str, Any]) -> Decision:
         if error := self.refuses(reading):
             raise error
         self.heard.append(("push", reading["key"]))
+        self.pushed.append(reading)
         return self.decision
 
     async def push_many(self, readings: list[dict[str, Any]]) -> Batch:
@@ -82,6 +89,7 @@ class Scripted:
             if error := self.refuses(reading):
                 raise error
         self.heard += [("push", reading["key"]) for reading in readings]
+        self.pushed += readings
         return Batch(stored=len(readings), repeated=0, items=(self.decision,) * len(readings))
 
     async def confirm(self, machine: str, number: int, **said: Any) -> None:
@@ -109,7 +117,7 @@ def story(
         unit = unit_of(Model(), store, **fields or {})
         if before is not None:
             await before(store)
-        for step in (server_side._tell, server_side._forward, server_side._ask):
+        for step in (offering.tell, server_side._forward, offering.ask):
             await step(unit, cast("AsyncClient", server))
         return unit
 
@@ -129,8 +137,8 @@ def answered(outcome: Outcome, order: Order, *, told: bool) -> Callable[[Store],
 ORDER = Order(18, 3, 0.0, -0.01)
 
 
-def test_the_oldest_correction_is_offered_and_noted_first(tmp_path: Path) -> None:
-    unit = story(tmp_path, Scripted(correction(18), correction(19, -0.02)))
+def test_a_correction_is_offered_and_noted_first(tmp_path: Path) -> None:
+    unit = story(tmp_path, Scripted(correction(18)))
     assert unit.orders == (ORDER,)
     assert [intent.order for intent in run(unit.store.intents(M, "open"))] == [ORDER]
 
@@ -153,7 +161,7 @@ def test_each_answer_is_told_once(tmp_path: Path, outcome: Outcome, heard: list[
     server = Scripted()
     unit = story(tmp_path, server, answered(outcome, ORDER, told=False))
     assert server.heard == heard
-    run(server_side._tell(unit, cast("AsyncClient", server)))
+    run(offering.tell(unit, cast("AsyncClient", server)))
     assert server.heard == heard
 
 
@@ -211,7 +219,7 @@ def test_a_report_that_is_refused_holds_up_no_other(tmp_path: Path) -> None:
         await unit.store.held(M, {2: 0.001, 3: 0.002})
         await answered(Outcome(18, applied=False, reason="\x07"), ORDER, told=False)(unit.store)
         with pytest.raises(NotFound, match="no such tool memory"):
-            await server_side._tell(unit, cast("AsyncClient", server))
+            await offering.tell(unit, cast("AsyncClient", server))
 
     run(story())
     assert server.heard == [("reject", 18, "The control has refused it."), ("report", 3, 0.002)]
@@ -243,13 +251,119 @@ def test_a_number_that_the_control_has_answered_is_not_offered_again(
     assert unit.orders == ()
 
 
-def test_what_stands_behind_a_correction_that_waits_waits_too(tmp_path: Path) -> None:
-    unit = story(tmp_path, Scripted(correction(18, tool=9), correction(19)))
+def held_back(unit: Unit) -> list[tuple[int, int | None]]:
+    return [(each.tool_memory, each.number) for each in unit.held_back]
+
+
+def test_one_correction_that_cannot_go_holds_back_its_own_tool_alone(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A tool memory without a location, one that no touch test has proved: the others go on, and a person hears of it once."""
+    server = Scripted(
+        correction(18, tool=9),
+        correction(19),
+        correction(20, tool=9),
+        correction(21, None, tool=4),
+        correction(22, -0.02),
+    )
+    unit = story(tmp_path, server, fields={"location": PLACES})
+    assert unit.orders == (Order(22, 3, 0.0, -0.02, (19,)),)
+    assert held_back(unit) == [(9, 18), (4, 21)]
+    assert "tool memory 9, which has no" in unit.held_back[0].reason
+    assert "does not say which offset" in unit.held_back[1].reason
+    assert [record.levelname for record in caplog.records] == ["WARNING", "WARNING"]
+    run(offering.ask(unit, cast("AsyncClient", server)))
+    assert len(caplog.records) == 2
+    said = run(server_side.heartbeat(unit))
+    assert [(each["tool_memory"], each["number"]) for each in said["held_back"]] == [(9, 18), (4, 21)]
+    assert "tool memory 9" in said["detail"]
+    proved = story(tmp_path / "proof", server, prove(4), {"location": PLACES, "proof_needed": True})
+    assert held_back(proved) == [(9, 18), (3, 19), (4, 21)]
+
+
+def prove(memory: int) -> Callable[[Store], Any]:
+    chosen = machine(Model(), location=PLACES)
+    mapping = chosen.mapping_hash(next(place for place in PLACES if place.tool_memory == memory))
+    return lambda store: store.prove(M, memory, mapping)
+
+
+def test_what_waits_for_a_location_is_one_order_the_longest_wait_first(tmp_path: Path) -> None:
+    rows = [correction(18 + n, -0.01 * (1 + n // 2), tool=4 - n % 2) for n in range(6)]
+    unit = story(tmp_path, Scripted(*rows), fields={"location": PLACES})
+    assert unit.orders == (Order(22, 4, 0.0, -0.03, (18, 20)), Order(23, 3, 0.0, -0.03, (19, 21)))
+    assert [intent.order for intent in run(unit.store.intents(M, "open"))] == list(unit.orders)
+
+
+def test_no_order_is_larger_than_the_limits(tmp_path: Path) -> None:
+    """Three steps of 0.04 mm: two of them are within 0.1 mm; the limit of the sum rejects none of them."""
+    server = Scripted(*(correction(18 + n, 0.04 * (1 + n), 0.04) for n in range(3)))
+    unit = story(tmp_path, server)
+    assert unit.orders == (Order(19, 3, 0.0, 0.08, (18,)),)
+    assert server.heard == []
+
+
+def test_an_order_is_confirmed_for_each_correction_in_it(tmp_path: Path) -> None:
+    server = Scripted()
+    order = Order(22, 3, 0.0, -0.03, (18, 20))
+    unit = story(tmp_path, server, answered(Outcome(22, applied=True, offset=-0.03), order, told=False))
+    assert server.heard == [("confirm", 18, None), ("confirm", 20, None), ("confirm", 22, -0.03)]
+    server = Scripted(correction(18), correction(20, -0.02), correction(22, -0.03))  # went back in time
+    run(offering.ask(unit, cast("AsyncClient", server)))
+    assert server.heard == [("confirm", 18, None), ("confirm", 20, None), ("confirm", 22, -0.03)]
     assert unit.orders == ()
-    assert "tool memory 9" in unit.held_back[0]
-    unit = story(tmp_path / "other", Scripted(correction(18, after=None)))
-    assert unit.orders == ()
-    assert "does not say which offset" in unit.held_back[0]
+    refused = Scripted()
+    story(tmp_path / "refused", refused, answered(Outcome(22, applied=False, reason="no"), order, told=False))
+    assert refused.heard == [("reject", 18, "no"), ("reject", 20, "no"), ("reject", 22, "no")]
+
+
+def test_an_answer_that_comes_while_the_server_is_asked_takes_the_location_off(tmp_path: Path) -> None:
+    """What was pending then begins at the offset before that answer: the control would call it an edit by hand."""
+
+    class Slow(Scripted):
+        async def pending(self, machine: str) -> list[Correction]:
+            unit.taken.add(3)
+            return await super().pending(machine)
+
+    unit = unit_of(Model(), store_in(tmp_path), location=PLACES)
+    server = Slow(correction(18), correction(19, -0.02), correction(20, tool=4))
+    run(offering.ask(unit, cast("AsyncClient", server)))
+    assert [order.number for order in unit.orders] == [20]
+    untold = answered(Outcome(18, applied=True, offset=-0.01), ORDER, told=False)
+    unit = unit_of(Model(), store_in(tmp_path / "untold"), location=PLACES)
+    run(untold(unit.store))
+    run(offering.ask(unit, cast("AsyncClient", Scripted(*server.waiting))))
+    assert [order.number for order in unit.orders] == [20], "the server has not heard of 18"
+
+
+def test_a_reading_names_the_correction_in_effect_of_its_own_location(tmp_path: Path) -> None:
+    """A control keeps one number for all tools. 7 of tool 3 was taken before 5 of tool 4, which waited for a touch test."""
+    server = Scripted()
+    server.characteristics = {"shaft-1": 3, "bore-1": 4, "face-1": 5}
+
+    async def before(store: Store) -> None:
+        for order in (Order(7, 3, 0.0, 0.01, (2, 3)), Order(5, 4, 0.0, 0.01, (4,)), Order(9, 4, 0.01, 0.02)):
+            await store.intend(M, order, "hash")
+            if order.number != 9:  # in the mailbox still
+                await store.answered(M, Outcome(order.number, applied=True, offset=order.after))
+        rows = [
+            ("shaft-1", 7),
+            ("bore-1", 7),
+            ("face-1", 7),
+            ("bore-1", 5),
+            ("shaft-1", 5),
+            ("bore-1", 9),
+            ("bore-1", 1),
+        ]
+        await store.add(
+            M,
+            [
+                Received(f"k{n}", {"characteristic": key, "measured": 1.0, "correction_in_effect": number})
+                for n, (key, number) in enumerate(rows)
+            ],
+        )
+
+    story(tmp_path, server, before)
+    assert [reading.get("correction_in_effect") for reading in server.pushed] == [7, 3, None, 5, 7, 9, None]
 
 
 def test_a_step_beyond_the_limit_is_rejected_with_its_reason(tmp_path: Path) -> None:
@@ -266,7 +380,7 @@ def test_a_rejection_that_somebody_was_quicker_with_leaves_nothing_on_offer(tmp_
     server.rejecting = Conflict("POST rejected", "superseded", status=409, **said("conflict"))
     unit = unit_of(Model(), store_in(tmp_path))
     unit.orders = (Order(17, 3, 0.0, -0.01),)  # superseded as well
-    run(server_side._ask(unit, cast("AsyncClient", server)))
+    run(offering.ask(unit, cast("AsyncClient", server)))
     assert not unit.orders
 
 
@@ -279,7 +393,7 @@ def test_what_stands_behind_a_rejected_correction_of_its_tool_is_asked_for_anew(
     assert unit.to_tell
     assert unit.news.is_set()
     server.waiting = [correction(19, after=-0.01)]
-    run(server_side._ask(unit, cast("AsyncClient", server)))
+    run(offering.ask(unit, cast("AsyncClient", server)))
     assert unit.orders == (Order(19, 3, 0.0, -0.01),)
 
 
@@ -287,7 +401,7 @@ def test_a_hold_by_command_is_seen_and_released(tmp_path: Path) -> None:
     unit = story(tmp_path, Scripted(correction(18)), lambda store: store.note("", "hold_all", "x"))
     assert (unit.held, unit.orders) == (True, ())
     run(unit.store.note("", "hold_all", None))
-    run(server_side._ask(unit, cast("AsyncClient", Scripted(correction(18)))))
+    run(offering.ask(unit, cast("AsyncClient", Scripted(correction(18)))))
     assert (unit.held, unit.orders) == (False, (ORDER,))
 
 
@@ -322,7 +436,7 @@ def test_what_a_proxy_answers_puts_no_reading_into_the_quarantine(tmp_path: Path
 
     unit = unit_of(Model(), store_in(tmp_path))
     run(before(unit.store))
-    for step in (server_side._tell, server_side._forward):
+    for step in (offering.tell, server_side._forward):
         with pytest.raises(NotFound):
             run(step(unit, cast("AsyncClient", server)))
     assert run(unit.store.quarantine(M)) == []

@@ -351,7 +351,8 @@ class MqttLink:
         if self._offered is not None and self._offered[0] == tuple(orders) and now < self._offered[1] + valid / 2:
             return
         expires = datetime.now(UTC) + timedelta(seconds=valid)
-        content = [self._told_as(order, expires) for order in orders]
+        # by number: a machine that takes them in this order ends with the highest one, and names it as that in effect
+        content = [self._told_as(order, expires) for order in sorted(orders, key=lambda order: order.number)]
         await self._publish("corrections", {"corrections": content}, retain=True, expires=valid if content else None)
         self._offered = (tuple(orders), now)
 

@@ -7,6 +7,7 @@ that a test compares with. Offsets and sizes are in the control's unit.
 
 import asyncio
 import random
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
@@ -69,7 +70,10 @@ class Applied(NamedTuple):
 
 @dataclass(slots=True)
 class Model:
-    """A machine. seed: None for another noise, and another epoch, each time. history: every change of an offset, before and after, by the NC program or by hand."""
+    """A machine. seed: None for another noise, and another epoch, each time. history: every change of an offset, before and after,
+    by the NC program or by hand. mail_wait: s that the NC program waits for the next correction after each that it has taken;
+    idle: it waits.
+    """
 
     features: tuple[Feature, ...] = (Feature(),)
     unit: Unit = Unit.MM
@@ -83,6 +87,8 @@ class Model:
     running: bool = False
     tool_in_spindle: int = 0
     on_hold: bool = False
+    mail_wait: float = 0.0
+    idle: bool = False
     written: list[tuple[int, Slot]] = field(default_factory=list)
     applied: list[Applied] = field(default_factory=list)
     refused: list[tuple[int, Answer]] = field(default_factory=list)
@@ -98,10 +104,10 @@ class Model:
     # --- the NC program
 
     def part(self) -> Steps:
-        """One part: take a correction, cut, measure every characteristic, write the readings."""
+        """One part: take corrections, cut, measure every characteristic, write the readings."""
         self.running = True
         yield from self.set_up()
-        yield from self.take_correction()
+        yield from self.take_corrections()
         self.parts += 1
         for feature in self.features:
             self.tool_in_spindle = feature.tool
@@ -150,6 +156,19 @@ class Model:
         self.written.append((round(self.registers[Register.EPOCH]), slot))
         self.registers[Register.WRITTEN] = float(sequence)
         yield
+
+    def take_corrections(self) -> Steps:
+        """Take mail until none has come for `mail_wait` seconds after the last one."""
+        until = 0.0
+        while True:
+            answered = self.registers[Register.ANSWERED]
+            yield from self.take_correction()
+            if self.registers[Register.ANSWERED] != answered:
+                until = time.monotonic() + self.mail_wait
+            self.idle = time.monotonic() < until
+            if not self.idle:
+                return
+            yield
 
     def take_correction(self) -> Steps:
         """Take the mailbox at a safe point. Whatever is answered is answered once; the number last."""
@@ -243,7 +262,6 @@ async def live(model: Model, cycle: float) -> None:
     """Make parts, one every ``cycle`` seconds, until cancelled."""
     while True:
         for _ in model.part():
-            await asyncio.sleep(
-                0 if model.registers[Register.WRITTEN] - model.registers[Register.ACK] < SLOTS else 0.05
-            )
+            full = model.registers[Register.WRITTEN] - model.registers[Register.ACK] >= SLOTS
+            await asyncio.sleep(0.05 if full or model.idle else 0)
         await asyncio.sleep(cycle)
