@@ -3,7 +3,7 @@
 from typing import Annotated, Any
 
 import msgspec
-from fastapi import APIRouter, Path, Query, Response, params
+from fastapi import APIRouter, Depends, Path, Query, Response, params
 from fastapi.routing import APIRoute
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
@@ -38,7 +38,18 @@ KeyAfter = Annotated[str, Query(max_length=64, description=_CURSOR), AfterValida
 Before = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description=_CURSOR)]
 SerialBefore = Annotated[int | None, Query(ge=1, le=LARGEST_SERIAL, description=_CURSOR)]
 Limit = Annotated[int, Query(ge=1, le=1000, description="How many items at most.")]
-Theme = Annotated[ThemeName, Query(description="For a light or a dark page.")]
+Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
+
+
+def theme_of(
+    theme: Annotated[ThemeName, Query(description="For a light or a dark page.")] = "light",
+    width: Width = 1240,  # noqa: ARG001 - every chart is asked with its width
+) -> ThemeName:
+    """The theme of a chart."""
+    return theme
+
+
+Theme = Annotated[ThemeName, Depends(theme_of)]
 FIGURE: dict[int | str, dict[str, Any]] = {
     200: {
         "description": "A Plotly figure: `data` and `layout`",

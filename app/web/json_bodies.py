@@ -13,6 +13,7 @@ from fastapi.routing import APIRoute
 
 from app.errors import FieldError, Invalid, NotSignedIn
 from app.language.i18n import _
+from app.web.query_strings import known_parameters, read_strictly
 from app.web.validation import field_path
 
 DEEPEST = 20
@@ -119,12 +120,15 @@ class _Read(Request):
 
 
 class JsonRoute(APIRoute):
-    """A route whose JSON body, if it takes one, is read by `read_json`."""
+    """A route that reads strictly: its query by `read_strictly`, its JSON body, if it takes one, by `read_json`."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         handle = super().get_route_handler()
+        known = known_parameters(self.dependant)
 
         async def handle_strictly(request: Request) -> Response:
+            if request.scope["query_string"] and ("authorization" in request.headers or request.cookies):
+                read_strictly(request, known)  # before anything is done; nobody learns of it without credentials
             if self.body_field is None:
                 return await handle(request)
             read = _Read(request.scope, request.receive)

@@ -32,6 +32,9 @@ session works too; then a change carries the header `X-CSRF-Token`.
 Errors are `{PROBLEM_JSON}` (RFC 9457) with what is wrong, where, and what to do about it. After a 5xx nothing was stored, but for \
 `outcome-unknown`: send it again with the same key and you get its answer.
 
+Unknown fields of a body and unknown parameters of a query are 422. The filter of states is `status` in some lists and `state` in \
+others; each takes both names.
+
 Lists answer `items` and `next`: pass `next` as the cursor of the following page (`after`, or `before` where the newest come first) \
 until it is null."""
 

@@ -93,6 +93,29 @@ class TestComplete:
         """Two classes of one name would be named by their modules, which is nothing for a program of somebody else."""
         assert [name for name in made["components"]["schemas"] if "__" in name or name.startswith("app")] == []
 
+    def test_generators_of_programs_can_write_every_body(self, made: Json) -> None:
+        """openapi-python-client leaves out what has an object as default, or an enum of more than one type."""
+
+        def odd(part: Any, path: str) -> Iterator[str]:
+            if isinstance(part, dict):
+                kinds = {type(each) for each in part.get("enum", []) if each is not None} if "type" in part else set()
+                if len(kinds) > 1 or ("type" in part and isinstance(part.get("default"), dict) and part["default"]):
+                    yield path
+                for name, inner in part.items():
+                    yield from odd(inner, f"{path}/{name}") if name not in {"example", "examples"} else ()
+            elif isinstance(part, list):
+                for at, inner in enumerate(part):
+                    yield from odd(inner, f"{path}/{at}")
+
+        assert list(odd(made, "")) == []
+
+    def test_r_numbers_stand_in_what_is_sent(self, made: Json) -> None:
+        given = made["components"]["schemas"]["CharacteristicIn"]["properties"]["parameters"]["properties"]
+        assert {"R10", "R24", "R33", "R42"} <= set(given)
+        assert given["R33"]["minimum"] == 0
+        answered = made["components"]["schemas"]["CharacteristicOut"]["properties"]["parameters"]["properties"]
+        assert "R33" not in answered
+
     def test_every_tag_has_a_sentence_and_every_operation_one_tag(self, made: Json) -> None:
         tags = {tag["name"]: tag["description"] for tag in made["tags"]}
         used = {tag for _m, _p, operation in operations(made) for tag in operation["tags"]}

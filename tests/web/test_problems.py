@@ -48,6 +48,46 @@ def test_a_refusal_of_one_field_names_it_as_a_list_of_one_would() -> None:
     assert Invalid.at("take", wrong).as_problem()["what_to_do"] == "Correct the named fields and send it again."
 
 
+class TestQueries:
+    """A filter that nobody reads would answer with everything."""
+
+    def test_an_unknown_parameter_is_named_with_the_known_ones(self, shop: Shop) -> None:
+        problem = refused(shop.admin.get("/api/v1/readings", params={"limitt": 1}), 422)
+        (error,) = problem["errors"]
+        assert error["field"] == "limitt"
+        assert "characteristic, " in error["message"]
+        assert "limit, " in error["message"]
+
+    @pytest.mark.parametrize(
+        ("method", "path"),
+        [("POST", "/api/v1/readings"), ("POST", "/api/v1/readings/batch"), ("GET", "/api/v1/machines/none/tools")],
+    )
+    def test_at_every_address(self, shop: Shop, method: str, path: str) -> None:
+        answer = shop.admin.request(method, path, params={"as_of": "x"}, json={} if method == "POST" else None)
+        assert [error["field"] for error in refused(answer, 422)["errors"]] == ["as_of"]
+
+    def test_the_door_of_machines_refuses_them_too(self, shop: Shop) -> None:
+        reading = {"characteristic": shop.characteristic, "measured": 40.0}
+        answer = shop.machine_client.post("/api/v1/readings?dry_run=true", json=reading)
+        assert "takes none" in refused(answer, 422)["errors"][0]["message"]
+
+    def test_one_value_is_sent_once(self, shop: Shop) -> None:
+        problem = refused(shop.admin.get("/api/v1/alarms?state=active&state=all"), 422)
+        assert problem["errors"] == [{"field": "state", "message": "is given twice; send it once"}]
+
+    def test_states_are_filtered_under_either_name(self, shop: Shop) -> None:
+        corrections = f"/api/v1/machines/{shop.machine}/corrections"
+        for path in (corrections, "/api/v1/alarms", "/api/v1/signals", "/api/v1/proposals"):
+            asked = [refused(shop.admin.get(path, params={name: "no such"}), 422) for name in ("state", "status")]
+            assert asked[0]["errors"] == asked[1]["errors"]
+        refused(shop.admin.get("/api/v1/alarms?state=active&status=all"), 422)
+        assert shop.admin.get(f"{corrections}?state=pending&status=held").status_code == 200
+
+    def test_without_credentials_nobody_learns_of_parameters(self, shop: Shop) -> None:
+        with httpx.Client(base_url=shop.admin.base_url) as nobody:
+            refused(nobody.get("/api/v1/readings?limitt=1"), 401)
+
+
 class TestBodies:
     @pytest.mark.parametrize(
         ("body", "field", "words"),

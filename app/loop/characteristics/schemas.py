@@ -1,12 +1,22 @@
 """Characteristics as JSON. The parameters' schema is made from the core's table of them."""
 
+from collections.abc import Mapping
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
 from app.core.decision.limits import nanometres
-from app.core.parameters import FIELDS, FieldKind, MachineType, ParameterError, Problem, read, unusual_on
+from app.core.parameters import (
+    FIELDS,
+    TWO_POINT_SWITCH,
+    FieldKind,
+    MachineType,
+    ParameterError,
+    Problem,
+    read,
+    unusual_on,
+)
 from app.core.plausibility import inch_warnings
 from app.loop.characteristics import queries, wording
 from app.loop.tables.characteristics import ParametersVersion
@@ -15,8 +25,8 @@ from app.web.fields import Body, Reason, Slug, Text200
 from app.web.warnings import WarningOut, Warnings, warnings_out
 
 
-def parameters_schema() -> dict[str, Any]:
-    """The JSON schema of `parameters`, with R numbers."""
+def parameters_schema(*, given: bool = False) -> dict[str, Any]:
+    """The JSON schema of `parameters`. given: as they are sent, each under its R number as well."""
     types = {
         FieldKind.LENGTH: "number",
         FieldKind.NUMBER: "number",
@@ -37,18 +47,36 @@ def parameters_schema() -> dict[str, Any]:
             **({"default": field.default} if field.default is not None else {}),
         }
     properties["nominal"]["type"] = ["number", "string", "null"]  # a fit of ISO 286
-    properties["accept"] = {
+    properties["accept"] = {  # a default that is an object is more than some generators of programs can write
         "type": ["object", "null"],
-        "description": "Acceptance: n of m sections must be inside the tolerance.",
+        "description": "Acceptance: n of m sections must be inside the tolerance; 1 of 1 where nothing is given.",
         "properties": {"n": {"type": "integer", "minimum": 1}, "m": {"type": "integer", "maximum": 100}},
-        "default": {"n": 1, "m": 1},
     }
-    return {
-        "type": "object",
-        "properties": properties,
-        "patternProperties": {r"^[Rr]\d{2}$": {"description": "Any of them under its R number."}},
-        "additionalProperties": False,
-    }
+    if given:
+        properties |= _under_r_numbers(properties)
+    return {"type": "object", "properties": properties, "additionalProperties": False}
+
+
+def _under_r_numbers(properties: Mapping[str, Any]) -> dict[str, Any]:
+    """Every parameter under its R number; choices by the numbers of the control, too.
+
+    Those without `enum`: generators of programs make no type of one that holds texts and numbers.
+    """
+    numbered: dict[str, Any] = {}
+    for field in FIELDS:
+        if field.r is None:
+            continue
+        schema = dict(properties[field.name])
+        schema.pop("default", None)  # stands at the name
+        words = f"The same as `{field.name}`"
+        if field.codes:
+            schema = {"type": ["integer", "string", "null"]}
+            words += ": " + ", ".join(
+                f"{code} is {choice}" for code, choice in zip(field.codes, field.choices, strict=False)
+            )
+        numbered[field.r] = schema | {"description": f"{words}."}
+    numbered[TWO_POINT_SWITCH] = {"type": ["integer", "null"], "description": "Two-point measurement: 1, or 0."}
+    return numbered
 
 
 GivenParameters = Annotated[
@@ -56,7 +84,7 @@ GivenParameters = Annotated[
     Field(
         description="The R parameters, by name or R number. R33 < R34 ≤ R35/2 ≤ R37 ≤ R36 must hold. "
         "`target` with `tolerance_width` may stand in place of nominal and deviations.",
-        json_schema_extra=parameters_schema(),
+        json_schema_extra=parameters_schema(given=True),
     ),
 ]
 Part = Annotated[Text200, Field(description="The part it belongs to: drawing or article number.")]

@@ -26,6 +26,7 @@ from app.loop.readings.writer.pending import Stored, Verdict
 from app.web.api import BASE, CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import Body, Reason
+from app.web.json_bodies import JsonRoute
 from app.web.openapi import example_of
 
 MOST_IN_BATCH = 10_000
@@ -36,7 +37,9 @@ SCHEMAS = _definitions
 _BODY = {"schema": _schema}
 
 # Bodies are read by our own strict decoder, so these routes do not use the JSON route class of the others.
-push = APIRouter(prefix=BASE, tags=["readings"], generate_unique_id_function=lambda route: route.name)
+push = APIRouter(
+    prefix=BASE, tags=["readings"], route_class=JsonRoute, generate_unique_id_function=lambda route: route.name
+)
 router = api_router("readings")
 Sequence = Annotated[int, Path(ge=1, le=2**63 - 1, description="Number of the reading: 1, 2, 3 … without gaps.")]
 

@@ -31,7 +31,7 @@ from app.quality.control_charts.schemas import (
 )
 from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import Marks
-from app.web.api import FIGURE, CharacteristicKey, Limit, Theme, api_router, chart_answer, problems, sent_again
+from app.web.api import FIGURE, CharacteristicKey, Limit, Theme, Width, api_router, chart_answer, problems, sent_again
 from app.web.choice import Chosen
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Page, page_of
@@ -48,7 +48,6 @@ Judge = Annotated[
 Kind = Annotated[
     Chart | None, Query(description="Which chart; individuals or X-bar, whichever the baseline is for, if left out.")
 ]
-Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
 
 
 def _in_force(session: SessionDep, current: CurrentCharacteristic) -> int | None:

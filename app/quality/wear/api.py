@@ -12,7 +12,7 @@ from app.quality.wear import queries
 from app.quality.wear.chart import chart_of
 from app.quality.wear.figures import wear_figure
 from app.quality.wear.schemas import WearOut
-from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
+from app.web.api import FIGURE, CharacteristicKey, Theme, Width, api_router, chart_answer, problems
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.fields import LARGEST_ID
 
@@ -52,7 +52,7 @@ def get_wear_figure(
         ),
     ] = None,
     theme: Theme = "light",
-    width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")] = 1240,
+    width: Width = 1240,
 ) -> Response:
     """The wear curve with its line, what the corrections took out of it, and the forecast to the limits that are near."""
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")

@@ -21,7 +21,7 @@ from app.quality.what_if.schemas import (
     WhatIfIn,
     WhatIfOut,
 )
-from app.web.api import FIGURE, Before, CharacteristicKey, Limit, Theme, api_router, chart_answer, problems
+from app.web.api import FIGURE, Before, CharacteristicKey, Limit, Theme, Width, api_router, chart_answer, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, Moment, Page, page_of
 
@@ -98,7 +98,7 @@ def get_what_if_figure(
     characteristic: CharacteristicKey,
     asked: Annotated[WhatIfIn, Depends(asked_for)],
     theme: Theme = "light",
-    width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")] = 1240,
+    width: Width = 1240,
 ) -> Response:
     """Deviations with today's and the other settings, and what each loop had taken out by its corrections."""
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")

@@ -14,7 +14,7 @@ from app.loop.summaries.queries import Window
 from app.loop.timeline import queries as timeline
 from app.views.characteristic.chart import chart_of, results_of, run_of
 from app.views.characteristic.figures import counting_edges, histogram_figure, result_figure, run_figure, zone_chart
-from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
+from app.web.api import FIGURE, CharacteristicKey, Theme, Width, api_router, chart_answer, problems
 from app.web.choice import Choice, Chosen
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.fields import LARGEST_ID
@@ -22,7 +22,6 @@ from app.web.fields import LARGEST_ID
 router = api_router("characteristics", FROM_REPLICA)
 
 ResultName = Literal["run_out", "out_of_roundness", "taper", "repeat_range", "repeat_deviation"]
-Width = Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels, about.")]
 
 
 def _found(
@@ -117,7 +116,6 @@ def get_histogram(
     characteristic: CharacteristicKey,
     choice: Chosen,
     theme: Theme = "light",
-    width: Width = 300,  # noqa: ARG001 - every chart is asked with its width
 ) -> Response:
     """Histogram of the deviations, without excluded readings and probe faults; of more than 100 000 the last 100 000."""
     current, window = _found(session, caller, characteristic, choice)

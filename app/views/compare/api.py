@@ -9,7 +9,7 @@ from app.loop.timeline.figures import with_lane
 from app.views.compare.chart import course_of, events_of
 from app.views.compare.figures import compare_figure
 from app.views.compare.series import SeriesBy, compared
-from app.web.api import FIGURE, Theme, api_router, chart_answer, problems
+from app.web.api import FIGURE, Theme, Width, api_router, chart_answer, problems
 from app.web.choice import Chosen
 from app.web.deps import FROM_REPLICA, SessionDep
 
@@ -28,7 +28,7 @@ def get_comparison(
     of_tolerance: Annotated[bool, Query(description="As a share of half the tolerance, in place of µm.")] = False,
     own_scale: Annotated[bool, Query(description="Each panel reaches as far as its own readings.")] = False,
     theme: Theme = "light",
-    width: Annotated[int, Query(ge=200, le=10_000, description="Of the chart in pixels.")] = 1240,
+    width: Width = 1240,
 ) -> Response:
     """Readings of several characteristics, or of several versions, tools or periods, on one scale."""
     in_time = by is SeriesBy.CHARACTERISTIC
