@@ -253,7 +253,7 @@ class Problem(NamedTuple):
 
     Codes: required, unknown, twice, not_a_number, not_whole, not_a_choice, not_yes_no, range, order, target_missing,
     target_twice, tolerance_sign, sign_missing, factor_zero, accept, sections, tool_measured, no_location, and the warnings source_range,
-    variant_axis, points_missing, not_on_lathe, factor_on_lathe.
+    variant_axis, points_missing, not_on_lathe, factor_on_lathe, switch_value, switch_wins, switch_loses.
     """
 
     field: str
@@ -294,7 +294,7 @@ def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
     """
     problems: list[Problem] = []
     values = dict(_named(with_fit(given), problems))
-    accept = values.pop("accept", None)
+    accept, switch = values.pop("accept", None), values.pop(TWO_POINT_SWITCH, None)
     values = {name: value for name, value in values.items() if value is not None}
     for field in FIELDS:
         if field.name in values:
@@ -303,6 +303,8 @@ def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
             problems.append(Problem(field.name, "required", {}))
         elif field.default is not None:
             values[field.name] = field.default
+    if _two_points(switch, problems):
+        values["variant"] = Variant.TWO_POINT.value
     values["accept_n"], values["accept_m"] = _accept(accept, problems)
     _target(values, problems)
     if problems:
@@ -323,22 +325,48 @@ def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
 
 
 def _named(given: Mapping[str, Any], problems: list[Problem]) -> Iterator[tuple[str, Any]]:
-    """Translate R numbers to names; refuse unknown and doubled ones."""
+    """Translate R numbers to names; refuse unknown and doubled ones. R24 has no name and stays as it is."""
     seen: dict[str, str] = {}
     for raw, value in given.items():
         key = raw.upper()
-        if key == TWO_POINT_SWITCH:
-            if value not in (0, 0.0, None, False):
-                yield "variant", "two_point"
-            continue
-        name = BY_R.get(key, raw)
-        if name not in BY_NAME and name != "accept":
+        name = TWO_POINT_SWITCH if key == TWO_POINT_SWITCH else BY_R.get(key, raw)
+        if name not in BY_NAME and name not in {"accept", TWO_POINT_SWITCH}:
             problems.append(Problem(raw, "unknown", {}))
         elif name in seen:
             problems.append(Problem(raw, "twice", {"other": seen[name]}))
         else:
             seen[name] = raw
             yield name, value
+
+
+def _two_points(switch: Any, problems: list[Problem]) -> bool:
+    """Tell if R24 asks for two points: any number but 0 does, whatever R25 says."""
+    if switch is None or (isinstance(switch, int | float) and abs(switch) <= 1e300):
+        return bool(switch)
+    problems.append(Problem(TWO_POINT_SWITCH, "not_a_number", {}))
+    return False
+
+
+def unusual_switch(given: Mapping[str, Any]) -> list[Problem]:
+    """Warn of an R24 that the cycles do not know, and of one that contradicts the variant given beside it (R25).
+
+    >>> [problem.code for problem in unusual_switch({"R24": 2, "R25": 1})], unusual_switch({"R25": 0, "R24": 1})
+    (['switch_value', 'switch_wins'], [])
+    """
+    ignored: list[Problem] = []
+    values = dict(_named(given, ignored))
+    switch, given_variant = values.get(TWO_POINT_SWITCH), values.get("variant")
+    variant = None if given_variant is None else _checked(BY_NAME["variant"], given_variant, ignored)
+    if switch is None or ignored:
+        return []
+    problems = []
+    if switch not in (0, 1):
+        problems.append(Problem(TWO_POINT_SWITCH, "switch_value", {"value": switch}, warning=True))
+    if switch and variant not in (None, Variant.SINGLE, Variant.TWO_POINT):
+        problems.append(Problem("variant", "switch_wins", {"variant": variant}, warning=True))
+    if not switch and variant == Variant.TWO_POINT:
+        problems.append(Problem("variant", "switch_loses", {}, warning=True))
+    return problems
 
 
 def _checked(field: Field, value: Any, problems: list[Problem]) -> Any:
@@ -473,7 +501,10 @@ def unusual_partly(given: Mapping[str, Any]) -> list[Problem]:
     """Warn of what is unusual in a set that is not complete: what is known of it counts, defaults stand for the rest."""
     values = {field.name: field.default for field in FIELDS} | {"accept_m": 1}
     ignored: list[Problem] = []
-    for name, value in _named(given, ignored):
+    named = dict(_named(given, ignored))
+    if _two_points(named.pop(TWO_POINT_SWITCH, None), ignored):
+        named["variant"] = Variant.TWO_POINT.value
+    for name, value in named.items():
         field = BY_NAME.get(name)
         if field is not None and value is not None:
             wrong: list[Problem] = []

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.fits import fit_of
-from app.core.parameters import BY_R, FIELDS, ParameterError, Parameters, Variant, read
+from app.core.parameters import BY_R, FIELDS, ParameterError, Parameters, Variant, read, unusual_switch
 from tests.core.conftest import SHAFT
 
 
@@ -28,6 +28,33 @@ def test_codes_of_the_control_are_understood() -> None:
     assert (parameters.variant.value, parameters.axis.value, parameters.direction.value) == ("indexed", "Z", "negative")
     assert read(SHAFT | {"R24": 1})[0].variant is Variant.TWO_POINT
     assert read(SHAFT | {"R24": 0})[0].variant is Variant.SINGLE
+
+
+@pytest.mark.parametrize(
+    ("switches", "variant", "warned"),
+    [
+        ({"R24": 1, "R25": 0}, "two_point", []),
+        ({"R24": 0, "R25": 1}, "indexed", []),
+        ({"R24": 1, "R25": 2, "R23": 3}, "two_point", ["switch_wins"]),
+        ({"R24": 2}, "two_point", ["switch_value"]),
+        ({"R24": 0, "variant": "two_point"}, "two_point", ["switch_loses"]),
+        ({"r24": 1.0, "variant": "two_point"}, "two_point", []),
+    ],
+)
+def test_r24_wins_over_r25_in_any_order(switches: dict[str, Any], variant: str, warned: list[str]) -> None:
+    for each in (switches, dict(reversed(switches.items()))):
+        assert read(SHAFT | each)[0].variant == variant
+        assert [problem.code for problem in unusual_switch(SHAFT | each)] == warned
+
+
+@pytest.mark.parametrize("value", [[], "", "1", {}, float("nan"), float("inf"), 10**400])
+def test_r24_is_a_number(value: Any) -> None:
+    assert problems(SHAFT | {"R24": value}) == {"R24": "not_a_number"}
+
+
+def test_r24_does_not_hide_an_r25_that_is_none() -> None:
+    assert problems(SHAFT | {"R24": 1, "R25": 9}) == {"variant": "not_a_choice"}
+    assert problems(SHAFT | {"R24": 1, "r24": 0}) == {"r24": "twice"}
 
 
 def test_target_with_width_stands_in_place_of_nominal_and_deviations() -> None:

@@ -122,7 +122,12 @@ def merged(current: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, An
     Nominal with deviations, or target with width: what is given replaces what was said the other way. R34 at its default
     follows R35.
     """
-    changed, given = dict(current), with_fit(given)
+    changed = dict(current)
+    given = {  # R24 = 0 leaves the other variants as they are
+        raw: value
+        for raw, value in with_fit(given).items()
+        if raw.upper() != TWO_POINT_SWITCH or value not in (0, None) or current.get("variant") == Variant.TWO_POINT
+    }
     names = {raw: _name_of(raw) for raw in given}
     named = {names[raw] for raw, value in given.items() if value is not None}
     if named & set(DRAWING):
@@ -135,12 +140,7 @@ def merged(current: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, An
         drop = (*drop, "averaging_limit")  # it was left to follow the tolerance, and goes on following it
     for name in (*drop, *names.values()):
         changed.pop(name, None)
-    for raw, value in given.items():
-        if raw.upper() == TWO_POINT_SWITCH and not value and current.get("variant") != Variant.TWO_POINT:
-            changed.setdefault("variant", current.get("variant"))  # R24 = 0 leaves the other variants as they are
-        else:
-            changed[raw] = value
-    return changed
+    return changed | given
 
 
 def _name_of(raw: str) -> str:

@@ -29,7 +29,7 @@ def add_characteristic(
     """Set up a characteristic. Parameters outside the control's ranges are accepted with a warning."""
     created = actions.add_characteristic(session, characteristic, caller.name)
     response.headers["Location"] = f"/api/v1/characteristics/{characteristic.key}"
-    return characteristic_out(created)
+    return characteristic_out(created, given=characteristic.parameters)
 
 
 @router.get("/characteristics", responses=problems(404))
@@ -59,7 +59,7 @@ def change_characteristic(
 ) -> CharacteristicOut:
     """Change it. `parameters` make a new version and need a `reason`; old readings keep the version they were judged by."""
     current = actions.change_characteristic(session, characteristic, change, caller.name)
-    return characteristic_out(current, queries.target_before(session, current))
+    return characteristic_out(current, queries.target_before(session, current), change.parameters)
 
 
 @router.get("/characteristics/{characteristic}/parameters", responses=problems(404))

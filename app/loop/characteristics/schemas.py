@@ -16,6 +16,7 @@ from app.core.parameters import (
     Problem,
     read,
     unusual_on,
+    unusual_switch,
 )
 from app.core.plausibility import inch_warnings
 from app.loop.characteristics import queries, wording
@@ -140,10 +141,12 @@ class VersionOut(BaseModel):
     parameters: Annotated[dict[str, Any], Field(json_schema_extra=parameters_schema())]
 
 
-def warnings_of(current: queries.CurrentCharacteristic, before: float | None = None) -> list[WarningOut]:
+def warnings_of(
+    current: queries.CurrentCharacteristic, before: float | None = None, given: Mapping[str, Any] | None = None
+) -> list[WarningOut]:
     """Warn of what is outside the ranges of the sources, does not fit the machine, or is finer than its probe tells.
 
-    before: the target of the version before, mm; one that is the same in inches is named.
+    before: the target of the version before, mm; one that is the same in inches is named. given: what was sent just now.
     """
     parameters, machine = current.parameters, current.machine
     try:
@@ -151,6 +154,7 @@ def warnings_of(current: queries.CurrentCharacteristic, before: float | None = N
     except ParameterError:  # made when rules were others
         unusual = []
     unusual += unusual_on(parameters.as_dict(), MachineType(machine.type))
+    unusual += unusual_switch(given or {})
     if nanometres(parameters.zero_range) < nanometres(machine.zero_range_floor):
         values = {"value": parameters.zero_range, "floor": machine.zero_range_floor}
         unusual.append(Problem("zero_range", "signal_path", values, warning=True))
@@ -158,8 +162,10 @@ def warnings_of(current: queries.CurrentCharacteristic, before: float | None = N
     return [*warnings_out(inches, sentence), *wording.warnings(unusual)]
 
 
-def characteristic_out(current: queries.CurrentCharacteristic, before: float | None = None) -> CharacteristicOut:
-    """Return a characteristic as it is answered. before: the target of the version before, mm."""
+def characteristic_out(
+    current: queries.CurrentCharacteristic, before: float | None = None, given: Mapping[str, Any] | None = None
+) -> CharacteristicOut:
+    """Return a characteristic as it is answered. before, given: as `warnings_of` has them."""
     characteristic, machine, version = current
     return CharacteristicOut(
         key=characteristic.key,
@@ -170,7 +176,7 @@ def characteristic_out(current: queries.CurrentCharacteristic, before: float | N
         parameters=wording.in_order(version.parameters),
         parameters_version=version.version,
         created_at=characteristic.created_at,
-        warnings=warnings_of(current, before),
+        warnings=warnings_of(current, before, given),
     )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from app.core.parameters import BY_NAME, Field, FieldKind, Problem, Variant
+from app.core.parameters import BY_NAME, TWO_POINT_SWITCH, Field, FieldKind, Problem, Variant
 from app.errors import FieldError
 from app.language.i18n import _
 from app.language.numbers import typed_length
@@ -43,6 +43,7 @@ def label(name: str) -> str:
         "max_step": _("Largest step"),
         "max_total": _("Largest sum"),
         "plausible_jump": _("Largest plausible jump"),
+        TWO_POINT_SWITCH: _("Two-point measurement (R24)"),
     }.get(name, name)
 
 
@@ -204,6 +205,13 @@ def sentence(problem: Problem) -> str:
         "points_missing": _("“{variant}” needs several points, but R23 does not say how many").format(
             variant=choice("variant", data.get("variant", ""))
         ),
+        "switch_value": _(
+            "R24 = {value} is taken as two-point measurement; the cycles know 0 (off) and 1 (on). Check the number"
+        ).format(value=data.get("value")),
+        "switch_wins": _("R24 asks for two points, so R25 “{variant}” does not count; give only one of them").format(
+            variant=choice("variant", data.get("variant", ""))
+        ),
+        "switch_loses": _("R24 = 0 asks for no two points, but the variant does; the variant counts"),
         "not_on_lathe": _(
             "Two-point measurement (R24) is not for lathes: the cycles know it on machining centres only"
         ),

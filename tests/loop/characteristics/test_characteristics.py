@@ -74,6 +74,22 @@ class TestSetUp:
         )["parameters"]
         assert (made["direction"], made["axis"], made["variant"]) == ("negative", "Z", "two_point")
 
+    def test_r24_beside_r25_in_a_change(self, common_shop: Shop) -> None:
+        common_shop.add("switched", R25=1)
+
+        def changed(**given: Any) -> tuple[str, list[str]]:
+            body = {"parameters": given, "reason": "the tables of the source print both"}
+            answer = common_shop.call("PATCH", "/characteristics/switched", **body)
+            return answer["parameters"]["variant"], [each["code"] for each in answer["warnings"]]
+
+        assert changed(R24=0) == ("indexed", [])
+        assert changed(R24=1, R25=1)[0] == changed(R25=0, R24=1)[0] == "two_point"
+        assert "switch_wins" in changed(R25=1, R24=1)[1]
+        assert changed(R25=1, R24=0) == ("indexed", [])
+        assert changed(R25=0, R24=0) == ("single", [])
+        assert changed(R24=1)[0] == "two_point"
+        assert changed(R24=0)[0] == "single"
+
     def test_a_target_changed_to_the_same_in_inches_is_named(self, common_shop: Shop) -> None:
         common_shop.add("to-inches")
         given: dict[str, Any] = {"parameters": {"target": 1.5748}, "reason": "new drawing"}
