@@ -1,98 +1,74 @@
-"""The parameters of a characteristic: names, R numbers, order, ranges, and L75 (domain §2).
+"""The parameters of a characteristic: one complete set, its order, and L75 (domain §2).
 
-`FIELDS` is the one table of them: the API, the form and the documents are made from it. `read`
-turns what a person or a program sent into `Parameters`, or into the complete list of `Problem`.
-Lengths are mm.
+`read` turns what a person or a program sent into `Parameters`, or into the complete list of `Problem`; the table of the
+fields stands in `parameter_table`. Lengths are mm.
 """
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from math import inf, isfinite
-from typing import Any, NamedTuple
+from typing import Any
 
 from app.core.decision.limits import Limits, nanometres
 from app.core.decision.step import Rules
 from app.core.fits import with_fit
+from app.core.parameter_table import (
+    AVERAGE_LOCATIONS,
+    BY_NAME,
+    BY_R,
+    ENUMS,
+    FIELDS,
+    LARGEST_LENGTH,
+    MOST_LOCATIONS,
+    TOOL_LOCATIONS,
+    TWO_POINT_SWITCH,
+    Axis,
+    Direction,
+    Feature,
+    Field,
+    FieldKind,
+    MachineType,
+    Mode,
+    Problem,
+    Variant,
+    WearPolicy,
+)
+from app.core.unusual import unusual, unusual_calibration, unusual_on
 
-LARGEST_LENGTH = 100_000.0  # mm; no machine tool is a hundred metres long
-
-
-class Variant(StrEnum):
-    """Measuring variant of a dimension (R25, and R24 for two points)."""
-
-    SINGLE = "single"
-    INDEXED = "indexed"
-    ROUND = "round"
-    ALONG = "along"
-    TWO_POINT = "two_point"
-
-
-class Axis(StrEnum):
-    """Measuring axis (R30)."""
-
-    X = "X"
-    Z = "Z"
-    Y = "Y"
-
-
-class Direction(StrEnum):
-    """Direction of probing (R31)."""
-
-    POSITIVE = "positive"
-    NEGATIVE = "negative"
-
-
-class MachineType(StrEnum):
-    """Kinds of machine tool, as far as measuring cycles differ between them."""
-
-    LATHE = "lathe"
-    MILL = "mill"
-    MILL_TURN = "mill_turn"
-    GRINDER = "grinder"
-    OTHER = "other"
-
-
-TOOL_LOCATIONS, AVERAGE_LOCATIONS = 32, 20  # of the control in the sources (R10, R11); a machine has its own
-MOST_LOCATIONS = 999
-
-
-class Feature(StrEnum):
-    """The probed feature: a part from outside (shaft, spigot, web) or inside (bore, slot, pocket), or the tool R10 itself.
-
-    The length or radius of a tool tells its wear directly: no correction of an offset changes it.
-    """
-
-    OUTSIDE = "outside"
-    INSIDE = "inside"
-    TOOL = "tool"
-
-
-class Mode(StrEnum):
-    """Use of a computed correction."""
-
-    AUTOMATIC = "automatic"
-    APPROVAL = "approval"
-    MEASURE_ONLY = "measure_only"
-
-
-class WearPolicy(StrEnum):
-    """Policy for a correction computed in the wear zone: hold it for the operator, or release it."""
-
-    HOLD = "hold"
-    RELEASE = "release"
-
-
-ENUMS: dict[str, type[StrEnum]] = {
-    "variant": Variant,
-    "axis": Axis,
-    "direction": Direction,
-    "feature": Feature,
-    "mode": Mode,
-    "wear_policy": WearPolicy,
-}
+__all__ = [
+    "AVERAGE_LOCATIONS",
+    "BY_NAME",
+    "BY_R",
+    "ENUMS",
+    "FIELDS",
+    "LARGEST_LENGTH",
+    "MOST_LOCATIONS",
+    "TOOL_LOCATIONS",
+    "TWO_POINT_SWITCH",
+    "Axis",
+    "Direction",
+    "Feature",
+    "Field",
+    "FieldKind",
+    "MachineType",
+    "Mode",
+    "ParameterError",
+    "Parameters",
+    "Problem",
+    "Variant",
+    "WearPolicy",
+    "default_averaging_limit",
+    "mean_nominal",
+    "read",
+    "unusual_calibration",
+    "unusual_on",
+    "unusual_partly",
+    "unusual_switch",
+    "without_location",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,91 +153,6 @@ class Parameters:
         return cls(**values, accept_n=accept["n"], accept_m=accept["m"])
 
 
-class FieldKind(StrEnum):
-    """Type of a parameter's value."""
-
-    LENGTH = "length"
-    NUMBER = "number"
-    WHOLE = "whole"
-    CHOICE = "choice"
-    YES_NO = "yes_no"
-
-
-class Field(NamedTuple):
-    """One parameter: its name, R number (or None), what it holds and the range printed in the source.
-
-    required: must be said; `default` stands where it is not. codes: the control's numbers for choices.
-    lowest, highest: outside it has no meaning and is refused; source_range: outside it is unusual, a warning.
-    """
-
-    name: str
-    r: str | None
-    kind: FieldKind
-    required: bool = False
-    default: Any = None
-    lowest: float | None = None
-    highest: float | None = None
-    source_range: tuple[float, float] | None = None
-    choices: tuple[str, ...] = ()
-    codes: tuple[int, ...] = ()
-
-
-def _choices(enum: type[StrEnum]) -> tuple[str, ...]:
-    return tuple(member.value for member in enum)
-
-
-_location = partial(Field, kind=FieldKind.WHOLE, default=0, lowest=0, highest=MOST_LOCATIONS)
-
-FIELDS: tuple[Field, ...] = (
-    _location("tool_memory", "R10", source_range=(0, TOOL_LOCATIONS)),
-    _location("average_memory", "R11", source_range=(0, AVERAGE_LOCATIONS)),
-    Field("variant", "R25", FieldKind.CHOICE, default="single", choices=_choices(Variant), codes=(0, 1, 2, 3)),
-    Field("points", "R23", FieldKind.WHOLE, default=1, lowest=1, highest=100),
-    Field("repeats", "R27", FieldKind.WHOLE, default=1, lowest=1, highest=100, source_range=(1, 10)),
-    Field("index", "R26", FieldKind.NUMBER, lowest=-100_000, highest=100_000),
-    Field("wait", "R04", FieldKind.NUMBER, lowest=0, highest=3600),
-    Field("axis", "R30", FieldKind.CHOICE, default="X", choices=_choices(Axis), codes=(1, 2)),
-    Field("direction", "R31", FieldKind.CHOICE, default="positive", choices=_choices(Direction), codes=(0, 1)),
-    Field("feature", None, FieldKind.CHOICE, default="outside", choices=_choices(Feature)),
-    Field("nominal", "R42", FieldKind.LENGTH),
-    Field("upper_deviation", "R40", FieldKind.LENGTH),
-    Field("lower_deviation", "R41", FieldKind.LENGTH),
-    Field("target", "R32", FieldKind.LENGTH),
-    Field("tolerance_width", "R35", FieldKind.LENGTH, lowest=0),
-    Field("zero_range", "R33", FieldKind.LENGTH, required=True, lowest=0, source_range=(0, 0.1)),
-    Field("averaging_limit", "R34", FieldKind.LENGTH, lowest=0, source_range=(0, 0.1)),
-    Field("wear_limit", "R37", FieldKind.LENGTH, required=True, lowest=0, source_range=(0.3, 3)),
-    Field("confidence_limit", "R36", FieldKind.LENGTH, required=True, lowest=0, source_range=(1, 3)),
-    Field("weighting_factor", "R29", FieldKind.NUMBER, default=1.0, lowest=1, highest=1_000_000, source_range=(1, 4)),
-    Field("path_factor", "R28", FieldKind.NUMBER, default=1.0, lowest=0.001, highest=1000, source_range=(1, 5)),
-    Field("factor", None, FieldKind.NUMBER, lowest=-1000, highest=1000),
-    Field("rejected_may_correct", None, FieldKind.YES_NO, default=False),
-    Field("mode", None, FieldKind.CHOICE, default="automatic", choices=_choices(Mode)),
-    Field("wear_policy", None, FieldKind.CHOICE, default="hold", choices=_choices(WearPolicy)),
-    Field("max_step", None, FieldKind.LENGTH, lowest=0.000001),
-    Field("max_total", None, FieldKind.LENGTH, lowest=0),
-    Field("plausible_jump", None, FieldKind.LENGTH, lowest=0.000001),
-)
-BY_NAME: dict[str, Field] = {field.name: field for field in FIELDS}
-BY_R: dict[str, str] = {field.r: field.name for field in FIELDS if field.r}
-# R24 is the control's switch for two-point measurement; here that is a variant of its own.
-TWO_POINT_SWITCH = "R24"
-
-
-class Problem(NamedTuple):
-    """Something wrong with a parameter set: where, what (a code with values), and how bad.
-
-    Codes: required, unknown, twice, not_a_number, not_whole, not_a_choice, not_yes_no, range, order, target_missing,
-    target_twice, tolerance_sign, sign_missing, factor_zero, accept, sections, tool_measured, no_location, and the warnings source_range,
-    variant_axis, points_missing, not_on_lathe, factor_on_lathe, switch_value, switch_wins, switch_loses.
-    """
-
-    field: str
-    code: str
-    data: dict[str, Any]
-    warning: bool = False
-
-
 class ParameterError(ValueError):
     """A parameter set that cannot be used; `problems` lists everything that is wrong with it."""
 
@@ -321,7 +212,7 @@ def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
         raise ParameterError(problems)
     for name, enum in ENUMS.items():
         values[name] = enum(values[name])
-    return Parameters(**values), list(_unusual(values))
+    return Parameters(**values), list(unusual(values))
 
 
 def _named(given: Mapping[str, Any], problems: list[Problem]) -> Iterator[tuple[str, Any]]:
@@ -478,25 +369,6 @@ def _tool_measured(values: Mapping[str, Any]) -> Iterator[Problem]:
         yield Problem("mode", "tool_measured", {})
 
 
-INDEX_ANGLES = (0.0, 359.5)  # degrees, R26 of the variants that index the part
-CALIBRATION_RANGES = {"path_factor": (1, 10)}  # where L92 has another range than L93
-
-
-def _unusual(values: Mapping[str, Any]) -> Iterator[Problem]:
-    """Values that the measuring cycles of the sources would not take: ranges, and variants that do not fit together."""
-    for field in FIELDS:
-        if field.source_range and values.get(field.name) is not None:
-            yield from _outside(field.name, values[field.name], field.source_range)
-    variant, points = values["variant"], values["points"]
-    if variant in (Variant.INDEXED, Variant.ROUND) and values.get("index") is not None:
-        yield from _outside("index", values["index"], INDEX_ANGLES)
-    if variant in (Variant.INDEXED, Variant.ROUND, Variant.ALONG) and values["axis"] != Axis.X:
-        data = {"variant": str(variant), "axis": str(values["axis"])}
-        yield Problem("axis", "variant_axis", data, warning=True)
-    if variant in (Variant.ROUND, Variant.ALONG) and max(points, values["accept_m"]) < 2:
-        yield Problem("points", "points_missing", {"variant": str(variant)}, warning=True)
-
-
 def unusual_partly(given: Mapping[str, Any]) -> list[Problem]:
     """Warn of what is unusual in a set that is not complete: what is known of it counts, defaults stand for the rest."""
     values = {field.name: field.default for field in FIELDS} | {"accept_m": 1}
@@ -513,46 +385,7 @@ def unusual_partly(given: Mapping[str, Any]) -> list[Problem]:
                 values[name] = checked
         elif name == "accept" and value is not None:
             values["accept_m"] = _accept(value, ignored)[1]
-    return list(_unusual(values))
-
-
-def _outside(name: str, value: float, usual: tuple[float, float]) -> Iterator[Problem]:
-    low, high = usual
-    if not low <= value <= high:
-        yield Problem(name, "source_range", {"value": value, "lowest": low, "highest": high}, warning=True)
-
-
-def unusual_calibration(values: Mapping[str, Any]) -> list[Problem]:
-    """Warn of values of a calibration (L92) outside the ranges of the sources. values: parameters by name, as far as said."""
-    problems: list[Problem] = []
-    for field in FIELDS:
-        usual = CALIBRATION_RANGES.get(field.name, field.source_range)
-        value = values.get(field.name)
-        if usual and isinstance(value, int | float) and not isinstance(value, bool):
-            problems.extend(_outside(field.name, value, usual))
-    return problems
-
-
-def unusual_on(values: Mapping[str, Any], machine: MachineType) -> list[Problem]:
-    """Warn of what does not fit the type of a machine. values: parameters by name, as far as they are known.
-
-    Two-point measurement is for machining centres (R24, domain §2); on a lathe the offset acts against the size, so that no
-    factor is positive (domain §3).
-
-    >>> given = {"factor": 0.5, "tool_memory": 3}
-    >>> [problem.code for problem in unusual_on(given, MachineType.LATHE)], unusual_on(given, MachineType.MILL)
-    (['factor_on_lathe'], [])
-    """
-    if machine is not MachineType.LATHE:
-        return []
-    problems = []
-    if values.get("variant") == Variant.TWO_POINT:
-        problems.append(Problem("variant", "not_on_lathe", {}, warning=True))
-    factor = values.get("factor")
-    corrects = values.get("tool_memory") and values.get("mode") != Mode.MEASURE_ONLY
-    if isinstance(factor, int | float) and factor > 0 and corrects:
-        problems.append(Problem("factor", "factor_on_lathe", {"value": factor}, warning=True))
-    return problems
+    return list(unusual(values))
 
 
 def without_location(values: Mapping[str, Any], tool_locations: int, average_locations: int) -> list[Problem]:

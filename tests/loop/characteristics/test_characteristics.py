@@ -78,7 +78,7 @@ class TestSetUp:
         common_shop.add("switched", R25=1)
 
         def changed(**given: Any) -> tuple[str, list[str]]:
-            body = {"parameters": given, "reason": "the tables of the source print both"}
+            body: dict[str, Any] = {"parameters": given, "reason": "the tables of the source print both"}
             answer = common_shop.call("PATCH", "/characteristics/switched", **body)
             return answer["parameters"]["variant"], [each["code"] for each in answer["warnings"]]
 
