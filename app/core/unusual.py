@@ -1,4 +1,4 @@
-"""What is unusual in a set of parameters: taken with a warning, because it may well be meant."""
+"""Warnings of parameters that are accepted, because they may be meant, but that the sources would not take."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
