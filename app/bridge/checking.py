@@ -112,6 +112,14 @@ async def _context(machine: Machine) -> AsyncIterator[Finding]:
     try:
         async with context.client() as http:
             await context.poll(http)
-        yield Finding(machine.key, context.summary(), good=not context.unclear)
+        without, silent = context.lacking()
+        words = [context.summary()]
+        if without:
+            words.append(
+                f"No data item of the device tells {' and '.join(without)}; any other is named as context.{without[0]}."
+            )
+        if silent:
+            words.append(f"UNAVAILABLE now: {', '.join(silent)}.")
+        yield Finding(machine.key, " ".join(words), good=not context.unclear and "part" not in without)
     except AgentError as error:
         yield Finding(machine.key, str(error), False)

@@ -34,7 +34,15 @@ ELEMENTS: Final[dict[str, tuple[str, ...]]] = {
     "program": ("Program",),
     "tool": ("ToolNumber", "ToolAssetId", "ToolId"),
 }
-"""Elements of an answer that tell each; the first that the device has is taken."""
+"""Elements of an answer that tell each, the best first; one that is UNAVAILABLE leaves it to the next until it has had a value."""
+SUBTYPES: Final[dict[str, tuple[str, ...]]] = {
+    "part": ("", "ALL"),
+    "program": ("", "ALL", "MAIN", "ACTIVE"),
+    "tool": ("", "ALL"),
+}
+"""Subtypes that count, the best first: a TARGET is no count, and the program that is ACTIVE may be a subprogram."""
+AGENT: Final = "Agent"
+"""The device that newer agents have for themselves."""
 
 
 class Settings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -67,6 +75,7 @@ class Observation:
     subtype: str
     at: str
     value: str | None
+    device: str = ""
 
 
 @dataclass(slots=True)
@@ -89,6 +98,7 @@ class _Reader:
         self.answer = Answer()
         self.root = ""
         self._size = 0
+        self._device = ""
         self._open: tuple[str, dict[str, str]] | None = None
         self._text: list[str] = []
         self._parser = expat.ParserCreate(namespace_separator=" ")
@@ -115,6 +125,8 @@ class _Reader:
             self.answer.created = attributes.get("creationTime", "")
             for word in ("first", "next", "last"):
                 setattr(self.answer, word, int(attributes.get(f"{word}Sequence", 0)))
+        elif local == "DeviceStream":
+            self._device = attributes.get("name") or attributes.get("uuid", "")
         elif "dataItemId" in attributes or local == "Error":
             self._open = local, attributes
         self._text.clear()
@@ -135,6 +147,7 @@ class _Reader:
                 attributes.get("subType", ""),
                 attributes.get("timestamp", ""),
                 value,
+                self._device,
             )
         )
 
@@ -151,7 +164,10 @@ class Context:
         self.gaps = 0
         self._gap: tuple[datetime, str] | None = None
         self.unclear: list[str] = []
-        self._items: dict[str, str] = {}
+        self._items: dict[str, tuple[str, int]] = {}
+        """What each data item tells, and its rank among those that tell it."""
+        self._ranks: dict[str, int] = {}
+        """The rank of the data item that tells each now: the best that has had a value."""
         self._instance: str | None = None
         self._next = 0
         self._until: datetime | None = None
@@ -205,6 +221,13 @@ class Context:
         recent = self._gap is not None and datetime.now(UTC) - self._gap[0] < GAP_SHOWN
         return " ".join([told, *self.unclear, *([self._gap[1]] if recent and self._gap else [])])
 
+    def lacking(self) -> tuple[list[str], list[str]]:
+        """Names without a data item at the device, and those whose data item is UNAVAILABLE, once the agent has answered."""
+        there = {name for name, _ in self._items.values()}
+        named = {name for name in ELEMENTS if any(f"context.{name}." in each for each in self.unclear)}
+        silent = [name for name in ELEMENTS if name in there and self.values.get(name) is None]
+        return [name for name in ELEMENTS if name not in there | named], silent
+
     async def poll(self, http: httpx.AsyncClient) -> bool:
         """Ask once; whether more waits at the agent. Raises `AgentError`."""
         if self._instance is None:
@@ -234,9 +257,18 @@ class Context:
         answer = await self._ask(http, "current", {})
         self._refuse(answer)
         before, until = self.values.get("part"), self._until
-        self.unclear, self._items = [], {}
+        devices = sorted({each.device for each in answer.observations} - {AGENT})
+        if self.settings.device is None and len(devices) > 1:
+            raise AgentError(
+                f"The MTConnect agent {self.base} has several devices ({', '.join(devices[:5])}): name the one of this machine"
+                " as context.device."
+            )
+        known, self.unclear, self._items = self._items, [], {}
         for name in ELEMENTS:
             self._choose(name, answer.observations)
+        if self._items != known:
+            self._ranks.clear()
+        self._ranks = self._told(answer.observations) | self._ranks
         self.values.clear()
         self._take(answer, asked)
         same = not again and before is not None and before == self.values.get("part")
@@ -246,23 +278,34 @@ class Context:
         self._until = asked
 
     def _choose(self, name: str, observations: list[Observation]) -> None:
-        """Find the data item that tells part, program or tool."""
+        """Find the data items that tell part, program or tool, and rank them."""
         wanted = getattr(self.settings, name)
         if wanted is not None:
             if any(each.item == wanted for each in observations):
-                self._items[wanted] = name
+                self._items[wanted] = name, 0
             else:
                 self.unclear.append(f"The device has no data item {wanted!r}: correct context.{name}.")
             return
         for element in ELEMENTS[name]:
-            fitting = {each.item for each in observations if each.element == element and each.subtype in {"", "ALL"}}
-            if len(fitting) == 1:
-                self._items[fitting.pop()] = name
-                return
-            if fitting:
-                listed = ", ".join(sorted(fitting)[:5])
-                self.unclear.append(f"Several data items tell the {name} ({listed}): name one as context.{name}.")
-                return
+            for subtype in SUBTYPES[name]:
+                fitting = {each.item for each in observations if (each.element, each.subtype) == (element, subtype)}
+                if len(fitting) > 1:
+                    if name in self._told(observations):
+                        return
+                    listed = ", ".join(sorted(fitting)[:5])
+                    self.unclear.append(f"Several data items tell the {name} ({listed}): name one as context.{name}.")
+                    return
+                for item in fitting:
+                    self._items[item] = name, len(self._items)
+
+    def _told(self, observations: Sequence[Observation]) -> dict[str, int]:
+        """The rank of the best data item that has a value, of each that is told."""
+        found: dict[str, int] = {}
+        for each in observations:
+            if each.value is not None and each.item in self._items:
+                name, rank = self._items[each.item]
+                found[name] = min(rank, found.get(name, rank))
+        return found
 
     def _take(self, answer: Answer, asked: datetime) -> None:
         created = _moment(answer.created)
@@ -270,8 +313,13 @@ class Context:
         if abs(ahead) < WHOLE_SECONDS:
             ahead = timedelta()
         for each in answer.observations:
-            if (name := self._items.get(each.item)) is None:
+            if (known := self._items.get(each.item)) is None:
                 continue
+            name, rank = known
+            best = self._ranks.get(name)
+            if rank != best and (each.value is None or (best is not None and rank > best)):
+                continue  # another one tells it, or none yet
+            self._ranks[name] = rank
             self.values[name] = each.value
             if name == "part":
                 at = _moment(each.at)

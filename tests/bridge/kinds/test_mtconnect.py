@@ -267,6 +267,56 @@ def test_the_data_item_can_be_named_and_a_wrong_name_is_said() -> None:
     run(work())
 
 
+def streams(**devices: list[tuple[str, str, str, str]]) -> bytes:
+    """A document with these devices: element, id, subtype and value of their data items."""
+    content = "".join(
+        f'<DeviceStream name="{name}" uuid="{name}"><ComponentStream component="Path" componentId="p"><Events>'
+        + "".join(
+            f'<{element} dataItemId="{item}" sequence="1" subType="{subtype}" timestamp="{now()}">{value}</{element}>'
+            for element, item, subtype, value in items
+        )
+        + "</Events></ComponentStream></DeviceStream>"
+        for name, items in devices.items()
+    )
+    header = f'<Header creationTime="{now()}" instanceId="7" firstSequence="1" lastSequence="9" nextSequence="10"/>'
+    return f"<MTConnectStreams>{header}<Streams>{content}</Streams></MTConnectStreams>".encode()
+
+
+UNIQUE, COUNT, TOOL = (
+    ("PartUniqueId", "u", "", "UNAVAILABLE"),
+    ("PartCount", "c", "ALL", "812"),
+    ("ToolNumber", "t", "", "3"),
+)
+MAIN, ACTIVE = ("Program", "p", "MAIN", "O1"), ("Program", "s", "ACTIVE", "O9810")
+
+
+@pytest.mark.parametrize("items", [[UNIQUE, COUNT, ACTIVE, MAIN, TOOL], [MAIN, ACTIVE, COUNT, TOOL, UNIQUE]])
+def test_an_item_that_is_unavailable_leaves_it_to_the_next_until_it_has_a_value(items: list[Any]) -> None:
+    async def work() -> None:
+        async with agent() as simulator, asking(simulator) as (context, http):
+            simulator.instead = streams(Agent=[], mazak=items)
+            await context.poll(http)
+            assert context.summary() == "MTConnect: part 812, program O1, tool 3."
+            assert context.part_at(now()) == "812"
+            for unique, part in (("A-17", "A-17"), ("UNAVAILABLE", None)):  # and then it tells the part alone
+                simulator.instead = streams(mazak=[("PartUniqueId", "u", "", unique), ("PartCount", "c", "ALL", "813")])
+                await context.poll(http)
+                assert context.part_at(now()) == part
+
+    run(work())
+
+
+def test_an_agent_with_several_devices_asks_for_one() -> None:
+    async def work() -> None:
+        async with agent() as simulator, asking(simulator, device=None) as (context, http):
+            simulator.instead = streams(okuma=[TOOL], mazak=[COUNT])
+            with pytest.raises(AgentError, match=r"several devices \(mazak, okuma\): name the one of this machine as"):
+                await context.poll(http)
+            assert context.part_at(now()) is None
+
+    run(work())
+
+
 def test_readings_get_the_part_and_keep_their_own_and_an_agent_that_hangs_holds_up_none(tmp_path: Path) -> None:
     async def work() -> None:
         store = store_in(tmp_path)
@@ -368,7 +418,12 @@ def test_the_check_says_what_the_agent_answers() -> None:
             simulator.observe("count", "17")
             chosen = machine(Model(), context=settings(simulator))
             [found] = [each async for each in checking._context(chosen)]
-            assert str(found) == "✓ lathe-1: MTConnect: part 17."
+            assert str(found) == "✓ lathe-1: MTConnect: part 17. UNAVAILABLE now: program, tool."
+            simulator.instead = streams(mazak=[TOOL])
+            [found] = [each async for each in checking._context(chosen)]
+            assert str(found).startswith(
+                "✗ lathe-1: MTConnect: tool 3. No data item of the device tells part and program;"
+            )
             simulator.instead = b"<html/>"
             [found] = [each async for each in checking._context(chosen)]
             assert not found.good
