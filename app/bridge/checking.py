@@ -1,6 +1,7 @@
 """The check of a configuration against the server and the controls: nothing is changed anywhere."""
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator
 from typing import NamedTuple
 
@@ -11,6 +12,8 @@ from app.bridge.moments import wrong_date
 from app.bridge.program import link_of
 from app.bridge.server_side import TRUST
 from inband_client import AsyncClient, Forbidden, NotFound, ProblemError, Unauthorized, Unavailable, Untrusted
+
+log = logging.getLogger(__name__)
 
 
 class Finding(NamedTuple):
@@ -32,11 +35,21 @@ async def check(configuration: Configuration) -> list[Finding]:
 
 
 async def _of_machine(configuration: Configuration, machine: Machine) -> list[Finding]:
-    return (
-        [finding async for finding in _server(configuration, machine)]
-        + [finding async for finding in _control(machine)]
-        + [finding async for finding in _context(machine)]
-    )
+    parts = {"server": _server(configuration, machine), "control": _control(machine), "agent": _context(machine)}
+    return [finding for name, part in parts.items() for finding in await _all_of(part, machine, name)]
+
+
+async def _all_of(findings: AsyncIterator[Finding], machine: Machine, name: str) -> list[Finding]:
+    """The findings of one part of a check; an error that nobody thought of ends that part alone."""
+    found = []
+    try:
+        async for finding in findings:
+            found.append(finding)  # noqa: PERF401 - those before an error count
+    except Exception as error:
+        log.debug("%s: %s", machine.key, name, exc_info=error)
+        words = f"the check of the {name} ended with an error that it does not know: {type(error).__name__}: {error}"
+        found.append(Finding(machine.key, words, False))
+    return found
 
 
 async def _server(configuration: Configuration, machine: Machine) -> AsyncIterator[Finding]:

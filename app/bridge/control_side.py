@@ -27,8 +27,10 @@ async def run(unit: Unit) -> None:
         except TimeoutError:
             unit.say("control_away", silence(unit.machine.patience))
         except Exception as error:
-            log.exception("%s", unit.machine.key)
-            unit.say("control_away", f"{type(error).__name__}: {error}")
+            said = f"{type(error).__name__}: {error}"
+            if (unit.state, unit.detail) != ("control_away", said):  # once: it comes again with each attempt
+                log.exception("%s", unit.machine.key)
+            unit.say("control_away", said)
         finally:
             await _closed(unit)
         pause = FIRST_PAUSE if unit.polls > began else min(2 * pause, LONGEST_PAUSE)

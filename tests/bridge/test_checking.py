@@ -1,10 +1,14 @@
 """The check of a configuration: what would go to the quarantine, and who does not answer."""
 
 import socket
+import termios
 from pathlib import Path
+
+import pytest
 
 from app.bridge.checking import check
 from app.bridge.configuration import configuration_from
+from app.bridge.kinds.dprnt import PrintedLink
 from app.core.printed_line import Printed, line_of
 from app.core.ring import Slot, Unit
 from tests.loops import run
@@ -66,3 +70,18 @@ def test_a_machine_or_a_server_that_is_silent_or_another_is_told_with_what_to_do
     with socket.create_server(("127.0.0.1", 0)) as silent:
         haas = table("haas", address="127.0.0.1", port=silent.getsockname()[1]) | {"patience": 0.3}
         assert [each for each in findings(tmp_path, haas) if "is it on" in each or "has not answered" in each]
+
+
+def test_an_error_of_one_machine_does_not_end_the_check_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def odd(link: object) -> str:
+        raise termios.error(22, "Invalid argument")
+
+    monkeypatch.setattr(PrintedLink, "connect", odd)
+    machines = {"lathe-1": table("dprnt", listen=9), "cmm-1": table("folder", path=str(tmp_path), format="csv")}
+    machines["cmm-1"]["secret"] = "another"
+    content = {"server": SERVER, "machine": machines}
+    said = [str(each) for each in run(check(configuration_from(content, tmp_path)))]
+    assert [each for each in said if each.startswith("✗ lathe-1: the check of the control ended with an error")]
+    assert "✓ cmm-1: 0 readings can be fetched now" in said

@@ -6,6 +6,7 @@ told by its number, and comes again with the second print at the end of the prog
 
 import asyncio
 import contextlib
+import errno
 import os
 import socket
 from collections import OrderedDict
@@ -30,6 +31,8 @@ COMPARED = 512  # bytes in front of those that are new: another file has others 
 REMEMBERED = 64  # readings that a second print is compared with
 NAMED = 12  # sequences that a sentence names
 LONGEST_GAP = 1000  # sequences that are kept as missing
+EIGHT_BITS = {"7E1": "8N1", "7E2": "8N2"}
+"""Framings with as many bits on the wire, for ports that do not do seven bits with parity."""
 Port = Annotated[int, Meta(ge=1, le=65535)]
 
 
@@ -188,13 +191,13 @@ class SerialPort(One):
             ) from error
         settings = self.settings
 
-        def opened() -> Any:
+        def opened(framing: str) -> Any:
             return serial.Serial(
                 settings.serial,
                 settings.baud,
-                bytesize=int(settings.framing[0]),
-                parity=settings.framing[1],
-                stopbits=int(settings.framing[2]),
+                bytesize=int(framing[0]),
+                parity=framing[1],
+                stopbits=int(framing[2]),
                 xonxoff=settings.flow == "xon",
                 rtscts=settings.flow == "rts",
                 timeout=0,
@@ -202,16 +205,38 @@ class SerialPort(One):
             )
 
         try:
-            port = await asyncio.to_thread(opened)
-        except (OSError, ValueError) as error:  # SerialException is an OSError
+            try:
+                port = await asyncio.to_thread(opened, settings.framing)
+            except Exception as error:
+                eight = EIGHT_BITS.get(settings.framing)
+                if eight is None or not _refuses_framing(error):
+                    raise
+                port = await asyncio.to_thread(opened, eight)
+                self.remark = (
+                    f"The port {settings.serial} refuses {settings.framing}. It is read as {eight}, which is the same on the"
+                    f' wire: the eighth bit is the parity, and is left out. Set framing = "{eight}", and it is not said again.'
+                )
+        except (
+            Exception
+        ) as error:  # a SerialException is an OSError, the termios.error of Linux is nothing but an Exception
             raise ControlAway(
-                f"The serial port {settings.serial} cannot be opened: {error}. Is it plugged in, may this program use it"
-                " (group dialout), and does no other?"
+                f"The serial port {settings.serial} cannot be opened: {_reason(error)}. Is it plugged in, may this program use"
+                " it (group dialout), does no other, and does it know baud, framing and flow?"
             ) from error
         reader = asyncio.StreamReader()
         loop = asyncio.get_running_loop()
         transport, _ = await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), port)
         return reader, transport
+
+
+def _refuses_framing(error: Exception) -> bool:
+    """Tell if the port is there, and does not do what was asked for."""
+    return isinstance(error, ValueError) or error.args[:1] == (errno.EINVAL,)
+
+
+def _reason(error: Exception) -> str:
+    """The words of an error; one of termios has its number in front of them."""
+    return str(error.args[-1]) if error.args else type(error).__name__
 
 
 class Listener(Source):

@@ -2,6 +2,7 @@
 
 import asyncio
 import random
+import termios
 from collections.abc import AsyncIterator, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import replace
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import serial
 from typer.testing import CliRunner
 
 from app.bridge.configuration import Machine, configuration_from
@@ -103,6 +105,33 @@ def test_a_serial_port(tmp_path: Path, framing: Any, *, parity: bool) -> None:
                 await all_stored(store, simulator.model)
                 await until(lambda: "Damaged lines since the start: 1." in tasks.detail, "the damage said")
             store.close()
+
+    run(work())
+
+
+def test_a_port_that_refuses_seven_bits_is_read_with_eight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = serial.Serial
+
+    def refusing(device: str, baud: int, **named: Any) -> Any:
+        if named["bytesize"] == 7 or baud == 57:
+            raise termios.error(22, "Invalid argument")
+        return opened(device, baud, **named)
+
+    monkeypatch.setattr(serial, "Serial", refusing)
+
+    async def work() -> None:
+        async with printing(parity=True) as simulator:
+            store = store_in(tmp_path)
+            one = printed_machine(Settings(serial=simulator.device, framing="7E1"))
+            async with fetching(one, store) as tasks:
+                await until(lambda: tasks.state == "online", "the port")
+                await parts(simulator.model, 2)
+                await all_stored(store, simulator.model)
+                await until(lambda: "refuses 7E1. It is read as 8N1" in tasks.detail, "the remark")
+            store.close()
+            link = PrintedLink(printed_machine(Settings(serial=simulator.device, baud=57)))
+            with pytest.raises(ControlAway, match=r"cannot be opened: Invalid argument\. Is it plugged in"):
+                await link.connect()
 
     run(work())
 
