@@ -1,23 +1,29 @@
 # Inband alone, as a wheel; it wants a PostgreSQL 18 (docker-compose.yml brings one) and a proxy with https before it.
-FROM python:3.13-slim AS build
+# Both images are named to the release of Debian; a digest pins them to the byte:
+#     docker build --build-arg PYTHON=python:3.13-slim-trixie@sha256:... .
+ARG PYTHON=python:3.13-slim-trixie
+FROM ${PYTHON} AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
 WORKDIR /build
 
 # Libraries first: they change less often than the program.
-COPY pyproject.toml constraints.txt ./
-RUN python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["dependencies"], sep="\n")' > libraries.txt \
-    && pip install -c constraints.txt hatchling \
+# Every file that is fetched has one of the hashes of constraints.txt.
+COPY constraints.txt ./
+RUN sed '/^# For extras/,$d' constraints.txt > server.txt \
+    && sed -n '/^# For building/,/^# For tests/p' constraints.txt > building.txt \
     && python -m venv /opt/inband \
-    && /opt/inband/bin/pip install -c constraints.txt -r libraries.txt
+    && /opt/inband/bin/pip install --require-hashes -r server.txt \
+    && pip install --require-hashes --no-deps -r building.txt
 
-COPY LICENSE README.md ./
+COPY pyproject.toml LICENSE README.md ./
 COPY docs/reference/api-examples docs/reference/api-examples
 COPY migrations migrations
 COPY frontend frontend
 COPY app app
-RUN hatchling build -t wheel -d wheels && /opt/inband/bin/pip install --no-index --no-deps wheels/*.whl
+RUN PYTHONPATH=$(echo /opt/inband/lib/python3*/site-packages) hatchling build -t wheel -d wheels \
+    && /opt/inband/bin/pip install --no-index --no-deps wheels/*.whl
 
-FROM python:3.13-slim
+FROM ${PYTHON}
 RUN useradd --system --home-dir /var/lib/inband --create-home inband
 COPY --from=build /opt/inband /opt/inband
 # Nothing beside the program can be written; what is stored, compiled loops too, lies in the data folder.

@@ -5,7 +5,11 @@
 # make lint    style, types, lengths, templates, and the walls between the rooms
 # make bench   the benchmarks; each prints ratios
 # make messages  collect what can be translated into frontend/locale/inband.pot
-# make wheel   what others install: dist/inband-*.whl, dist/inband_client-*.whl, and the sources beside them
+# make wheel   what others install: dist/inband-*.whl, dist/inband_client-*.whl, the sources beside them, and the libraries
+#              with their hashes: dist/libraries.txt
+# make lock    write constraints.txt: versions as they are, hashes of today; ARGS=--upgrade for the newest versions
+# make audit   look the libraries up in a database of known vulnerabilities
+# make sbom    what is installed, as CycloneDX: dist/inband.cdx.json
 # make clean   remove what make has made; no data
 
 SHELL := /bin/sh
@@ -13,11 +17,11 @@ SHELL := /bin/sh
 .DELETE_ON_ERROR:
 # Where it is set, each of some hundred processes compiles the whole program again.
 unexport PYTHONDONTWRITEBYTECODE
-.PHONY: run test test-long lint bench messages wheel clean
+.PHONY: run test test-long lint bench messages wheel lock audit sbom clean
 
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check --no-input --root-user-action ignore -c constraints.txt
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check --no-input --root-user-action ignore
 # The first Python that is new enough; `make PYTHON=...` knows better.
 PYTHON ?= $(shell for each in python3 python3.14 python3.13 python3.12 python3.11; do \
 	$$each -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$each; break; }; done)
@@ -51,6 +55,18 @@ wheel: $(VENV)/installed
 	@rm -rf dist
 	@$(BIN)/hatchling build
 	@cd app/client && $(CURDIR)/$(BIN)/hatchling build -d $(CURDIR)/dist
+	@sed '/^# For extras/,$$d' constraints.txt > dist/libraries.txt
+	@sed '/^# For building/,$$d' constraints.txt > dist/libraries-with-extras.txt
+
+lock: $(VENV)/installed-tools
+	@$(BIN)/python .ci/lock.py $(BIN)/uv $(ARGS)
+
+audit: $(VENV)/installed-tools
+	@$(BIN)/python .ci/audit.py
+
+sbom: $(VENV)/installed
+	@mkdir -p dist
+	@$(BIN)/inband sbom > dist/inband.cdx.json
 
 clean:
 	rm -rf $(VENV) dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
@@ -61,16 +77,23 @@ $(BIN)/python:
 	@echo "Making the Python environment in $(VENV) (once; needs the network) ..." >&2
 	@$(PYTHON) -m venv $(VENV)
 
-# The build backend comes from the constraints too, so nothing unpinned is fetched.
+# Libraries by the sections of constraints.txt, the build backend too: every file that is fetched has one of the hashes there.
+# Inband itself comes without libraries and without a network.
+INSTALL = $(PIP) --require-hashes -r $(VENV)/wanted.txt && $(PIP) --no-index --no-deps --no-build-isolation -e .
+
 $(VENV)/installed: pyproject.toml constraints.txt | $(BIN)/python
-	@$(PIP) hatchling editables
-	@$(PIP) --no-build-isolation -e .
+	@{ sed '/^# For extras/,$$d' constraints.txt; sed -n '/^# For building/,/^# For tests/p' constraints.txt; } > $(VENV)/wanted.txt
+	@$(INSTALL)
 	@touch $@
 
 $(VENV)/installed-dev: pyproject.toml constraints.txt | $(BIN)/python
-	@$(PIP) hatchling editables
-	@$(PIP) --no-build-isolation -e '.[dev]'
+	@sed '/^# For make lock/,$$d' constraints.txt > $(VENV)/wanted.txt
+	@$(INSTALL)
 	@touch $(VENV)/installed $@
+
+$(VENV)/installed-tools: $(VENV)/installed-dev
+	@$(PIP) --require-hashes -r constraints.txt
+	@touch $@
 
 # A browser for the tests: one that is installed, else Debian's where we may install it, else Playwright's own.
 $(VENV)/browser: | $(VENV)/installed-dev
