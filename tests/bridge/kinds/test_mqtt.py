@@ -328,7 +328,8 @@ def test_contradictions_are_told_with_their_place(settings: dict[str, Any], word
     assert words in str(caught.value)
 
 
-def test_every_reading_once_while_broker_and_bridge_are_killed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kills", [2, pytest.param(8, marks=pytest.mark.long)])
+def test_every_reading_once_while_broker_and_bridge_are_killed(tmp_path: Path, kills: int) -> None:
     async def work() -> None:
         store = store_in(tmp_path / "store")
         async with Broker(tmp_path) as broker:
@@ -337,7 +338,7 @@ def test_every_reading_once_while_broker_and_bridge_are_killed(tmp_path: Path) -
             await simulator.start()
             chosen = machine(broker.port)
             try:
-                for number in range(4):
+                for number in range(kills):
                     async with fetching(chosen, store):
                         for _ in range(5):
                             await _part(model)
