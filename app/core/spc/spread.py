@@ -24,8 +24,9 @@ from app.core.spc.variation import varies
 
 Factor = Callable[[int], float]
 
-FAR, QUARTILES = 10.0, 1.349
-"""Beyond so many sigma a reading is named; the quartiles of a normal distribution lie 1.349 sigma apart."""
+FAR, GAP, ALWAYS_FAR, QUARTILES = 10.0, 2.0, 50.0, 1.349
+"""Beyond `FAR` sigma a reading is named if it lies `GAP` times as far off as the next one inside, beyond `ALWAYS_FAR` sigma in
+any case; the quartiles of a normal distribution lie 1.349 sigma apart."""
 FEWEST_TO_STAND_OUT = 8
 STEP = 4.0
 """Ranges of neighbours of more than so many mean ranges are steps, not scatter: a new edge, an offset set by hand."""
@@ -240,10 +241,15 @@ def _weighted(groups: Subgroups, statistic: Floats, estimator: Estimator, *, mea
 def far_off(values: Floats) -> NDArray[np.bool_]:
     """Mark the readings that lie far from all others.
 
-    They lie more than ten sigma of the middle half (quartile distance/1.349) from the median, and further from the nearest
-    of the other readings than that one from the median: the long tail of a skewed process has no such gap. No process of one
-    mode brings such readings; a chip under the stylus does, a broken edge, a part of another kind. They are named, never left
-    out: whether the part was so is for a person to say.
+    They lie more than ten sigma of the middle half (quartile distance/1.349) from the median, and twice as far from it as the
+    next reading inside: the long tail of a skewed process has no such gap. The gap may lie anywhere beyond ten sigma, and all
+    readings outside it are marked, so that a few between ten and twenty sigma hide none at three hundred. Beyond fifty sigma
+    a reading is marked without a gap. Both limits rest on the quartiles, which a few readings hardly move: more readings
+    nearer to the middle do not unmark one that lies there (Barnett and Lewis 1994, Outliers in statistical data, on masking).
+
+    No process of one mode brings such readings; a chip under the stylus does, a broken edge, a part of another kind. They are
+    named, never left out: whether the part was so is for a person to say. docs/reference/statistics.md says how often a heavy
+    tail has one by chance.
 
     >>> far_off(np.array([1.0, 2, 3, 4, 5, 6, 7, 8, 400])).nonzero()[0].tolist()
     [8]
@@ -258,9 +264,8 @@ def far_off(values: Floats) -> NDArray[np.bool_]:
     if sigma == 0:
         return far
     for distance in (values - median, median - values):
-        beyond = distance > FAR * sigma
-        if beyond.any():
-            last = float(distance[~beyond].max())
-            if float(distance[beyond].min()) > 2 * last:
-                far |= beyond
+        outwards = np.sort(distance[distance >= 0])
+        gaps = (outwards[1:] > FAR * sigma) & (outwards[1:] > GAP * outwards[:-1])
+        limit = float(outwards[1:][gaps][0]) if gaps.any() else np.inf
+        far |= (distance >= limit) | (distance > ALWAYS_FAR * sigma)
     return far

@@ -30,6 +30,7 @@ class CapabilityVerdict(Base):
     parameters_version: Mapped[int]
     baseline: Mapped[int | None]
     excluded: Mapped[int]
+    rule: Mapped[int]  # `app.core.spc.quoting.RULE` by which it was judged
     half: Mapped[float]  # of the tolerance
     readings: Mapped[int]
     first: Mapped[int | None] = mapped_column(BigInteger)  # sequences

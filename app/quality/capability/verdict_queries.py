@@ -11,7 +11,7 @@ from typing import NamedTuple
 from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
-from app.core.spc.quoting import Quote, WhyNot
+from app.core.spc.quoting import RULE, Quote, WhyNot
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.summaries import queries as statistics
 from app.quality.capability.queries import USUAL, Judgement, judgement_of
@@ -103,11 +103,8 @@ def states(
 
 def is_older(row: CapabilityVerdict, state: State, now: datetime, share: float, after: timedelta) -> bool:
     """Tell whether something that it depends on has changed, or so many new readings have come, or some so long ago."""
-    if (row.parameters_version, row.baseline, row.excluded) != (
-        state.parameters_version,
-        state.baseline,
-        state.excluded,
-    ):
+    depends = (state.parameters_version, state.baseline, state.excluded, RULE)
+    if (row.parameters_version, row.baseline, row.excluded, row.rule) != depends:
         return True
     new = state.newest - row.newest
     return new > share * row.readings or (new > 0 and row.at < now - after)
@@ -118,8 +115,9 @@ def verdicts_of(
 ) -> tuple[CapabilityVerdict, CapabilityVerdict | None]:
     """Work out the index of the last readings, and where it may not be quoted, the last one that could be.
 
-    before: the one that is stored. It goes on to be the last, unless the tolerance has changed. Where none is, and one reading
-    lies far from all others, it is that of the readings before.
+    before: the one that is stored. It goes on to be the last, unless the tolerance has changed; one that was judged by an older
+    rule is judged again, of its own readings. Where none is, and one reading lies far from all others, it is that of the
+    readings before.
     """
     current = characteristic_named(session, state.key)
     window = statistics.window_of(session, current.characteristic, last=USUAL)
@@ -127,7 +125,12 @@ def verdicts_of(
     row = _row(judgement, state)
     if row.quotable:
         return row, row
-    if before is not None and before.half == row.half:
+    if before is not None and before.rule != RULE:
+        assert before.first is not None
+        assert before.last is not None
+        own = replace(window, first=before.first, last=before.last)
+        before = _row(judgement_of(session, current, own), state)
+    if before is not None and before.quotable and before.half == row.half:
         return row, before
     if row.why == WhyNot.FAR_OFF.value:
         earlier = _row(judgement_of(session, current, replace(window, last=judgement.far[0] - 1)), state)
@@ -147,6 +150,7 @@ def _row(judgement: Judgement, state: State) -> CapabilityVerdict:
         parameters_version=state.parameters_version,
         baseline=state.baseline,
         excluded=state.excluded,
+        rule=RULE,
         half=judgement.limits.upper,
         readings=len(sequence),
         first=int(sequence[0]) if len(sequence) else None,

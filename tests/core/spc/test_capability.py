@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import anderson, nct
+from scipy.stats import anderson, nct, norm
 
 from app.core.spc.capability import Capability, Caution, Limits, capability, expected_ppm, observed_ppm, percentile
 from app.core.spc.normality import anderson_darling, shapiro_wilk
@@ -135,6 +135,52 @@ def test_what_lies_far_off_lies_there_in_any_unit(values: list[int], scale: floa
     x = np.array([*values, 90_000], dtype=np.float64)
     assert far_off(x)[-1]
     assert far_off(5 + scale * x).tolist() == far_off(x).tolist()
+
+
+HIDING = np.append(2 * norm.ppf((np.arange(1000) + 0.5) / 1000), [15, 19, 19.8, 20.6])
+"""A quiet process, 1,000 quantiles of a normal one with sigma 2, and four readings about ten sigma out: a tail without a gap."""
+
+
+def test_a_few_at_ten_sigma_hide_none_at_three_hundred() -> None:
+    assert not far_off(HIDING).any()
+    for sign in (1, -1):
+        x = sign * np.append(HIDING, [600.0, 602, 603])
+        assert far_off(x).nonzero()[0].tolist() == [1004, 1005, 1006]
+    stairs = np.append(HIDING, [35.0, 60, 110, 200, 390, 600])  # no gap of twice the last one anywhere
+    assert far_off(stairs).nonzero()[0].tolist() == [1006, 1007, 1008, 1009], "beyond fifty sigma"
+
+
+@given(
+    nearer=st.lists(st.floats(-1, 1, allow_nan=False), max_size=60),
+    off=st.floats(200, 1000),
+    quiet=st.integers(120, 600),
+    seed=st.integers(0, 1 << 30),
+)
+@examples(60)
+def test_more_readings_nearer_to_the_middle_never_unmark_one(
+    nearer: list[float], off: float, quiet: int, seed: int
+) -> None:
+    x = np.random.default_rng(seed).normal(size=quiet)
+    assert far_off(np.array([*x, off]))[-1]
+    assert far_off(np.array([*x, *(off * each for each in nearer), off]))[-1]
+
+
+@pytest.mark.parametrize(
+    ("draw", "most"),
+    [("normal", 0.0), ("rayleigh", 0.0), ("laplace", 0.02), ("exponential", 0.02), ("lognormal", 0.04), ("t5", 0.08)],
+)
+def test_heavy_tails_are_seldom_far_off(draw: str, most: float) -> None:
+    """Shares of 1,000 readings each in which one is marked by chance; docs/reference/statistics.md names them."""
+    rng = np.random.default_rng(7)
+    kinds: dict[str, Callable[[], Any]] = {
+        "normal": lambda: rng.normal(size=1000),
+        "rayleigh": lambda: rng.rayleigh(size=1000),
+        "laplace": lambda: rng.laplace(size=1000),
+        "exponential": lambda: rng.exponential(size=1000),
+        "lognormal": lambda: rng.lognormal(0, 0.5, 1000),
+        "t5": lambda: rng.standard_t(5, 1000),
+    }
+    assert np.mean([far_off(kinds[draw]()).any() for _ in range(400)]) <= most
 
 
 def test_nothing_lies_far_off_by_chance_or_in_a_saw_tooth() -> None:

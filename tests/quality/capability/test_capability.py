@@ -1,9 +1,11 @@
 """The capability of a characteristic through the front door: by hand, by limits in force, and with the loop taken out."""
 
 from random import Random
+from statistics import NormalDist
 from typing import Any
 
 import pytest
+from sqlalchemy import text
 
 from app.jobs.actions import Unit
 from app.loop.characteristics.queries import characteristic_named
@@ -233,6 +235,38 @@ def test_the_overview_keeps_the_last_verdict_that_could_be_quoted(server: Server
     assert found.of.value is not None
     assert found.of.value > 0.5, "not that of the broken edge"
     assert found.of.last_at is not None
+
+
+def test_a_few_ordinary_readings_hide_no_enormous_one(server: Server, shop: Shop) -> None:
+    key = shop.another("hiding", mode="measure_only", tool_memory=0)
+    line = [NormalDist(0, 2).inv_cdf((number + 0.5) / 495) for number in range(495)]
+    shop.push([*line, 15.0, 19.0, 19.8, 20.6, 600.0], key)
+    told = of(shop, "", key)
+    assert (told["quote"], told["far"]) == ("none", [500])
+
+
+def test_a_verdict_that_is_kept_is_judged_again_when_the_rule_changes(server: Server, shop: Shop) -> None:
+    key = shop.another("rule", mode="measure_only", tool_memory=0)
+    shop.push(quiet(120, seed=9), key)
+    judge(server, key)
+    shop.push([250.0], key)
+    judge(server, key)
+    assert verdict_for_overview(server, key).of.last == 120
+    with server.database.begin() as session:  # an older rule had quoted an index with the broken edge in its window
+        session.execute(
+            text(
+                "UPDATE capability_verdict SET rule = 0, last = 121, value = CASE WHEN quotable THEN 0.02 END"
+                " WHERE characteristic_id = (SELECT id FROM characteristic WHERE key = :key)"
+            ),
+            {"key": key},
+        )
+    for stored in (False, True):
+        if stored:
+            judge(server, key)
+        found = verdict_for_overview(server, key)
+        assert (found.of.readings, found.of.last, found.now) == (120, 120, "far_off")
+        assert found.of.value is not None
+        assert found.of.value > 0.5, "not that of the older rule"
 
 
 def test_it_is_kept_whatever_the_reason_and_until_the_tolerance_changes(

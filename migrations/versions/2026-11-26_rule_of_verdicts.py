@@ -1,0 +1,22 @@
+"""Capability verdicts name the rule by which they were judged; those of before, rule 0, are judged again by the job.
+
+Revision ID: 0115
+Revises: 0110
+Create Date: 2026-11-26
+"""
+
+from alembic import op
+
+revision = "0115"
+down_revision: str | None = "0110"
+branch_labels = None
+depends_on = None
+
+
+def upgrade() -> None:
+    op.execute("ALTER TABLE capability_verdict ADD COLUMN rule INTEGER DEFAULT 0 NOT NULL")
+    op.execute("ALTER TABLE capability_verdict ALTER COLUMN rule DROP DEFAULT")
+
+
+def downgrade() -> None:
+    op.execute("ALTER TABLE capability_verdict DROP COLUMN rule")
