@@ -1,4 +1,4 @@
-"""Capability verdicts name the rule by which they were judged; those of before, rule 0, are judged again by the job.
+"""The rule by which a capability verdict was judged; those of rule 0 are judged again by the job.
 
 Revision ID: 0115
 Revises: 0110
