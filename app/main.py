@@ -13,9 +13,11 @@ from app.access import api as people
 from app.access import events_api, keys_api
 from app.access import pages as sign_in_pages
 from app.access.audit import api as audit
+from app.access.bodies import read_after_recognition
 from app.access.deps import recognise
 from app.access.keys import KeyRing
 from app.access.queries import still_granted
+from app.access.recognition import Lookups
 from app.db.connections import Connections, in_schema
 from app.db.engine import Database
 from app.db.replica import Replica
@@ -107,7 +109,6 @@ from app.views.station import pages as station_pages
 from app.views.to_do import pages as to_do_pages
 from app.views.to_do.queries import COUNT as TO_DO_COUNT
 from app.web import api_docs, health
-from app.web.limits import BodyLimit
 from app.web.live import Live
 from app.web.openapi import document
 from app.web.own_changes import OwnChanges
@@ -259,7 +260,8 @@ def create_app(settings: Settings | None = None, ending: Callable[[], None] = la
     front = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, redirect_slashes=False)
     front.state.settings = settings
     add_problem_handlers(front, _nobody)
-    front.include_router(plants_pages.router)
+    front.router.routes += plants_pages.router.routes
+    read_after_recognition(front)
     return Plants(settings, create_plant, front, process(ending))
 
 
@@ -328,6 +330,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     app.state.database = database
     app.state.replica = replica
     app.state.key_ring = keys
+    app.state.lookups = Lookups(letting_in)
     app.state.directory = directory
     app.state.writer = writer
     app.state.live = live
@@ -337,10 +340,10 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
         "to_do": TO_DO_COUNT.scalar_subquery(),
     }
     add_problem_handlers(app, recognise)
-    app.add_middleware(BodyLimit)
     app.mount("/static", assets())  # first, so that no file waits until hundreds of routes have been looked through
     for router in ROUTERS:
         app.router.routes += router.routes  # as they are: include_router would build each again, for every plant
+    read_after_recognition(app)
     if replica is not None:
         app.add_middleware(OwnChanges, replica=replica, secure=settings.secure_cookies)
     app.openapi = partial(document, app, readings.SCHEMAS, prefix or "/")  # type: ignore[method-assign]

@@ -14,18 +14,17 @@ from typing import Annotated, Any, NamedTuple
 
 from fastapi import Depends, Request
 from sqlalchemy.exc import SQLAlchemyError
-from sqlalchemy.orm import Session
-from starlette.concurrency import run_in_threadpool
 
 from app.access.audit.actions import acts
 from app.access.callers import Caller, Role
-from app.access.devices import Device, device_of
-from app.access.keys import KeyRing
-from app.access.queries import SignedIn, signed_in
-from app.db.engine import Database, database_of
+from app.access.devices import Device
+from app.access.recognition import browser_of, caller_of, device_at
 from app.errors import NotAllowed, NotSignedIn
 from app.language.i18n import _
-from app.web.deps import MOST_FIELDS, SAFE_METHODS, SESSION_COOKIE, STATION_COOKIE, SessionDep
+from app.web.deps import MOST_FIELDS, SAFE_METHODS, SESSION_COOKIE, STATION_COOKIE
+
+LONGEST_TOKEN = 400
+"""Characters of a token that is looked at; ours have some 120."""
 
 __all__ = [
     "Admin",
@@ -41,83 +40,34 @@ __all__ = [
 ]
 
 
-def bearer(request: Request) -> str | None:
-    """The secret in `Authorization: Bearer`; None without that header.
-
-    Raises `NotSignedIn` for any other way of authorization.
-    """
-    header = request.headers.get("authorization")
-    if header is None:
-        return None
-    scheme, _space, secret = header.partition(" ")
-    if scheme.lower() != "bearer" or not secret.strip():
-        raise NotSignedIn(
-            _("The Authorization header is not understood."), _("Send it as: Authorization: Bearer YOUR-KEY")
-        )
-    return secret.strip()
-
-
-async def get_caller(request: Request, session: SessionDep) -> Caller:
+async def get_caller(request: Request) -> Caller:
     """Return the caller, by key or by the browser's session.
 
     Raises `NotSignedIn`; `NotAllowed` for a change without the form's token (a foreign page may have sent it).
     """
-    secret = bearer(request)
-    if secret is not None:
-        ring: KeyRing = request.app.state.key_ring
-        caller = await ring.lookup(secret)
-        if caller is None:
-            raise NotSignedIn(
-                _("This key is not known, or was revoked."),
-                _("Ask an administrator for a new key: Set-up, machine, keys."),
-            )
-        request.state.person = caller  # a page says to whom it is shown, whoever that is
-        acts(caller.person_id, caller.key_id)
-        return caller
-    token = request.cookies.get(SESSION_COOKIE)
-    browser = await run_in_threadpool(_browser, request, session, token) if token else None
-    if browser is None:
-        raise NotSignedIn(
-            _("Not signed in."), _("Sign in in the browser, or send a key: Authorization: Bearer YOUR-KEY")
-        )
-    _remember(request, browser)
-    caller = browser.caller
+    caller = await caller_of(request)
+    _remember(request, caller)
     acts(caller.person_id, caller.key_id)
-    if request.method not in SAFE_METHODS:
+    if caller.csrf and request.method not in SAFE_METHODS:
         await _check_token(request, caller.csrf)
     return caller
 
 
-def _browser(request: Request, session: Session, token: str) -> SignedIn | None:
-    """Look up who is signed in, always where it is written: no copy may let in whoever was signed out or disabled just now."""
-    primary = database_of(session).copy_of
-    if primary is None:
-        return signed_in(session, token, request.app.state.waiting)
-    with primary.begin() as own:
-        return signed_in(own, token, request.app.state.waiting)
-
-
-def _remember(request: Request, browser: SignedIn) -> None:
-    """Keep for the frame of the page to whom it is shown, and the numbers of its navigation."""
-    request.state.person, request.state.waiting = browser.caller, browser.waiting
-    request.state.csrf = masked(browser.caller.csrf)
+def _remember(request: Request, caller: Caller) -> None:
+    """Keep for the frame of the page to whom it is shown, whoever that is."""
+    request.state.person = caller
+    if caller.csrf:
+        request.state.csrf = masked(caller.csrf)
 
 
 async def recognise(request: Request) -> None:
     """Look up who is signed in, if that can be told, for a page without a caller of its own ("there is nothing here")."""
-    token = request.cookies.get(SESSION_COOKIE)
-    if token is None or getattr(request.state, "person", None) is not None:
+    if getattr(request.state, "person", None) is not None:
         return
-
-    def look_up() -> SignedIn | None:
-        database: Database = request.app.state.database
-        with database.begin() as session:
-            return signed_in(session, token, request.app.state.waiting)
-
     with suppress(SQLAlchemyError):
-        browser = await run_in_threadpool(look_up)
+        browser = await browser_of(request)
         if browser is not None:
-            _remember(request, browser)
+            _remember(request, browser.caller)
 
 
 async def _check_token(request: Request, expected: str) -> None:
@@ -146,6 +96,8 @@ def masked(token: str) -> str:
 
 def _unmasked(token: str) -> bytes:
     """The session's token of a masked one; of anything else some bytes that are no token."""
+    if len(token) > LONGEST_TOKEN:
+        return b""
     try:
         pad_and_token = urlsafe_b64decode(token)
     except ValueError:
@@ -190,14 +142,13 @@ class AtStation(NamedTuple):
         return self.caller is None or self.caller.may("operator")
 
 
-async def get_at_station(request: Request, session: SessionDep, machine: str) -> AtStation:
+async def get_at_station(request: Request, machine: str) -> AtStation:
     """Return the device of this machine, or whoever is signed in. A device is nobody: no other route knows its cookie.
 
     Raises what `get_caller` raises; `NotSignedIn` for a device that is not bound any more, `NotAllowed` for that of another
     machine.
     """
-    token = request.cookies.get(STATION_COOKIE)
-    device = await run_in_threadpool(device_of, session, token) if token else None
+    device = await device_at(request)
     if device is not None and device.machine == machine:
         request.state.csrf = masked(device.csrf)
         if request.method not in SAFE_METHODS:
@@ -208,11 +159,11 @@ async def get_at_station(request: Request, session: SessionDep, machine: str) ->
             _("This device is bound to machine {machine}.").format(machine=device.machine),
             _("Open /station/{machine}, or have it bound again: Set-up, Stations.").format(machine=device.machine),
         )
-    if token and device is None and SESSION_COOKIE not in request.cookies:
+    if STATION_COOKIE in request.cookies and device is None and SESSION_COOKIE not in request.cookies:
         ended = NotSignedIn(_("This device is not bound to a machine any more."))
         ended.page = "/station"
         raise ended
-    caller = await get_caller(request, session)
+    caller = await get_caller(request)
     caller.must("viewer")
     return AtStation(caller, None)
 

@@ -17,6 +17,7 @@ from app.errors import InbandError, Invalid, NotAllowed
 from app.language.i18n import _
 from app.web.deps import SESSION_COOKIE, FormDep, SessionDep, SettingsDep, from_this_site
 from app.web.forms import by_field
+from app.web.limits import FEW, takes
 from app.web.problems import local_path
 from app.web.templates import page
 
@@ -55,6 +56,7 @@ def sign_in_page(request: Request, session: SessionDep, after: Next = "/", ended
 
 
 @router.post("/sign-in", dependencies=[FromThisSite])
+@takes(FEW, by="anybody")
 def send_sign_in(request: Request, form: FormDep, settings: SettingsDep) -> Response:
     database: Database = request.app.state.database
     name, after = form.get("name", ""), local_path(form.get("next"))
@@ -120,6 +122,7 @@ def invitation_page(request: Request, session: SessionDep, token: str) -> Respon
 
 
 @router.post("/invitation/{token}", dependencies=[FromThisSite])
+@takes(FEW, by="anybody")
 def send_invitation(
     request: Request, session: SessionDep, form: FormDep, settings: SettingsDep, token: str
 ) -> Response:

@@ -19,6 +19,7 @@ from app.plants.prefix import cookies_of
 from app.plants.serving import Plants, Served
 from app.plants.summary_queries import Summary, summary
 from app.web.deps import SESSION_COOKIE, FormDep, SettingsDep, from_this_site
+from app.web.limits import FEW, takes
 from app.web.problems import is_for_programs
 from app.web.templates import page
 
@@ -43,6 +44,7 @@ async def plants_page(request: Request) -> Response:
 
 
 @router.post("/plants/sign-in", dependencies=[Depends(from_this_site)])
+@takes(FEW, by="anybody")
 async def send_sign_in(request: Request, form: FormDep, settings: SettingsDep) -> Response:
     """Sign in to every plant in which there is a person of this name with this password."""
     name, password = form.get("name", ""), form.get("password", "")

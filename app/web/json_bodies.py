@@ -4,20 +4,29 @@ Python's reader takes NaN, doubled keys, half surrogates and numbers beyond any 
 """
 
 import json
-from collections.abc import Callable, Coroutine
+import re
+from collections import Counter
+from collections.abc import Callable, Coroutine, Iterator
+from itertools import islice
 from math import isfinite
 from typing import Any
 
 from fastapi import Request, Response
+from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
+from starlette.concurrency import run_in_threadpool
 
-from app.errors import FieldError, Invalid, NotSignedIn
+from app.errors import FieldError, Invalid
 from app.language.i18n import _
 from app.web.query_strings import known_parameters, read_strictly
 from app.web.validation import field_path
 
 DEEPEST = 20
 """Nothing here has lists in lists deeper than three."""
+ON_THE_LOOP = 16_000
+"""Bytes of a body that are read where they come in, which takes some milliseconds; a larger one is read on a thread."""
+MOST_ERRORS = 100
+_SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 def read_json(body: bytes, content_type: str | None) -> Any:
@@ -54,8 +63,7 @@ def read_json(body: bytes, content_type: str | None) -> Any:
         raise _refused(
             "body", str(error) if isinstance(error, _DoubledError) else _("holds too large a number"), None
         ) from None
-    problems: list[FieldError] = []
-    _look(value, (), problems)
+    problems = list(islice(_unusable(value), MOST_ERRORS))
     if problems:
         raise Invalid(
             _("The request contains values that cannot be used."),
@@ -76,36 +84,41 @@ class _DoubledError(ValueError):
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     values = dict(pairs)
     if len(values) != len(pairs):
-        names = [name for name, _value in pairs]
-        doubled = next(name for name in names if names.count(name) > 1)
+        counted = Counter(name for name, _value in pairs)
+        doubled = next(name for name, count in counted.items() if count > 1)
         raise _DoubledError(_("says {name} twice; say it once").format(name=json.dumps(doubled)))
     return values
 
 
-def _look(value: Any, path: tuple[str | int, ...], problems: list[FieldError]) -> None:
-    """Note everything in the value that cannot be stored or compared."""
+def _unusable(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[FieldError]:
+    """Everything in the value that cannot be stored or compared."""
     if len(path) > DEEPEST:
-        problems.append(FieldError("body", _("is nested too deeply")))
+        yield FieldError("body", _("is nested too deeply"))
     elif isinstance(value, dict):
         for name, item in value.items():
-            wrong = _wrong_text(name)
-            if wrong:
-                problems.append(FieldError(field_path(("body", *path)), wrong))
-            else:
-                _look(item, (*path, name), problems)
+            if wrong := _wrong_text(name):
+                yield FieldError(field_path(("body", *path)), wrong)
+            elif not _plain(item):
+                yield from _unusable(item, (*path, name))
     elif isinstance(value, list):
         for index, item in enumerate(value):
-            _look(item, (*path, index), problems)
+            if not _plain(item):
+                yield from _unusable(item, (*path, index))
     elif isinstance(value, float) and not isfinite(value):
-        problems.append(FieldError(field_path(("body", *path)), _("must be a finite number")))
+        yield FieldError(field_path(("body", *path)), _("must be a finite number"))
     elif isinstance(value, str) and (wrong := _wrong_text(value)):
-        problems.append(FieldError(field_path(("body", *path)), wrong))
+        yield FieldError(field_path(("body", *path)), wrong)
+
+
+def _plain(value: Any) -> bool:
+    """Tell if it is plain at a glance that `_unusable` has nothing to say, as of nearly all values."""
+    return (isinstance(value, str) and value.isprintable()) or isinstance(value, int) or value is None
 
 
 def _wrong_text(text: str) -> str | None:
     if "\0" in text:
         return _("holds the character U+0000, which cannot be stored; remove it")
-    if any("\ud800" <= character <= "\udfff" for character in text):
+    if _SURROGATE.search(text):
         return _("holds half a character (a lone surrogate); send complete Unicode text")
     return None
 
@@ -133,13 +146,20 @@ class JsonRoute(APIRoute):
                 return await handle(request)
             read = _Read(request.scope, request.receive)
             body = await read.body()
-            try:
-                if body:
-                    read.value = read_json(body, request.headers.get("content-type"))
-            except Invalid:
-                if "authorization" not in request.headers and not request.cookies:
-                    raise NotSignedIn(_("Not signed in."), _("Send a key: Authorization: Bearer YOUR-KEY")) from None
-                raise
+            if len(body) > ON_THE_LOOP:
+                read.value = await run_in_threadpool(self._read, body, request.headers.get("content-type"))
+            elif body:
+                read.value = read_json(body, request.headers.get("content-type"))
             return await handle(read)
 
         return handle_strictly
+
+    def _read(self, body: bytes, content_type: str | None) -> Any:
+        """The value of a large body, as the route's own model already: to make one takes as long as reading."""
+        value = read_json(body, content_type)
+        if self.body_field is None or len(self.dependant.body_params) != 1 or self._embed_body_fields:
+            return value
+        model, errors = self.body_field.validate(value, {}, loc=("body",))
+        if errors:
+            raise RequestValidationError(errors[:MOST_ERRORS])
+        return model

@@ -1,48 +1,59 @@
-"""Largest size of a request. Past its limit a request is not read on, and is answered 413."""
+"""Largest bodies of requests, declared where a route is: how many bytes, and by which callers.
 
-from starlette.datastructures import Headers
-from starlette.exceptions import HTTPException
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+    @router.post("/import")
+    @takes(64 * MEGABYTE, by="engineer")
+    async def send(...): ...
 
+Nothing is read of a body before it is known who sends it; see `app.access.bodies`.
+"""
+
+from collections.abc import Callable
+from typing import Any, Literal, NamedTuple, TypeVar
+
+from app.errors import TooLarge
+from app.language.i18n import _
+
+KILOBYTE = 1000
 MEGABYTE = 1_000_000
-DEFAULT = MEGABYTE
-LARGER: dict[str, int] = {
-    "/api/v1/readings/batch": 32 * MEGABYTE,
-    "/api/v1/readings/aqdef": 64 * MEGABYTE,
-    "/import": 64 * MEGABYTE,
-}
-"""Paths, by their beginning, that take more than the default."""
+FEW = 8 * KILOBYTE
+"""Of a stranger, on the pages that are for everybody: a name, a password, a code."""
+FORM = 64 * KILOBYTE
+"""Of a device that is bound to a machine."""
+
+By = Literal["anybody", "caller", "viewer", "operator", "engineer", "admin"]
 
 
-def limit_of(path: str) -> int:
-    """The bytes that a request to this path may have."""
-    return next((limit for beginning, limit in LARGER.items() if path.startswith(beginning)), DEFAULT)
+class Takes(NamedTuple):
+    """Body that a route takes: at most so many bytes. by: the least role of those who may send more than `DEFAULT`."""
+
+    most: int
+    by: By
 
 
-class BodyLimit:
-    """ASGI middleware. (Starlette's own answers 413 as plain text only.)"""
+DEFAULT = Takes(MEGABYTE, "caller")
+Endpoint = TypeVar("Endpoint", bound=Callable[..., Any])
+_declared: dict[Callable[..., Any], Takes] = {}
 
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        limit = limit_of(scope["path"])
-        announced = Headers(scope=scope).get("content-length", "")
-        total = int(announced) if announced.isascii() and announced.isdigit() else 0
-        too_large = total > limit
-        total = 0
+def takes(most: int, by: By = "caller") -> Callable[[Endpoint], Endpoint]:
+    """Declare the largest body of a route, under the decorator of its router. by: "anybody" for what strangers may send."""
 
-        async def receive_limited() -> Message:
-            nonlocal total
-            message = {"type": "http.request"} if too_large else await receive()
-            if message["type"] == "http.request":
-                total += len(message.get("body", b""))
-                if too_large or total > limit:
-                    # An HTTPException, because FastAPI makes a 400 of any other error while it reads a body.
-                    raise HTTPException(413, f"{limit // MEGABYTE} MB")
-            return message
+    def declare(endpoint: Endpoint) -> Endpoint:
+        _declared[endpoint] = Takes(most, by)
+        return endpoint
 
-        await self.app(scope, receive_limited, send)
+    return declare
+
+
+def taken_by(endpoint: Callable[..., Any]) -> Takes | None:
+    """Return what was declared for the function of a route."""
+    return _declared.get(endpoint)
+
+
+def too_large(most: int) -> TooLarge:
+    """The refusal of a body of more bytes than these."""
+    size = f"{most // MEGABYTE} MB" if most >= MEGABYTE else f"{most // KILOBYTE} kB"
+    return TooLarge(
+        _("The request is larger than the {limit} that are taken here.").format(limit=size),
+        _("Send it in several smaller requests."),
+    )

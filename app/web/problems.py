@@ -29,13 +29,12 @@ from app.errors import (
     NotFound,
     NotSignedIn,
     OutcomeUnknown,
-    TooLarge,
     Unexpected,
 )
 from app.language.i18n import _, negotiate, speaking
 from app.logs import REQUEST
 from app.web.deps import SAFE_METHODS
-from app.web.limits import MEGABYTE, limit_of
+from app.web.json_bodies import MOST_ERRORS
 from app.web.problem import problem_page
 from app.web.request_log import note_reason
 from app.web.validation import field_errors
@@ -96,7 +95,7 @@ async def _validation(request: Request, error: Exception) -> Response:
         return answer(
             request, _method_not_allowed(request)
         )  # the word was taken for a number of the neighbour's address
-    errors = field_errors(error.errors())
+    errors = field_errors(error.errors()[:MOST_ERRORS])
     detail = "; ".join(f"{field}: {message}" for field, message in errors[:3])
     return answer(request, Invalid(detail, errors=errors))
 
@@ -116,13 +115,6 @@ def _of_http(request: Request, error: HTTPException) -> InbandError:
         return NotFound(
             _("There is nothing at {path}.").format(path=path),
             _("Check the address; the documentation of the API lists them all."),
-        )
-    if error.status_code == TooLarge.status:
-        return TooLarge(
-            _("The request is larger than the {limit} MB that are taken here.").format(
-                limit=limit_of(path) // MEGABYTE
-            ),
-            _("Send it in several smaller requests."),
         )
     if error.status_code == NotAllowed.status:
         return NotAllowed(str(error.detail))

@@ -1,7 +1,9 @@
 """Whatever is wrong with a request, the answer is a problem in words: a document for programs, a page for people."""
 
 import json
+import socket
 from typing import Any
+from urllib.parse import urlsplit
 
 import httpx
 import psycopg
@@ -11,8 +13,8 @@ from sqlalchemy import exc as sql
 from starlette.requests import Request
 
 from app.errors import FieldError, Invalid, NotFound, TooManyRequests
-from app.web.json_bodies import read_json
-from app.web.limits import LARGER, MEGABYTE, BodyLimit, limit_of
+from app.web.json_bodies import MOST_ERRORS, read_json
+from app.web.limits import MEGABYTE
 from app.web.problems import add_problem_handlers
 from app.web.validation import field_path
 from tests.loops import run
@@ -131,6 +133,15 @@ class TestBodies:
         for body in (b"nonsense", b"{}", b'{"key": NaN}'):
             refused(shop.server.client().post("/api/v1/machines", content=body, headers=JSON), 401)
 
+    def test_a_stranger_need_not_send_the_body(self, shop: Shop) -> None:
+        """With `Expect: 100-continue` it is not asked for; what comes all the same is thrown away."""
+        address = urlsplit(shop.server.url)
+        for key, expected in ("", b"HTTP/1.1 401"), (f"Authorization: Bearer {shop.machine_key}\r\n", b"HTTP/1.1 100"):
+            with socket.create_connection((address.hostname, address.port), timeout=30) as line:
+                head = f"POST /api/v1/machines HTTP/1.1\r\nHost: {address.netloc}\r\nContent-Type: application/json\r\n{key}"
+                line.sendall(f"{head}Content-Length: 900000\r\nExpect: 100-continue\r\n\r\n".encode())
+                assert line.recv(4096).startswith(expected)
+
     def test_charset_and_json_dialects_are_welcome(self, shop: Shop) -> None:
         for number, media_type in enumerate(("application/json; charset=utf-8", "application/merge-patch+json")):
             body = json.dumps({"key": f"dialect-{number}", "name": "x", "control": "other"})
@@ -145,15 +156,23 @@ class TestBodies:
         fits = b" " * (MEGABYTE - 100) + b"{}"
         refused(shop.admin.post("/api/v1/machines", content=fits, headers=JSON), 422)
 
-    def test_batches_may_be_larger(self) -> None:
-        assert limit_of("/api/v1/readings") == MEGABYTE
-        assert limit_of("/api/v1/readings/batch") == LARGER["/api/v1/readings/batch"] > 10 * MEGABYTE
-
     def test_paths_of_fields(self) -> None:
         assert field_path(("body", "parameters", "zero_range")) == "parameters.zero_range"
         assert field_path(("body", 17, "measured")) == "[17].measured"
         assert field_path(("query", "limit")) == "limit"
         assert field_path(("body",)) == "body"
+
+    def test_a_doubled_name_is_found_among_a_hundred_thousand(self) -> None:
+        """In one pass: to look through all names for each of them took minutes."""
+        names = ",".join(f'"{number:x}":1' for number in range(100_000))
+        with pytest.raises(Invalid) as refusal:
+            read_json(f'{{{names},"last":1,"last":2}}'.encode(), "application/json")
+        assert refusal.value.errors == [FieldError("body", 'says "last" twice; say it once')]
+
+    def test_a_hundred_thousand_mistakes_are_not_all_named(self) -> None:
+        with pytest.raises(Invalid) as refusal:
+            read_json(b"[" + b"NaN," * 100_000 + b"1]", "application/json")
+        assert len(refusal.value.errors) == MOST_ERRORS
 
     def test_good_json_is_read_as_it_is(self) -> None:
         assert read_json('{"a": [1, 2.5, "ш", null, true]}'.encode(), "application/json") == {
@@ -236,7 +255,6 @@ def raising() -> FastAPI:
         pass
 
     add_problem_handlers(app, nobody)
-    app.add_middleware(BodyLimit)
     return app
 
 

@@ -16,9 +16,9 @@ from app.errors import FieldError, NotFound, TooLarge
 from app.language.i18n import _
 from app.loop.readings import actions, queries
 from app.loop.readings.answers import ReadingAnswer, ReadingDetail
-from app.loop.readings.door import Directory, answer_of, store_reading
+from app.loop.readings.door import LARGEST_BODY, Directory, answer_of, decoded, store_reading
 from app.loop.readings.records import Entry
-from app.loop.readings.schemas import ReadingIn, decode_many, decode_one
+from app.loop.readings.schemas import ReadingIn, decode_many
 from app.loop.readings.writer.batch import store_batch
 from app.loop.readings.writer.columnar import ColumnarReadings, Outcome
 from app.loop.readings.writer.group_commit import Writer
@@ -27,6 +27,7 @@ from app.web.api import BASE, CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import Body, Reason
 from app.web.json_bodies import JsonRoute
+from app.web.limits import MEGABYTE, takes
 from app.web.openapi import example_of
 
 MOST_IN_BATCH = 10_000
@@ -82,13 +83,14 @@ def _here(request: Request) -> tuple[Directory, Writer, Database]:
     },
     openapi_extra={"requestBody": {"required": True, "content": {"application/json": _BODY | {"example": EXAMPLE}}}},
 )
+@takes(LARGEST_BODY, by="operator")
 async def push_reading(request: Request, caller: AnyCaller) -> Response:
     """Push one reading; the answer is given after the commit and says what was decided and why.
 
     `touches` may stand in place of `measured`: one list per point, each with its repeats. `correction_in_effect` is the
     number of the last correction that the machine had applied when it cut this part; `machined_at` may say it by time.
     """
-    reading = decode_one(await request.body(), datetime.now(UTC))
+    reading = await decoded(await request.body())
     status, value = await store_reading(caller, reading, *_here(request))
     return Response(msgspec.json.encode(value), status, media_type="application/json")
 
@@ -108,6 +110,7 @@ async def push_reading(request: Request, caller: AnyCaller) -> Response:
         }
     },
 )
+@takes(32 * MEGABYTE, by="operator")
 async def push_batch(
     request: Request,
     caller: AnyCaller,

@@ -26,6 +26,7 @@ from app.web.api import api_router, problems
 from app.web.deps import SessionDep
 from app.web.downloads import download
 from app.web.fields import Body, Moment
+from app.web.limits import MEGABYTE, takes
 
 router = api_router("readings")
 AQDEF = "text/plain"
@@ -140,6 +141,7 @@ class AqdefResult(BaseModel):
 
 
 @router.post("/readings/aqdef", responses=problems(404, 409, 413))
+@takes(64 * MEGABYTE, by="engineer")
 def import_aqdef(request: Request, session: SessionDep, caller: Engineer, given: AqdefIn) -> AqdefResult:
     """Import an AQDEF file (Q-DAS): all of it or nothing, as history: it corrects nothing and raises no alarm.
 

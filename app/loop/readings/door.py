@@ -24,6 +24,7 @@ from app.loop.readings.schemas import ReadingIn, decode_one
 from app.loop.readings.writer.columnar import Outcome
 from app.loop.readings.writer.group_commit import Writer
 from app.loop.readings.writer.pending import Stored, Verdict
+from app.web.json_bodies import ON_THE_LOOP
 from app.web.problems import unforeseen
 from app.web.request_log import note_reason
 
@@ -114,9 +115,15 @@ class ReadingsDoor:
             )
         scope["caller"] = caller
         body = await _body(receive)
-        reading = decode_one(body, datetime.now(UTC))
+        reading = await decoded(body)
         status, value = await store_reading(caller, reading, self.directory, self.writer, self.database)
         return status, _json.encode(value), {}
+
+
+async def decoded(body: bytes) -> ReadingIn:
+    """The reading in a body; a large one is read on a thread. Raises `Invalid`."""
+    now = datetime.now(UTC)
+    return decode_one(body, now) if len(body) <= ON_THE_LOOP else await asyncio.to_thread(decode_one, body, now)
 
 
 async def store_reading(

@@ -43,6 +43,7 @@ from app.views.station import queries
 from app.views.station.wording import next_action
 from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, Word, from_this_site
 from app.web.forms import by_field, length, parsed, words
+from app.web.limits import FEW, takes
 from app.web.live import Access, stream
 from app.web.paging import address
 from app.web.templates import page
@@ -64,6 +65,7 @@ def bind_page(request: Request, session: SessionDep, code: Annotated[str, Query(
 
 
 @router.post("", dependencies=[Depends(from_this_site)])
+@takes(FEW, by="anybody")
 def bind(request: Request, session: SessionDep, settings: SettingsDep, form: FormDep) -> Response:
     """Bind this browser to the machine of the code. Whoever is signed in on it is signed out: it is everybody's from now on."""
     try:

@@ -25,6 +25,7 @@ from app.loop.readings.importing.preview import TRIED_WHOLE, Preview, PreviewLin
 from app.loop.readings.importing.uploads import Upload
 from app.loop.readings.importing.wide import ColumnResult
 from app.web.deps import FormDep, Number, SessionDep, SettingsDep
+from app.web.limits import MEGABYTE, takes
 from app.web.paging import address
 from app.web.templates import page
 
@@ -86,6 +87,7 @@ def _start(
 
 
 @router.post("/import")
+@takes(64 * MEGABYTE, by="engineer")
 async def send(request: Request, session: SessionDep, caller: Engineer, settings: SettingsDep) -> Response:
     """Keep the file and go on to the preview."""
     form = await request.form()

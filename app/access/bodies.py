@@ -1,0 +1,143 @@
+"""Bodies of requests: read when it is known from the head who sends them, and no further than that caller may send.
+
+So a stranger's body is not read at all, but for a few kB on the pages that are for everybody; and a body that comes in slowly
+keeps nothing waiting but itself: it is complete before a route begins, which takes a thread, a session and a connection.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from fastapi import FastAPI, Request
+from starlette.routing import BaseRoute, Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.access.callers import Caller
+from app.access.recognition import caller_of, device_at
+from app.errors import InbandError, NotAllowed, NotSignedIn
+from app.web.deps import SAFE_METHODS
+from app.web.limits import DEFAULT, FORM, Takes, taken_by, too_large
+
+
+def read_after_recognition(app: FastAPI) -> None:
+    """Put `BodyLimit` around the routes that the application has, where what it raises becomes an answer."""
+    app.router.middleware_stack = BodyLimit(app.router.middleware_stack, app.router.routes)
+
+
+class Allowance(NamedTuple):
+    """Bytes that are read of a body, and what is said of one that is longer."""
+
+    most: int
+    beyond: InbandError
+
+
+class BodyLimit:
+    """ASGI middleware around the routes of an application."""
+
+    def __init__(self, app: ASGIApp, routes: Iterable[BaseRoute]) -> None:
+        self.app = app
+        self._declared = [
+            (route.path_regex, route.methods or (), taken)
+            for route in routes
+            if isinstance(route, Route) and (taken := taken_by(route.endpoint)) is not None
+        ]
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http" or scope["method"] in SAFE_METHODS:
+            await self.app(scope, receive, send)
+            return
+        request = Request(scope)
+        allowance = await _allowance(request, self._taken(scope))
+        if _announced(request) > allowance.most:
+            receive = _refusing(allowance.beyond)
+        elif request.headers.get("content-type", "").startswith("multipart/"):
+            receive = _counted(receive, allowance)
+        else:
+            receive = await _read(receive, allowance)
+        await self.app(scope, receive, send)
+
+    def _taken(self, scope: Scope) -> Takes:
+        path, method = scope["path"], scope["method"]
+        return next(
+            (taken for regex, methods, taken in self._declared if method in methods and regex.match(path)), DEFAULT
+        )
+
+
+async def _allowance(request: Request, taken: Takes) -> Allowance:
+    if taken.by == "anybody":
+        return Allowance(taken.most, too_large(taken.most))
+    if await device_at(request) is not None:
+        return Allowance(FORM, too_large(FORM))
+    try:
+        caller = await caller_of(request)
+    except NotSignedIn as refusal:
+        return Allowance(-1, refusal)
+    wrong = _not_allowed(caller, taken)
+    if wrong is not None:
+        return Allowance(min(taken.most, DEFAULT.most), wrong)
+    return Allowance(taken.most, too_large(taken.most))
+
+
+def _not_allowed(caller: Caller, taken: Takes) -> NotAllowed | None:
+    """The refusal of a caller who may not send as much as the route takes."""
+    if taken.by in {"anybody", "caller"}:
+        return None
+    try:
+        if taken.by == "operator":  # which machines' own keys are as well
+            caller.must_somewhere(taken.by)
+        else:
+            caller.must(taken.by)  # type: ignore[arg-type] # what is left is a role
+    except NotAllowed as refusal:
+        return refusal
+    return None
+
+
+def _announced(request: Request) -> int:
+    length = request.headers.get("content-length", "")
+    return int(length) if length.isascii() and length.isdigit() and len(length) < 20 else 0
+
+
+def _refusing(refusal: InbandError) -> Receive:
+    """A body whose reading is refused; a route that reads none answers as ever."""
+
+    async def receive() -> Message:
+        raise refusal
+
+    return receive
+
+
+def _counted(receive: Receive, allowance: Allowance) -> Receive:
+    """A body that the route reads piece by piece, as far as it is allowed: a file."""
+    total = 0
+
+    async def counted() -> Message:
+        nonlocal total
+        message = await receive()
+        total += len(message.get("body", b""))
+        if total > allowance.most:
+            raise allowance.beyond
+        return message
+
+    return counted
+
+
+async def _read(receive: Receive, allowance: Allowance) -> Receive:
+    """A body that has been read to its end, or as far as it is allowed."""
+    parts: list[bytes] = []
+    total, more = 0, True
+    while more:
+        message = await receive()
+        if message["type"] != "http.request":
+            break
+        part, more = message.get("body", b""), message.get("more_body", False)
+        total += len(part)
+        if total > allowance.most:
+            return _refusing(allowance.beyond)
+        parts.append(part)
+    whole: Message | None = message if more else {"type": "http.request", "body": b"".join(parts), "more_body": False}
+
+    async def replay() -> Message:
+        nonlocal whole
+        first, whole = whole, None
+        return await receive() if first is None else first
+
+    return replay

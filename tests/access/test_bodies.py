@@ -1,0 +1,159 @@
+"""Bodies of requests: nothing is read before it is known from the head who sends them, and no further than that caller may send."""
+
+import json
+import threading
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import pytest
+from fastapi.routing import APIRoute
+
+from app.access import devices
+from app.main import ROUTERS
+from app.web import json_bodies
+from app.web.deps import SAFE_METHODS
+from app.web.limits import FEW, MEGABYTE
+from tests.access.pieces import PIECE, send
+from tests.conftest import NewDatabase, drop_database
+from tests.in_process import Direct, InProcess, in_process
+from tests.shop import Person, Shop
+
+JSON, FORM, FILE = "application/json", "application/x-www-form-urlencoded", "multipart/form-data; boundary=b"
+KINDS = (JSON, FORM, FILE)
+
+
+class Address(NamedTuple):
+    """Where something is changed."""
+
+    method: str
+    path: str
+
+
+ADDRESSES = sorted(
+    {
+        Address(method, route.path)
+        for router in ROUTERS
+        for route in router.routes
+        if isinstance(route, APIRoute)
+        for method in (route.methods or set()) - SAFE_METHODS
+    }
+)
+FOR_EVERYBODY = {"/sign-in", "/invitation/{token}", "/station"}
+STRANGERS: dict[str, dict[str, str]] = {
+    "nobody": {},
+    "an unknown key": {"Authorization": "Bearer inband_nobody"},
+    "Basic": {"Authorization": "Basic YTpi"},
+    "foreign cookies": {"Cookie": "inband_session=nobody; inband_station=nobody"},
+}
+
+
+@pytest.fixture(scope="module")
+def server(new_database: NewDatabase) -> Iterator[InProcess]:
+    url = new_database()
+    with in_process(url) as running:
+        yield running
+    drop_database(url)
+
+
+@pytest.fixture(scope="module")
+def shop(server: InProcess) -> Shop:
+    return Shop(server)
+
+
+def filled(path: str) -> str:
+    return path.replace("{", "").replace("}", "").replace(":path", "")
+
+
+@pytest.mark.parametrize("stranger", STRANGERS)
+def test_no_route_reads_more_of_a_stranger_than_a_few_kilobytes(server: InProcess, stranger: str) -> None:
+    """Walk all that change something, with a megabyte that comes in pieces without a length."""
+    assert len(ADDRESSES) > 150
+    wrong = []
+    for number, (method, path) in enumerate(ADDRESSES):
+        kind = KINDS[number % len(KINDS)]
+        sent = send(server, method, filled(path), MEGABYTE, kind, STRANGERS[stranger])
+        most = FEW + PIECE if path in FOR_EVERYBODY else 0
+        usual = {401, 404, 413, 422} if path in FOR_EVERYBODY else {401} if path.startswith("/api/") else {303}
+        if sent.read > most or sent.status not in usual:
+            wrong.append((method, path, kind, sent))
+    assert not wrong
+
+
+@pytest.mark.parametrize("kind", [FORM, FILE])
+@pytest.mark.parametrize("path", ["/sign-in", "/invitation/guess", "/station"])
+def test_what_is_announced_too_large_is_not_read_at_all(server: InProcess, path: str, kind: str) -> None:
+    sent = send(server, "POST", path, 64 * MEGABYTE, kind, {}, announced=True)
+    assert (sent.status, sent.read) == (413, 0)
+    assert "The request is larger than the 8 kB that are taken here." in sent.text
+
+
+def test_a_bound_device_sends_forms_and_no_files(server: InProcess, shop: Shop) -> None:
+    with server.database.begin() as session:
+        device, token = devices.bind(session, devices.make_code(session, shop.machine, "Tablet", "tests"))
+    cookie = {"Cookie": f"inband_station={token}"}
+    path = f"/station/{device.machine}/note"
+    assert send(server, "POST", path, 20_000, FORM, cookie).status == 403  # read, and without the token of the device
+    too_much = send(server, "POST", path, MEGABYTE, FORM, cookie)
+    assert too_much.status == 413
+    assert too_much.read <= 64_000 + PIECE
+
+
+@pytest.mark.parametrize("path", ["/import", "/api/v1/readings/aqdef"])
+def test_sixty_four_megabytes_are_for_those_who_may_import(server: InProcess, shop: Shop, path: str) -> None:
+    viewer, engineer = ({"Authorization": f"Bearer {server.key(role)}"} for role in ("viewer", "engineer"))
+    machine = {"Authorization": f"Bearer {shop.machine_key}"}
+    kind = FILE if path == "/import" else JSON
+    for caller in (viewer, machine):
+        sent = send(server, "POST", path, 64 * MEGABYTE, kind, caller)
+        assert sent.status == 403
+        assert sent.read <= MEGABYTE + PIECE
+    assert send(server, "POST", path, 64 * MEGABYTE, kind, viewer, announced=True).read == 0
+    assert send(server, "POST", path, 2 * MEGABYTE, kind, engineer).status == 422
+    beyond = send(server, "POST", path, 64 * MEGABYTE + 1, kind, engineer, announced=True)
+    assert (beyond.status, beyond.read) == (413, 0)
+    assert "64 MB" in beyond.text
+
+
+def test_batches_are_for_machines_and_operators(server: InProcess, shop: Shop) -> None:
+    for key, status in ((shop.machine_key, 422), (server.key("operator"), 422), (server.key("viewer"), 403)):
+        sent = send(server, "POST", "/api/v1/readings/batch", 2 * MEGABYTE, JSON, {"Authorization": f"Bearer {key}"})
+        assert sent.status == status
+    sent = send(server, "POST", "/api/v1/readings", MEGABYTE, JSON, {"Authorization": f"Bearer {shop.machine_key}"})
+    assert sent.status == 413
+
+
+def test_a_person_who_is_signed_in_may_send_a_megabyte_and_no_more(server: InProcess) -> None:
+    session = Person(server, "admin").browser.cookies["inband_session"]
+    browser = {"Cookie": f"inband_session={session}"}
+    assert send(server, "POST", "/setup/machines/new", MEGABYTE // 2, FORM, browser).status == 403  # no token
+    sent = send(server, "POST", "/setup/machines/new", 2 * MEGABYTE, FORM, browser)
+    assert sent.status == 413
+    assert MEGABYTE <= sent.read <= MEGABYTE + PIECE
+
+
+def test_a_large_body_is_read_beside_the_event_loop(
+    server: InProcess, shop: Shop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read, threads = json_bodies.read_json, []
+
+    def reading(*given: Any) -> Any:
+        threads.append(threading.current_thread())
+        return read(*given)
+
+    monkeypatch.setattr(json_bodies, "read_json", reading)
+    assert isinstance(server.transport, Direct)
+    loop = server.transport.portal.call(threading.current_thread)
+    for size in (1000, json_bodies.ON_THE_LOOP + 1):
+        problem = shop.admin.post("/api/v1/machines", json={"key": "a", "name": "n" * size, "control": "other"}).json()
+        assert [error["field"] for error in problem["errors"]] == ["name"]
+    small, large = threads
+    assert small is loop
+    assert large is not loop
+
+
+def test_a_large_body_makes_what_a_small_one_would(server: InProcess, shop: Shop) -> None:
+    """It is the route's own model before the framework sees it."""
+    note = json.dumps({"text": "A note.", "machine": shop.machine}).ljust(20_000)
+    answer = shop.admin.post("/api/v1/notes", content=note, headers={"Content-Type": JSON})
+    assert answer.status_code == 201, answer.text
+    assert answer.json()["text"] == "A note."
