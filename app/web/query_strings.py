@@ -3,6 +3,7 @@
 A filter that is ignored answers with everything, and a machine would take that for what it asked for.
 """
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import get_args, get_origin
 from urllib.parse import urlencode
@@ -18,6 +19,9 @@ from app.language.i18n import _
 SAME = {"state": "status", "status": "state"}
 """The filter of states has one of these names in each list and is taken under the other as well."""
 
+MOST = 1000
+"""Parameters of one query; nobody needs as many."""
+
 
 def known_parameters(dependant: Dependant) -> dict[str, bool]:
     """The query parameters of a route, and whether each may be given several times."""
@@ -30,13 +34,16 @@ def known_parameters(dependant: Dependant) -> dict[str, bool]:
 
 def read_strictly(request: Request, known: Mapping[str, bool]) -> None:
     """Give every parameter the name that the route knows it by. Raises `Invalid` for all that cannot be meant."""
+    if request.scope["query_string"].count(b"&") >= MOST:
+        raise Invalid(_("The query of the address holds more than {most} parameters.").format(most=MOST))
     given = QueryParams(request.scope["query_string"]).multi_items()
     named = [name if name in known else SAME.get(name, name) for name, _value in given]
+    times = Counter(named)
     errors: dict[str, str] = {}
     for (written, _value), name in zip(given, named, strict=True):
         if name not in known:
             errors[written] = _unknown(known)
-        elif not known[name] and named.count(name) > 1:
+        elif not known[name] and times[name] > 1:
             errors[written] = _("is given twice; send it once")
     if errors:
         found = [FieldError(name[:64], message) for name, message in errors.items()]

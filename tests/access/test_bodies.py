@@ -131,6 +131,13 @@ def test_a_person_who_is_signed_in_may_send_a_megabyte_and_no_more(server: InPro
     assert MEGABYTE <= sent.read <= MEGABYTE + PIECE
 
 
+def test_a_query_of_thousands_is_refused_before_it_is_looked_at(shop: Shop) -> None:
+    """Before it is known who calls; each name was sought among all others."""
+    answer = shop.admin.get("/api/v1/machines?" + "&".join(["limit=1"] * 5000))
+    assert answer.status_code == 422
+    assert answer.json()["detail"] == "The query of the address holds more than 1000 parameters."
+
+
 def test_a_large_body_is_read_beside_the_event_loop(
     server: InProcess, shop: Shop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
