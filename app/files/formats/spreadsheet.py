@@ -3,8 +3,9 @@
 openpyxl reads row by row, so that a long sheet needs no more memory than a short one.
 """
 
-import re
-from collections.abc import Collection, Iterator
+import errno
+import zlib
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, date, datetime, time, timedelta
 from functools import cache
@@ -18,34 +19,48 @@ from app.language.i18n import _
 
 ENDINGS = {".xlsx", ".xlsm"}
 MOST_BYTES = 500_000_000  # of the parts of the file when unpacked: about ten million cells, a minute's work
+MOST_SHEETS = 100
+MOST_ROWS = 1_048_576  # of a sheet, as Excel has them
 MOST_COLUMNS = 2_000
 NO_RESULT = "#FORMULA?"
 """A formula whose result the file does not hold, as programs write them that do not calculate."""
 ERRORS = {NO_RESULT, "#DIV/0!", "#N/A", "#NAME?", "#NULL!", "#NUM!", "#REF!", "#VALUE!", "#SPILL!", "#CALC!"}
-# A formula without a result, and not one whose result is an empty text; and the place of its cell.
-_UNCALCULATED = re.compile(
-    rb'<c (?![^>]*\bt="str")(?=[^>]*\br="([A-Z]{1,3}\d{1,7})")[^>]*>\s*<f(?:[^>]*/>|[^>]*>[^<]*</f>)\s*(?:<v\s*/>|<v>\s*</v>)?\s*</c>'
-)
-CHUNK = 1_000_000  # bytes
+_BROKEN = (
+    KeyError, ValueError, TypeError, AttributeError, IndexError, ArithmeticError, SyntaxError, EOFError, RuntimeError,
+    OSError, BadZipFile, zlib.error,
+)  # fmt: skip
+"""Errors of openpyxl, and of what it calls, on files that are no workbooks."""
+_OF_THE_DISK = {errno.EFBIG, errno.ENOSPC, errno.EDQUOT}
 _PLAIN = str.maketrans({"\t": " ", "\r": " ", "\n": " "})
+Spend = Callable[[int], None]
 
 
-def texts(path: Path, folder: Path, stem: str) -> dict[str, Path]:
+def texts(path: Path, folder: Path, stem: str, spend: Spend = lambda _bytes: None) -> dict[str, Path]:
     """Write each sheet that holds something as `stem.1.data`, `stem.2.data` … in the folder; their files by name of the sheet.
 
-    Raises `Unusable` for what is no workbook, or holds nothing.
+    spend: is told of bytes before they are written. Raises `Unusable` for what is no workbook, or holds nothing.
     """
     from openpyxl import load_workbook
 
     _refuse_large(path)
     try:
         with path.open("rb") as file:
-            book = load_workbook(file, read_only=True, data_only=True)
+            book = load_workbook(file, read_only=True, data_only=True, keep_links=False)
+            if len(book.worksheets) > MOST_SHEETS:
+                raise Unusable(
+                    _("The workbook has {count} sheets; at most {most} are read. Save the one you need as CSV.").format(
+                        count=len(book.worksheets), most=MOST_SHEETS
+                    )
+                )
             written = {
-                sheet.title: _write(sheet, folder / f"{stem}.{number}.data", _uncalculated(path, sheet))
+                sheet.title: _write(sheet, folder / f"{stem}.{number}.data", spend)
                 for number, sheet in enumerate(book.worksheets, 1)
             }
-    except (KeyError, ValueError, TypeError, AttributeError, OSError, SyntaxError, BadZipFile) as error:
+    except Unusable:
+        raise
+    except _BROKEN as error:
+        if isinstance(error, OSError) and error.errno in _OF_THE_DISK:
+            raise
         raise Unusable(_("This workbook cannot be read: {error}.").format(error=str(error)[:200])) from None
     found = {name: file for name, file in written.items() if file is not None}
     if not found:
@@ -73,7 +88,7 @@ def _refuse_large(path: Path) -> None:
     try:
         with ZipFile(path) as parts:
             size = sum(part.file_size for part in parts.infolist())
-    except (BadZipFile, OSError):
+    except (BadZipFile, ValueError, OSError):
         raise Unusable(
             _("This is not an XLSX workbook. Save the sheet as XLSX or CSV; the older XLS is not read.")
         ) from None
@@ -81,50 +96,60 @@ def _refuse_large(path: Path) -> None:
         raise Unusable(_("The workbook is too large. Save the sheet as CSV."))
 
 
-def _uncalculated(path: Path, sheet: Any) -> set[str]:
-    """The cells of a sheet whose formula has no result in the file, as `D2`."""
-    found: set[str] = set()
-    with ZipFile(path) as parts, parts.open(sheet._worksheet_path) as part:  # noqa: SLF001 - openpyxl does not tell it otherwise
-        rest = b""
-        while chunk := part.read(CHUNK):
-            rest += chunk
-            if b"<f" in rest:
-                found.update(match[1].decode() for match in _UNCALCULATED.finditer(rest))
-            rest = rest[max(rest.rfind(b"<c "), 0) :][-CHUNK:]
-    return found
+@cache
+def _parser() -> Any:
+    """The parser of a sheet, which says of a formula that it has no result (an empty text is one)."""
+    from openpyxl.worksheet._reader import FORMULA_TAG, WorkSheetParser
+
+    class Parser(WorkSheetParser):  # type: ignore[misc] # has no types
+        def parse_cell(self, element: Any) -> dict[str, Any]:
+            cell: dict[str, Any] = super().parse_cell(element)
+            if cell["value"] in {None, ""} and element.get("t") != "str" and element.find(FORMULA_TAG) is not None:
+                cell["value"] = NO_RESULT
+            return cell
+
+    return Parser
 
 
-def _write(sheet: Any, target: Path, uncalculated: Collection[str]) -> Path | None:
+def _write(sheet: Any, target: Path, spend: Spend) -> Path | None:
     """The rows of a sheet, the number of a line being that of its row; None where no cell is filled.
 
     A row ends with its last filled cell: what the file says of its width is often that of a formatted column.
     """
-    sheet.reset_dimensions()
-    filled = False
-    with target.open("w", encoding="utf-8", newline="") as file:
-        for number, row in enumerate(sheet.iter_rows(values_only=True), 1):
-            cells = list(map(_text, row[:MOST_COLUMNS]))
-            if uncalculated:
-                for place, cell in enumerate(cells):
-                    if not cell and f"{_letters(place)}{number}" in uncalculated:
-                        cells[place] = NO_RESULT
-            line = "\t".join(cells).rstrip("\t")
+    book, last, filled = sheet.parent, 0, False
+    with sheet._get_source() as source, target.open("wb") as file:  # noqa: SLF001 - openpyxl reads it no other way
+        parser = _parser()(
+            source,
+            sheet._shared_strings,  # noqa: SLF001
+            data_only=True,
+            epoch=book.epoch,
+            date_formats=book._date_formats,  # noqa: SLF001
+            timedelta_formats=book._timedelta_formats,  # noqa: SLF001
+        )
+        for number, cells in parser.parse():
+            if number > MOST_ROWS:
+                raise Unusable(
+                    _("Row {number} of sheet {sheet}: a sheet of Excel ends with row {most}. Save it as CSV.").format(
+                        number=number, sheet=repr(sheet.title[:40]), most=f"{MOST_ROWS:,}"
+                    )
+                )
+            if number <= last:
+                continue
+            line = _line({cell["column"] - 1: _text(cell["value"]) for cell in cells})
             filled = filled or bool(line)
-            file.write(line + "\n")
+            content = b"\n" * (number - last - 1) + line.encode() + b"\n"
+            spend(len(content))
+            file.write(content)
+            last = number
     if not filled:
         target.unlink()
         return None
     return target
 
 
-@cache
-def _letters(place: int) -> str:
-    """The name of a column.
-
-    >>> _letters(0), _letters(25), _letters(26), _letters(702)
-    ('A', 'Z', 'AA', 'AAA')
-    """
-    return (_letters(place // 26 - 1) if place >= 26 else "") + chr(ord("A") + place % 26)
+def _line(cells: Mapping[int, str]) -> str:
+    width = max((place + 1 for place, text in cells.items() if text and place < MOST_COLUMNS), default=0)
+    return "\t".join(cells.get(place, "") for place in range(width))
 
 
 def _text(value: Any) -> str:

@@ -101,6 +101,7 @@ async def send(request: Request, session: SessionDep, caller: Engineer, settings
         )
     if characteristic:
         await run_in_threadpool(characteristics.characteristic_named, session, characteristic)
+    await run_in_threadpool(session.commit)  # nothing is kept open while a workbook is read
     try:
         kept = await run_in_threadpool(uploads.keep_pair, settings, caller.name, files)
     except Invalid as error:

@@ -7,10 +7,12 @@ import secrets
 import shutil
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from app.errors import Invalid, NotFound
+from app.files.apart import apart, spend, sweep
 from app.files.formats import aqdef, delimited, spreadsheet
 from app.language.i18n import _
 from app.settings import Settings
@@ -39,45 +41,57 @@ class Upload(NamedTuple):
 
 
 def keep_pair(settings: Settings, owner: str, files: Sequence[tuple[str, BinaryIO]]) -> Upload:
-    """Keep a file, or the description and the values of AQDEF that were sent together. Raises `Invalid`."""
+    """Keep a file, or the description and the values of AQDEF that were sent together; the sheets of a workbook as text.
+
+    Raises `Invalid`, `TooManyRequests`, and `OSError` for a full disk.
+    """
     endings = [Path(name).suffix.lower() for name, _content in files]
     if endings == [".dfx"]:
         raise Invalid.at("file", _("These are values alone: choose the .dfd that describes them too, both at once."))
     if len(files) > 1 and sorted(endings) != [".dfd", ".dfx"]:
         raise Invalid.at("file", _("Choose one file, or a .dfd and its .dfx."))
-    (name, content), *rest = sorted(files, key=lambda file: Path(file[0]).suffix.lower())
-    kept = keep(settings, owner, name, content)
-    for _name, values in rest:
-        path = kept.path.with_name(f"{kept.token}.values")
-        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-            shutil.copyfileobj(values, file)
-    return kept
-
-
-def keep(settings: Settings, owner: str, name: str, content: BinaryIO) -> Upload:
-    """Keep what was sent, the sheets of a workbook as text; files of yesterday go. Raises `Invalid` for no workbook."""
+    files = sorted(files, key=lambda file: Path(file[0]).suffix.lower())
     folder = _folder(settings)
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    for old in folder.iterdir():
-        if old.stat().st_mtime < time.time() - LASTS:
-            old.unlink(missing_ok=True)
+    _sweep(folder)
     token = secrets.token_urlsafe(16)
+    try:
+        return _keep(folder, token, owner, files)
+    except BaseException:
+        _remove(folder, token)  # nothing is left of what was not taken: the disk may be full of it
+        raise
+
+
+def _keep(folder: Path, token: str, owner: str, files: Sequence[tuple[str, BinaryIO]]) -> Upload:
     path = folder / f"{token}.data"
-    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-        shutil.copyfileobj(content, file)
-    name = "".join(character for character in Path(name).name if character.isprintable())[:100] or "file.csv"
+    for target, (_name, content) in zip((path, folder / f"{token}.values"), files, strict=False):
+        with _new(target) as file:
+            shutil.copyfileobj(content, file)
+    name = "".join(character for character in Path(files[0][0]).name if character.isprintable())[:100] or "file.csv"
     sheets = {}
     if Path(name).suffix.lower() in spreadsheet.ENDINGS:
         try:
-            sheets = {sheet: text.name for sheet, text in spreadsheet.texts(path, folder, token).items()}
+            sheets = {sheet: text.name for sheet, text in apart(spreadsheet.texts, path, folder, token, spend).items()}
         except delimited.Unusable as error:
-            raise Invalid.at("file", str(error)) from None
-        finally:
-            path.unlink()
-    about = json.dumps({"name": name, "owner": owner, "sheets": sheets})
-    with os.fdopen(os.open(folder / f"{token}.about", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-        file.write(about)
+            raise Invalid.at("file", str(error).removesuffix(".")) from None
+        path.unlink()
+    with _new(folder / f"{token}.about") as file:
+        file.write(json.dumps({"name": name, "owner": owner, "sheets": sheets}).encode())
     return Upload(token, name, path)
+
+
+def _new(path: Path) -> BinaryIO:
+    """A file that nobody else can read."""
+    return os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb")
+
+
+def _sweep(folder: Path) -> None:
+    """Files of yesterday go, and what a killed server has left of one that it read."""
+    for old in folder.iterdir():
+        with suppress(FileNotFoundError):  # another request was faster
+            if old.stat().st_mtime < time.time() - LASTS:
+                old.unlink()
+    sweep()
 
 
 def find(settings: Settings, owner: str, token: str, sheet: str = "") -> Upload:
@@ -102,7 +116,11 @@ def find(settings: Settings, owner: str, token: str, sheet: str = "") -> Upload:
 
 def forget(upload: Upload) -> None:
     """It was imported, or is not wanted."""
-    for path in upload.path.parent.glob(f"{upload.token}.*"):
+    _remove(upload.path.parent, upload.token)
+
+
+def _remove(folder: Path, token: str) -> None:
+    for path in folder.glob(f"{token}.*"):
         path.unlink(missing_ok=True)
 
 
