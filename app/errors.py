@@ -10,6 +10,7 @@
     ├── Invalid            422  the payload; `errors` names each field
     ├── TooManyRequests    429  with Retry-After
     ├── DatabaseAway       503  with Retry-After; nothing was stored
+    │   └── DiskFull       503  of the server; nothing was stored
     ├── ServerEnding       503  it does not wait for this request any longer
     ├── OutcomeUnknown     503  the database went away during the commit; send again with the same key
     └── Unexpected         500  an unhandled error; its trace is in the log under the id of the request
@@ -177,6 +178,21 @@ class DatabaseAway(InbandError):
             "Send the request again, with the same key, after the time in Retry-After.",
             retry_after=2,
         )
+
+
+class DiskFull(DatabaseAway):
+    """The disk of the server, or of its database, is full; nothing was stored."""
+
+    kind = "disk-full"
+    title = "The disk is full"
+
+    def __init__(self) -> None:
+        super().__init__("The disk of the server is full. Nothing of this request was stored.")
+        self.what_to_do = (
+            "Make room on it. Send the request again, with the same key, after the time in Retry-After: "
+            "nothing needs to be started again."
+        )
+        self.retry_after = 10
 
 
 class ServerEnding(InbandError):

@@ -4,11 +4,13 @@ import logging
 import shutil
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 log = logging.getLogger(__name__)
 
 LEAST = 1_000_000_000  # bytes
+NOTHING = 20_000_000  # bytes; a log segment of PostgreSQL needs 16 MB
 LOOK_EVERY = 60.0  # s
 SAY_EVERY = 3600.0  # s
 
@@ -17,6 +19,13 @@ def free(data_dir: Path) -> int:
     """Bytes that are free there, or where the folder would be made. Raises `OSError`."""
     there = next(folder for folder in (data_dir, *data_dir.parents) if folder.exists())
     return shutil.disk_usage(there).free
+
+
+def is_full(data_dir: Path) -> bool:
+    """Tell if nothing can be stored there. A disk that does not tell is not full."""
+    with suppress(OSError):
+        return free(data_dir) < NOTHING
+    return False
 
 
 def shortage(data_dir: Path) -> str | None:

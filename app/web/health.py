@@ -13,10 +13,12 @@ from prometheus_client.registry import Collector
 from sqlalchemy import text
 from starlette.responses import Response
 
-from app.db.disk import free
+from app.db.disk import free, is_full
 from app.db.engine import Database
 from app.db.replica import Replica
+from app.errors import DiskFull
 from app.web.api import EVERY_ERROR
+from app.web.deps import SettingsDep
 
 router = APIRouter(tags=["health"], generate_unique_id_function=lambda route: route.name)
 
@@ -32,8 +34,10 @@ def live() -> dict[str, str]:
 
 
 @router.get("/health/ready", responses=_says({"status": "ready"}) | {503: EVERY_ERROR[503]})
-def ready(request: Request) -> dict[str, str]:
-    """The process answers and reaches its database. Where there is a replica: how far it is behind."""
+def ready(request: Request, settings: SettingsDep) -> dict[str, str]:
+    """The process answers, reaches its database, and its disk is not full. Where there is a replica: how far it is behind."""
+    if is_full(settings.data_dir):
+        raise DiskFull
     database: Database = request.app.state.database
     with database.begin() as session:
         session.execute(text("SELECT 1"))

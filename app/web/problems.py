@@ -1,5 +1,6 @@
 """Everything that is refused or fails, as an answer: RFC 9457 for programs, a page for people. Never a stack trace."""
 
+import errno
 import logging
 import re
 from collections.abc import Awaitable, Callable, Collection, Sequence
@@ -22,6 +23,7 @@ from app.errors import (
     PROBLEM_JSON,
     Conflict,
     DatabaseAway,
+    DiskFull,
     InbandError,
     Invalid,
     MethodNotAllowed,
@@ -44,6 +46,7 @@ log = logging.getLogger("inband")
 FOR_PROGRAMS = ("/api/", "/health/", "/metrics")
 ALREADY_TAKEN = "23505"
 BAD_DATA = "22"
+NO_ROOM = "53100"
 
 
 def is_for_programs(path: str) -> bool:
@@ -179,6 +182,8 @@ async def _database(request: Request, error: Exception) -> Response:
     """Answer an error of the driver by its cause: none of ours (away, busy), the request, another request, or our fault."""
     cause = error.orig if isinstance(error, sql.DBAPIError) else error
     state = getattr(cause, "sqlstate", None) or ""
+    if state == NO_ROOM:
+        return answer(request, DiskFull(), cause)
     away = isinstance(cause, psycopg.OperationalError | psycopg.InterfaceError) or isinstance(error, sql.TimeoutError)
     if away or (isinstance(error, sql.DBAPIError) and error.connection_invalidated):
         if getattr(request.state, "behind", None) is not None:
@@ -200,6 +205,13 @@ async def _database(request: Request, error: Exception) -> Response:
         return answer(
             request, Invalid(_("A value of the request cannot be stored."), _("Correct it and send it again."))
         )
+    return incident(request, error)
+
+
+def _system(request: Request, error: Exception) -> Response:
+    """Answer an error of the operating system: a full disk is said to be one."""
+    if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
+        return answer(request, DiskFull(), error)
     return incident(request, error)
 
 
@@ -227,7 +239,7 @@ async def unforeseen(request: Request, error: Exception) -> Response:
     """The answer to an error that is not one of our own."""
     if isinstance(error, sql.DBAPIError | sql.TimeoutError | psycopg.Error):
         return await _database(request, error)
-    return incident(request, error)
+    return _system(request, error)
 
 
 def incident(request: Request, error: BaseException) -> Response:
@@ -269,7 +281,7 @@ class LastResort:
             except Exception as error:
                 if started:
                     raise  # half an answer has left; the server must break the connection
-                await incident(request, error)(scope, receive, send)
+                await _system(request, error)(scope, receive, send)
 
 
 Recognise = Callable[[Request], Awaitable[None]]

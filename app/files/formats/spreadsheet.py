@@ -5,7 +5,7 @@ openpyxl reads row by row, so that a long sheet needs no more memory than a shor
 
 import errno
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, date, datetime, time, timedelta
 from functools import cache
@@ -46,12 +46,7 @@ def texts(path: Path, folder: Path, stem: str, spend: Spend = lambda _bytes: Non
     try:
         with path.open("rb") as file:
             book = load_workbook(file, read_only=True, data_only=True, keep_links=False)
-            if len(book.worksheets) > MOST_SHEETS:
-                raise Unusable(
-                    _("The workbook has {count} sheets; at most {most} are read. Save the one you need as CSV.").format(
-                        count=len(book.worksheets), most=MOST_SHEETS
-                    )
-                )
+            _refuse_many(book.worksheets)
             written = {
                 sheet.title: _write(sheet, folder / f"{stem}.{number}.data", spend)
                 for number, sheet in enumerate(book.worksheets, 1)
@@ -96,12 +91,21 @@ def _refuse_large(path: Path) -> None:
         raise Unusable(_("The workbook is too large. Save the sheet as CSV."))
 
 
+def _refuse_many(sheets: Sequence[Any]) -> None:
+    if len(sheets) > MOST_SHEETS:
+        raise Unusable(
+            _("The workbook has {count} sheets; at most {most} are read. Save the one you need as CSV.").format(
+                count=len(sheets), most=MOST_SHEETS
+            )
+        )
+
+
 @cache
 def _parser() -> Any:
     """The parser of a sheet, which says of a formula that it has no result (an empty text is one)."""
     from openpyxl.worksheet._reader import FORMULA_TAG, WorkSheetParser
 
-    class Parser(WorkSheetParser):  # type: ignore[misc] # has no types
+    class Parser(WorkSheetParser):
         def parse_cell(self, element: Any) -> dict[str, Any]:
             cell: dict[str, Any] = super().parse_cell(element)
             if cell["value"] in {None, ""} and element.get("t") != "str" and element.find(FORMULA_TAG) is not None:

@@ -105,8 +105,13 @@ async def send(request: Request, session: SessionDep, caller: Engineer, settings
     try:
         kept = await run_in_threadpool(uploads.keep_pair, settings, caller.name, files)
     except Invalid as error:
-        return await run_in_threadpool(_start, request, session, characteristic, error=error.detail, status=422)
+        return await run_in_threadpool(_refused, request, characteristic, error.detail)
     return RedirectResponse(address(f"/import/{kept.token}", characteristic=characteristic or None), 303)
+
+
+def _refused(request: Request, characteristic: str, error: str) -> Response:
+    with _database(request).sessions() as session:
+        return _start(request, session, characteristic, error=error, status=422)
 
 
 @router.get("/import/{token}")

@@ -13,7 +13,7 @@ import psycopg
 
 from app.db.engine import Database
 from app.db.pipeline import Pipeline
-from app.errors import DatabaseAway, InbandError, OutcomeUnknown
+from app.errors import DatabaseAway, DiskFull, InbandError, OutcomeUnknown
 from app.language.i18n import _
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
@@ -76,7 +76,8 @@ class ReadingStore:
                 self.connection.is_away()
                 if not await attempts.another():
                     log.warning("readings could not be stored, the database is away: %s", error)
-                    return [DatabaseAway()] * len(readings)
+                    full = isinstance(error, psycopg.errors.DiskFull)
+                    return [DiskFull() if full else DatabaseAway()] * len(readings)
             except InbandError:
                 await self._roll_back()
                 self.connection.is_back()
