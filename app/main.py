@@ -66,6 +66,7 @@ from app.loop.tools import api as offsets
 from app.loop.tools import edge_pages, edges_api, text_api, text_pages
 from app.loop.tools import jobs as offset_jobs
 from app.loop.tools import pages as offset_pages
+from app.loop.tools.untaken import Watch
 from app.memory import give_back_free_memory, keep_few_arenas
 from app.plants import pages as plants_pages
 from app.plants.prefix import UnderPrefix
@@ -217,7 +218,8 @@ JOBS: tuple[PeriodicJob, ...] = (
 
 def jobs_of(settings: Settings) -> tuple[PeriodicJob, ...]:
     """All of them, as the settings have it."""
-    return *JOBS, connection_jobs.job(settings.bridge_silent_after)
+    untaken = Watch(settings.corrections_taken_within, settings.corrections_not_taken_most)
+    return *JOBS, connection_jobs.job(settings.bridge_silent_after), untaken.job()
 
 
 NOT_COMPRESSED = (

@@ -198,6 +198,19 @@ class Settings(BaseSettings):
         description="Seconds that the oldest reading may wait in a bridge before it counts as backing up.",
     )
 
+    corrections_taken_within: float = Field(
+        default=1800.0,
+        ge=60,
+        le=86_400 * 7,
+        description="Seconds in which a machine that cuts parts has to take a correction before an alarm says that it does not.",
+    )
+    corrections_not_taken_most: int = Field(
+        default=5,
+        ge=2,
+        le=1000,
+        description="Corrections of one characteristic that a machine may leave behind before that alarm, for five minutes.",
+    )
+
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         default="info", description="The least that is logged: debug, info, warning or error."
     )

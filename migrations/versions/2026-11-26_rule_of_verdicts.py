@@ -1,14 +1,14 @@
 """The rule by which a capability verdict was judged; those of rule 0 are judged again by the job.
 
 Revision ID: 0115
-Revises: 0110
+Revises: 0111
 Create Date: 2026-11-26
 """
 
 from alembic import op
 
 revision = "0115"
-down_revision: str | None = "0110"
+down_revision: str | None = "0111"
 branch_labels = None
 depends_on = None
 

@@ -15,7 +15,12 @@ def raise_for_tool(session: Session, machine_id: int, tool_memory: int, kind: Al
 
     The values of the last time are what its sentence says.
     """
-    active = session.scalars(
+    active = _active_of_tool(session, machine_id, tool_memory, kind)
+    return _raised(session, active or Alarm(machine_id=machine_id, tool_memory=tool_memory, kind=kind.name), data)
+
+
+def _active_of_tool(session: Session, machine_id: int, tool_memory: int, kind: AlarmKind) -> Alarm | None:
+    return session.scalars(
         select(Alarm)
         .where(
             Alarm.machine_id == machine_id,
@@ -26,7 +31,6 @@ def raise_for_tool(session: Session, machine_id: int, tool_memory: int, kind: Al
         )
         .execution_options(populate_existing=True)
     ).one_or_none()
-    return _raised(session, active or Alarm(machine_id=machine_id, tool_memory=tool_memory, kind=kind.name), data)
 
 
 def _raised(session: Session, alarm: Alarm, data: dict[str, Any]) -> Alarm:
@@ -88,7 +92,23 @@ def settle_for_place(
     outcome: dict[str, Any],
 ) -> Alarm | None:
     """End an alarm about this location, because what it asked for has been done; None if there is none."""
-    active = active_of_place(session, machine_id, kind, data)
+    return _settled(session, active_of_place(session, machine_id, kind, data), by, comment, outcome)
+
+
+def settle_for_tool(
+    session: Session,
+    machine_id: int,
+    tool_memory: int,
+    kind: AlarmKind,
+    by: str,
+    comment: str,
+    outcome: dict[str, Any],
+) -> Alarm | None:
+    """As `settle_for_place`, of an alarm about a tool."""
+    return _settled(session, _active_of_tool(session, machine_id, tool_memory, kind), by, comment, outcome)
+
+
+def _settled(session: Session, active: Alarm | None, by: str, comment: str, outcome: dict[str, Any]) -> Alarm | None:
     if active is None:
         return None
     active.acknowledged_at, active.acknowledged_by = datetime.now(UTC), by

@@ -81,7 +81,7 @@ def add_characteristic(session: Session, given: CharacteristicIn, actor: str) ->
     after = given.model_dump(exclude={"parameters"}) | {"parameters": parameters.as_dict()}
     record(session, actor, "characteristic added", f"characteristic/{new.key}", None, after)
     publish(session, {"kind": "characteristic", "machine": machine.key, "characteristic": new.key})
-    return CurrentCharacteristic(new, machine, version)
+    return CurrentCharacteristic(new, machine, version, queries.mapped(session, machine))
 
 
 def change_characteristic(
@@ -203,7 +203,7 @@ def _change_parameters(
     session: Session, current: CurrentCharacteristic, given: Mapping[str, Any], reason: str | None, actor: str
 ) -> tuple[CurrentCharacteristic, list[dict[str, Any]]]:
     """Under the machine's lock. Returns how things stand now, and what to tell everybody."""
-    characteristic, machine, version = current
+    characteristic, machine, version, mapped = current
     changed = merged(version.parameters, given)
     errors = refusals(changed, machine)
     old, new = current.parameters, None if errors else read(changed)[0]
@@ -236,7 +236,7 @@ def _change_parameters(
     )
     if other_tool:
         _keep_parts(session, machine.id, old.tool_memory, parts)
-    now = CurrentCharacteristic(characteristic, machine, new_version)
+    now = CurrentCharacteristic(characteristic, machine, new_version, mapped)
     changes = [_changed(now)]
     if (other_tool or nanometres(new.target) != nanometres(old.target)) and new.average_memory:
         _restart_average(session, machine.id, new.average_memory)

@@ -1,6 +1,6 @@
 """Characteristics and the versions of their parameters. Never writes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, Float, Integer, func, select
@@ -12,6 +12,7 @@ from app.db.text import holds_words
 from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
+from app.loop.tables.connections import Connection
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
 from app.loop.tables.tools import Tool
@@ -19,20 +20,30 @@ from app.web.fields import is_slug
 
 
 class CurrentCharacteristic(NamedTuple):
-    """A characteristic as it stands now."""
+    """A characteristic as it stands now. mapped: what the machine's bridge may write to; None without a bridge."""
 
     characteristic: Characteristic
     machine: Machine
     version: ParametersVersion
+    mapped: Sequence[Mapping[str, Any]] | None = None
 
     @property
     def parameters(self) -> Parameters:
         return Parameters.from_dict(self.version.parameters)
 
+    @property
+    def is_unmapped(self) -> bool:
+        """Tell if the machine's bridge brings corrections to other tool memories, but not to this one's."""
+        parameters = self.parameters
+        if not self.mapped or parameters.measures_only:
+            return False
+        return all(location["tool_memory"] != parameters.tool_memory for location in self.mapped)
+
 
 _CURRENT = (
-    select(Characteristic, Machine, ParametersVersion)
+    select(Characteristic, Machine, ParametersVersion, Connection.locations)
     .join(Machine, Machine.id == Characteristic.machine_id)
+    .outerjoin(Connection, Connection.machine_id == Machine.id)
     .join(Stream, (Stream.machine_id == Characteristic.machine_id) & (Stream.characteristic_id == Characteristic.id))
     .join(
         ParametersVersion,
@@ -62,6 +73,11 @@ def characteristic_for(session: Session, caller: Caller, key: str, role: Role) -
     current = characteristic_named(session, key)
     caller.must_at(current.machine.id, role)
     return current
+
+
+def mapped(session: Session, machine: Machine) -> Sequence[Mapping[str, Any]] | None:
+    """Return the tool locations to which the bridge of a machine may write; None without a bridge."""
+    return session.scalar(select(Connection.locations).where(Connection.machine_id == machine.id))
 
 
 def key_is_taken(session: Session, key: str) -> bool:

@@ -158,6 +158,9 @@ def warnings_of(
     if nanometres(parameters.zero_range) < nanometres(machine.zero_range_floor):
         values = {"value": parameters.zero_range, "floor": machine.zero_range_floor}
         unusual.append(Problem("zero_range", "signal_path", values, warning=True))
+    if current.is_unmapped:
+        place = {"value": parameters.tool_memory, "machine": machine.key}
+        unusual.append(Problem("tool_memory", "not_mapped", place, warning=True))
     inches = [] if before is None else inch_warnings([("parameters.target", parameters.target, before)])
     return [*warnings_out(inches, sentence), *wording.warnings(unusual)]
 
@@ -166,7 +169,7 @@ def characteristic_out(
     current: queries.CurrentCharacteristic, before: float | None = None, given: Mapping[str, Any] | None = None
 ) -> CharacteristicOut:
     """Return a characteristic as it is answered. before, given: as `warnings_of` has them."""
-    characteristic, machine, version = current
+    characteristic, machine, version, _mapped = current
     return CharacteristicOut(
         key=characteristic.key,
         name=characteristic.name,

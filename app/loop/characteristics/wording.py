@@ -199,6 +199,10 @@ def sentence(problem: Problem) -> str:
         "no_location": _(
             "{name} {value} is not on this machine: it has {last}; the number is set with the machine"
         ).format(name=name, value=data.get("value"), last=data.get("last")),
+        "not_mapped": _(
+            "The bridge of this machine has no location for tool memory {value}: no correction of it reaches the control until "
+            "[[machine.{machine}.location]] names it. The other tools go on"
+        ).format(value=data.get("value"), machine=data.get("machine")),
         "variant_axis": _("{name} is {axis}, but “{variant}” is measured in X only; check R25 and R30").format(
             name=name, axis=data.get("axis"), variant=choice("variant", data.get("variant", ""))
         ),

@@ -120,4 +120,6 @@ def _values(beat: HeartbeatIn, now: datetime, backlog_after: float) -> dict[str,
         "hold_all": beat.hold_all,
         "identity": beat.identity,
         "locations": [each.model_dump(mode="json") for each in beat.locations],
+        "held_back": [each.model_dump(mode="json") for each in beat.held_back],
+        "carries_decisions": beat.carries_decisions,
     }

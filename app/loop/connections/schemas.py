@@ -66,6 +66,16 @@ class QuarantinedIn(BaseModel):
     at: Annotated[AnyMoment, Field(description="When.")]
 
 
+class HeldBackIn(BaseModel):
+    """Corrections of one tool memory that the bridge holds back."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    tool_memory: Annotated[int, Field(strict=True, ge=1, le=MOST_LOCATIONS, description="R10")]
+    number: Annotated[int, Field(strict=True, ge=1, le=LARGEST_SERIAL, description="The first of them.")]
+    reason: Annotated[Sentence, Field(description="Why, in words.")]
+
+
 class HeartbeatIn(Body):
     """Heartbeat of a bridge, every ten seconds. Fields that this server does not know are passed over."""
 
@@ -104,6 +114,21 @@ class HeartbeatIn(Body):
         list[LocationIn],
         Field(default_factory=list, max_length=MOST_PLACES, description="What it may write to."),
     ]
+    held_back: Annotated[
+        list[HeldBackIn],
+        Field(
+            default_factory=list,
+            max_length=MOST_PLACES,
+            description="Corrections that cannot go, one entry for each tool memory; an alarm says so.",
+        ),
+    ]
+    carries_decisions: Annotated[
+        bool | None,
+        Field(
+            strict=True,
+            description="true: `stop` and `hold` reach the control; false: this machine cannot be stopped by Inband; null: the bridge does not say.",
+        ),
+    ] = None
 
 
 class ServerOut(BaseModel):
@@ -143,6 +168,14 @@ class QuarantinedOut(BaseModel):
     at: datetime
 
 
+class HeldBackOut(BaseModel):
+    """Corrections of one tool memory that the bridge holds back: the first of them, and why."""
+
+    tool_memory: int
+    number: int
+    reason: str
+
+
 class ConnectionOut(BaseModel):
     """The connection of one machine, as its bridge told it last."""
 
@@ -170,3 +203,10 @@ class ConnectionOut(BaseModel):
     hold_all: bool
     identity: str | None
     locations: list[LocationOut]
+    held_back: Annotated[
+        list[HeldBackOut], Field(description="Corrections that the bridge cannot give to the control.")
+    ]
+    carries_decisions: Annotated[
+        bool | None,
+        Field(description="Whether `stop` and `hold` reach the control; null: the bridge does not say."),
+    ]

@@ -35,3 +35,5 @@ class Connection(Base):
     hold_all: Mapped[bool]
     identity: Mapped[str | None]
     locations: Mapped[list[Any]]
+    held_back: Mapped[list[Any]] = mapped_column(server_default="[]")  # why corrections of a tool memory wait
+    carries_decisions: Mapped[bool | None]  # of stop and hold, to the control; None: an older bridge does not say

@@ -1,7 +1,10 @@
 """Alarm kinds about the offset of a tool and its life."""
 
-from app.language.i18n import _
+from datetime import datetime
+
+from app.language.i18n import _, ngettext
 from app.language.numbers import mm, um, um_limit
+from app.language.times import MINUTES, written
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.tables.alarms import Alarm
 
@@ -52,6 +55,40 @@ OFFSET_DIFFERS = register(
                 _("Nobody knows"),
             ]
         },
+    )
+)
+
+
+def _not_taken(alarm: Alarm) -> str:
+    data = alarm.data
+    if data.get("reason"):
+        return _("No correction of tool {tool} reaches the machine: {reason}").format(
+            tool=alarm.tool_memory, reason=data["reason"]
+        )
+    count = int(data.get("waiting") or 1)
+    since = written(datetime.fromisoformat(str(data["since"])), MINUTES) if data.get("since") else "–"
+    return ngettext(
+        "The machine does not take correction {first} of tool {tool}, which waits since {since}. Parts are cut with the offset "
+        "of before.",
+        "The machine does not take {n} corrections of tool {tool}, the first of which, {first}, waits since {since}. Parts are "
+        "cut with the offset of before.",
+        count,
+    ).format(n=count, first=data.get("first"), tool=alarm.tool_memory, since=since)
+
+
+CORRECTIONS_NOT_TAKEN = register(
+    AlarmKind(
+        "corrections_not_taken",
+        word=lambda: _("Corrections are not taken"),
+        sentence=_not_taken,
+        what_to_do=lambda: _(
+            "With a bridge: does the part program call the program that takes corrections, does the control hold them, has this "
+            "tool memory a location in the bridge's configuration and a touch test? Else: does the machine ask for pending "
+            "corrections and confirm them? The alarm ends when they are taken or rejected."
+        ),
+        icon="waiting",
+        comments={"noted": lambda: [_("Part program corrected"), _("Location added"), _("Touch test made")]},
+        outcomes={"corrections_taken": lambda _item: _("No correction waits too long any more.")},
     )
 )
 TOOL_LIFE = register(

@@ -1,0 +1,120 @@
+"""Corrections that a machine does not take: an alarm for each tool, which names the cause and ends by itself."""
+
+from typing import Any
+
+import psycopg
+import pytest
+
+from app.jobs.actions import run_jobs
+from app.loop.tools.untaken import Watch
+from tests.loop.connections.test_heartbeat import ago, beat
+from tests.shop import Shop
+
+STEP = 240.0  # s between two runs
+HELD: dict[str, Any] = {"tool_memory": 3, "number": 1, "reason": "Tool memory 3 has no location."}
+
+
+class Runs:
+    """The job of a server that has been up for a while."""
+
+    def __init__(self, shop: Shop) -> None:
+        self.shop, self.now = shop, 0.0
+        self.watch = Watch(1800.0, 5, lambda: self.now)
+
+    def __call__(self, times: int = 9, step: float = STEP) -> list[dict[str, Any]]:
+        for _ in range(times):
+            self.now += step
+            run_jobs(self.shop.server.database, [self.watch.job()])
+        return [alarm for alarm in self.shop.alarms() if alarm["kind"] == "corrections_not_taken"]
+
+
+@pytest.fixture
+def runs(shop: Shop) -> Runs:
+    return Runs(shop)
+
+
+def waited(shop: Shop, minutes: int) -> None:
+    """Let the pending corrections of this machine be as old as that."""
+    with psycopg.connect(shop.server.database.dsn) as connection:
+        connection.execute("SET session_replication_role = replica")  # else it is refused: a correction is a fact
+        connection.execute(
+            "UPDATE correction SET created_at = now() - make_interval(mins => %s)"
+            " WHERE machine_id = (SELECT id FROM machine WHERE key = %s)",
+            [minutes, shop.machine],
+        )
+
+
+def test_parts_that_are_cut_long_after_a_correction_raise_an_alarm(shop: Shop, runs: Runs) -> None:
+    """A mailbox that nobody takes, or a machine that asks for none: without a bridge, too."""
+    shop.read(6, measured_at=ago(minutes=50))
+    waited(shop, 50)
+    assert runs() == [], "no part since: the machine stands still"
+    shop.read(6, measured_at=ago(minutes=1))
+    [alarm] = runs(1)
+    assert alarm["tool_memory"] == 3
+    assert "does not take correction 1 of tool 3" in alarm["text"]
+    assert "part program" in alarm["what_to_do"]
+    assert [each["count"] for each in runs(1)] == [1]
+    shop.correction(1, "applied")
+    assert runs(1) == []
+    ended = shop.call("GET", f"/alarms/{alarm['id']}")
+    assert (ended["state"], ended["outcome"][0]["code"]) == ("acknowledged", "corrections_taken")
+
+
+def test_corrections_in_a_row_raise_it_sooner(shop: Shop, runs: Runs) -> None:
+    for size in (6, 12, 18, 24, 30):  # each is decided as if the corrections before it were in the offset
+        shop.read(size)
+    waited(shop, 6)
+    [alarm] = runs(3)
+    assert "5 corrections of tool 3" in alarm["text"]
+    shop.acknowledge(alarm["id"], "noted")
+    assert runs(3) == [], "it is not told again of the same ones"
+
+
+def test_what_the_bridge_holds_back_is_told_at_once_with_its_reason(shop: Shop, runs: Runs) -> None:
+    shop.read(6)
+    beat(shop, held_back=[HELD], hold_all=True)
+    assert runs(2) == [], "on hold by command"
+    beat(shop, held_back=[HELD, HELD | {"tool_memory": 4}])
+    [alarm] = runs(1)
+    assert alarm["text"].endswith("reaches the machine: Tool memory 3 has no location.")
+    assert shop.call("GET", f"/machines/{shop.machine}/connection")["held_back"][0] == HELD
+    beat(shop)
+    assert runs(1) == []
+
+
+def test_time_while_the_server_was_away_does_not_count(shop: Shop, runs: Runs) -> None:
+    """A server that cannot be reached for an hour: what was cut meanwhile is sent when it is back, and then taken."""
+    shop.read(6, measured_at=ago(minutes=70))
+    waited(shop, 70)
+    runs(9)
+    shop.push([6.0] * 6, measured_at=[ago(minutes=60 - 10 * n) for n in range(6)])
+    waited(shop, 70)
+    assert runs(1, 3600.0) == []
+    assert runs(1) == []
+    assert len(runs(8)) == 1, "but from then on it does"
+
+
+def test_set_up_warns_of_a_tool_memory_without_a_location(shop: Shop) -> None:
+    def warned(memory: int, **more: Any) -> list[str]:
+        body: dict[str, Any] = {
+            "key": f"{shop.characteristic}-{memory}",
+            "name": "x",
+            "machine": shop.machine,
+            "unit": "mm",
+        }
+        parameters = shop.call("GET", f"/characteristics/{shop.characteristic}")["parameters"]
+        answer = shop.call(
+            "POST", "/characteristics", 201, **body, parameters=parameters | {"tool_memory": memory} | more
+        )
+        return [each["code"] for each in answer["warnings"]]
+
+    assert "not_mapped" not in warned(7), "no bridge"
+    beat(shop, locations=[{"tool_memory": 3}])
+    assert "not_mapped" in warned(8)
+    assert "not_mapped" not in warned(9, mode="measure_only")
+    change: dict[str, Any] = {"parameters": {"tool_memory": 8}, "reason": "another turret"}
+    answer = shop.call("PATCH", f"/characteristics/{shop.characteristic}", **change)
+    [warning] = [each for each in answer["warnings"] if each["code"] == "not_mapped"]
+    assert warning["field"] == "parameters.tool_memory"
+    assert f"[[machine.{shop.machine}.location]]" in warning["text"]
