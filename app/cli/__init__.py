@@ -26,6 +26,7 @@ PARTS = (
     "app.cli.replay",
     "app.cli.programs",
     "app.cli.proof",
+    "app.cli.sbom",
     "app.cli.bridge",
     "app.cli.demo.cli",
 )

@@ -183,6 +183,8 @@ PAGES = {
     "/api/docs": ["/api/docs"],
     "/compare": ["/compare", "/compare?of={characteristic}&by=version"],
     "/proof": ["/proof"],
+    "/licences": ["/licences"],
+    "/licences/{library}": ["/licences/psycopg"],
 }
 ADDRESSES = [address for addresses in PAGES.values() for address in addresses]
 

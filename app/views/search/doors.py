@@ -51,6 +51,7 @@ def doors() -> list[Door]:
         Door(_("Record of changes"), "/setup/audit", _("audit trail, who changed what"), "engineer"),
         Door(_("Background jobs"), "/setup/jobs", _("periodic jobs, failing"), "engineer"),
         Door(_("Proof"), "/proof", _("published examples, validation")),
+        Door(_("Licences"), "/licences", _("libraries, versions, SBOM, open source")),
         Door(_("Account"), "/account", _("password, sign out")),
         Door(_("API"), "/api/docs", _("REST, OpenAPI, program")),
     ]
