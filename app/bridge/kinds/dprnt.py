@@ -9,6 +9,7 @@ import contextlib
 import errno
 import os
 import socket
+import time
 from collections import OrderedDict
 from collections.abc import Sequence
 from datetime import datetime
@@ -20,7 +21,7 @@ from msgspec import Meta
 
 from app.bridge.configuration import Machine
 from app.bridge.links import Clock, ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
-from app.bridge.moments import learn, measured_at
+from app.bridge.moments import START, Prints
 from app.bridge.slots import printed_reading
 from app.core.printed_line import LineReader, Printed
 
@@ -55,9 +56,15 @@ class Settings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Source:
-    """A source of bytes. Each connection is a stream of its own, so that halves of two lines are never joined."""
+    """A source of bytes. Each connection is a stream of its own, so that halves of two lines are never joined.
+
+    since: from then on, by the bridge's clock (s), nothing waits any more in a buffer. written: when the newest of the lines that
+    were taken last was, where it is known.
+    """
 
     remark = ""
+    since = 0.0
+    written: datetime | None = None
 
     async def open(self) -> str:
         """Open it, and say what it is. Raises `LinkError`."""
@@ -134,7 +141,7 @@ class One(Source):
     async def open(self) -> str:
         """Connect."""
         reader, self._connection = await self._connected()
-        self._stream = Stream(reader)
+        self._stream, self.since = Stream(reader), time.monotonic() + START
         return str(self.settings.serial or self.settings.connect)
 
     async def take(self) -> list[Printed]:
@@ -262,6 +269,7 @@ class Listener(Source):
     async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         _keep_alive(writer)
         self._streams[Stream(reader)] = writer
+        self.since = time.monotonic() + START
 
     async def take(self) -> list[Printed]:
         """The lines that have come on any connection."""
@@ -310,6 +318,7 @@ class Following(Source):
         self._lines, self._at, self._known, self._before = LineReader(), 0, None, b""
         await asyncio.to_thread(self._read)
         self._at, self._known, self._before = 0, None, b""
+        self.since = time.monotonic()
         return str(self.path)
 
     async def take(self) -> list[Printed]:
@@ -329,6 +338,7 @@ class Following(Source):
                 self._known = about.st_ino
                 file.seek(self._at)
                 data = file.read(AT_ONCE)
+                self.written = datetime.fromtimestamp(about.st_mtime).astimezone()
         except OSError as error:
             raise ControlAway(
                 f"{self.path} cannot be read: {error.strerror or error}. Does the control, or the DNC program, write there?"
@@ -368,6 +378,7 @@ class PrintedLink:
         self.machine = machine
         self.clock = Clock()
         self.remark = ""
+        self._prints = Prints(self.clock, machine.interval)
         self._source: Source | None = None
         self._unstored: list[Received] = []
         self._highest: tuple[int, int] | None = None
@@ -401,8 +412,8 @@ class PrintedLink:
         """The readings that have come, in their order; those that were not stored the last time come first."""
         if self._source is None:
             raise ControlAway("It is not open.")
-        live = not isinstance(self._source, Following)  # a file is read from its beginning, and counted from there
-        if live and self._highest is None and stored.epoch is not None:
+        following = isinstance(self._source, Following)  # a file is read from its beginning, and counted from there
+        if not following and self._highest is None and stored.epoch is not None:
             self._highest = (stored.epoch, stored.sequence)
         try:
             lines = await self._source.take()
@@ -410,47 +421,54 @@ class PrintedLink:
             if not self._unstored:
                 raise
             lines = []
-        now = datetime.now().astimezone()
-        for printed in lines:
-            if received := self._received(printed, stored.generation, now, live=live):
-                self._unstored.append(received)
+        self._unstored += self._received(self._source, lines, stored.generation)
         self._damaged += self._source.damaged()
         self.remark = self._remark()
         return list(self._unstored)
 
-    def _received(self, printed: Printed, generation: int, now: datetime, *, live: bool) -> Received | None:
-        """One reading; None where it was printed before with the same size."""
-        slot, place = printed.slot, (printed.epoch, printed.slot.sequence)
-        known = self._recent.get(place)
-        if known == slot.measured:
-            return None
-        next_one = self._count(place)
-        if live and next_one and slot.time is not None:
-            learn(self.clock, slot.time, now)
-        at = measured_at(self.clock, slot.time, now, fresh=live and next_one)
-        if known is None:
-            self._recent[place] = slot.measured
-            if len(self._recent) > REMEMBERED:
-                self._recent.popitem(last=False)
-        epoch, sequence = self._highest or place
-        return printed_reading(self.machine, printed, Position(epoch, sequence, generation), at, known)
+    def _received(self, source: Source, lines: Sequence[Printed], generation: int) -> list[Received]:
+        """The readings on these lines but for those that were printed before with the same size."""
+        new = []
+        for printed in lines:
+            slot, place = printed.slot, (printed.epoch, printed.slot.sequence)
+            known = self._recent.get(place)
+            if known == slot.measured:
+                continue
+            self._count(place)
+            if known is None:
+                self._recent[place] = slot.measured
+                if len(self._recent) > REMEMBERED:
+                    self._recent.popitem(last=False)
+            epoch, sequence = self._highest or place
+            new.append((printed, Position(epoch, sequence, generation), known))
+        times = self._prints.place(
+            [printed for printed, _, _ in new],
+            datetime.now().astimezone(),
+            time.monotonic(),
+            source.since,
+            source.written,
+        )
+        return [
+            printed_reading(self.machine, printed, position, at, known)
+            for (printed, position, known), at in zip(new, times, strict=True)
+        ]
 
-    def _count(self, place: tuple[int, int]) -> bool:
-        """Note which sequences are missing; whether this one is the next."""
+    def _count(self, place: tuple[int, int]) -> None:
+        """Note which sequences are missing."""
         epoch, sequence = place
         before = self._highest
         if before is None:
             self._highest = place
-            return True
+            return
         if epoch != before[0]:
             self._epochs = (
                 f"The control began to count anew: epoch {before[0]} became {epoch}. Were its variables lost?"
             )
             self._highest = place
-            return True
+            return
         if sequence <= before[1]:
             self._missing.pop(place, None)
-            return False
+            return
         for lost in range(before[1] + 1, sequence)[-LONGEST_GAP:]:
             self._missing[epoch, lost] = None
         self._lost += max(0, sequence - before[1] - 1 - LONGEST_GAP)
@@ -458,7 +476,6 @@ class PrintedLink:
             self._missing.popitem(last=False)
             self._lost += 1
         self._highest = place
-        return sequence == before[1] + 1
 
     def _remark(self) -> str:
         """Gaps and damage in words."""

@@ -10,6 +10,7 @@ import logging
 import re
 import socket
 import tempfile
+import time
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path, PureWindowsPath
@@ -21,7 +22,7 @@ from msgspec import Meta
 
 from app.bridge.configuration import Location, Machine
 from app.bridge.links import Clock, ControlAway, Misconfigured, Order, Outcome, Position, Received
-from app.bridge.moments import learn, measured_at
+from app.bridge.moments import Prints
 from app.bridge.plain_files import read_plain, write_new
 from app.bridge.slots import printed_reading
 from app.core.printed_line import DECIMALS, MODULUS, LineReader, Printed
@@ -127,7 +128,9 @@ def _signed(value: float) -> str:
 
 
 class Files(Protocol):
-    """The two files; every call blocks, and is made in a thread."""
+    """The two files; every call blocks, and is made in a thread. written: when the one that was read last was written, if it is known."""
+
+    written: datetime | None
 
     def open(self) -> str:
         """Connect, and answer the identity. Raises `LinkError`, as all do."""
@@ -149,6 +152,7 @@ class FolderFiles:
         self.folder = Path(settings.folder or "")
         self.readings = self.folder / PureWindowsPath(settings.readings).name
         self.corrections = self.folder / PureWindowsPath(settings.corrections).name
+        self.written: datetime | None = None
         self._known: tuple[int, int] | None = None
 
     def open(self) -> str:
@@ -171,6 +175,7 @@ class FolderFiles:
         except OSError as error:
             raise ControlAway(f"{self.readings} cannot be read: {error.strerror or error}.") from error
         self._known = (about.st_size, about.st_mtime_ns)
+        self.written = datetime.fromtimestamp(about.st_mtime).astimezone()
         return content
 
     def put(self, text: str) -> None:
@@ -201,6 +206,8 @@ class _Socket(socket.socket):
 
 class Lsv2Files:
     """Files of a TNC by LSV2. Logins INSPECT and FILE, nothing else: pyLSV2's safe mode stays on."""
+
+    written: datetime | None = None  # the control says it by its own clock
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
@@ -325,6 +332,7 @@ class TncLink:
         self.clock = Clock()
         self.remark = ""
         self._files: Files | None = None
+        self._prints = Prints(self.clock, machine.interval)
         self._begin()
 
     def _begin(self) -> None:
@@ -336,6 +344,7 @@ class TncLink:
         self._answers: list[Answered] = []
         self._lying: str | None = None
         self._looked = False
+        self._since = time.monotonic()
         self._missing = 0
 
     async def connect(self) -> str:
@@ -371,13 +380,14 @@ class TncLink:
     async def fetch(self, stored: Position) -> Sequence[Received]:
         """The readings that the file has and the store has not, in the order of the file."""
         content = await asyncio.to_thread(self._open_files().read)
-        if content is not None:
+        if content is None:
+            self._placed([])
+        else:
             content = content.replace(b",", b".")  # decimal comma, by the language of the control
             self._take(content, stored)
         return list(self._unstored)
 
     def _take(self, content: bytes, stored: Position) -> None:
-        fresh = self._looked
         if not content.startswith(self._content):  # emptied, or another file: from its beginning
             self._reader, self._sizes = LineReader(), {}
             self._content = b""
@@ -392,29 +402,34 @@ class TncLink:
                 first = places.index(self._highest) + 1
                 self._sizes = {place: line.slot.measured for place, line in zip(places[:first], lines, strict=False)}
                 lines = lines[first:]
-        now = datetime.now().astimezone()
-        for printed in lines:
-            if received := self._received(printed, stored.generation, now, fresh=fresh and len(lines) == 1):
-                self._unstored.append(received)
+        new = [each for printed in lines if (each := self._new(printed, stored.generation))]
+        times = self._placed([printed for printed, _, _ in new])
+        self._unstored += [
+            printed_reading(self.machine, printed, position, at, known)
+            for (printed, position, known), at in zip(new, times, strict=True)
+        ]
         self.remark = self._remark()
 
-    def _received(self, printed: Printed, generation: int, now: datetime, *, fresh: bool) -> Received | None:
-        """One reading; None where the file has it before: M_APPEND writes whole blocks again."""
+    def _placed(self, lines: Sequence[Printed]) -> list[datetime | None]:
+        now, written = datetime.now().astimezone(), self._open_files().written
+        return self._prints.place(lines, now, time.monotonic(), self._since, written)
+
+    def _new(self, printed: Printed, generation: int) -> tuple[Printed, Position, float | None] | None:
+        """A line with its position and the other size that it had before; None where the file has it: M_APPEND writes whole
+        blocks again.
+        """
         slot, place = printed.slot, (printed.epoch, printed.slot.sequence)
         known = self._sizes.get(place)
         if known == slot.measured:
             return None
         self._sizes.setdefault(place, slot.measured)
-        if fresh and slot.time is not None:
-            learn(self.clock, slot.time, now)
-        at = measured_at(self.clock, slot.time, now, fresh=fresh)
         before = self._highest
         if before is None or before[0] != place[0] or place[1] > before[1]:
             if before is not None and before[0] == place[0]:
                 self._missing += place[1] - before[1] - 1
             self._highest = place
         epoch, sequence = self._highest or place
-        return printed_reading(self.machine, printed, Position(epoch, sequence, generation), at, known)
+        return printed, Position(epoch, sequence, generation), known
 
     def _remark(self) -> str:
         words = []

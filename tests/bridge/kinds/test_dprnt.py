@@ -1,11 +1,14 @@
 """Readings that a control prints: by TCP, by a serial port (a pseudo terminal), into a file; with gaps, cuts and rubbish."""
 
 import asyncio
+import os
 import random
 import termios
+import time
 from collections.abc import AsyncIterator, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +17,7 @@ import serial
 from typer.testing import CliRunner
 
 from app.bridge.configuration import Machine, configuration_from
-from app.bridge.kinds.dprnt import PrintedLink, Settings
+from app.bridge.kinds.dprnt import PrintedLink, Settings, Source
 from app.bridge.links import ControlAway, LinkError, Misconfigured, Position, Received
 from app.bridge.simulators.dprnt import PrintingSimulator, serve
 from app.bridge.simulators.model import Model
@@ -199,10 +202,8 @@ def test_a_file_that_grows_shrinks_and_is_read_again_after_a_restart(tmp_path: P
     run(work())
 
 
-class Canned:
-    """A source of lines that are given. remark: nothing to say."""
-
-    remark = ""
+class Canned(Source):
+    """A source of lines that are given."""
 
     def __init__(self, *batches: bytes) -> None:
         self.batches = list(batches)
@@ -220,7 +221,7 @@ class Canned:
 
 def canned(*batches: bytes, **other: Any) -> PrintedLink:
     link = PrintedLink(printed_machine(Settings(connect="127.0.0.1:1"), **other))
-    link._source = Canned(*batches)  # type: ignore[assignment]
+    link._source = Canned(*batches)
     return link
 
 
@@ -228,6 +229,58 @@ async def taken(link: PrintedLink, stored: Position = Position()) -> Sequence[Re
     received = await link.fetch(stored)
     await link.acknowledge(received)
     return received
+
+
+def ages(received: Sequence[Received]) -> list[float]:
+    """How many minutes ago each was measured."""
+    moments = [datetime.fromisoformat(each.body["measured_at"]) for each in received]
+    return [round((datetime.now(UTC) - each).total_seconds() / 60) for each in moments]
+
+
+def printed_ago(minutes: Sequence[float], first: int = 1) -> bytes:
+    now = datetime.now().astimezone()
+    today = (now - now.replace(hour=0, minute=0, second=0)).total_seconds()
+    times = [float(int(today - 60 * each) % 86_400) for each in minutes]
+    return b"".join(lines(number, time=time) for number, time in enumerate(times, first))
+
+
+def test_what_a_serial_server_has_kept_has_the_times_of_its_lines() -> None:
+    async def work() -> None:
+        kept = list(range(60, 0, -5))
+        damaged = printed_ago(kept).replace(b"N6 C1 V40", b"N6 C1 V39")
+        link = canned(damaged + printed_ago([35], 6), b"", printed_ago([0], 13))  # printed again at the end
+        received = await taken(link)
+        numbers = [int(each.key.rpartition(":")[2]) for each in received]
+        assert dict(zip(numbers, ages(received), strict=True)) == dict(enumerate(kept, 1))
+        await taken(link)
+        assert ages(await taken(link)) == [0]
+        assert link.clock.offset == pytest.approx(0, abs=2)
+
+    run(work())
+
+
+def test_lines_of_a_file_have_their_times_and_teach_the_clock_once_it_is_followed(tmp_path: Path) -> None:
+    async def work() -> None:
+        file = tmp_path / "print.txt"
+        file.write_bytes(printed_ago([90, 60, 30]))
+        link = PrintedLink(printed_machine(Settings(file=str(file))))
+        await link.connect()
+        assert ages(await taken(link)) == [90, 60, 30]
+        assert link.clock.offset is None
+        assert await taken(link) == []
+        with file.open("ab") as end:
+            end.write(printed_ago([25], 4))  # by a clock that is wrong
+        assert ages(await taken(link)) == [0]
+        assert link.clock.offset == pytest.approx(-1500, abs=3)
+        os.utime(file, (time.time() - 3 * 86_400,) * 2)
+        again = PrintedLink(printed_machine(Settings(file=str(file))))
+        await again.connect()
+        found = await taken(again)
+        assert [age // 1440 for age in ages(found)] == [3, 3, 3, 3], "nothing in it is younger than the file"
+        await link.close()
+        await again.close()
+
+    run(work())
 
 
 def test_missing_sequences_are_told_until_they_come() -> None:
