@@ -27,6 +27,7 @@ from app.files.formats.aqdef_context import context_of
 from app.files.formats.aqdef_keys import Keys
 from app.files.formats.aqdef_times import WallClock, day_order, slashed
 from app.files.formats.cell_values import Unreadable, moment, number, zone_named
+from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_in
 
 FIELDS: Final = ("characteristic", "measured", "measured_at", "machined_at", "part", "correction_in_effect", "key")
 """What a column, or a named group of a regular expression, may be."""
@@ -281,19 +282,39 @@ class _Reader:
 
     def _table(self, rows: Iterator[tuple[int, Mapping[str, Any]]]) -> None:
         columns = self.settings.columns or {name: name for name in FIELDS}
+        scales: dict[str, float] = {}
         for line, row in rows:
             fields = {name: row[column] for name, column in columns.items() if column in row}
+            sizes = (
+                [columns["measured"]]
+                if "measured" in fields
+                else [name for name in self.machine.characteristics if name in row]
+            )
+            try:
+                scales |= {column: self._scale_of(column) for column in sizes if column not in scales}
+            except UnknownUnit as error:
+                reason = (
+                    f"the header names the unit {error.word}, which is no length that is known ({', '.join(LENGTHS)}): "
+                    "name a unit that is, or none where the sizes are in the machine's."
+                )
+                self._fault(line, error.word, reason)
+                return
             if "measured" in fields:
-                self._take(line, str(fields.get("characteristic", EVERY)).strip(), fields, row)
+                name = str(fields.get("characteristic", EVERY)).strip()
+                self._take(line, name, fields, row, scales[columns["measured"]])
                 continue
-            named = [name for name in self.machine.characteristics if name in row]
-            if not named:
+            if not sizes:
                 reason = "has neither a column measured nor one that characteristics names."
                 self._fault(line, "", f"{reason} It has {', '.join(map(str, row))}.")
                 return
-            for name in named:
+            for name in sizes:
                 if row[name] not in {None, ""} and str(row[name]).strip():
-                    self._take(line, name, fields | {"measured": row[name]}, row)
+                    self._take(line, name, fields | {"measured": row[name]}, row, scales[name])
+
+    def _scale_of(self, column: str) -> float:
+        """Millimetres in the unit of a column: that of its header, else the machine's. Raises `UnknownUnit`."""
+        unit = unit_in(column)
+        return self.scale if unit is None else LENGTHS[unit]
 
     # --- text protocols
 
@@ -343,8 +364,8 @@ class _Reader:
                 continue
             alone = None
             if value is not None and value.at is not None:
-                unit = aqdef.length_unit(characteristic.fields.get("K2142", ""))
-                measured = value.measured * (self.scale if unit is None else aqdef.LENGTHS[unit])
+                unit = length_unit(characteristic.fields.get("K2142", ""))
+                measured = value.measured * (self.scale if unit is None else LENGTHS[unit])
                 alone = keys.of(item, description.identity(characteristic), measured, value.at)
             if value is None or value.attribute:
                 self.content.skipped += 1
@@ -363,12 +384,12 @@ class _Reader:
         alone: str | None,
     ) -> None:
         unit = description.characteristics[item.characteristic].fields.get("K2142", "")
-        said = aqdef.length_unit(unit)
+        said = length_unit(unit)
         if unit and said is None:
-            reason = f"{unit!r} is no unit of length that is known; known are mm, µm, inch, cm, m and nm."
+            reason = f"{unit!r} is no unit of length that is known; known are {', '.join(LENGTHS)}."
             self._fault(item.line, "K2142", reason)
             return
-        scale = self.scale if said is None else aqdef.LENGTHS[said]
+        scale = self.scale if said is None else LENGTHS[said]
         if not isfinite(value.measured * scale):
             self._fault(item.line, "", f"{value.measured:g} is not a number.")
             return
@@ -403,7 +424,9 @@ class _Reader:
 
     # --- one reading
 
-    def _take(self, line: int, name: str, fields: Mapping[str, Any], raw: Mapping[str, Any]) -> None:
+    def _take(
+        self, line: int, name: str, fields: Mapping[str, Any], raw: Mapping[str, Any], scale: float | None = None
+    ) -> None:
         key = self.machine.characteristics.get(name)
         if key is None:
             self._nobody(line, name)
@@ -417,22 +440,22 @@ class _Reader:
                 if field_ == "key":
                     own = str(value)
                 else:
-                    body[field_] = self._value(field_, value)
+                    body[field_] = self._value(field_, value, self.scale if scale is None else scale)
             except Unreadable as error:
                 column = self.settings.columns.get(field_, field_ if name == EVERY or "measured" in fields else name)
                 self._fault(line, column, f"{str(value)[:40]!r} {error}.")
                 return
         self._add(line, name, body, raw, own)
 
-    def _value(self, field_: str, value: Any) -> Any:
+    def _value(self, field_: str, value: Any, scale: float) -> Any:
         text = str(value).strip()
         if field_ == "measured":
             if isinstance(value, bool) or not isinstance(value, int | float | str):
                 raise Unreadable("is not a number")
             size = value if isinstance(value, int | float) else number(text, self.settings.decimal)
-            if not isfinite(size * self.scale):
+            if not isfinite(size * scale):
                 raise Unreadable("is not a number")
-            return round(size * self.scale, 9)
+            return round(size * scale, 9)
         if field_ in {"measured_at", "machined_at"}:
             return moment(text, self.zone, self.settings.times).isoformat()
         if field_ == "correction_in_effect":

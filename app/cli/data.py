@@ -32,7 +32,13 @@ class Unit(StrEnum):
 
     MM = "mm"
     UM = "um"
+    NM = "nm"
+    CM = "cm"
+    M = "m"
     INCH = "inch"
+    MIL = "mil"
+    TENTH = "tenth"
+    UIN = "uin"
 
 
 class Format(StrEnum):

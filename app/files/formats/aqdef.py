@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from app.files.formats import delimited
-from app.files.formats.cell_values import UNITS
 from app.files.formats.delimited import Unusable
 from app.language.i18n import _
 
@@ -31,26 +30,10 @@ MOST_REMARKS = 200
 LINE = re.compile(r"[Kk](\d{4,5})(?:/(\d{0,9})(?:/(\d{0,9}))?)?(?:[ \t]+(.*))?", re.DOTALL | re.ASCII)
 _OF_VALUE = re.compile(r"[Kk](00\d\d)/(\d{1,9})/(\d{1,9})(?:[ \t]+(.*))?", re.DOTALL | re.ASCII)
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
-_UNIT_WORDS = {
-    "mm": "mm", "millimeter": "mm", "millimetre": "mm", "µm": "um", "μm": "um", "um": "um", "mikrometer": "um",
-    "micrometer": "um", "micrometre": "um", "мм": "mm", "мкм": "um", "毫米": "mm", "in": "inch", "inch": "inch", "inches": "inch", "zoll": "inch", '"': "inch",
-    "дюйм": "inch", "cm": "cm", "см": "cm", "m": "m", "м": "m", "meter": "m", "nm": "nm", "micron": "um", "microns": "um", "mikron": "um", "mkm": "um",
-}  # fmt: skip
-LENGTHS = UNITS | {"cm": 10.0, "m": 1000.0, "nm": 1e-6}
-"""Millimetres in each unit."""
 _WHO = {"K1001", "K2001", "K2002"}
 _FAMILIES = set("1234580")
 HIERARCHY = {"K5102", "K5103", "K5111", "K5112"}
 """The file's tree by the numbers of nodes: characteristics and nodes below one, the part and the characteristic that it is."""
-
-
-def length_unit(word: str) -> str | None:
-    """The unit of length that K2142 names, one of `LENGTHS`; None where it names another or nothing.
-
-    >>> length_unit("[MM]"), length_unit("µm"), length_unit("°")
-    ('mm', 'um', None)
-    """
-    return _UNIT_WORDS.get(word.strip(" []()").casefold())
 
 
 class Remark(NamedTuple):

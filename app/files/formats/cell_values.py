@@ -19,8 +19,6 @@ _ISO = re.compile(
 _COUNT = re.compile(
     r"(days|seconds) since (1899-12-30|1904-01-01|1970-01-01)"
 )  # spreadsheets, old ones of the Mac, Unix
-UNITS = {"mm": 1.0, "um": 0.001, "inch": 25.4}
-"""Millimetres in each unit that a file may hold."""
 
 
 class Unreadable(ValueError):
@@ -157,15 +155,3 @@ def folded(text: str) -> str:
     text = re.sub(r"[\[(<].*?[\])>]", " ", text.replace("_", " ").replace("-", " ").replace(".", " "))
     decomposed = unicodedata.normalize("NFD", text.casefold().replace("đ", "d"))
     return " ".join("".join(c for c in decomposed if unicodedata.category(c) != "Mn").split())
-
-
-def unit_in(name: str) -> str | None:
-    """The unit that a column's name carries.
-
-    >>> unit_in("Wert [µm]"), unit_in("размер (мкм)"), unit_in("measured")
-    ('um', 'um', None)
-    """
-    match = re.search(r"[\[(<]\s*([^\])>]*?)\s*[\])>]|[_ ](mm|um|µm|μm|inch)$", name)
-    word = (match[1] or match[2] or "").casefold() if match else ""
-    words = {"mm": "mm", "мм": "mm", "µm": "um", "μm": "um", "um": "um", "mkm": "um", "мкм": "um", "mikron": "um"}
-    return (words | {"in": "inch", "inch": "inch", '"': "inch", "zoll": "inch"}).get(word)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import Query, Request, Response
 from pydantic import BaseModel, Field
@@ -14,6 +14,7 @@ from app.files.formats import cell_values
 from app.files.formats.aqdef import Source
 from app.files.formats.aqdef_times import day_order
 from app.files.formats.cell_values import Unreadable
+from app.files.formats.units import Unit
 from app.language.i18n import _
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
@@ -100,9 +101,7 @@ class AqdefIn(Body):
     timezone: Annotated[
         str | None, Field(max_length=64, description="Zone of the file's times; if left out, that of the plant.")
     ] = None
-    unit: Annotated[
-        Literal["mm", "um", "inch"] | None, Field(description="Of lengths for which the file names none.")
-    ] = None
+    unit: Annotated[Unit | None, Field(description="Of lengths for which the file names none.")] = None
     day_first: Annotated[
         bool | None,
         Field(

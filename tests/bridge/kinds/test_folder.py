@@ -84,6 +84,17 @@ def test_names_of_characteristics_may_be_columns(tmp_path: Path) -> None:
     ]
 
 
+def test_the_unit_of_a_column_is_that_of_its_header(tmp_path: Path) -> None:
+    names = {"D40 [µm]": "shaft-1", "D20": "bore-1"}
+    content = read(tmp_path, "D40 [µm];D20;part\n40010;2,0;P1\n", columns={"part": "part"}, names=names, unit="inch")
+    assert [each.body["measured"] for each in content.entries] == [40.01, 50.8]
+    content = read(
+        tmp_path, "measured [Nm];part\n25;P1\n", columns={"measured": "measured [Nm]"}, names={"*": "shaft-1"}
+    )
+    assert (content.entries, [each.field for each in content.faults]) == ([], ["Nm"])
+    assert "names the unit Nm" in content.faults[0].reason
+
+
 def test_ndjson_is_read_by_the_names_of_the_fields(tmp_path: Path) -> None:
     text = '{"characteristic": "D40", "measured": 1.5, "part": 7, "measured_at": "2026-11-23T05:05:00Z"}\n'
     content = read(tmp_path, text, "a.ndjson", format="ndjson", unit="inch")

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.files.formats.cell_values import Unreadable, folded, moment, number, unit_in, zone_named
+from app.files.formats.cell_values import Unreadable, folded, moment, number, zone_named
+from app.files.formats.units import unit_in
 
 BELGRADE = ZoneInfo("Europe/Belgrade")
 

@@ -11,6 +11,7 @@ from zoneinfo import ZoneInfo
 from app.errors import FieldError, Invalid
 from app.files.formats import cell_values, delimited, spreadsheet
 from app.files.formats.delimited import Row, Unusable
+from app.files.formats.units import LENGTHS, UnknownUnit, unit_in
 from app.language.i18n import _
 
 # Folded: lower case, no accents, no unit. The first of a line is the field's own name.
@@ -116,8 +117,8 @@ def look(path: Path, wishes: Wishes, name: str | None = None, *, complete: bool 
         zone = cell_values.zone_named(wishes.timezone) if wishes.timezone else None
     except cell_values.Unreadable as error:
         raise wrong("timezone", str(error)) from None
-    if wishes.unit not in {None, *cell_values.UNITS}:
-        raise wrong("unit", _("Choose one of {units}.").format(units=", ".join(cell_values.UNITS)))
+    if wishes.unit not in {None, *LENGTHS}:
+        raise wrong("unit", _("Choose one of {units}.").format(units=", ".join(LENGTHS)))
     if wishes.decimal not in {None, ".", ","}:
         raise wrong("decimal", _("Decimals are written with a point or a comma."))
     if wishes.encoding not in {None, *delimited.ENCODINGS}:
@@ -148,6 +149,20 @@ def look(path: Path, wishes: Wishes, name: str | None = None, *, complete: bool 
 def wrong(where: str, message: str) -> Invalid:
     """One thing that is wrong with the file or with what was said about it."""
     return Invalid(f"{where}: {message}", _("Nothing was imported."), errors=[FieldError(where, message)])
+
+
+def unit_of(column: str, said: str | None) -> str:
+    """The unit of a column's numbers: what a person said, else what its header names, else mm. Raises `Invalid`."""
+    try:
+        return said or unit_in(column) or "mm"
+    except UnknownUnit as error:
+        raise wrong(
+            "unit",
+            _(
+                "The header of the column {column} names the unit {unit}, which is not known as a length. "
+                "Say in which unit its numbers are: {units}."
+            ).format(column=column, unit=error.word, units=", ".join(LENGTHS)),
+        ) from None
 
 
 def _refuse_wide(columns: int) -> None:
@@ -184,7 +199,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         encoding=encoding,
         delimiter=delimiter,
         decimal=wishes.decimal or delimited.decimal_of(sample),
-        unit=wishes.unit or ("measured" in columns and cell_values.unit_in(header[place])) or "mm",
+        unit=unit_of(header[place] if "measured" in columns else "", wishes.unit),
         zone=zone,
         time_format=wishes.time_format,
         header_line=head,
@@ -260,10 +275,8 @@ def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: 
     if not header:
         raise wrong("file", _("The file holds no JSON objects."))
     columns = _columns(header, wishes.mapping)
-    unit = wishes.unit or (cell_values.unit_in(header[columns["measured"][0]]) if "measured" in columns else None)
-    return Layout(
-        "list" if is_list else "lines", header, columns, unit=unit or "mm", zone=zone, time_format=wishes.time_format
-    )
+    unit = unit_of(header[columns["measured"][0]] if "measured" in columns else "", wishes.unit)
+    return Layout("list" if is_list else "lines", header, columns, unit=unit, zone=zone, time_format=wishes.time_format)
 
 
 def _first_values(path: Path, *, is_list: bool, most: int = 200) -> list[Any]:

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 
 from app.errors import Invalid
 from app.files.formats import cell_values, spreadsheet
-from app.files.formats.cell_values import UNITS, Unreadable
+from app.files.formats.cell_values import Unreadable
 from app.files.formats.delimited import Unusable
+from app.files.formats.units import LENGTHS
 from app.language.i18n import _
 from app.loop.readings.importing.layout import Layout, rows_of
 from app.loop.readings.schemas import ReadingIn, reading_of
@@ -127,7 +128,7 @@ def _width(cells: int, width: int, delimiter: str) -> str:
 
 
 def _readers(layout: Layout) -> list[tuple[str, tuple[int, ...], Callable[[str], Any]]]:
-    scale, decimal, zone, pattern = UNITS[layout.unit], layout.decimal, layout.zone, layout.time_format
+    scale, decimal, zone, pattern = LENGTHS[layout.unit], layout.decimal, layout.zone, layout.time_format
 
     def length(text: str) -> float:
         value = cell_values.number(text, decimal)
@@ -207,7 +208,7 @@ def objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:
 
 def _converted(values: dict[str, Any], layout: Layout, number: int) -> Iterator[Flaw]:
     """Bring lengths to mm and times to their zone; what is of the wrong kind is told with the other fields."""
-    scale = UNITS[layout.unit]
+    scale = LENGTHS[layout.unit]
     if scale != 1.0 and isinstance(values.get("measured"), int | float) and abs(values["measured"]) < 1e300:
         values["measured"] = round(values["measured"] * scale, 9)
     for name in ("measured_at", "machined_at"):

@@ -15,7 +15,7 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.readings import queries
 from app.loop.readings.importing.history import MOST_FLAWS, Flawed, Progress, Summary, store_history
-from app.loop.readings.importing.layout import Layout
+from app.loop.readings.importing.layout import Layout, unit_of
 from app.loop.readings.importing.lines import Flaw, lines
 from app.loop.readings.records import Entry
 
@@ -58,7 +58,7 @@ def columns_by_name(layout: Layout, known: Sequence[CurrentCharacteristic]) -> d
 def layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
     """The layout by which one column is read; without a unit that somebody said, that of its header counts, else mm."""
     fields = {name: places for name, places in layout.columns.items() if name not in {"measured", "touches", "key"}}
-    own_unit = unit or cell_values.unit_in(layout.header[column.place]) or "mm"
+    own_unit = unit_of(layout.header[column.place], unit)
     return replace(layout, columns=fields | {"measured": (column.place,)}, unit=own_unit, skips_blank=True)
 
 

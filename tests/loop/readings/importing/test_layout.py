@@ -50,6 +50,29 @@ def test_files_in_five_languages_are_understood_by_their_headers(tmp_path: Path,
     assert first.reading.measured_at == datetime(2026, 11, 20, 8, tzinfo=UTC)
 
 
+@pytest.mark.parametrize(
+    ("unit", "sizes"),
+    [
+        ("mil", (0.00254, 0.003048)), ("thou", (0.00254, 0.003048)), ("tenths", (0.000254, 0.0003048)), ("µin", (0.00000254, 0.000003048)),
+        ("cm", (1.0, 1.2)), ("nm", (0.0000001, 0.00000012)), ("um", (0.0001, 0.00012)), ("inch", (2.54, 3.048)), ('"', (2.54, 3.048)),
+    ],
+)  # fmt: skip
+def test_the_unit_of_the_header_is_converted(tmp_path: Path, unit: str, sizes: tuple[float, float]) -> None:
+    path = write(tmp_path, f"Zeit;Run-out [{unit}]\n2025-11-18T06:05:00Z;0,10\n2025-11-18T06:06:00Z;0,12\n")
+    assert [size for size, _part in good(path, mapping={"measured": "2"})] == list(sizes)
+
+
+@pytest.mark.parametrize("unit", ["Nm", "furlong", "°"])
+def test_a_header_that_names_no_length_is_refused_by_column(tmp_path: Path, unit: str) -> None:
+    path = write(tmp_path, f"Zeit;Run-out [{unit}]\n2025-11-18T06:05:00Z;0,10\n")
+    with pytest.raises(Invalid, match=re.escape(f"Run-out [{unit}] names the unit {unit}")):
+        good(path, mapping={"measured": "2"})
+    assert [size for size, _part in good(path, mapping={"measured": "2"}, unit="mil")] == [0.00254]
+    listed = write(tmp_path, json.dumps([{f"measured [{unit}]": 0.1}]), name="a.json")
+    with pytest.raises(Invalid, match="names the unit"):
+        good(listed, mapping={"measured": f"measured [{unit}]"})
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1250", "cp1251", "cp1252"])
 def test_encodings(tmp_path: Path, encoding: str) -> None:
     part = {"cp1251": "Шипка", "cp1252": "Welle Ø"}.get(encoding, "Žižek")

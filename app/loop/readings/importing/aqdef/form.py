@@ -10,6 +10,7 @@ from app.files.formats.aqdef import Description, Source
 from app.files.formats.aqdef_times import DayOrder
 from app.files.formats.cell_values import Unreadable
 from app.files.formats.delimited import ENCODINGS
+from app.files.formats.units import LENGTHS
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
 from app.loop.machines import queries as machines
@@ -136,7 +137,7 @@ def _wishes(said: Mapping[str, str]) -> Wishes:
     unit = said.get("unit", "")
     dates = said.get("dates", "")
     orders: dict[str, DayOrder] = {"day_first": "day_first", "month_first": "month_first"}
-    return Wishes(zone, orders.get(dates), unit if unit in cell_values.UNITS else None)
+    return Wishes(zone, orders.get(dates), unit if unit in LENGTHS else None)
 
 
 def _has_choice(said: Mapping[str, str]) -> bool:

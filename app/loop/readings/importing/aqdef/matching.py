@@ -7,9 +7,10 @@ from typing import Any
 
 from app.core.parameters import Parameters, default_averaging_limit
 from app.core.plausibility import INCH, inch_warnings, looks_like_inches
-from app.files.formats.aqdef import LENGTHS, LONGEST, Characteristic, Description, length_unit
+from app.files.formats.aqdef import LONGEST, Characteristic, Description
 from app.files.formats.aqdef_values import number_of
 from app.files.formats.cell_values import Unreadable, folded
+from app.files.formats.units import LENGTHS, length_unit
 from app.language.i18n import _
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.warnings.wording import sentence

@@ -220,12 +220,14 @@ def test_what_cannot_be_chosen_is_refused(
 
 
 def test_where_nothing_is_chosen_it_is_said_why(plant: Database, tmp_path: Path) -> None:
-    lines = ["K0100 2", "K2001/1 L1", "K2101/1 40", "K2142/1 mm", "K2001/2 W1", "K2142/2 °", "K0001/1 40"]
+    lines = ["K0100 3", "K2001/1 L1", "K2101/1 40", "K2142/1 mm", "K2001/2 W1", "K2142/2 °", "K0001/1 40"]
+    lines += ["K2001/3 M8", "K2110/3 20", "K2111/3 30", "K2142/3 Nm"]
     with pytest.raises(Invalid) as refusal:
         run(plant, written(tmp_path / "a.dfq", lines))
     assert [each.message for each in refusal.value.errors][1:] == [
         "L1: it has no tolerance: K2111 is missing",
         "W1: is not a length: its unit is '°' (K2142)",
+        "M8: is not a length: its unit is 'Nm' (K2142)",
     ]
 
 
