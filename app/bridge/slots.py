@@ -10,7 +10,6 @@ from app.core.printed_line import Printed
 from app.core.ring import INCH, Slot, Status, Unit
 
 FAULTS = {
-    Status.NO_TRIGGER: "The probe did not trigger (status 1): there is no size.",
     Status.MARKED: "The NC program has marked the reading as not valid (status 3).",
 }
 
@@ -68,6 +67,9 @@ def _body(machine: Machine, slot: Slot, unit: str) -> dict[str, object]:
         body["part"] = str(slot.part)
     if slot.status == Status.FIRST_MOVE:
         body["first_move_triggered"] = True
+    if slot.status == Status.NO_TRIGGER:  # what stands there as a size is none; the server makes a probe fault of it
+        del body["measured"]
+        body["touches"] = []
     return body
 
 

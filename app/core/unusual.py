@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from app.core.decision.limits import nanometres
 from app.core.parameter_table import FIELDS, Axis, MachineType, Mode, Problem, Variant
 
 INDEX_ANGLES = (0.0, 359.5)  # degrees, R26 of the variants that index the part
@@ -20,6 +21,10 @@ def unusual(values: Mapping[str, Any]) -> Iterator[Problem]:
     if variant in (Variant.INDEXED, Variant.ROUND, Variant.ALONG) and values["axis"] != Axis.X:
         data = {"variant": str(variant), "axis": str(values["axis"])}
         yield Problem("axis", "variant_axis", data, warning=True)
+    window, confidence = values["path_factor"], values.get("confidence_limit")
+    if confidence is not None and nanometres(confidence) > nanometres(window):
+        data = {"value": confidence, "window": window}
+        yield Problem("confidence_limit", "out_of_reach", data, warning=True)
     if variant in (Variant.ROUND, Variant.ALONG) and max(points, values["accept_m"]) < 2:
         yield Problem("points", "points_missing", {"variant": str(variant)}, warning=True)
 

@@ -159,7 +159,14 @@ def test_a_reading_says_what_the_control_knows() -> None:
         [second] = await link.fetch(first.position or Position())
         assert "measured_at" in second.body
         assert link.clock.offset == pytest.approx(90, abs=3)
-        for status, words in ((Status.NO_TRIGGER, "did not trigger"), (Status.MARKED, "marked"), (9, "not known")):
+        for _ in model.send(1, 0.0, 3, Status.NO_TRIGGER):
+            pass
+        [missed] = await link.fetch(second.position or Position())
+        await link.acknowledge([missed])
+        assert missed.fault is None, "the server makes a probe fault of it; in the quarantine nobody would see it"
+        assert (missed.body["touches"], "measured" in missed.body) == ([], False)
+        second = missed
+        for status, words in ((Status.MARKED, "marked"), (9, "not known")):
             for _ in model.send(1, 40.0, 3, status):
                 pass
             [faulty] = await link.fetch(second.position or Position())

@@ -73,7 +73,7 @@ def test_our_corrections_make_the_same_offset_count_and_verdict() -> None:
     for part in CASE["parts"]:
         sections = [Decimal(section) for section in part["sections"]]
         macro.measure(sections)
-        value, points = measured_value(parameters, [[float(section)] for section in sections])
+        value, points, _fault = measured_value(parameters, [[float(section)] for section in sections])
         good = accepted(parameters, points)
         rejects += sections_outside(parameters, points)
         decision = decide(parameters, LoopState(), deviation_of(value, parameters.target), accepted=good)
@@ -87,7 +87,7 @@ def test_our_corrections_make_the_same_offset_count_and_verdict() -> None:
 @pytest.mark.parametrize("part", [part for part in CASE["parts"] if not part["good"]])
 def test_without_that_setting_a_rejected_part_corrects_nothing(part: dict[str, Any]) -> None:
     parameters = line(rejected_may_correct=False)
-    value, points = measured_value(parameters, [[float(section)] for section in part["sections"]])
+    value, points, _fault = measured_value(parameters, [[float(section)] for section in part["sections"]])
     decision = decide(
         parameters, LoopState(), deviation_of(value, parameters.target), accepted=accepted(parameters, points)
     )

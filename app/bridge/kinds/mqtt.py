@@ -462,7 +462,7 @@ def _read(payload: bytes) -> tuple[dict[str, Any], str | None]:
             return body, f"{name} = {str(value)[:40]!r} is not of the kind that a reading has there."
     if not body.get("characteristic"):
         return body, "The reading has no characteristic."
-    if (body.get("measured") is None) == (body.get("touches") is None):
+    if (body.get("measured") is None) == (body.get("touches") is None) and not body.get("first_move_triggered"):
         return body, "The reading has either measured or touches."
     return {name: value for name, value in body.items() if value is not None}, None
 

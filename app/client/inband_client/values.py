@@ -38,7 +38,7 @@ class ReadingFields(TypedDict, total=False):
 class Reading:
     """One reading to be pushed.
 
-    touches: in place of `measured`, one list per point, each with its repeats. key: names this measurement for ever; one is
+    touches: in place of `measured`, one list per point, each with its repeats; None for a touch that is missing. key: names this measurement for ever; one is
     made if you give none, so pushing the same object twice stores it once. correction_in_effect: number of the last
     correction that was in the offset when the part was **cut**, 0 for none yet; machined_at may say it by time.
     first_move_triggered: the probe triggered on its first move, where there should have been air. context: order, batch, nest,
@@ -47,7 +47,7 @@ class Reading:
 
     characteristic: str
     measured: float | None = None
-    touches: Iterable[Iterable[float]] | None = None
+    touches: Iterable[Iterable[float | None] | None] | None = None
     measured_at: datetime | str | None = None
     machined_at: datetime | str | None = None
     part: str | None = None

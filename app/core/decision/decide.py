@@ -25,7 +25,18 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from app.core.decision.limits import FAULT, WEAR, ZONES, Zone, within_tolerance
-from app.core.decision.step import ACTIONS, CODES, CORRECT, HOLD, OFFSET_LIMIT, Action, Code, effect_of, step
+from app.core.decision.step import (
+    ACTIONS,
+    BELIEVED,
+    CODES,
+    CORRECT,
+    HOLD,
+    OFFSET_LIMIT,
+    Action,
+    Code,
+    effect_of,
+    step,
+)
 from app.core.parameters import Mode, Parameters
 
 
@@ -92,7 +103,7 @@ def decide(
     previous_tool: bool = False,
     accepted: bool = True,
     jump: bool = False,
-    first_move_triggered: bool = False,
+    fault: Code | None = None,
 ) -> Decision:
     """Decide one reading (domain §3).
 
@@ -105,7 +116,8 @@ def decide(
         nothing unless the characteristic allows it.
     jump: neither wear nor scatter explains it (`plausibility.is_jump`): what it asks for is computed in full and held, and
         it says nothing to the average. In the wear zone the alarm *tool worn* asks the same already.
-    first_move_triggered: the probe triggered on its way to the surface (domain §5, *not a bore*): a probe fault, whatever D.
+    fault: why the reading cannot be believed whatever D is: the probe triggered on its way to the surface (domain §5, *not a
+        bore*), or a touch is missing or outside its window (domain §4). A probe fault.
 
     >>> p = Parameters(target=10.0, tolerance_width=0.04, zero_range=0.004, averaging_limit=0.0133,
     ...                wear_limit=0.3, confidence_limit=1.0, weighting_factor=2, factor=-1, tool_memory=1, average_memory=1)
@@ -122,9 +134,9 @@ def decide(
         previous_tool,
         not accepted,
         jump,
-        first_move_triggered,
+        BELIEVED if fault is None else CODES.index(fault),
     )
-    good = within_tolerance(deviation, parameters.limits) and not first_move_triggered
+    good = within_tolerance(deviation, parameters.limits) and fault is None
     alarms = []
     if made.zone == FAULT:
         alarms.append(ReadingAlarm.PROBE_FAULT)

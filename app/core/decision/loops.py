@@ -18,7 +18,18 @@ from numpy.typing import NDArray
 
 from app.core.compiled import compiled, compiled_form_of
 from app.core.decision.limits import FAULT, FULL, WEAR, nanometres, reaches, within
-from app.core.decision.step import CORRECT, HOLD, NONE, OFFSET_LIMIT, Rules, deviation_of, effect_of, rounded, step
+from app.core.decision.step import (
+    BELIEVED,
+    CORRECT,
+    HOLD,
+    NONE,
+    OFFSET_LIMIT,
+    Rules,
+    deviation_of,
+    effect_of,
+    rounded,
+    step,
+)
 from app.core.parameters import Parameters
 
 Floats = NDArray[np.float64]
@@ -125,7 +136,7 @@ def quiet_run(
             return i
         deviation = deviation_of(measured[i], its.target, its.empirical_value)
         average = float(averages[its.memory]) if its.memory >= 0 else 0.0
-        made = step(its, average, 0.0, deviation, its.outstanding, False, False, False, False, False)
+        made = step(its, average, 0.0, deviation, its.outstanding, False, False, False, False, BELIEVED)
         if made.action != NONE or made.code == OFFSET_LIMIT or made.zone > FULL:
             return i
         if not within(nanometres(deviation), its.tolerance):
@@ -297,7 +308,7 @@ def follow(trace: ProcessTrace, lanes: Rows, delay: int, result: ReplayResult, t
             False,
             mark & Mark.REJECTED != 0,
             mark & Mark.JUMP != 0,
-            False,
+            BELIEVED,
         )
         if made.action == HOLD:
             held, holding = made.amount, True

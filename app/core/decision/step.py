@@ -47,12 +47,14 @@ class Code(StrEnum):
     IMPLAUSIBLE = "implausible"
     IMPORTED = "imported"
     FIRST_MOVE_TRIGGERED = "first_move_triggered"
+    TOUCH_FAULT = "touch_fault"
 
 
 CODES = tuple(Code)
 WITHIN_ZERO_RANGE, AVERAGE_KEPT, AVERAGED_DEVIATION, FULL_DEVIATION, OUT_OF_TOLERANCE = range(5)
 TOOL_WORN_HELD, TOOL_WORN_RELEASED, PROBE_FAULT, PAUSED, MEASURE_ONLY = range(5, 10)
-BEFORE_TOOL_CHANGE, OFFSET_LIMIT, REJECTED, IMPLAUSIBLE, IMPORTED, FIRST_MOVE_TRIGGERED = range(10, 16)
+BEFORE_TOOL_CHANGE, OFFSET_LIMIT, REJECTED, IMPLAUSIBLE, IMPORTED, FIRST_MOVE_TRIGGERED, TOUCH_FAULT = range(10, 17)
+BELIEVED = -1
 
 
 class Rules(NamedTuple):
@@ -157,18 +159,19 @@ def step(
     previous_tool: bool,
     rejected: bool,
     jump: bool,
-    first_move_triggered: bool,
+    fault: int,
 ) -> Step:
-    """Decide one reading as `decide` explains. average: M before it; total: sum of the corrections of the tool."""
+    """Decide one reading as `decide` explains. average: M before it; total: sum of the corrections of the tool.
+
+    fault: the code why it cannot be believed whatever its size, else `BELIEVED`.
+    """
     before = average if rules.averages else 0.0
     decided = rounded(deviation + outstanding) if outstanding else deviation
     zone = zone_of(decided, rules)
-    if first_move_triggered or reaches(nanometres(deviation), rules.confidence):
+    if fault != BELIEVED or reaches(nanometres(deviation), rules.confidence):
         zone = FAULT
     if zone == FAULT:
-        return without_correction(
-            decided, zone, FIRST_MOVE_TRIGGERED if first_move_triggered else PROBE_FAULT, before, STOP
-        )
+        return without_correction(decided, zone, PROBE_FAULT if fault == BELIEVED else fault, before, STOP)
     if paused:
         return without_correction(decided, zone, PAUSED, before)
     if previous_tool:

@@ -1,9 +1,10 @@
 """Alarm kinds that a reading raises: the signals of the decision (`app.core.decision.decide.ReadingAlarm`)."""
 
+from app.core.probing import TouchError
 from app.language.i18n import _
 from app.language.numbers import um, um_limit
 from app.loop.alarms.kinds import AlarmKind, register
-from app.loop.readings.wording import first_move_sentence
+from app.loop.readings.wording import first_move_sentence, touch_problem
 from app.loop.tables.alarms import Alarm
 
 
@@ -68,6 +69,8 @@ TOOL_WORN = register(
 def _probe_fault(alarm: Alarm) -> str:
     if alarm.data.get("first_move_triggered"):
         return f"{first_move_sentence(alarm.data.get('feature'))} {_('Compensation is paused.')}"
+    if "touch" in alarm.data:
+        return f"{touch_problem(TouchError(**alarm.data['touch']))} {_('Compensation is paused.')}"
     return _deviation(
         alarm,
         _(

@@ -209,6 +209,7 @@ def sentence(problem: Problem) -> str:
         "points_missing": _("“{variant}” needs several points, but R23 does not say how many").format(
             variant=choice("variant", data.get("variant", ""))
         ),
+        "out_of_reach": _out_of_reach(problem, name),
         "switch_value": _(
             "R24 = {value} is taken as two-point measurement; the cycles know 0 (off) and 1 (on). Check the number"
         ).format(value=data.get("value")),
@@ -237,6 +238,15 @@ def sentence(problem: Problem) -> str:
         ).format(name=name, points=data.get("points"), sections=data.get("sections")),
         "accept": _('Acceptance must be {"n": n, "m": m} with whole numbers, 1 ≤ n ≤ m ≤ 100, for example 2 of 3'),
     }.get(problem.code, problem.code)
+
+
+def _out_of_reach(problem: Problem, name: str) -> str:
+    if problem.code != "out_of_reach":
+        return ""
+    return _(
+        "{name} {value} lies beyond ±a = {window} (R28), so touches never reach it: one outside ±a is a probe fault already. "
+        "Raise R28, or lower R36"
+    ).format(name=name, value=millimetres(problem.data["value"]), window=millimetres(problem.data["window"]))
 
 
 def _not_a_number(problem: Problem, name: str) -> str:

@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field
 from app.core.decision.decide import needs_approval
 from app.core.decision.step import DECIMALS, Action
 from app.core.parameters import Parameters
+from app.core.probing import Touches
 from app.core.variants import Results
 from app.loop.readings.by_hand.schemas import HandMeasurementOut
 from app.loop.readings.records import Record
@@ -23,6 +24,7 @@ def answer(
     correction: tuple[int, float] | None,
     alarms: Iterable[tuple[int, str]],
     results: Results | None = None,
+    touches: Touches | None = None,
 ) -> dict[str, Any]:
     """The answer to the machine. `correction` is (R10, amount in mm) of the one this reading led to.
 
@@ -60,7 +62,7 @@ def answer(
         "action": record.action,
         "correction": issued,
         "alarms": [{"id": number, "kind": kind} for number, kind in alarms],
-        "reason": reason(record, parameters, correction[1] if correction else None),
+        "reason": reason(record, parameters, correction[1] if correction else None, touches),
         "parameters_version": record.parameters_version,
     }
 
@@ -188,7 +190,12 @@ class ReadingDetail(ReadingRow):
     """A stored reading with everything about it."""
 
     by_hand: Annotated[list[HandMeasurementOut], Field(description="What people measured on this part.")]
-    touches: Annotated[list[list[float]] | None, Field(description="One list per point, each with its repeats.")]
+    touches: Annotated[
+        list[list[float | None] | None] | None,
+        Field(
+            description="One list per point, each with its repeats, as they were sent; null for one that is missing."
+        ),
+    ]
     machined_at: datetime | None
     correction_in_effect: int | None
     context: Annotated[ReadingContextOut | None, Field(description="Its circumstances, if any were sent.")]

@@ -10,6 +10,7 @@ from app.access.callers import Caller
 from app.core.decision.limits import Zone
 from app.core.decision.step import Code
 from app.core.plausibility import uncorrected
+from app.core.probing import Touches
 from app.core.variants import Results
 from app.errors import FieldError, Invalid, NotFound
 from app.language.i18n import _
@@ -135,6 +136,7 @@ def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[
         )
     }
     results = _results(session, entry, [record.sequence for record in records])
+    touches = touches_of(session, entry, [record.sequence for record in records if record.code == Code.TOUCH_FAULT])
     return [
         answer(
             entry.characteristic,
@@ -145,6 +147,7 @@ def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[
             correction=corrections.get(record.correction) if record.correction is not None else None,
             alarms=[(number, kinds[number]) for number in record.alarms or () if number in kinds],
             results=results.get(record.sequence),
+            touches=touches.get(record.sequence),
         )
         | {"excluded": excluded.get(record.sequence)}
         for record in records
@@ -161,6 +164,20 @@ def _results(session: Session, entry: Entry, sequences: list[int]) -> dict[int, 
         )
     )
     return {sequence: Results(*found) for sequence, *found in rows}
+
+
+def touches_of(session: Session, entry: Entry, sequences: Sequence[int]) -> dict[int, Touches]:
+    """Return the touches of these readings, of those that came as touches."""
+    if not sequences:
+        return {}
+    rows = session.execute(
+        select(ReadingTouches.sequence, ReadingTouches.touches).where(
+            ReadingTouches.machine_id == entry.machine_id,
+            ReadingTouches.characteristic_id == entry.characteristic_id,
+            ReadingTouches.sequence.in_(sequences),
+        )
+    )
+    return {sequence: touches for sequence, touches in rows}  # noqa: C416 - rows are no pairs to mypy
 
 
 def record_of(session: Session, entry: Entry, sequence: int) -> Record:
@@ -233,6 +250,7 @@ def course_of(session: Session, machine_id: int, characteristic_id: int, factor:
             Reading.sequence > func.greatest(Stream.sequence_at_tool_change, Stream.sequence - limit),
             Reading.compensated.is_not(None),
             Reading.code != Code.IMPLAUSIBLE,
+            Reading.zone != Zone.PROBE_FAULT,
             Exclusion.sequence.is_(None),
         )
         .order_by(Reading.sequence)
@@ -260,13 +278,6 @@ def first_answers(session: Session, entry: Entry, sequences: Iterable[int]) -> d
 def detail(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
     """One reading with its touches and the full reason."""
     record = record_of(session, entry, sequence)
-    touches = session.scalar(
-        select(ReadingTouches.touches).where(
-            ReadingTouches.machine_id == entry.machine_id,
-            ReadingTouches.characteristic_id == entry.characteristic_id,
-            ReadingTouches.sequence == sequence,
-        )
-    )
     context = session.scalar(
         select(ReadingContext.context).where(
             ReadingContext.machine_id == entry.machine_id,
@@ -277,7 +288,7 @@ def detail(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
     measurements = by_hand.of_readings(session, entry.machine_id, entry.characteristic_id, [sequence])
     return answers(session, entry, [record])[0] | {
         "by_hand": [in_json(measurement) for measurement in measurements.get(sequence, ())],
-        "touches": touches,
+        "touches": touches_of(session, entry, [sequence]).get(sequence),
         "machined_at": record.machined_at,
         "correction_in_effect": record.correction_in_effect,
         "context": context,

@@ -56,6 +56,7 @@ def replay(
             correction=(issued.tool_memory, issued.amount) if issued else None,
             alarms=[(number, alarm.kind) for number, alarm in enumerate(verdict.alarms, start=1)],
             results=verdict.results,
+            touches=reading.touches,
         )
         if tool is not None and issued is not None and issued.status != "held":
             tool.total += issued.amount

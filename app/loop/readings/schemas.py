@@ -73,7 +73,8 @@ class ReadingIn(Struct, forbid_unknown_fields=True, gc=False):
         | None,
         Meta(
             description="In place of measured: one list per point (R23), each with its repeats (R27). null stands for a "
-            "touch that is missing; it is refused by the number of its point and repeat."
+            "touch that is missing. A missing touch, or one outside ±a (R28), makes a probe fault of the reading: it is stored, "
+            "raises the alarm, and the answer is `stop`. More points or repeats than there can be are refused."
         ),
     ] = None
     measured_at: Annotated[Moment | None, Meta(description="When it was measured; if left out, when it came in.")] = (
@@ -105,7 +106,8 @@ class ReadingIn(Struct, forbid_unknown_fields=True, gc=False):
         bool,
         Meta(
             description="true: the probe triggered on its first move, where there should have been air (no bore, a chip, a "
-            "wrong part). measured is then the position where it did; it is judged a probe fault whatever its value."
+            "wrong part). measured is then the position where it did, and may be left out; it is judged a probe fault whatever its "
+            "value."
         ),
     ] = False
     context: Annotated[Context | None, Meta(description="Its circumstances: order, batch, nest, events and more.")] = (
@@ -301,20 +303,15 @@ def _all_plain(readings: list[ReadingIn], latest: datetime) -> bool:
 
 def _sense(reading: ReadingIn, now: datetime, prefix: str) -> Iterator[FieldError]:
     """Check what the types alone cannot say."""
-    if (reading.measured is None) == (reading.touches is None):
+    if (reading.measured is None) == (reading.touches is None) and not (
+        reading.first_move_triggered and reading.measured is None
+    ):
         message = (
             _("A reading needs measured (mm), or touches in its place.")
             if reading.measured is None
             else _("Send measured or touches, not both: the value is made of the touches.")
         )
         yield FieldError(f"{prefix}measured", message)
-    if reading.first_move_triggered and reading.touches is not None:
-        yield FieldError(
-            f"{prefix}touches",
-            _(
-                "With first_move_triggered nothing was touched as planned: send measured, the position where it triggered."
-            ),
-        )
     for name in ("characteristic", "part", "key"):
         value = getattr(reading, name)
         if value is not None and not value.isprintable() and not clean_text(value):
@@ -392,7 +389,7 @@ def _number(value: Any) -> str | None:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return _("This must be a number in mm, such as 39.9981 (a decimal point, no unit, no quotes).")
     if isinstance(value, float) and not isfinite(value):
-        return _("This is not a finite number. A probe that did not trigger has no reading: do not send one.")
+        return _("This is not a finite number. Of a probe that did not trigger send touches, with null for the touch.")
     if abs(value) > LARGEST_LENGTH:
         return _("%(value)g mm is longer than any machine. Lengths are in mm, not in µm or nm.") % {
             "value": float(value) if abs(value) < 1e300 else float("inf")

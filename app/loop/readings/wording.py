@@ -7,11 +7,12 @@ from app.core.decision.limits import Zone, nanometres, within_tolerance
 from app.core.decision.step import Code, average_of
 from app.core.parameters import Feature, Parameters
 from app.core.plausibility import looks_like_inches
-from app.core.probing import TouchError
+from app.core.probing import TouchError, Touches, measured_value
 from app.language.i18n import _
 from app.loop.readings.records import MOST_OUTSTANDING, Record
 
 NAMED_AT_MOST = 3
+UNBELIEVABLE = (Code.PROBE_FAULT, Code.TOUCH_FAULT)
 
 
 def um(length: float) -> str:
@@ -21,10 +22,16 @@ def um(length: float) -> str:
     return f"{text} µm".replace("-", "\N{MINUS SIGN}")
 
 
-def reason(record: Record, parameters: Parameters, amount: float | None = None) -> dict[str, Any]:
-    """Code, sentence and notes on one decision; `amount` (mm) is that of the correction it led to, if any."""
+def reason(
+    record: Record, parameters: Parameters, amount: float | None = None, touches: Touches | None = None
+) -> dict[str, Any]:
+    """Code, sentence and notes on one decision.
+
+    amount: of the correction it led to, if any, mm. touches: of a touch fault, which names the one that it is about.
+    """
     notes = [code for code, applies in _notes(record, parameters, amount) if applies]
-    sentences = [_sentence(record, parameters), *(_note(code, record, parameters) for code in notes)]
+    about = _touch_fault(parameters, touches) if record.code == Code.TOUCH_FAULT else _sentence(record, parameters)
+    sentences = [about, *(_note(code, record, parameters) for code in notes)]
     return {"code": record.code, "text": " ".join(sentences), "notes": notes}
 
 
@@ -41,10 +48,10 @@ def _notes(record: Record, parameters: Parameters, amount: float | None) -> tupl
         ("clamped", amount is not None and nanometres(abs(amount)) < nanometres(abs(parameters.factor * size_error))),
         ("empirical_value", nanometres(empirical_value(record, parameters)) != 0),
         ("late", record.late),
-        ("inches", record.code == Code.PROBE_FAULT and looks_like_inches(record.measured, parameters.target)),
+        ("inches", record.code in UNBELIEVABLE and looks_like_inches(record.measured, parameters.target)),
         (
             "target_in_inches",
-            record.code == Code.PROBE_FAULT and looks_like_inches(parameters.target, record.measured),
+            record.code in UNBELIEVABLE and looks_like_inches(parameters.target, record.measured),
         ),
     )
 
@@ -144,8 +151,7 @@ def _sentence(record: Record, parameters: Parameters) -> str:
                 "The machine is told to stop, and compensation pauses until the alarm is acknowledged."
             )
         case Code.FIRST_MOVE_TRIGGERED:
-            consequence = _("The machine is told to stop, and compensation pauses until the alarm is acknowledged.")
-            text = f"{first_move_sentence(parameters.feature)} {consequence}"
+            text = f"{first_move_sentence(parameters.feature)} {_stopped()}"
         case Code.PAUSED:
             text = _(
                 "Deviation %(deviation)s: compensation is paused by alarm %(alarm)s. Stored and judged, nothing is corrected."
@@ -181,6 +187,16 @@ def _sentence(record: Record, parameters: Parameters) -> str:
         case _:
             text = record.code
     return text % values
+
+
+def _stopped() -> str:
+    return _("The machine is told to stop, and compensation pauses until the alarm is acknowledged.")
+
+
+def _touch_fault(parameters: Parameters, touches: Touches | None) -> str:
+    fault = None if touches is None else measured_value(parameters, touches).fault
+    about = _("A touch is missing, or outside its window.") if fault is None else touch_problem(fault)
+    return f"{about} {_stopped()}"
 
 
 def _note(code: str, record: Record, parameters: Parameters) -> str:
@@ -224,10 +240,7 @@ def touch_problem(error: TouchError) -> str:
     few = (error.got or 0) < error.expected
     match error.code:
         case "points" if few:
-            text = _(
-                "%(got)s points came, %(expected)s are expected: point %(point)s is missing. "
-                "Send one list of touches per point."
-            )
+            text = _("%(got)s points came, %(expected)s are expected: point %(point)s is missing.")
         case "points":
             text = _("%(got)s points came, %(expected)s are expected: point %(point)s is one too many.")
         case "repeats" if few:

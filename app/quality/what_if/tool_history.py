@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 
 from app.core.decision.limits import FAULT, in_nanometres, nanometres, reaches
 from app.core.decision.loops import Mark, ProcessTrace
-from app.core.decision.step import FIRST_MOVE_TRIGGERED, IMPLAUSIBLE, REJECTED, TOOL_WORN_HELD, rounded
+from app.core.decision.step import FIRST_MOVE_TRIGGERED, IMPLAUSIBLE, REJECTED, TOOL_WORN_HELD, TOUCH_FAULT, rounded
 from app.core.parameters import Parameters
 from app.core.replay import LONGEST_DELAY, Figures, Policy, ReplayedCharacteristic, parts_of, rebuilt
 from app.core.spc.resolution import resolution_of
@@ -296,7 +296,8 @@ def _trace(
     # A held correction that was let go shows as a step that no reading may ask for by itself.
     held = parameters.wear_limit if parameters.plausible_jump is None else parameters.plausible_jump
     step = np.abs(np.diff(compensated, prepend=compensated[:1])) / abs(parameters.factor)
-    unplanned = joined["code"] == FIRST_MOVE_TRIGGERED  # its size says nothing, so no replay may decide on it
+    # Their sizes say nothing, so no replay may decide on them.
+    unplanned = np.isin(joined["code"], (FIRST_MOVE_TRIGGERED, TOUCH_FAULT))
     marks = (
         begins * Mark.BEGIN
         + joined["restart"] * Mark.RESTART

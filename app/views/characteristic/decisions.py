@@ -8,16 +8,16 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.core.decision.limits import within_tolerance
-from app.core.decision.step import deviation_of
+from app.core.decision.step import Code, deviation_of
 from app.core.parameters import Parameters
-from app.core.probing import sections_of
+from app.core.probing import Touches, sections_of
 from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.readings import queries as readings
+from app.loop.readings.records import Entry
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import ParametersVersion
-from app.loop.tables.readings import ReadingTouches
 from app.loop.tables.tools import Correction
 
 
@@ -39,7 +39,7 @@ class Decision:
     reading: dict[str, Any]
     correction: Correction | None
     alarms: list[Alarm]
-    touches: list[list[float]] | None
+    touches: list[list[float | None]] | None
 
     @property
     def sequence(self) -> int:
@@ -47,11 +47,12 @@ class Decision:
 
     def sections(self, limits: Parameters) -> list[Section]:
         """The sections of a part accepted by n of m, judged as the reading was: with the empirical value of then."""
-        if not self.touches or limits.accept_m == 1:
+        if not self.believed or limits.accept_m == 1:
             return []
         empirical_value = self.reading["measured"] - limits.target - self.reading["deviation"]
         deviations = [
-            deviation_of(value, limits.target, empirical_value) for value in sections_of(limits, self.point_means)
+            deviation_of(value, limits.target, empirical_value)
+            for value in sections_of(limits, [mean for mean in self.point_means if mean is not None])
         ]
         return [
             Section(limits.target + deviation, deviation, within_tolerance(deviation, limits.limits))
@@ -59,9 +60,18 @@ class Decision:
         ]
 
     @property
-    def point_means(self) -> list[float]:
-        """The mean of the repeats at each point, mm."""
-        return [sum(point) / len(point) for point in self.touches or () if point]
+    def believed(self) -> bool:
+        """Tell if it came as touches and each of them is there and in its window."""
+        return bool(self.touches) and self.reading["reason"]["code"] not in {
+            Code.TOUCH_FAULT,
+            Code.FIRST_MOVE_TRIGGERED,
+        }
+
+    @property
+    def point_means(self) -> list[float | None]:
+        """The mean of the repeats at each point, mm; None where nothing was touched."""
+        there = [[touch for touch in point if touch is not None] for point in self.touches or ()]
+        return [sum(point) / len(point) if point else None for point in there]
 
 
 def decisions(
@@ -71,19 +81,25 @@ def decisions(
     entry = readings.entry_of(session, current.characteristic.key)
     assert entry is not None
     answers = readings.answers(session, entry, readings.latest(session, entry, before, limit))
-    return _complete(session, current, answers)
+    return _complete(session, current, entry, answers)
 
 
 def decision(session: Session, current: CurrentCharacteristic, sequence: int) -> Decision:
     """The decision on one reading. Raises `NotFound`."""
     entry = readings.entry_of(session, current.characteristic.key)
     assert entry is not None
-    (only,) = _complete(session, current, [readings.detail(session, entry, sequence)])
+    (only,) = _complete(session, current, entry, [readings.detail(session, entry, sequence)])
     return only
 
 
-def _complete(session: Session, current: CurrentCharacteristic, answers: Sequence[dict[str, Any]]) -> list[Decision]:
-    machine_id, characteristic_id = current.machine.id, current.characteristic.id
+def _every_point(touches: Touches | None) -> list[list[float | None]] | None:
+    return None if touches is None else [list(point or ()) for point in touches]
+
+
+def _complete(
+    session: Session, current: CurrentCharacteristic, entry: Entry, answers: Sequence[dict[str, Any]]
+) -> list[Decision]:
+    machine_id = current.machine.id
     numbers = [answer["correction"]["number"] for answer in answers if answer["correction"]]
     corrections: dict[int, Correction] = {}
     if numbers:
@@ -96,22 +112,13 @@ def _complete(session: Session, current: CurrentCharacteristic, answers: Sequenc
     if ids:
         alarm_rows = session.scalars(select(Alarm).where(Alarm.machine_id == machine_id, Alarm.id.in_(ids)))
         alarms = {row.id: row for row in alarm_rows}
-    touches: dict[int, list[list[float]]] = {}
-    if answers:
-        rows_of_touches = session.execute(
-            select(ReadingTouches.sequence, ReadingTouches.touches).where(
-                ReadingTouches.machine_id == machine_id,
-                ReadingTouches.characteristic_id == characteristic_id,
-                ReadingTouches.sequence.in_([answer["sequence"] for answer in answers]),
-            )
-        )
-        touches = {sequence: stored for sequence, stored in rows_of_touches}  # noqa: C416 - rows are no pairs to mypy
+    touches = readings.touches_of(session, entry, [answer["sequence"] for answer in answers])
     return [
         Decision(
             answer,
             corrections.get(answer["correction"]["number"]) if answer["correction"] else None,
             [alarms[alarm["id"]] for alarm in answer["alarms"] if alarm["id"] in alarms],
-            touches.get(answer["sequence"]),
+            _every_point(touches.get(answer["sequence"])),
         )
         for answer in answers
     ]

@@ -295,6 +295,7 @@ def _reading(
     )
     newest = statistics.window_of(session, current.characteristic).newest
     key = current.characteristic.key
+    points = [mean for mean in shown_decision.point_means if mean is not None] if shown_decision.believed else []
     around = {"first": max(1, sequence - AROUND), "through": min(newest, sequence + AROUND), "ringed": sequence}
     return page(
         request,
@@ -326,8 +327,8 @@ def _reading(
         typed=typed or {},
         problem=problem,
         errors=by_field(problem) if problem else {},
-        picture=touches_picture(limits, shown_decision.point_means) if shown_decision.touches else None,
-        residuals=residuals_of(limits, shown_decision.point_means) if shown_decision.touches else [],
+        picture=touches_picture(limits, points) if points else None,
+        residuals=residuals_of(limits, points) if points else [],
         sections=shown_decision.sections(limits),
         angle_of=angle_of,
         result_label=result_label,

@@ -326,12 +326,12 @@ def test_what_was_not_stored_comes_again() -> None:
 
 def test_contradictions_and_wrong_units_go_to_the_quarantine() -> None:
     async def work() -> None:
-        link = canned(lines(1), lines(1, measured=41.0), lines(2, characteristic=9), lines(3, status=1))
+        link = canned(lines(1), lines(1, measured=41.0), lines(2, characteristic=9), lines(3, status=3))
         await taken(link)
         for words in (
             "was printed as 40.001 before, and as 41 now",
             "characteristic 9, which machine.lathe-1.characteristics does not name",
-            "did not trigger",
+            "marked the reading",
         ):
             [received] = await taken(link)
             assert received.fault is not None

@@ -114,19 +114,13 @@ def test_a_batch_keeps_results_however_large(checked: Shop, server: Server) -> N
 @pytest.mark.parametrize(
     ("touches", "says"),
     [
-        ([[40.0, None], [40.0, 40.0]], "Point 1, repeat 2: the touch is missing, the probe did not trigger."),
-        ([[40.0, 40.0], None], "Point 2 has 0 touches, 2 are expected (R27): repeat 1 is missing."),
-        ([[40.0, 40.0], []], "Point 2 has 0 touches, 2 are expected (R27): repeat 1 is missing."),
-        ([[40.0, 40.0], [40.0]], "Point 2 has 1 touches, 2 are expected (R27): repeat 2 is missing."),
         ([[40.0, 40.0], [40.0] * 3], "Point 2 has 3 touches, 2 are expected (R27): repeat 3 is one too many."),
-        ([[40.0, 40.0]], "1 points came, 2 are expected: point 2 is missing."),
         ([[40.0, 40.0]] * 3, "3 points came, 2 are expected: point 3 is one too many."),
-        ([[40.0, 40.0], [40.0, 41.0001]], "Point 2, repeat 2: the touch at 41.0001 mm lies more than 1"),
         ([[40.0, "40"], [40.0, 40.0]], "Point 1, repeat 2: This must be a number in mm"),
         ([[40.0, 40.0], 7], "Touches are one list per point"),
     ],
 )
-def test_touches_that_cannot_be_used_are_refused_by_point_and_repeat(
+def test_touches_that_cannot_be_of_this_characteristic_are_refused_by_point_and_repeat(
     checked: Shop, touches: list[Any], says: str
 ) -> None:
     name = f"{checked.characteristic}-v"
@@ -135,6 +129,80 @@ def test_touches_that_cannot_be_used_are_refused_by_point_and_repeat(
     assert says in problem["detail"]
     assert [error["field"] for error in problem["errors"]] == ["touches"]
     assert checked.call("GET", f"/readings?characteristic={name}")["items"] == []
+
+
+@pytest.mark.parametrize(
+    ("touches", "measured", "says"),
+    [
+        (
+            [[40.0, None], [40.002, 40.0]],
+            40.0005,
+            "Point 1, repeat 2: the touch is missing, the probe did not trigger.",
+        ),
+        ([[40.0, 40.0], None], 40.0, "Point 2 has 0 touches, 2 are expected (R27): repeat 1 is missing."),
+        ([[40.0, 40.0], []], 40.0, "Point 2 has 0 touches, 2 are expected (R27): repeat 1 is missing."),
+        ([[40.0, 40.0], [40.0]], 40.0, "Point 2 has 1 touches, 2 are expected (R27): repeat 2 is missing."),
+        ([[40.0, 40.0]], 40.0, "1 points came, 2 are expected: point 2 is missing."),
+        ([], 39.0, "0 points came, 2 are expected: point 1 is missing."),
+        ([None, None], 39.0, "Point 1 has 0 touches"),
+        ([[40.0, 40.0], [40.0, 41.0001]], 40.250025, "Point 2, repeat 2: the touch at 41.0001 mm lies more than 1"),
+    ],
+)
+def test_touches_that_cannot_be_believed_stop_the_machine(
+    checked: Shop, touches: list[Any], measured: float, says: str
+) -> None:
+    """Stored as they are, with the alarm that names point and repeat; what comes after corrects nothing."""
+    name = f"{checked.characteristic}-v"
+    checked.add(name, variant="indexed", index=180, repeats=2, average_memory=0)
+    body: dict[str, Any] = {"characteristic": name, "touches": touches, "key": "k"}
+    answer = checked.call("POST", "/readings", 201, **body)
+    assert (answer["zone"], answer["action"], answer["correction"]) == ("probe_fault", "stop", None)
+    assert (answer["measured"], answer["results"], answer["reason"]["code"]) == (measured, None, "touch_fault")
+    assert says in answer["reason"]["text"]
+    (alarm,) = checked.alarms()
+    assert alarm["kind"] == "probe_fault"
+    assert says in alarm["text"]
+    assert checked.call("POST", "/readings", 200, **body) == answer
+    stored = checked.call("GET", f"/readings/{name}/1")
+    assert (stored["touches"], stored["reason"]) == (touches, answer["reason"])
+    (listed,) = checked.call("GET", f"/readings?characteristic={name}")["items"]
+    assert listed["reason"] == answer["reason"]
+    assert touched(checked, name, [[40.0, 40.0], [40.0, 40.0]])["reason"]["code"] == "paused"
+    statistics = checked.call("GET", f"/characteristics/{name}/statistics")
+    assert (statistics["count"], statistics["probe_faults"]) == (2, 1)
+
+
+def test_the_unattended_line_stops_at_a_bore_that_is_not_there(checked: Shop) -> None:
+    """The table of S1: deeper than the window, no bore at all, one section without a signal, the first move triggered."""
+    bore = {"R42": 25.0, "R40": 0.021, "R41": 0.0, "R33": 0, "R29": 1, "R36": 1.0, "R37": 0.3, "R10": 7, "factor": -1}
+    bore |= {"feature": "inside", "variant": "along", "R23": 3, "R26": -8, "accept": {"n": 2, "m": 3}}
+    for number, sent in enumerate(
+        [
+            {"touches": [[26.0105]] * 3},
+            {"touches": [[26.0106]] * 3},
+            {"touches": [[24.0]] * 3},
+            {"touches": [None, [25.01], [25.01]]},
+            {"touches": []},
+            {"first_move_triggered": True},
+            {"first_move_triggered": True, "measured": 3.0},
+            {"first_move_triggered": True, "touches": [[24.5], None]},
+        ]
+    ):
+        name = f"{checked.characteristic}-bore-{number}"
+        body = {"key": name, "name": "Bore", "machine": checked.machine, "parameters": bore}
+        checked.call("POST", "/characteristics", 201, **body)
+        answer = checked.call("POST", "/readings", 201, characteristic=name, **sent)
+        assert (answer["zone"], answer["action"], answer["correction"]) == ("probe_fault", "stop", None), sent
+    assert [alarm["kind"] for alarm in checked.alarms()].count("probe_fault") == 8
+
+
+def test_a_batch_with_a_missing_touch_is_decided_in_its_order(checked: Shop) -> None:
+    name = f"{checked.characteristic}-v"
+    checked.add(name, average_memory=0)
+    batch = [{"characteristic": name, "touches": [[touch]]} for touch in (40.0, None, 40.0)]
+    answer = checked.admin.post("/api/v1/readings/batch?decisions=true", json=batch)
+    codes = [item["reason"]["code"] for item in answer.json()["items"]]
+    assert codes == ["within_zero_range", "touch_fault", "paused"]
 
 
 def test_points_that_do_not_fit_the_sections_are_refused(checked: Shop) -> None:

@@ -159,7 +159,9 @@ class _Judge:
         measured, results = float(reading.measured or 0.0), None
         if reading.touches is not None:
             try:
-                measured, points = measured_value(parameters, reading.touches)
+                measured, points, fault = measured_value(parameters, reading.touches)
+                if fault is not None:
+                    raise fault
                 results = results_of(parameters, reading.touches, points, self.empirical_value)
             except TouchError as error:
                 return Flaw(line.number, "touches", "", touch_problem(error))

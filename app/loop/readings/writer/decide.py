@@ -12,7 +12,7 @@ from app.core.decision.decide import Decision, LoopState, ReadingAlarm, decide, 
 from app.core.decision.step import DECIMALS, Action, Code, deviation_of
 from app.core.parameters import Parameters
 from app.core.plausibility import is_jump, moved, uncorrected
-from app.core.probing import TouchError, measured_value
+from app.core.probing import Measured, TouchError, measured_value, unmeasured
 from app.core.variants import Results, results_of
 from app.errors import Conflict, FieldError, InbandError, Invalid
 from app.language.i18n import _
@@ -53,7 +53,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     parameters = stream.parameters
     if reading.key is not None and (first := _first_with_key(pending, entry, reading.key, reading)):
         return first
-    measured, points = _measured(parameters, reading)
+    measured, points, fault = _measured(parameters, reading)
     tool = stream.tool
     in_effect = reading.correction_in_effect
     if in_effect is not None and in_effect > pending.last_number(entry.machine_id):
@@ -90,9 +90,9 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         previous_tool=previous_tool,
         accepted=results is None or not results.rejected,
         jump=jump,
-        first_move_triggered=reading.first_move_triggered,
+        fault=Code.FIRST_MOVE_TRIGGERED if reading.first_move_triggered else Code.TOUCH_FAULT if fault else None,
     )
-    alarms = [_signal(pending, stream, signal, sequence, decision, results) for signal in decision.alarms]
+    alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
     correction = None
     if decision.amount is not None and tool is not None:
         correction = _issue(pending, stream, tool, sequence, decision)
@@ -135,27 +135,29 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     return verdict
 
 
-def _measured(parameters: Parameters, reading: ReadingIn) -> tuple[float, tuple[float, ...]]:
-    """Return the value, and the mean at each probed point if it came as points."""
+def _measured(parameters: Parameters, reading: ReadingIn) -> Measured:
+    """Return the value, with the mean at each probed point if it came as points that can be believed."""
     if reading.touches is None:
-        if parameters.accept_m > 1:
+        if reading.first_move_triggered and reading.measured is None:
+            return Measured(unmeasured(parameters, first_move=True), ())
+        if parameters.accept_m > 1 and not reading.first_move_triggered:
             raise Invalid(
                 _("This characteristic is accepted by %(n)s of %(m)s sections, so it needs touches.")
                 % {"n": parameters.accept_n, "m": parameters.accept_m},
                 _("Send touches with one list per section in place of measured."),
                 errors=[FieldError("touches", _("Send one list of touches per section."))],
             )
-        return float(reading.measured or 0.0), ()
+        return Measured(float(reading.measured or 0.0), ())
     try:
         value = measured_value(parameters, reading.touches)
     except TouchError as error:
         message = touch_problem(error)
         raise Invalid(
             message,
-            _("Nothing was stored. Measure again, or correct points, repeats or path factor of the characteristic."),
+            _("Nothing was stored. Correct points or repeats of the characteristic, or what the program sends."),
             errors=[FieldError("touches", message)],
         ) from None
-    return value.value, value.points
+    return Measured(value.value, ()) if reading.first_move_triggered else value
 
 
 def _first_with_key(pending: PendingWrites, entry: Entry, key: str, reading: ReadingIn) -> Verdict | Stored | None:
@@ -169,7 +171,7 @@ def _first_with_key(pending: PendingWrites, entry: Entry, key: str, reading: Rea
     if first is None:
         return None
     sequence, value = first.sequence, first.measured
-    measured, _sections = _measured(first.parameters, reading)
+    measured = _measured(first.parameters, reading).value
     if round(value - measured, DECIMALS) != 0:
         raise Conflict(
             _(
@@ -236,6 +238,7 @@ def _signal(
     sequence: int,
     decision: Decision,
     results: Results | None,
+    fault: TouchError | None,
 ) -> PendingAlarm:
     """Raise the alarm, or add to the one that is active for the same trouble."""
     entry, parameters = stream.entry, stream.parameters
@@ -266,6 +269,8 @@ def _signal(
     }
     if decision.code is Code.FIRST_MOVE_TRIGGERED:
         active.data |= {"first_move_triggered": True, "feature": parameters.feature.value}
+    elif fault is not None:
+        active.data["touch"] = fault.as_dict()
     if signal is ReadingAlarm.ACCEPTANCE and results is not None:
         active.data |= {
             "m": parameters.accept_m,
