@@ -127,7 +127,7 @@ class TestSetUp:
             ({"R24": 1}, "not_on_lathe", "variant"),
             ({"factor": 0.5}, "factor_on_lathe", "factor"),
             ({"R27": 11}, "source_range", "repeats"),
-            ({"R36": 1.000001}, "out_of_reach", "confidence_limit"),
+            ({"confidence_limit": 1.000001}, "out_of_reach", "confidence_limit"),
         ],
     )
     def test_what_the_cycles_would_not_take_is_warned_of(

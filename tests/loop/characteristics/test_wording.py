@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from app.core import parameters
+from app.core import parameters, unusual
 from app.core.parameters import FIELDS, ParameterError, Problem, read
 from app.loop.characteristics import wording
 
-CODES = set(re.findall(r'Problem\(\s*[\w.\[\]"]+,\s*"(\w+)"', Path(parameters.__file__).read_text(encoding="utf-8")))
+SOURCES = "\n".join(Path(module.__file__).read_text(encoding="utf-8") for module in (parameters, unusual))
+CODES = set(re.findall(r'Problem\(\s*[\w.\[\]"]+,\s*"(\w+)"', SOURCES))
 
 
 def test_the_codes_were_found() -> None:
@@ -17,7 +18,7 @@ def test_the_codes_were_found() -> None:
     assert len(CODES) >= 14
 
 
-@pytest.mark.parametrize("code", sorted(CODES - {"order", "range", "source_range", "target_twice"}))
+@pytest.mark.parametrize("code", sorted(CODES - {"order", "range", "source_range", "target_twice", "out_of_reach"}))
 def test_every_code_has_words(code: str) -> None:
     sentence = wording.sentence(Problem("zero_range", code, {"choices": ("a", "b"), "other": "R33", "value": 1.5}))
     assert sentence != code
