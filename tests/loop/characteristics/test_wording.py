@@ -9,7 +9,7 @@ from app.core import parameters, unusual
 from app.core.parameters import FIELDS, ParameterError, Problem, read
 from app.loop.characteristics import wording
 
-SOURCES = "\n".join(Path(module.__file__).read_text(encoding="utf-8") for module in (parameters, unusual))
+SOURCES = "\n".join(Path(str(module.__file__)).read_text(encoding="utf-8") for module in (parameters, unusual))
 CODES = set(re.findall(r'Problem\(\s*[\w.\[\]"]+,\s*"(\w+)"', SOURCES))
 
 

@@ -52,7 +52,7 @@ def test_the_position_may_be_left_out_or_be_touches(shop: Shop) -> None:
     """A program comes to this line once a year: no refusal may keep it from being heard."""
     answer = shop.call("POST", "/readings", 201, characteristic=shop.characteristic, first_move_triggered=True)
     assert (answer["action"], answer["measured"]) == ("stop", 41.0), "outside, the move begins a = 1 mm off the part"
-    touched = {"first_move_triggered": True, "touches": [[40.5]]}
+    touched: dict[str, Any] = {"first_move_triggered": True, "touches": [[40.5]]}
     answer = shop.call("POST", "/readings", 201, characteristic=shop.characteristic, **touched)
     assert (answer["action"], answer["measured"], answer["reason"]["code"]) == ("stop", 40.5, "first_move_triggered")
 

@@ -174,22 +174,31 @@ def test_touches_that_cannot_be_believed_stop_the_machine(
 
 def test_the_unattended_line_stops_at_a_bore_that_is_not_there(checked: Shop) -> None:
     """The table of S1: deeper than the window, no bore at all, one section without a signal, the first move triggered."""
-    bore = {"R42": 25.0, "R40": 0.021, "R41": 0.0, "R33": 0, "R29": 1, "R36": 1.0, "R37": 0.3, "R10": 7, "factor": -1}
+    bore: dict[str, Any] = {
+        "R42": 25.0,
+        "R40": 0.021,
+        "R41": 0.0,
+        "R33": 0,
+        "R29": 1,
+        "R36": 1.0,
+        "R37": 0.3,
+        "R10": 7,
+        "factor": -1,
+    }
     bore |= {"feature": "inside", "variant": "along", "R23": 3, "R26": -8, "accept": {"n": 2, "m": 3}}
-    for number, sent in enumerate(
-        [
-            {"touches": [[26.0105]] * 3},
-            {"touches": [[26.0106]] * 3},
-            {"touches": [[24.0]] * 3},
-            {"touches": [None, [25.01], [25.01]]},
-            {"touches": []},
-            {"first_move_triggered": True},
-            {"first_move_triggered": True, "measured": 3.0},
-            {"first_move_triggered": True, "touches": [[24.5], None]},
-        ]
-    ):
+    sent_by_turns: list[dict[str, Any]] = [
+        {"touches": [[26.0105]] * 3},
+        {"touches": [[26.0106]] * 3},
+        {"touches": [[24.0]] * 3},
+        {"touches": [None, [25.01], [25.01]]},
+        {"touches": []},
+        {"first_move_triggered": True},
+        {"first_move_triggered": True, "measured": 3.0},
+        {"first_move_triggered": True, "touches": [[24.5], None]},
+    ]
+    for number, sent in enumerate(sent_by_turns):
         name = f"{checked.characteristic}-bore-{number}"
-        body = {"key": name, "name": "Bore", "machine": checked.machine, "parameters": bore}
+        body: dict[str, Any] = {"key": name, "name": "Bore", "machine": checked.machine, "parameters": bore}
         checked.call("POST", "/characteristics", 201, **body)
         answer = checked.call("POST", "/readings", 201, characteristic=name, **sent)
         assert (answer["zone"], answer["action"], answer["correction"]) == ("probe_fault", "stop", None), sent

@@ -89,6 +89,13 @@ class TestWithoutScripts:
         assert "The part was cut before correction" in text
         assert "Decided on" in text
 
+    def test_touches_that_are_missing(self, shop: Shop, viewer: Person) -> None:
+        key = shop.another("bore", variant="indexed", repeats=2, index=180, average_memory=0)
+        for touches, words in (([[None, 40.001], []], "none"), ([], "The probe touched nothing.")):
+            sequence = shop.call("POST", "/readings", 201, characteristic=key, touches=touches)["sequence"]
+            assert words in viewer.open(f"/characteristics/{key}/readings/{sequence}")
+        assert "is missing" in viewer.open(f"/characteristics/{key}")
+
     def test_touches_and_parameters_of_the_time(self, shop: Shop, viewer: Person) -> None:
         shop.call("PATCH", path(shop), parameters={"repeats": 2, "variant": "round", "points": 2}, reason="two points")
         touches = [[40.001, 40.003], [39.999, 40.001]]
