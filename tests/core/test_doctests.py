@@ -11,7 +11,10 @@ import app.core
 MODULES = sorted(module.name for module in pkgutil.walk_packages(app.core.__path__, "app.core."))
 
 
-@pytest.mark.parametrize("name", ["app.core", *MODULES, "app.language.numbers", "app.web.paging"])
+@pytest.mark.parametrize(
+    "name",
+    ["app.core", *MODULES, "app.db.binaries", "app.language.numbers", "app.views.licences.libraries", "app.web.paging"],
+)
 def test_examples_answer_as_printed(name: str) -> None:
     failed, _tried = doctest.testmod(importlib.import_module(name))
     assert failed == 0

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from datetime import date
 from pathlib import Path
 
 import psycopg
@@ -442,6 +443,18 @@ class TestPrograms:
         monkeypatch.setenv("INBAND_POSTGRES_BIN", str(folder))
         with pytest.raises(BinariesError, match="does not hold postgres, initdb"):
             binary("pg_dump")
+
+    def test_how_old_a_release_is_and_how_a_newer_one_comes(self) -> None:
+        today = date(2026, 11, 26)
+        old = binaries.age((18, 4), embedded=True, today=today) or ""
+        assert "196 days old, of 2026-05-14" in old
+        assert "2 minor release(s) were planned, the last for 2026-11-12" in old
+        assert "INBAND_POSTGRES_BIN" in old
+        assert "INBAND_POSTGRES_BIN" not in (binaries.age((18, 4), embedded=False, today=today) or "")
+        assert binaries.planned_since(date(2026, 5, 14), today) == [date(2026, 8, 13), date(2026, 11, 12)]
+        assert binaries.age((18, 4), embedded=True, today=date(2026, 8, 12)) is None, "none was planned since"
+        newer = (18, len(binaries.RELEASED))
+        assert binaries.age(newer, embedded=True, today=today) is None, "it may be of yesterday"
 
     def test_releases_that_are_not_supported_are_told(self) -> None:
         assert "older than Inband supports" in (binaries.advice((15, 18), embedded=False) or "")
