@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 LONGEST_FUNCTION = 89  # lines, from `def` to the end, docstring included
-LONGEST_FILE = 533
+LONGEST_FILE = 519
 QUESTIONS = {"What", "Whether", "How", "Which", "Who", "Whose", "Where", "When", "Why"}
 WIDEST_TEMPLATE = 160  # columns
 APP = Path(__file__).resolve().parents[1] / "app"

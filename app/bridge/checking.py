@@ -1,16 +1,20 @@
-"""The check of a configuration against the server and the controls: nothing is changed anywhere."""
+"""The check of a configuration against the server and the controls: what it writes is there already, or goes again."""
 
 import asyncio
+import contextlib
 import logging
-from collections.abc import AsyncIterator
+import os
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 from app.bridge.configuration import Configuration, Machine
 from app.bridge.kinds.mtconnect import AgentError, Context
-from app.bridge.links import LinkError, Position, look_who_answers, silence
+from app.bridge.links import Link, LinkError, Position, look_who_answers, silence
 from app.bridge.moments import wrong_date
 from app.bridge.program import link_of
 from app.bridge.server_side import TRUST
+from app.bridge.store_lock import StoreError, alone_with, lock_of
 from inband_client import AsyncClient, Forbidden, NotFound, ProblemError, Unauthorized, Unavailable, Untrusted
 
 log = logging.getLogger(__name__)
@@ -30,12 +34,42 @@ class Finding(NamedTuple):
 
 async def check(configuration: Configuration) -> list[Finding]:
     """The server's answer to each key, and each control's; machines are asked at the same time."""
-    found = await asyncio.gather(*(_of_machine(configuration, machine) for machine in configuration.machines))
-    return [finding for findings in found for finding in findings]
+    with _as_the_only_one(configuration) as alone:
+        found = await asyncio.gather(
+            *(_of_machine(configuration, machine, alone=alone) for machine in configuration.machines)
+        )
+    return [_store(configuration)] + [finding for findings in found for finding in findings]
 
 
-async def _of_machine(configuration: Configuration, machine: Machine) -> list[Finding]:
-    parts = {"server": _server(configuration, machine), "control": _control(machine), "agent": _context(machine)}
+@contextlib.contextmanager
+def _as_the_only_one(configuration: Configuration) -> Iterator[bool]:
+    """Keep a bridge from starting meanwhile; false where one runs already."""
+    file = Path(configuration.store.file)
+    with contextlib.ExitStack() as stack:
+        try:
+            if lock_of(file).exists():  # made by the bridge, with its rights: by nobody else
+                stack.enter_context(alone_with(file))
+        except StoreError:
+            yield False
+        else:
+            yield True
+
+
+def _store(configuration: Configuration) -> Finding:
+    file = Path(configuration.store.file)
+    places = [file, file.parent] if file.exists() else [next(each for each in file.parents if each.exists())]
+    if refused := [str(each) for each in places if not os.access(each, os.W_OK)]:
+        words = f"this user may not write {refused[0]}; the bridge keeps readings there: give it the right, or name another file"
+        return Finding(f"store {file}", words, False)
+    return Finding(f"store {file}", "this user may write it; the bridge has to run as the same", True)
+
+
+async def _of_machine(configuration: Configuration, machine: Machine, *, alone: bool) -> list[Finding]:
+    parts = {
+        "server": _server(configuration, machine),
+        "control": _control(machine, alone=alone),
+        "agent": _context(machine),
+    }
     return [finding for name, part in parts.items() for finding in await _all_of(part, machine, name)]
 
 
@@ -88,7 +122,7 @@ async def _server(configuration: Configuration, machine: Machine) -> AsyncIterat
             yield Finding(machine.key, f"the server {url}: {error}", False)
 
 
-async def _control(machine: Machine) -> AsyncIterator[Finding]:
+async def _control(machine: Machine, *, alone: bool) -> AsyncIterator[Finding]:
     link = link_of(machine)
     try:
         async with asyncio.timeout(machine.patience):
@@ -108,14 +142,33 @@ async def _control(machine: Machine) -> AsyncIterator[Finding]:
                 yield Finding(machine.key, words, False)
             if remark := getattr(link, "remark", ""):
                 yield Finding(machine.key, remark, False)
+        async with asyncio.timeout(machine.patience):
             for memory, offset in (await link.offsets()).items():
                 yield Finding(machine.key, f"tool memory {memory} holds {offset:.4f} mm", True)
+        async for finding in _tried(machine, link, alone=alone):
+            yield finding
     except TimeoutError:
         yield Finding(machine.key, silence(machine.patience), False)
     except LinkError as error:
         yield Finding(machine.key, str(error), False)
     finally:
         await link.close()
+
+
+async def _tried(machine: Machine, link: Link, *, alone: bool) -> AsyncIterator[Finding]:
+    """The result of doing what the bridge will do, where a kind can do it without a change."""
+    try_out: Callable[[], Awaitable[list[str]]] | None = getattr(link, "try_out", None)
+    if try_out is None:
+        return
+    if not alone:
+        yield Finding(machine.key, "a bridge runs with this store, so nothing was tried out that writes", True)
+        return
+    async with asyncio.timeout(machine.patience):
+        wrong = await try_out()
+    for words in wrong:
+        yield Finding(machine.key, words, False)
+    if not wrong:
+        yield Finding(machine.key, "what the bridge will write there can be written", True)
 
 
 async def _context(machine: Machine) -> AsyncIterator[Finding]:

@@ -3,25 +3,73 @@
 import asyncio
 import logging
 import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
 
 from app.bridge import guided_test
-from app.bridge.links import LinkError, look_who_answers, silence
+from app.bridge.links import LinkError, Misconfigured, look_who_answers, silence
 from app.bridge.moments import wrong_date
-from app.bridge.store import StoreError
+from app.bridge.store_lock import StoreError
 from app.bridge.unit import Unit
 
 log = logging.getLogger(__name__)
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 15.0  # s between attempts to connect
 FULL_EVERY = 5.0  # s
+AGAIN = 15.0  # s between attempts at what stands beside the readings, at most
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """Something beside the readings that has failed. of: what was to be done. until: when it is tried again. pause: s."""
+
+    error: Exception
+    of: object
+    until: float
+    pause: float
+
+
+class Beside:
+    """Work beside the readings, an offer or a look at the offsets: it may fail, and readings go on."""
+
+    def __init__(self, unit: Unit) -> None:
+        self.unit = unit
+        self.failed: dict[str, Failed] = {}
+
+    async def do(self, name: str, of: object, work: Callable[[], Awaitable[T]]) -> T | None:
+        """Do it, unless it has just failed. Raises what may have left the connection behind in disorder."""
+        before = self.failed.get(name)
+        if before is not None and before.of == of and time.monotonic() < before.until:
+            return None
+        try:
+            async with asyncio.timeout(self.unit.machine.patience):
+                found = await work()
+        except Exception as error:
+            pause = 0.0 if before is None else min(max(2 * before.pause, FIRST_PAUSE), AGAIN)
+            self.failed[name] = Failed(error, of, time.monotonic() + pause, pause)
+            if not isinstance(error, Misconfigured):
+                self.unit.polls += 1  # readings have come: the next attempt to connect need not wait
+                raise
+            return None
+        self.failed.pop(name, None)
+        return found
+
+    def words(self) -> tuple[str, str]:
+        """The state and the sentences of what fails time and again; empty if nothing does."""
+        said = [each.error for each in self.failed.values() if each.pause or isinstance(each.error, Misconfigured)]
+        words = [str(error) or silence(self.unit.machine.patience) for error in said]
+        return ("configuration" if said else ""), " ".join(f"{each} Readings go on." for each in words)
 
 
 async def run(unit: Unit) -> None:
     """Work with the control until cancelled; whatever fails is said, and tried again."""
-    pause = FIRST_PAUSE
+    pause, beside = FIRST_PAUSE, Beside(unit)
     while True:
         began = unit.polls
         try:
-            await _connected(unit)
+            await _connected(unit, beside)
         except (LinkError, StoreError) as error:
             unit.say(error.state if isinstance(error, LinkError) else "full", str(error))
         except TimeoutError:
@@ -50,7 +98,7 @@ async def _closed(unit: Unit) -> None:
         log.exception("%s: closing the connection", unit.machine.key)
 
 
-async def _connected(unit: Unit) -> None:
+async def _connected(unit: Unit, beside: Beside) -> None:
     machine, link, store = unit.machine, unit.link, unit.store
     await guided_test.resume(unit)
     async with asyncio.timeout(machine.patience):
@@ -98,20 +146,21 @@ async def _connected(unit: Unit) -> None:
                 # nor another order for this location, however long the server is away: it begins at the offset of before
                 unit.taken.add(memory or 0)
                 unit.orders = tuple(each for each in unit.orders if each.tool_memory != memory)
-            await link.offer(unit.offered)
+        offered = tuple(unit.offered)
+        await beside.do("offer", offered, partial(link.offer, offered))
         if time.monotonic() >= offsets_at:
-            async with asyncio.timeout(machine.patience):
-                offsets = await link.offsets()
-                if unit.test is not None and unit.test.changed:
-                    offsets.pop(unit.test.tool_memory, None)  # nobody's edit
-                if offsets:
-                    await store.held(machine.key, offsets)
+            offsets = await beside.do("offsets", None, link.offsets) or {}
+            if unit.test is not None and unit.test.changed:
+                offsets.pop(unit.test.tool_memory, None)  # nobody's edit
+            if offsets:
+                await store.held(machine.key, offsets)
             offsets_at = time.monotonic() + machine.offsets_every
         unit.polls += 1
         remark = getattr(link, "remark", "")  # of kinds that see gaps in what a control prints
         waits = unit.test.waits if unit.test is not None else ""
+        state, failed = beside.words()
         unit.say(
-            "held" if unit.held else "online",
-            " ".join(filter(None, (waits, remark, wrong_date(link.clock)))),
+            state or ("held" if unit.held else "online"),
+            " ".join(filter(None, (failed, waits, remark, wrong_date(link.clock)))),
         )
         await asyncio.sleep(_until_next(machine.interval))

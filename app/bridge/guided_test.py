@@ -18,7 +18,7 @@ import msgspec
 from app.bridge import offset_change
 from app.bridge.links import LinkError, Misconfigured, NotNow
 from app.bridge.offset_change import FACT, Change
-from app.bridge.store import StoreError
+from app.bridge.store_lock import StoreError
 from app.bridge.unit import Guided, Unit
 from inband_client import AsyncClient, Conflict, Invalid, NotFound, ProblemError
 

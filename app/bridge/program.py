@@ -12,7 +12,8 @@ from app.bridge.configuration import Configuration, Machine
 from app.bridge.kinds import kind_named
 from app.bridge.kinds.mtconnect import Context
 from app.bridge.links import Link
-from app.bridge.store import Store, StoreError
+from app.bridge.store import Store
+from app.bridge.store_lock import StoreError
 from app.bridge.unit import Unit, ended
 from app.bridge.wire import Wire
 from inband_client import AsyncClient

@@ -54,6 +54,7 @@ WATCHED_WITH_MAIL = (Register.ANSWERED, Register.ANSWER)
 HEADS_EVERY = 10.0  # s: all heads are read again at the latest
 UNREADABLE_AFTER = 5.0  # s: no NC program writes that long at a slot which it has counted
 SLOTS_AT_ONCE = 4  # where registers are read one by one, so that a call does not take too long
+MAILBOX = tuple(place for place, _ in mail_registers(Mail(0, 0, 0, 0, 0.0, 0.0)))
 UNITS = {"mm": Unit.MM, "inch": Unit.INCH}
 HALF_A_STEP = 0.5 / max(STEPS.values())
 FRESH = 2.0  # polls: a reading that was not there so long ago was measured just now
@@ -286,6 +287,21 @@ class RegisterLink:
             return
         await self._write_all(content[:-1])
         await self._write_all(content[-1:])  # the number last, when all else is read back
+
+    async def try_out(self) -> list[str]:
+        """Write what the bridge writes, with what is there: the mailbox, the acknowledgement, the last correction that is applied."""
+        if self._block is None:
+            return []
+        places = [Register.ACK]
+        if self.machine.corrections == "control":
+            places = [*MAILBOX, Register.ACK]
+        if self.machine.corrections == "direct":
+            places.append(Register.APPLIED)
+        try:
+            await self._write_all([(place, self._numbers[place]) for place in places])
+        except LinkError as error:
+            return [f"The bridge could not write what it has to write: {error}"]
+        return []
 
     def _mail(self, order: Order) -> Mail:
         location = location_of(self.machine, order.tool_memory)

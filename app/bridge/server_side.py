@@ -14,7 +14,7 @@ from app.bridge import guided_test, offering
 from app.bridge.configuration import Server
 from app.bridge.offering import MOST_REASON, REFUSED, line, not_from_inband
 from app.bridge.offset_change import writes_offsets
-from app.bridge.store import StoreError
+from app.bridge.store_lock import StoreError
 from app.bridge.store_tables import Waiting
 from app.bridge.unit import Unit
 from inband_client import (

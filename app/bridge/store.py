@@ -12,15 +12,16 @@ import queue
 import sqlite3
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import closing, contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 from app.bridge.guards import Known
 from app.bridge.links import Order, Outcome, Position, Received
+from app.bridge.store_lock import alone_with, in_words
 from app.bridge.store_tables import LATER_COLUMNS, SCHEMA, Counts, Intent, Quarantined, Waiting, in_effect
 
 T = TypeVar("T")
@@ -41,10 +42,6 @@ NUMBER: Final = "number"
 EMPTY: Final[Mapping[str, str]] = MappingProxyType({})
 MOST_REASON: Final = 500  # characters
 ANSWERS_KEPT: Final = 90 * 86_400.0  # s
-
-
-class StoreError(Exception):
-    """The store cannot be written: disk full, no rights, damaged. Nothing was acknowledged to a control."""
 
 
 class Store:
@@ -68,7 +65,7 @@ class Store:
                 with suppress(sqlite3.OperationalError):  # it is there
                     self._database.execute(f"ALTER TABLE {table} ADD COLUMN {column} {kind}")
         except (OSError, sqlite3.Error) as error:
-            raise _in_words(error, file, "opened") from error
+            raise in_words(error, file, "opened") from error
         self._thread = threading.Thread(target=self._work, name="store", daemon=True)
         self._thread.start()
 
@@ -78,21 +75,9 @@ class Store:
         self._thread.join()
         self._database.close()
 
-    @contextmanager
-    def alone(self) -> Iterator[None]:
-        """Keep every other program from the controls while it lasts; a killed one keeps nobody. Raises `StoreError`."""
-        file = self.file.with_name(f"{self.file.name}.running")
-        with closing(sqlite3.connect(file, isolation_level=None, check_same_thread=False, timeout=0)) as lock:
-            try:
-                lock.execute("BEGIN EXCLUSIVE")
-            except sqlite3.OperationalError as error:
-                if "locked" not in str(error):
-                    raise _in_words(error, file, "opened") from error
-                raise StoreError(
-                    f"Another program works with the controls of {self.file}: a bridge, or a touch test. End it first (as a"
-                    " service: systemctl stop); one store has one bridge."
-                ) from error
-            yield
+    def alone(self) -> AbstractContextManager[None]:
+        """Keep every other program from the controls while it lasts, as `alone_with`."""
+        return alone_with(self.file)
 
     # --- readings
 
@@ -463,7 +448,7 @@ class Store:
             results = self._transaction([job for job, _ in jobs])
         except Exception as error:  # noqa: BLE001 - handed to whoever waits for it
             if len(jobs) == 1:
-                _settle(jobs[0][1], error=_in_words(error, self.file))
+                _settle(jobs[0][1], error=in_words(error, self.file))
                 return
             for job in jobs:
                 self._together([job])
@@ -511,17 +496,3 @@ def _settle(done: "Future[Any]", result: Any = None, error: BaseException | None
         done.set_result(result)
     else:
         done.set_exception(error)
-
-
-def _in_words(error: BaseException, file: Path, verb: str = "written") -> BaseException:
-    if not isinstance(error, sqlite3.Error | OSError):
-        return error
-    words = str(error)
-    if "full" in words:
-        return StoreError(f"The disk of {file} is full: free space. Nothing is fetched from the controls until then.")
-    what = "Its folder has to be there, and the bridge needs the right to write in it."
-    if "not a database" in words or "malformed" in words:
-        what = "It is damaged, or another program's: move it away, or name another file in [store]."
-    return StoreError(
-        f"The store {file} cannot be {verb}: {words}. {what} Nothing is fetched from the controls until then."
-    )

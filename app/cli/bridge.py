@@ -45,7 +45,7 @@ def _with_store(
 ) -> None:
     """Do something with the configuration and its store. alone: no other program may work with the controls meanwhile."""
     from app.bridge.program import store_of
-    from app.bridge.store import StoreError
+    from app.bridge.store_lock import StoreError
 
     configuration = _configuration(file)
     try:
@@ -82,7 +82,10 @@ def run_bridge(context: typer.Context, config: ConfigFile = PLANT) -> None:
 
 @bridge.command("check")
 def check_bridge(config: ConfigFile = PLANT) -> None:
-    """Say what is wrong with the configuration, and what the server and each machine answer. Nothing is changed."""
+    """Say what is wrong with the configuration, and what the server and each machine answer.
+
+    Where a bridge writes, the check writes too: what is there already, or a file that it takes away again. Nothing is changed.
+    """
     from app.bridge.checking import check
 
     findings = asyncio.run(check(_configuration(config)))

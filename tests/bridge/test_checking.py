@@ -1,5 +1,6 @@
 """The check of a configuration: what would go to the quarantine, and who does not answer."""
 
+import os
 import socket
 import termios
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from app.bridge.checking import check
 from app.bridge.configuration import configuration_from
 from app.bridge.kinds.dprnt import PrintedLink
+from app.bridge.store import Store
 from app.core.printed_line import Printed, line_of
 from app.core.ring import Slot, Unit
 from tests.loops import run
@@ -85,3 +87,31 @@ def test_an_error_of_one_machine_does_not_end_the_check_of_others(
     said = [str(each) for each in run(check(configuration_from(content, tmp_path)))]
     assert [each for each in said if each.startswith("✗ lathe-1: the check of the control ended with an error")]
     assert "✓ cmm-1: 0 readings can be fetched now" in said
+
+
+def test_the_rights_of_a_folder_are_tried_out_and_nothing_is_left(tmp_path: Path) -> None:
+    folder = tmp_path / "watched"
+    folder.mkdir()
+    machine = table("folder", path=str(folder), format="csv")
+    assert "✓ lathe-1: what the bridge will write there can be written" in findings(tmp_path, machine)
+    assert list(folder.iterdir()) == []
+    (folder / "failed").write_text("a file where the folder should be")
+    said = findings(tmp_path, machine)
+    assert [each for each in said if each.startswith(f"✗ lathe-1: A file cannot be written and moved in {folder}")]
+    assert [path.name for path in folder.iterdir()] == ["failed"]
+
+
+def test_nothing_is_tried_out_beside_a_bridge_that_runs(tmp_path: Path) -> None:
+    folder = tmp_path / "watched"
+    folder.mkdir()
+    store = Store(tmp_path / "inband-bridge.sqlite3")
+    with store.alone():
+        said = findings(tmp_path, table("folder", path=str(folder), format="csv"))
+    store.close()
+    assert "✓ lathe-1: a bridge runs with this store, so nothing was tried out that writes" in said
+
+
+def test_a_store_that_this_user_may_not_write_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    said = findings(tmp_path, table("dprnt", listen=9))
+    assert said[0].startswith(f"✗ store {tmp_path / 'inband-bridge.sqlite3'}: this user may not write {tmp_path};")

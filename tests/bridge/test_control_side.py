@@ -9,11 +9,13 @@ from typing import Any
 import pytest
 
 from app.bridge import control_side
-from app.bridge.links import Order, Outcome, Position
+from app.bridge.configuration import Location
+from app.bridge.links import ControlAway, LinkError, Misconfigured, Order, Outcome, Position
+from app.bridge.registers import RegisterLink
 from app.bridge.simulators.model import Feature, Model
 from app.bridge.unit import Unit
 from app.core.ring import Register
-from tests.bridge.plant import ModelRegisters, controlled, store_in, unit_of, until
+from tests.bridge.plant import ModelRegisters, controlled, parts, store_in, unit_of, until
 from tests.loops import run
 
 M = "lathe-1"
@@ -118,5 +120,70 @@ def test_an_answer_counts_that_the_bridge_sees_before_it_knows_the_correction(tm
             unit.orders = (order,)
             await until(answered, "the answer counts")
         unit.store.close()
+
+    run(story())
+
+
+class Refusing(ModelRegisters):
+    """Registers of a control that does not know its mailbox, or an offset. error: what it says."""
+
+    def __init__(self, model: Model, error: LinkError | None, *, offsets: bool = False) -> None:
+        super().__init__(model)
+        self.error, self.offsets = error, offsets
+
+    async def write(self, place: int, value: float) -> None:
+        if self.error is not None and place == Register.MAIL_TOOL:
+            raise self.error
+        await super().write(place, value)
+
+    async def read_offset(self, location: Location) -> float | None:
+        if self.offsets:
+            raise Misconfigured("The control has no such tool.")
+        return await super().read_offset(location)
+
+
+@pytest.mark.parametrize("error", [Misconfigured("It does not know the mailbox."), ControlAway("The mailbox is lost.")])
+def test_an_offer_that_fails_holds_up_no_reading(tmp_path: Path, error: LinkError) -> None:
+    model = Model((Feature(bias=0.0, wear=0.0, noise=0.0),))
+
+    async def story() -> None:
+        await parts(model, 1)
+        registers = Refusing(model, error, offsets=True)
+        unit = unit_of(model, store_in(tmp_path), registers)
+        order = Order(1, 3, 0.0, -0.01)
+        await unit.store.intend(M, order, "hash")
+        unit.orders = (order,)
+        async with controlled(unit):
+            await until(lambda: f"{error} Readings go on." in unit.detail, "the offer has failed")
+            await until(lambda: "The control has no such tool. Readings go on." in unit.detail, "the offsets too")
+            assert unit.state == "configuration"
+            await parts(model, 12)  # more than the ring holds
+            await until(lambda: model.registers[Register.ACK] == 13, "all readings")
+            registers.error = None
+            await until(lambda: model.registers[Register.MAIL_NUMBER] == 1, "the offer once it can be written")
+            registers.offsets = False
+            await until(lambda: unit.state == "online", "the offsets too")
+        unit.store.close()
+
+    run(story())
+
+
+def test_what_the_bridge_writes_is_tried_out_with_what_is_there(tmp_path: Path) -> None:
+    async def story() -> None:
+        model = Model((Feature(bias=0.0, wear=0.0, noise=0.0),))
+        await parts(model, 1)
+        registers = Refusing(model, None)
+        link = unit_of(model, store_in(tmp_path), registers).link
+        assert isinstance(link, RegisterLink)
+        before = list(model.registers)
+        await link.connect()
+        await link.fetch(Position())
+        assert await link.try_out() == []
+        assert {place for place, _ in registers.writes} >= {Register.MAIL_NUMBER, Register.MAIL_CHECK, Register.ACK}
+        assert model.registers == before
+        registers.error = Misconfigured("It does not know the mailbox.")
+        assert await link.try_out() == [
+            "The bridge could not write what it has to write: It does not know the mailbox."
+        ]
 
     run(story())

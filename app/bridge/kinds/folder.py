@@ -7,6 +7,7 @@ the bridge read what only the bridge may.
 """
 
 import asyncio
+import contextlib
 import hashlib
 import logging
 import os
@@ -137,6 +138,10 @@ class Folder:
         """None."""
         return {}
 
+    async def try_out(self) -> list[str]:
+        """Make, move and delete a file as the bridge will do with those of the machine."""
+        return await self._in_thread(self._try_out)
+
     async def _in_thread(self, work: Callable[[], T]) -> T:
         """Do something that a share may hold up, one at a time."""
         if self._work is not None and not self._work.done():
@@ -153,6 +158,36 @@ class Folder:
             raise ControlAway(f"The folder {self.path} does not answer: {error}.") from error
 
     # --- in the thread
+
+    def _try_out(self) -> list[str]:
+        probe = self.path / f".inband-check-{os.getpid()}.tmp"
+        made = []
+        try:
+            write_new(probe, b"")
+            for name in (self.settings.done, self.settings.failed):
+                folder = self.path / name
+                if not folder.exists():
+                    folder.mkdir(parents=True)
+                    made.append(folder)
+                probe = probe.rename(self._plain_folder(name) / probe.name)
+        except OSError as error:
+            words = (
+                f"A file cannot be written and moved in {self.path} ({error.strerror or error}): the bridge needs the right to"
+                " write there, and in done and failed, which lie on the same disk or share. Nothing could be taken."
+            )
+            return [words]
+        finally:
+            with contextlib.suppress(OSError):
+                probe.unlink(missing_ok=True)
+                for folder in made:
+                    folder.rmdir()
+        return []
+
+    def _plain_folder(self, name: str) -> Path:
+        folder = self.path / name
+        if folder.parent == self.path and folder.is_symlink():
+            raise NotPlain(0, f"{folder} is a link; make it a folder, or name the other place in the configuration")
+        return folder
 
     def _look(self) -> list[Received]:
         self._move_stored()
@@ -295,9 +330,7 @@ class Folder:
             self._known.pop(name, None)
 
     def _move(self, seen: Seen, content: Content) -> None:
-        folder = self.path / (self.settings.failed if content.faults else self.settings.done)
-        if folder.parent == self.path and folder.is_symlink():
-            raise NotPlain(0, f"{folder} is a link; make it a folder, or name the other place in the configuration")
+        folder = self._plain_folder(self.settings.failed if content.faults else self.settings.done)
         folder.mkdir(parents=True, exist_ok=True)
         count = 1
         while any((folder / _numbered(path, count)).exists() for path in seen.paths):

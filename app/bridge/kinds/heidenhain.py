@@ -189,6 +189,16 @@ class FolderFiles:
                 f"{self.corrections} cannot be written: {error.strerror or error}. May this program write into the folder?"
             ) from error
 
+    def try_out(self) -> str | None:
+        """A sentence if the program of corrections could not be written."""
+        probe = self.corrections.with_suffix(".check")
+        try:
+            write_new(probe, b"")
+            probe.unlink()
+        except OSError as error:
+            return f"{self.corrections} could not be written: {error.strerror or error}. May this program write into the folder?"
+        return None
+
     def end(self) -> None:
         """Nothing is open."""
 
@@ -461,6 +471,13 @@ class TncLink:
             self._lying = None
             await asyncio.to_thread(self._open_files().put, text)
             self._lying = text
+
+    async def try_out(self) -> list[str]:
+        """Write into the folder, where corrections go there."""
+        if self.machine.corrections == "none" or not isinstance(self._files, FolderFiles):
+            return []
+        wrong = await asyncio.to_thread(self._files.try_out)
+        return [wrong] if wrong else []
 
     async def outcomes(self) -> Sequence[Outcome]:
         """The NC program's last answer."""

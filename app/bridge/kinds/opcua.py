@@ -10,7 +10,6 @@ arrives late. A wear is written only over a connection over which it was read be
 import asyncio
 import logging
 import os
-import struct
 from collections.abc import Awaitable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,14 +17,13 @@ from typing import Annotated, Any, Final, TypeVar
 
 import msgspec
 from asyncua import Client, ua
-from asyncua.client.ua_session import UaSession
 from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
-from asyncua.ua.ua_binary import struct_from_binary
 from asyncua.ua.uaerrors import UaError
 from msgspec import Meta, Struct
 
 from app.bridge.certificates import uri_of
 from app.bridge.configuration import Location, Machine
+from app.bridge.kinds.opcua_answers import answered
 from app.bridge.links import ControlAway, LinkError, Misconfigured
 from app.bridge.registers import RegisterLink
 from app.core.ring import SIZE
@@ -47,13 +45,6 @@ ABORTED: Final = 5
 SHOWN_WITHIN: Final = 1.0
 """s: a value that was written is shown after the control's next sampling tick."""
 LOOK_EVERY: Final = 0.04  # s
-
-ANSWER: Final = struct.Struct("<4s12xIBi3siBBi")
-"""Beginning of an answer to a read: type, service result, diagnostics, texts, more of a header, number of values; of the first
-value what it has, its type, and its length."""
-READ_ANSWER: Final = b"\x01\x00\x7a\x02"
-GOOD: Final = b"\0\0\0\0"
-DOUBLES: Final = 0x80 | ua.VariantType.Double.value
 
 T = TypeVar("T")
 Codes = ua.StatusCodes
@@ -149,6 +140,10 @@ def node_of(identifier: str) -> ua.NodeId:
     return ua.NodeId(ua.String(identifier), ua.Int16(NAMESPACE))
 
 
+class NotKnown(Misconfigured):
+    """The control does not know an identifier."""
+
+
 def link(machine: Machine) -> RegisterLink:
     """The link to a SINUMERIK."""
     return RegisterLink(machine, SinumerikRegisters(machine))
@@ -167,6 +162,8 @@ class SinumerikRegisters:
         self._requests: dict[str, ua.ReadRequest] = {}
         self._read: set[str] = set()
         """Identifiers of offsets that were read over this connection."""
+        self._singly: set[str] = set()
+        """Identifiers of several registers that the control does not know, while it knows each by itself."""
 
     # --- identifiers
 
@@ -340,7 +337,7 @@ class SinumerikRegisters:
         """Registers of the block, by one read of all from the first to the last."""
         first, count = min(places), max(places) - min(places) + 1
         identifier = self.block_id(first, count)
-        values = await self._values(identifier)
+        values = await self._at_once_or_singly(identifier, first, count)
         if len(values) != count:
             raise Misconfigured(
                 f"{identifier} answers {len(values)} values in place of {count}: the field has to have {SIZE} elements"
@@ -348,6 +345,25 @@ class SinumerikRegisters:
             )
         numbers = values if set(map(type, values)) == {float} else [_number(value, identifier) for value in values]
         return numbers if len(places) == count else [numbers[place - first] for place in places]
+
+    async def _at_once_or_singly(self, identifier: str, first: int, count: int) -> list[Any]:
+        if identifier not in self._singly:
+            try:
+                return await self._values(identifier)
+            except NotKnown as error:
+                if count == 1:
+                    raise
+                unknown = error
+        singles = [self.block_id(place) for place in range(first, first + count)]
+        found = await self._ask([node_of(each) for each in singles])
+        try:
+            values = [self._good(each, single) for each, single in zip(found, singles, strict=True)]
+        except NotKnown:
+            if identifier in self._singly:
+                raise
+            raise unknown from None
+        self._singly.add(identifier)
+        return values
 
     async def write(self, place: int, value: float) -> None:
         """Write one register."""
@@ -388,7 +404,7 @@ class SinumerikRegisters:
         if request is None:
             request = self._requests[identifier] = ua.ReadRequest(Parameters=_parameters([node_of(identifier)]))
         request.RequestHeader.Timestamp = datetime.now(UTC)
-        answer = await self._sent(_answered(self._connected().uaclient.session, request))
+        answer = await self._sent(answered(self._connected().uaclient.session, request))
         if isinstance(answer, tuple):
             return list(answer)
         found = self._good(answer, identifier)
@@ -443,7 +459,7 @@ class SinumerikRegisters:
     def _refused(self, identifier: str, code: int, verb: str) -> LinkError:
         name = _name(code)
         if code in UNKNOWN:
-            return Misconfigured(
+            return NotKnown(
                 f"The control does not know {identifier} ({name}). {_hint(identifier)} Capital letters count; there is no"
                 " blank before “[”."
             )
@@ -462,36 +478,6 @@ def _parameters(nodes: Sequence[ua.NodeId]) -> ua.ReadParameters:
         TimestampsToReturn=ua.TimestampsToReturn.Neither,
         NodesToRead=[ua.ReadValueId(NodeId=node, AttributeId=ua.AttributeIds.Value) for node in nodes],
     )
-
-
-async def _answered(session: UaSession, request: ua.ReadRequest) -> tuple[float, ...] | ua.DataValue:
-    """The answer to a read of one field: ``session.read``, but for how numbers are read."""
-    answer = await session._send_request(request)  # noqa: SLF001 - the answer as it came
-    if (numbers := doubles_in(bytes(answer))) is not None:
-        return numbers
-    response = struct_from_binary(ua.ReadResponse, answer)
-    response.ResponseHeader.ServiceResult.check()
-    found: ua.DataValue
-    [found] = response.Results
-    return found
-
-
-def doubles_in(answer: bytes) -> tuple[float, ...] | None:
-    """The numbers of an answer to a read of one field of Double; None for any other answer.
-
-    asyncua reads an answer value by value, which costs as much as the rest of a poll.
-    """
-    if len(answer) < ANSWER.size:
-        return None
-    kind, result, diagnostics, texts, more, count, mask, variant, length = ANSWER.unpack_from(answer)
-    plain = (kind, result, diagnostics, more, count) == (READ_ANSWER, 0, 0, b"\0\0\0", 1) and texts <= 0
-    has_value, has_status = mask & 1, mask & 2
-    end = ANSWER.size + 8 * length
-    if not plain or not has_value or variant != DOUBLES or length < 0 or len(answer) < end + 4:
-        return None
-    if has_status and answer[end : end + 4] != GOOD:
-        return None
-    return struct.unpack_from(f"<{length}d", answer, ANSWER.size)
 
 
 def _name(code: int) -> str:

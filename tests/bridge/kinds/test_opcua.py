@@ -11,17 +11,18 @@ from typing import Any
 
 import pytest
 from asyncua import Client, ua
+from asyncua.common.utils import ServiceError
 from asyncua.ua.ua_binary import struct_to_binary
 from typer.testing import CliRunner
 
 from app.bridge.certificates import new_pair
 from app.bridge.configuration import ConfigurationError, Machine, configuration_from
 from app.bridge.kinds import opcua
-from app.bridge.kinds.opcua import doubles_in
+from app.bridge.kinds.opcua_answers import doubles_in
 from app.bridge.links import ControlAway, LinkError, Misconfigured, Order, Position
 from app.bridge.registers import RegisterLink
 from app.bridge.simulators.model import Feature, Model
-from app.bridge.simulators.opcua import ADMINISTRATOR, BRIDGE, PASSWORD, SimulatedSinumerik, serve
+from app.bridge.simulators.opcua import ADMINISTRATOR, BRIDGE, PASSWORD, Nc, SimulatedSinumerik, serve
 from app.cli.bridge import bridge
 from app.core.ring import SIZE, Register, Unit
 from tests.bridge.plant import until
@@ -170,6 +171,30 @@ def test_a_correction_goes_through_the_mailbox_once(first_r: int | None) -> None
             assert (outcome.number, outcome.applied) == (5, True)
             assert outcome.offset == pytest.approx(-0.0127)
             assert [(each.number, round(each.after, 6)) for each in model.applied] == [(5, -0.0005)]
+
+    run(scenario())
+
+
+def test_registers_that_the_control_does_not_know_together_are_read_singly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A control of another make knows the whole block, and each register by itself."""
+    known = Nc.read
+
+    def read(nc: Nc, identifier: str) -> ua.Variant:
+        if "#" in identifier and f"#{SIZE}]" not in identifier:
+            raise ServiceError(ua.StatusCodes.BadNodeIdUnknown)
+        return known(nc, identifier)
+
+    monkeypatch.setattr(Nc, "read", read)
+
+    async def scenario() -> None:
+        model = Model((QUIET,))
+        async with control(model) as simulator, linked(simulator) as link:
+            made(model)
+            await shown(simulator)
+            await link.fetch(Position())
+            assert await link.try_out() == []
+            await link.offer([Order(1, 3, 0.0, -0.01)])
+            assert model.registers[Register.MAIL_NUMBER] == 1
 
     run(scenario())
 
