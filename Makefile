@@ -1,7 +1,8 @@
 # make run     the demonstration plant at http://127.0.0.1:8000; ARGS="--past 42" for six weeks behind it
 # make test    lint, then the tests on a real PostgreSQL and in a real browser, in another order each time; ARGS="-k name" for
 #              some of them, ARGS="--randomly-seed=N" for the order of an earlier run
-# make test-long  what is slow by nature: campaigns of faults, failover, every page in every size, chance with fresh seeds
+# make test-long  what is slow by nature: campaigns of faults, failover, every page in every size, chance with fresh seeds; and the
+#              tests of make test with servers that have one connection to the database for all their pages
 # make lint    style, types, lengths, templates, and the walls between the rooms
 # make bench   the benchmarks; each prints ratios
 # make messages  collect what can be translated into frontend/locale/inband.pot
@@ -34,6 +35,7 @@ test: lint $(VENV)/browser
 
 test-long: $(VENV)/browser
 	@$(BIN)/pytest -n auto --dist worksteal --long $(ARGS)
+	@$(BIN)/pytest -n auto --dist worksteal --one-connection $(ARGS)
 
 lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check --quiet

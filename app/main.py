@@ -242,13 +242,20 @@ def keep_for_good() -> None:
     gc.freeze()
 
 
-def _replica(settings: Settings, database: Database) -> Replica | None:
+def _replica(settings: Settings, database: Database, waited: Callable[[float], object]) -> Replica | None:
     url = settings.read_database_url
     if url is None:
         return None
     if settings.schema_name is not None:
         url = in_schema(url, settings.schema_name)
-    return Replica(url, database, pool_size=settings.pool_size, most_behind=settings.read_most_behind)
+    return Replica(
+        url,
+        database,
+        pool_size=settings.pool_size,
+        overflow=settings.pool_overflow,
+        most_behind=settings.read_most_behind,
+        waited=waited,
+    )
 
 
 def create_app(settings: Settings | None = None, ending: Callable[[], None] = lambda: None) -> Plants:
@@ -292,12 +299,25 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     """Make the application of one plant. prefix: the path below which it is served, where there are several."""
     assert settings.database_url is not None
     connections = Connections(settings.database_url, settings.database_patience)
-    database = Database(settings.database_url, pool_size=settings.pool_size, connections=connections)
-    # Readings are let in by connections of their own: requests that work for seconds may hold all the others. There are as
-    # many as threads that look up: where the database is away, nobody waits half a minute for a connection of somebody else.
-    letting_in = Database(settings.database_url, pool_size=4, overflow=-1, connections=connections)
-    replica = _replica(settings, database)
-    keys, directory = KeyRing(letting_in, caller_of_key), Directory(letting_in)
+    waits = health.pool_waits()
+    database = Database(
+        settings.database_url,
+        pool_size=settings.pool_size,
+        overflow=settings.pool_overflow,
+        connections=connections,
+        waited=waits.labels("pages").observe,
+    )
+    # Machines come in by connections of their own: pages that work for seconds may hold all the others. There are as many
+    # as threads that ask: where the database is away, nobody waits half a minute for a connection of somebody else.
+    doors = Database(
+        settings.database_url,
+        pool_size=settings.door_pool_size,
+        overflow=-1,
+        connections=connections,
+        waited=waits.labels("doors").observe,
+    )
+    replica = _replica(settings, database, waits.labels("replica").observe)
+    keys, directory = KeyRing(doors, caller_of_key), Directory(doors)
     writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(database, jobs_of(settings))
     report_worker = ReportWorker(database, replica)
 
@@ -317,7 +337,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
         await writer.stop()
         if replica is not None:
             replica.stop()
-        letting_in.close()
+        doors.close()
         database.close()
         connections.stop()
 
@@ -332,14 +352,15 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     )
     app.state.settings = settings
     app.state.database = database
+    app.state.doors = doors
     app.state.replica = replica
     app.state.key_ring = keys
-    app.state.lookups = Lookups(letting_in)
+    app.state.lookups = Lookups(doors)
     app.state.directory = directory
     app.state.writer = writer
     app.state.live = live
     app.state.report_worker = report_worker
-    app.state.metrics = health.registry(database, settings.data_dir, replica)
+    app.state.metrics = health.registry(database, settings.data_dir, replica, waits)
     app.state.waiting = {
         "to_do": TO_DO_COUNT.scalar_subquery(),
     }
@@ -353,5 +374,5 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     app.openapi = partial(document, app, readings.SCHEMAS, prefix or "/")  # type: ignore[method-assign]
     answers = UnderPrefix(app, prefix) if prefix else app
     small = GZipMiddleware(answers, minimum_size=1024, compresslevel=5, exclude_content_types=NOT_COMPRESSED)
-    door = ReadingsDoor(SecurityHeaders(small), keys.lookup, directory, writer, letting_in)
+    door = ReadingsDoor(SecurityHeaders(small), keys.lookup, directory, writer, doors)
     return Application(app, RequestLog(door, settings.slow_request))

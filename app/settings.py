@@ -168,7 +168,19 @@ class Settings(BaseSettings):
     forwarded_allow_ips: str = Field(
         default="127.0.0.1", description="Proxies whose X-Forwarded-* headers are believed, comma-separated."
     )
-    pool_size: int = Field(default=10, ge=1, le=200, description="Database connections kept open per process.")
+    pool_size: int = Field(
+        default=10, ge=1, le=200, description="Database connections kept open per process for pages and programs."
+    )
+    pool_overflow: int | None = Field(
+        default=None, ge=0, le=200, description="How many more there may be at once; as many again if left out."
+    )
+    door_pool_size: int = Field(
+        default=8,
+        ge=1,
+        le=100,
+        description="Database connections per process for machines alone: their readings, corrections and heartbeats, and who "
+        "calls.",
+    )
     timezone: Annotated[str, AfterValidator(_timezone)] = Field(
         default_factory=computer_timezone,
         description="Time zone of the plant, such as Europe/Belgrade: pages, charts, reports and files have its times.",

@@ -35,7 +35,7 @@ from app import HOUSE
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
-from tests import chance, quick_passwords  # noqa: F401 - the passwords replace what they are about
+from tests import chance, one_connection, quick_passwords  # noqa: F401 - the last two replace what they are about
 from tests.db.first_program import make_first_program
 from tests.forked import Forked
 from tests.shop import KEY, Person, Shop
@@ -54,6 +54,8 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 def pytest_configure(config: pytest.Config) -> None:
     chance.load(long=config.getoption("--long"))
+    if config.getoption("--one-connection"):
+        os.environ |= {"INBAND_POOL_SIZE": "1", "INBAND_POOL_OVERFLOW": "0"}
 
 
 def pytest_collection_finish() -> None:

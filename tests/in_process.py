@@ -72,9 +72,9 @@ class Direct(httpx.BaseTransport):
 class InProcess(Server):
     """What a running `Server` has, for an application in this process."""
 
-    def __init__(self, database: Database, transport: httpx.BaseTransport) -> None:
+    def __init__(self, database: Database, transport: httpx.BaseTransport, app: FastAPI) -> None:
         self.url, self.database = "http://inband.test", database
-        self.transport = transport
+        self.transport, self.app = transport, app
         self._clients = []
 
     def client(self, key: str | None = None, **headers: str) -> httpx.Client:
@@ -107,7 +107,7 @@ def in_process(url: str, **settings: Any) -> Iterator[InProcess]:
     running = None
     try:
         with start_blocking_portal() as portal, portal.wrap_async_context_manager(life_of(made.app)):
-            running = InProcess(database, Direct(made.asgi, portal, chosen))
+            running = InProcess(database, Direct(made.asgi, portal, chosen), made.app)
             yield running
     finally:
         if running is not None:

@@ -44,6 +44,7 @@ WAYS = ((signal.SIGTERM, 3.0), (signal.SIGQUIT, 2.0), (signal.SIGKILL, 3.0))
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option of `make test-long`; keep the run from here on, before pytest captures anything."""
     parser.addoption("--long", action="store_true", help="run what is slow by nature, and chance with fresh seeds")
+    parser.addoption("--one-connection", action="store_true", help="servers have one connection for all their pages")
     if sys.platform == "linux" and MARK not in os.environ:
         keep()
 

@@ -7,7 +7,7 @@ import pkgutil
 import app
 from app.loop.readings.writer.columnar import compile_now
 from app.web.templates import environment
-from tests import quick_passwords  # noqa: F401 - the passwords replace what they are about
+from tests import one_connection, quick_passwords  # noqa: F401 - they replace what they are about
 
 for module in pkgutil.walk_packages(app.__path__, "app."):
     if not module.name.endswith("__main__"):

@@ -15,7 +15,7 @@ from app.access.sign_in import SignedIn, begin_session, sign_in, sign_out
 from app.db.engine import Database
 from app.errors import InbandError, Invalid, NotAllowed
 from app.language.i18n import _
-from app.web.deps import SESSION_COOKIE, FormDep, SessionDep, SettingsDep, from_this_site
+from app.web.deps import IN_TURN, SESSION_COOKIE, FormDep, SessionDep, SettingsDep, from_this_site
 from app.web.forms import by_field
 from app.web.limits import FEW, takes
 from app.web.problems import local_path
@@ -55,7 +55,7 @@ def sign_in_page(request: Request, session: SessionDep, after: Next = "/", ended
     )
 
 
-@router.post("/sign-in", dependencies=[FromThisSite])
+@router.post("/sign-in", dependencies=[FromThisSite, IN_TURN])
 @takes(FEW, by="anybody")
 def send_sign_in(request: Request, form: FormDep, settings: SettingsDep) -> Response:
     database: Database = request.app.state.database

@@ -1,16 +1,36 @@
 """SQLAlchemy's engine on our connections."""
 
-from collections.abc import Iterator
+import logging
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
-from sqlalchemy import create_engine
+from sqlalchemy import PoolProxiedConnection, QueuePool, create_engine
 from sqlalchemy.orm import Session, sessionmaker
 
 from app.db.connections import LIMITS, Connections, plain_url
 
 if TYPE_CHECKING:
     from psycopg import Connection
+
+
+logging.getLogger(f"{__name__}.Pool").setLevel(logging.WARNING)  # SQLAlchemy names what it logs of a pool by its class
+
+
+class Pool(QueuePool):
+    """Connections kept open, which says how long one waits for one of them."""
+
+    waited: Callable[[float], object] | None = None
+
+    def connect(self) -> PoolProxiedConnection:
+        """Take a connection that works, once there is one."""
+        began = perf_counter()
+        try:
+            return super().connect()
+        finally:
+            if self.waited is not None:
+                self.waited(perf_counter() - began)
 
 
 class Database:
@@ -28,11 +48,12 @@ class Database:
         application_name: str = "inband",
         connections: Connections | None = None,
         copy_of: "Database | None" = None,
+        waited: Callable[[float], object] | None = None,
     ) -> None:
         """pool_size: connections kept open. overflow: how many more there may be at once; as many again if left out, -1: any.
 
         connections: those of the process, if they are watched; else some of its own, which are not. copy_of: where what is read
-        here is written.
+        here is written. waited: gets the seconds after which somebody had a connection, or had none.
         """
         self.dsn = plain_url(url)
         """For psycopg itself and PostgreSQL's programs. Holds the password; not for logs."""
@@ -41,17 +62,23 @@ class Database:
         self.engine = create_engine(
             "postgresql+psycopg://",
             creator=lambda: self.connections.connect(options=LIMITS, application_name=application_name),
+            poolclass=Pool,
             pool_size=pool_size,
             max_overflow=pool_size if overflow is None else overflow,
             pool_pre_ping=True,  # a restarted database costs one retry here, not one failed page per connection
         )
+        cast("Pool", self.engine.pool).waited = waited
         self.sessions = sessionmaker(self.engine, expire_on_commit=False, info={"database": self})
 
     @contextmanager
     def begin(self) -> Iterator[Session]:
-        """One transaction: committed when the block ends, rolled back when it raises."""
-        with self.sessions.begin() as session:
+        """One transaction: committed when the block ends, rolled back when it raises.
+
+        ``commit()`` inside gives the connection back for a while; what follows is a transaction of its own.
+        """
+        with self.sessions() as session:
             yield session
+            session.commit()
 
     def close(self) -> None:
         self.engine.dispose()

@@ -10,6 +10,7 @@ import logging
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from typing import NamedTuple
 
 from sqlalchemy import text
@@ -46,11 +47,28 @@ class MustSee(NamedTuple):
 class Replica:
     """The copy, as one process sees it. behind: seconds that it lags; None if it is not known or away."""
 
-    def __init__(self, url: str, primary: Database, *, pool_size: int, most_behind: float) -> None:
+    def __init__(
+        self,
+        url: str,
+        primary: Database,
+        *,
+        pool_size: int,
+        most_behind: float,
+        overflow: int | None = None,
+        waited: Callable[[float], object] | None = None,
+    ) -> None:
+        """pool_size, overflow, waited: as of `Database`; most_behind: seconds beyond which it is not read."""
         self.primary = primary
         self.most_behind = most_behind
         self.connections = Connections(url, primary.connections.patience, of_several="prefer-standby")
-        self.database = Database(url, pool_size=pool_size, connections=self.connections, copy_of=primary)
+        self.database = Database(
+            url,
+            pool_size=pool_size,
+            overflow=overflow,
+            connections=self.connections,
+            copy_of=primary,
+            waited=waited,
+        )
         self.behind: float | None = None
         self._not_before = 0.0
         self._read: bool | None = None

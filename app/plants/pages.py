@@ -18,7 +18,7 @@ from app.language.i18n import _
 from app.plants.prefix import cookies_of
 from app.plants.serving import Plants, Served
 from app.plants.summary_queries import Summary, summary
-from app.web.deps import SESSION_COOKIE, FormDep, SettingsDep, from_this_site
+from app.web.deps import IN_TURN, SESSION_COOKIE, FormDep, SettingsDep, from_this_site
 from app.web.limits import FEW, takes
 from app.web.problems import is_for_programs
 from app.web.templates import page
@@ -43,7 +43,7 @@ async def plants_page(request: Request) -> Response:
     return await _page(request)
 
 
-@router.post("/plants/sign-in", dependencies=[Depends(from_this_site)])
+@router.post("/plants/sign-in", dependencies=[Depends(from_this_site), IN_TURN])
 @takes(FEW, by="anybody")
 async def send_sign_in(request: Request, form: FormDep, settings: SettingsDep) -> Response:
     """Sign in to every plant in which there is a person of this name with this password."""

@@ -1,7 +1,7 @@
 """Parameters that routes share: a session of the database, the settings, the address of the server, numbers, words, forms."""
 
 import socket
-from collections.abc import Iterator, Mapping
+from collections.abc import AsyncIterator, Iterator, Mapping
 from typing import Annotated, cast
 from urllib.parse import urlsplit
 
@@ -59,6 +59,13 @@ def get_session(request: Request) -> Iterator[Session]:
         yield session
 
 
+def get_door_session(request: Request) -> Iterator[Session]:
+    """The same on a connection that pages do not use."""
+    doors: Database = request.app.state.doors
+    with doors.begin() as session:
+        yield session
+
+
 def _must_see(request: Request) -> MustSee | None:
     """Return what a copy must have for this request; None if it has to be answered by the server that is written to.
 
@@ -73,13 +80,23 @@ def _place(text: str | None) -> int:
     return min(int(text), LARGEST_ID) if text and text.isascii() and text.isdigit() and len(text) < 20 else 0
 
 
-MOST_SESSIONS = 32
-"""Requests of one process that have a session at once; others wait without a thread.
+MOST_SESSIONS, MOST_AT_DOORS, MOST_IN_TURN = 22, 8, 4
+"""Requests of one process that have a session at once, those of machines, and those of anybody; others wait without a thread.
 
-Fewer than the 40 threads that answer: a request needs one for each of its steps. If all of them waited for a connection, or for a
-lock, none would be left for whoever holds it.
+Together fewer than the 40 threads that answer: a request needs one for each of its steps. If all of them waited for a
+connection, or for a lock, none would be left for whoever holds it.
 """
 SessionDep = Annotated[Session, Depends(get_session, scope="function", max_concurrency=MOST_SESSIONS)]
+DoorSessionDep = Annotated[Session, Depends(get_door_session, scope="function", max_concurrency=MOST_AT_DOORS)]
+"""For what machines do round by round: fetching and confirming corrections, heartbeats."""
+
+
+async def _turn() -> AsyncIterator[None]:
+    yield
+
+
+IN_TURN = cast("params.Depends", Depends(_turn, scope="function", max_concurrency=MOST_IN_TURN))
+"""For what strangers may ask and what takes a thread: signing in, health, metrics."""
 
 
 def get_settings(request: Request) -> Settings:

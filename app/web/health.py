@@ -6,7 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, Request
-from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, GCCollector, PlatformCollector, ProcessCollector
+from prometheus_client import (
+    CONTENT_TYPE_LATEST,
+    CollectorRegistry,
+    GCCollector,
+    Histogram,
+    PlatformCollector,
+    ProcessCollector,
+)
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.exposition import generate_latest
 from prometheus_client.registry import Collector
@@ -18,7 +25,7 @@ from app.db.engine import Database
 from app.db.replica import Replica
 from app.errors import DiskFull
 from app.web.api import EVERY_ERROR
-from app.web.deps import SettingsDep
+from app.web.deps import IN_TURN, SettingsDep
 
 router = APIRouter(tags=["health"], generate_unique_id_function=lambda route: route.name)
 
@@ -28,12 +35,12 @@ def _says(example: Any, media_type: str = "application/json") -> dict[int | str,
 
 
 @router.get("/health/live", responses=_says({"status": "live"}))
-def live() -> dict[str, str]:
+async def live() -> dict[str, str]:
     """The process answers."""
     return {"status": "live"}
 
 
-@router.get("/health/ready", responses=_says({"status": "ready"}) | {503: EVERY_ERROR[503]})
+@router.get("/health/ready", responses=_says({"status": "ready"}) | {503: EVERY_ERROR[503]}, dependencies=[IN_TURN])
 def ready(request: Request, settings: SettingsDep) -> dict[str, str]:
     """The process answers, reaches its database, and its disk is not full. Where there is a replica: how far it is behind."""
     if is_full(settings.data_dir):
@@ -49,6 +56,7 @@ def ready(request: Request, settings: SettingsDep) -> dict[str, str]:
     "/metrics",
     response_class=Response,
     responses=_says('inband_readings_total{machine="lathe-1"} 812.0\n', "text/plain") | {503: EVERY_ERROR[503]},
+    dependencies=[IN_TURN],
 )
 def metrics(request: Request) -> Response:
     """Prometheus metrics. What is counted is asked of the database, so every process answers the same."""
@@ -140,9 +148,21 @@ class Disk(Collector):
         return (room,)
 
 
-def registry(database: Database, data_dir: Path, replica: Replica | None) -> Any:
+def pool_waits() -> Histogram:
+    """The time that requests of this process wait for a connection to the database, by pool."""
+    return Histogram(
+        "inband_pool_wait_seconds",
+        "Time until a request had a connection to the database, by pool.",
+        ["pool"],
+        registry=None,
+        buckets=(0.001, 0.005, 0.025, 0.1, 0.5, 1, 5, 10, 30),
+    )
+
+
+def registry(database: Database, data_dir: Path, replica: Replica | None, waits: Histogram) -> Any:
     """The metrics of one application: those of the plant, of its process, of its disk, and of its replica."""
     collectors = CollectorRegistry()
+    collectors.register(waits)
     collectors.register(Plant(database))
     if replica is not None:
         collectors.register(Behind(replica))

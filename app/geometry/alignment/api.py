@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import Path, Request, Response
+from fastapi import Path, Response
 
 from app.access.deps import AnyCaller, Operator
 from app.geometry.alignment import actions, queries
@@ -20,9 +20,7 @@ Number = Annotated[int, Path(description="Number of the alignment.", examples=[7
 
 
 @router.post("/alignments", status_code=201, responses=problems(404, 409) | sent_again(AlignmentOut))
-def align(
-    request: Request, session: SessionDep, caller: AnyCaller, body: AlignmentIn, response: Response
-) -> AlignmentOut:
+def align(session: SessionDep, caller: AnyCaller, body: AlignmentIn, response: Response) -> AlignmentOut:
     """Find where a part lies: from six touches (3-2-1) or more, two points on a side, or two holes.
 
     The answer is the frame, how well it is known, which touches do not fit, and the text for the machine's control. Touches
@@ -30,7 +28,7 @@ def align(
     plausible: until somebody acknowledges them the text stops the control.
     """
     caller.must_somewhere("operator")
-    with readings.pushing(request.app.state.database) as own:
+    with readings.pushing(session) as own:
         machine = machine_for(own, caller, body.machine, "operator")
         created = actions.align(own, machine, body, caller)
     response.status_code = 200 if created.again else 201

@@ -140,7 +140,7 @@ def align(request: Request, session: SessionDep, caller: Operator, form: FormDep
         fields, lines = form_reader.fields(form)
         body = parsed(AlignmentIn, fields)
         machine = machine_named(session, body.machine)
-        with readings.pushing(request.app.state.database) as own:
+        with readings.pushing(session) as own:
             number = actions.align(own, machine, body, caller).row.id
     except (Invalid, Conflict) as error:
         return _new(request, session, form, error, lines)

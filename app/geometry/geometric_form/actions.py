@@ -15,7 +15,6 @@ from app.access.callers import Caller
 from app.core.geometry.elements import WrongSection
 from app.core.geometry.points import Degenerate
 from app.core.geometry.relations import DatumRefused
-from app.db.engine import Database
 from app.db.events import publish
 from app.geometry.geometric_form import queries, wording
 from app.geometry.geometric_form.evaluation import EvaluatedForm, find
@@ -31,21 +30,14 @@ from app.web.created import Created, sent_before
 HELD = ("method", "tolerance", "repeatability", "part")  # what makes another measurement of the same touches
 
 
-def measure_and_push(database: Database, machine: Machine, body: FormIn, caller: Caller) -> Created[FormRow]:
+def measure_and_push(session: Session, machine: Machine, body: FormIn, caller: Caller) -> Created[FormRow]:
     """Measure, commit, and push the reading that the result becomes; where that cannot be now, a periodic job does it.
 
     Raises what `measure` raises.
     """
-    with database.begin() as session:
-        created = measure(session, machine, body, caller)
-        waits = created.row.measurement.characteristic_id is not None
-        number = created.row.measurement.id
-    if waits:
-        readings.push_results(database)
-    with database.begin() as session:
-        row = queries.form(session, number)
-        session.expunge_all()
-    return Created(row, created.again)
+    with readings.pushing(session) as own:
+        created = measure(own, machine, body, caller)
+    return Created(queries.form(session, created.row.measurement.id), created.again)
 
 
 def measure(session: Session, machine: Machine, body: FormIn, caller: Caller) -> Created[FormRow]:

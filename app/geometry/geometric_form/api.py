@@ -2,10 +2,9 @@
 
 from typing import Annotated, Literal
 
-from fastapi import Path, Query, Request, Response
+from fastapi import Path, Query, Response
 
 from app.access.deps import AnyCaller, Caller
-from app.db.engine import Database
 from app.errors import NotFound
 from app.geometry.geometric_form import actions, figures, queries, wording
 from app.geometry.geometric_form.answers import FormOut, form_out
@@ -44,7 +43,7 @@ KindName = Literal[
 
 
 @router.post("/forms", status_code=201, responses=problems(404, 409) | sent_again(FormOut))
-def measure_form(request: Request, session: SessionDep, caller: AnyCaller, body: FormIn, response: Response) -> FormOut:
+def measure_form(session: SessionDep, caller: AnyCaller, body: FormIn, response: Response) -> FormOut:
     """Evaluate form or position of a feature from its touches.
 
     Answers the deviation by every method that applies, the verdict, the uncertainty from the probe's repeatability, and
@@ -52,10 +51,8 @@ def measure_form(request: Request, session: SessionDep, caller: AnyCaller, body:
     refused with the reason. With `characteristic` the result becomes a reading of it, so that control charts, alarms and
     reports work on it.
     """
-    database: Database = request.app.state.database
-    with database.begin() as own:
-        machine = machine_for(own, caller, body.machine, "operator")
-    created = actions.measure_and_push(database, machine, body, caller)
+    machine = machine_for(session, caller, body.machine, "operator")
+    created = actions.measure_and_push(session, machine, body, caller)
     response.status_code = 200 if created.again else 201
     return _answer(session, created.row)
 

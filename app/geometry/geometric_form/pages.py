@@ -10,7 +10,6 @@ from starlette.responses import RedirectResponse
 
 from app.access.deps import Operator, Viewer, require
 from app.core.geometry.relations import ENGINE
-from app.db.engine import Database
 from app.errors import FieldError, InbandError, Invalid, NotFound
 from app.geometry.geometric_form import actions, form_reader, queries, wording
 from app.geometry.geometric_form.evaluation import warnings_of
@@ -179,8 +178,7 @@ def measure(request: Request, session: SessionDep, caller: Operator, form: FormD
     """Evaluate and keep what was typed; or show what is wrong with it, with everything still there."""
     try:
         body = parsed(FormIn, form_reader.fields(form))
-        database: Database = request.app.state.database
-        created = actions.measure_and_push(database, machine_named(session, body.machine), body, caller)
+        created = actions.measure_and_push(session, machine_named(session, body.machine), body, caller)
     except (Invalid, NotFound) as error:
         return _new(request, session, form, error)
     return RedirectResponse(f"/forms/{created.row.measurement.id}", 303)

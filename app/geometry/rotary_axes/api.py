@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from fastapi import Path, Query, Request, Response
+from fastapi import Path, Query, Response
 from pydantic import StringConstraints
 
 from app.access.deps import AnyCaller, Caller, Engineer, Operator
@@ -50,16 +50,14 @@ HeadName = Annotated[str, StringConstraints(strip_whitespace=True, max_length=64
 
 
 @router.post("/kinematics/runs", status_code=201, responses=problems(404, 409) | sent_again(RunOut))
-def take_kinematics_run(
-    request: Request, session: SessionDep, caller: AnyCaller, body: RunIn, response: Response
-) -> RunOut:
+def take_kinematics_run(session: SessionDep, caller: AnyCaller, body: RunIn, response: Response) -> RunOut:
     """Take a run of cycle 452: ball touches or centres (`axes`, `shift`), result parameters, or the control's protocol.
 
     A ball further off than maxDevCalBall makes a refused run: that is kept, and counts for nothing. A change larger than
     maxModification, and one with `warnings` (an axis further off than is plausible on this machine), waits to be confirmed
     (`"status": "to_confirm"`). What of a protocol was not understood is answered.
     """
-    with readings.pushing(request.app.state.database) as own:
+    with readings.pushing(session) as own:
         machine = machine_for(own, caller, body.machine, "operator")
         created = actions.take(own, machine, body, caller)
     response.status_code = 200 if created.again else 201

@@ -88,7 +88,7 @@ def _send(request: Request, session: Session, caller: Caller, form: dict[str, st
         if form.get("do") == "look":
             limits = actions.limits_of(queries.plan(session, machine.id))
             return _form(request, session, form, evaluated=evaluate(body, limits))
-        with readings.pushing(request.app.state.database) as own:
+        with readings.pushing(session) as own:
             created = actions.take(own, machine, body, caller)
             number = created.row.run.id
     except (Invalid, NotFound) as error:

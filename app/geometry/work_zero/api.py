@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import Path, Query, Request, Response
+from fastapi import Path, Query, Response
 from fastapi.responses import PlainTextResponse
 
 from app.access.deps import AnyCaller, Engineer, Operator
@@ -48,9 +48,7 @@ FixtureFilter = Annotated[Slug | None, Query(description="Only of this fixture."
 
 
 @router.post("/work-zeros", status_code=201, responses=problems(404, 409) | sent_again(ZeroOut))
-def find_work_zero(
-    request: Request, session: SessionDep, caller: AnyCaller, body: ZeroIn, response: Response
-) -> ZeroOut:
+def find_work_zero(session: SessionDep, caller: AnyCaller, body: ZeroIn, response: Response) -> ZeroOut:
     """Find work zero and size from the touches of an edge finder or probe.
 
     The answer holds the text that sets it on the machine's control, and how far the fixture has shifted. Touches that make
@@ -58,7 +56,7 @@ def find_work_zero(
     `warnings` names what is hardly plausible: until somebody acknowledges them the text stops the control.
     """
     caller.must_somewhere("operator")
-    with readings.pushing(request.app.state.database) as own:
+    with readings.pushing(session) as own:
         machine = machine_for(own, caller, body.machine, "operator")
         created = actions.find(own, machine, body, caller)
     response.status_code = 200 if created.again else 201

@@ -136,7 +136,7 @@ def find(request: Request, session: SessionDep, caller: Operator, form: FormDep)
         fields, typed_in = form_reader.fields(form)
         body = parsed(ZeroIn, fields)
         machine = machine_named(session, body.machine)
-        with readings.pushing(request.app.state.database) as own:
+        with readings.pushing(session) as own:
             number = actions.find(own, machine, body, caller).row.id
     except (Invalid, Conflict) as error:
         return _new(request, session, form, error=error, typed_in=typed_in)

@@ -12,7 +12,7 @@ from app.loop.connections.touch_tests.schemas import TouchTestOut
 from app.loop.machines.queries import machine_for
 from app.settings import Settings
 from app.web.api import KeyAfter, Limit, MachineKey, api_router, problems
-from app.web.deps import SessionDep
+from app.web.deps import DoorSessionDep, SessionDep
 from app.web.fields import Page, answer_from, page_of
 
 router = api_router("connections")
@@ -20,7 +20,7 @@ router = api_router("connections")
 
 @router.post("/machines/{machine}/heartbeat", responses=problems(404))
 def take_heartbeat(
-    request: Request, session: SessionDep, caller: AnyCaller, machine: MachineKey, heartbeat: HeartbeatIn
+    request: Request, session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, heartbeat: HeartbeatIn
 ) -> HeartbeatOut:
     """A bridge says, every ten seconds, that it lives and how it stands with this machine. The answer tells where the
     server's database stands: one that was restored or has failed over may lack readings that it had stored; and which touch

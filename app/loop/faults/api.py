@@ -9,7 +9,7 @@ from app.access.deps import AnyCaller
 from app.loop.faults import actions
 from app.loop.faults.alarm_kinds import Fault
 from app.web.api import MachineKey, api_router, problems
-from app.web.deps import SessionDep
+from app.web.deps import DoorSessionDep
 from app.web.fields import Body, Text200
 
 router = api_router("machines")
@@ -34,7 +34,7 @@ class FaultOut(BaseModel):
 
 @router.post("/machines/{machine}/faults", status_code=201, responses=problems(404) | {200: {"model": FaultOut}})
 def report_fault(
-    session: SessionDep, caller: AnyCaller, machine: MachineKey, fault: FaultIn, response: Response
+    session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, fault: FaultIn, response: Response
 ) -> FaultOut:
     """Report a fault of the machine (battery of the probe low, receiver, probe not ready) or its end: the alarm
     *machine fault* is raised, counts up or ends. 201 for a new alarm, else 200.

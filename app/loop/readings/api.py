@@ -66,7 +66,7 @@ class ExcludeIn(Body):
 
 def _here(request: Request) -> tuple[Directory, Writer, Database]:
     state = request.app.state
-    return state.directory, state.writer, state.database
+    return state.directory, state.writer, state.doors
 
 
 @push.post(

@@ -57,10 +57,15 @@ def ask_for(session: Session, entries: Mapping[str, Entry], values: Mapping[str,
 
 
 @contextmanager
-def pushing(database: Database) -> Iterator[Session]:
-    """A transaction of its own; the results that it asks for become readings after its commit."""
-    with database.begin() as session:
-        yield session
+def pushing(session: Session) -> Iterator[Session]:
+    """A transaction of its own; the results that it asks for become readings after its commit.
+
+    session: of the request. It is committed first, so that the request never holds two connections.
+    """
+    session.commit()
+    database = database_of(session)
+    with database.begin() as own:
+        yield own
     push_results(database)
 
 

@@ -35,7 +35,7 @@ from app.loop.tools.schemas import (
     tool_set,
 )
 from app.web.api import FIGURE, Limit, MachineKey, SerialAfter, Theme, api_router, chart_answer, problems
-from app.web.deps import SessionDep
+from app.web.deps import DoorSessionDep, SessionDep
 from app.web.fields import Page, page_of
 
 router = api_router("offsets")
@@ -50,7 +50,7 @@ Number = Annotated[int, Path(description="Number of the correction; counts per m
 
 @router.get("/machines/{machine}/tools", responses=problems(404))
 def list_tools(
-    session: SessionDep,
+    session: DoorSessionDep,
     caller: AnyCaller,
     machine: MachineKey,
     after: SerialAfter = 0,
@@ -63,7 +63,7 @@ def list_tools(
 
 
 @router.get("/machines/{machine}/tools/{tool}", responses=problems(404))
-def get_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10) -> ToolOut:
+def get_tool(session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, tool: R10) -> ToolOut:
     """One location of the tool memory."""
     machine_row = machine_for(session, caller, machine, "viewer")
     queries.tool(session, machine_row, tool)
@@ -98,7 +98,7 @@ def change_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, too
 
 @router.post("/machines/{machine}/tools/{tool}/reported", responses=problems(404))
 def report_offset(
-    session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, report: OffsetReportIn
+    session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, report: OffsetReportIn
 ) -> OffsetReportOut:
     """Say what offset the control holds, without confirming a correction.
 
@@ -179,7 +179,7 @@ def set_empirical_value(
 
 @router.get("/machines/{machine}/corrections", responses=problems(404))
 def list_corrections(
-    session: SessionDep,
+    session: DoorSessionDep,
     caller: AnyCaller,
     machine: MachineKey,
     status: Annotated[list[Status], Query(description="Only these; may be given several times.")] = [],  # noqa: B006 - FastAPI copies it
@@ -198,7 +198,7 @@ def list_corrections(
 
 
 @router.get("/corrections/{machine}/{number}", responses=problems(404))
-def get_correction(session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number) -> CorrectionOut:
+def get_correction(session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, number: Number) -> CorrectionOut:
     """One correction."""
     machine_row = machine_for(session, caller, machine, "viewer")
     return correction_out(queries.row_of(session, machine_row, queries.correction(session, machine_row, number)))
@@ -206,7 +206,7 @@ def get_correction(session: SessionDep, caller: AnyCaller, machine: MachineKey, 
 
 @router.post("/corrections/{machine}/{number}/applied", responses=problems(404, 409))
 def mark_applied(
-    session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number, applied: AppliedIn | None = None
+    session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, number: Number, applied: AppliedIn | None = None
 ) -> CorrectionOut:
     """Confirm that the correction is in the offset now. Confirming twice is harmless.
 
@@ -230,7 +230,7 @@ def mark_applied(
 
 @router.post("/corrections/{machine}/{number}/rejected", responses=problems(404, 409))
 def reject_correction(
-    session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number, decision: RejectionIn
+    session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, number: Number, decision: RejectionIn
 ) -> CorrectionOut:
     """It will not be applied: the machine refuses the offset, or a person decides against it."""
     machine_row = machine_for(session, caller, machine, "operator")

@@ -200,7 +200,7 @@ def acknowledge(
     row = _of_machine(session, machine, number)
     outcome = "done"
     try:
-        caller = _who(request, at, form)
+        caller = _who(request, session, at, form)
         acknowledge_as_typed(session, number, form, caller)
     except Conflict:
         alarm = alarms.alarm(session, number).alarm
@@ -248,7 +248,7 @@ def change_tool(
     """Say that the tool was changed."""
     machine_row = machine_named(session, machine)
     try:
-        caller = _who(request, at, form)
+        caller = _who(request, session, at, form)
         change = parsed(ToolChange, {"offset": length(form.get("offset")), "reason": words(form, "reason")})
         tools.change_tool(session, machine_row, number, change.offset, change.reason, caller)
     except REFUSED as error:
@@ -303,7 +303,7 @@ def decide(request: Request, session: SessionDep, at: Station, machine: str, num
     """Approve, release or reject a correction. Who comes too late is told how it stands."""
     machine_row, verb = machine_named(session, machine), confirmation.verb(form.get("do", ""))
     try:
-        caller = _who(request, at, form)
+        caller = _who(request, session, at, form)
         outcome = decide_as_typed(session, machine_row, number, form, caller)
     except REFUSED as error:
         return _ask_correction(request, session, at, machine, number, verb, form, error)
@@ -343,13 +343,13 @@ def write_note(request: Request, session: SessionDep, at: Station, machine: str,
     """Write a note at the machine; sent twice, it is one."""
     written = {"machine": machine, "text": form.get("text", ""), "key": form.get("key", "")}
     try:
-        row = write_as_typed(session, written, _who(request, at, form))
+        row = write_as_typed(session, written, _who(request, session, at, form))
     except (*REFUSED, Conflict) as error:
         return _ask_note(request, session, at, machine, form, error)
     return RedirectResponse(address(f"/station/{machine}", note=row.note.id), 303)
 
 
-def _who(request: Request, at: AtStation, form: Mapping[str, str]) -> Caller:
+def _who(request: Request, session: Session, at: AtStation, form: Mapping[str, str]) -> Caller:
     """The person who acts: signed in, or identified on the device for this one action.
 
     Raises `NotIdentified`, `TooManyRequests`, and `NotAllowed` for a person without the role operator.
@@ -360,6 +360,7 @@ def _who(request: Request, at: AtStation, form: Mapping[str, str]) -> Caller:
         return at.caller
     name = form.get("other_name", "").strip() or form.get("who", "")
     shown = Shown(name, form.get("pin", ""), form.get("badge", "").strip())
+    session.commit()  # its connection is given back: identification has transactions of its own
     caller = identify(request.app.state.database, at.device, shown)
     caller.must("operator")
     acts(caller.person_id, None, at.device.id)
