@@ -20,9 +20,9 @@ from app.language.times import MINUTES, in_zone, plant_zone, written
 
 if TYPE_CHECKING:
     from app.loop.readings.importing.aqdef.content import Wishes as AqdefWishes
+    from app.loop.readings.importing.cells import Flaw
     from app.loop.readings.importing.history import Flawed, Summary
     from app.loop.readings.importing.layout import Layout, Wishes
-    from app.loop.readings.importing.lines import Flaw
 
 ALIKE = 3  # lines in a row with the same flaw that are named one by one
 

@@ -29,7 +29,7 @@ from app.language.i18n import _
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from app.loop.readings.importing.lines import Flaw
+    from app.loop.readings.importing.cells import Flaw
 
 
 @cli.command("replay")
@@ -89,7 +89,7 @@ def replay_file(
 
 
 def _aside(decisions: "Iterable[dict[str, Any] | Flaw]", flaws: "list[Flaw]") -> Iterator[dict[str, Any]]:
-    from app.loop.readings.importing.lines import Flaw
+    from app.loop.readings.importing.cells import Flaw
 
     for decision in decisions:
         if isinstance(decision, Flaw):

@@ -13,7 +13,8 @@ from app.core.decision.step import Code
 from app.core.parameters import Parameters
 from app.errors import InbandError
 from app.loop.readings.answers import answer
-from app.loop.readings.importing.lines import Flaw, Line
+from app.loop.readings.importing.cells import Flaw
+from app.loop.readings.importing.lines import Line
 from app.loop.readings.records import Entry
 from app.loop.readings.writer.decide import decide_reading
 from app.loop.readings.writer.pending import PendingStream, PendingWrites, Stored

@@ -8,9 +8,10 @@ from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from app.language.i18n import _
 from app.loop.readings import queries
+from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.history import MOST_FLAWS, Flawed, Progress, Summary, store_history
 from app.loop.readings.importing.layout import Layout
-from app.loop.readings.importing.lines import Flaw, Line, lines
+from app.loop.readings.importing.lines import Line, Read, lines
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.batch import store_batch
@@ -30,11 +31,12 @@ def import_readings(
     live: bool = False,
     dry_run: bool = False,
     progress: Progress = lambda: None,
+    read: Read | None = None,
 ) -> Summary:
     """Import a file, all of it or nothing.
 
     live: decide as if the readings came in now, with corrections and alarms. dry_run: say what would happen.
-    source: what the file is called in the record of changes. Raises `NotFound`, `Flawed` and `Invalid`.
+    source: what the file is called in the record of changes. read: its lines, where they were read apart. Raises `NotFound`, `Flawed` and `Invalid`.
     """
     with database.sessions() as session:
         entry = queries.entry_of(session, characteristic)
@@ -43,7 +45,7 @@ def import_readings(
                 _("There is no characteristic {key}.").format(key=repr(characteristic)),
                 _("Check its key under Set-up, or set it up first."),
             )
-        parsed_lines = lines(path, layout, characteristic)
+        parsed_lines = lines(path, layout, characteristic) if read is None else read(0, characteristic)
         if not live:
             summary = store_history(
                 session, entry, parsed_lines, actor=actor, source=source or path.name, progress=progress

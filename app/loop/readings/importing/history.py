@@ -27,7 +27,8 @@ from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.machines import queries as machines
-from app.loop.readings.importing.lines import Flaw, Line
+from app.loop.readings.importing.cells import Flaw
+from app.loop.readings.importing.lines import Line
 from app.loop.readings.records import Entry
 from app.loop.readings.wording import touch_problem
 from app.loop.readings.writer.save import full_blocks

@@ -136,14 +136,20 @@ def look(path: Path, wishes: Wishes, name: str | None = None, *, complete: bool 
     except Unusable as error:
         where = _("line {line}").format(line=error.line) if error.line else "file"
         raise wrong(where, str(error)) from None
-    if complete and not layout.complete:
+    if complete:
+        refuse_incomplete(layout)
+    return layout
+
+
+def refuse_incomplete(layout: Layout) -> None:
+    """Refuse a file in which no column is known to hold what was measured. Raises `Invalid`."""
+    if not layout.complete:
         raise wrong(
             "measured",
             _(
                 "No column is recognised as the measured value. Say which it is: measured=COLUMN. The columns are: {header}."
             ).format(header=", ".join(layout.header)),
         )
-    return layout
 
 
 def wrong(where: str, message: str) -> Invalid:

@@ -20,7 +20,8 @@ from app.loop.readings.importing import uploads, wide
 from app.loop.readings.importing.actions import import_readings
 from app.loop.readings.importing.aqdef import form as aqdef_form
 from app.loop.readings.importing.history import Flawed
-from app.loop.readings.importing.layout import NAMES, Layout, Wishes, look
+from app.loop.readings.importing.layout import NAMES, Layout, Wishes, refuse_incomplete
+from app.loop.readings.importing.lines import look_apart, read_apart
 from app.loop.readings.importing.preview import TRIED_WHOLE, Preview, PreviewLine, first_lines, preview
 from app.loop.readings.importing.uploads import Upload
 from app.loop.readings.importing.wide import ColumnResult
@@ -149,8 +150,9 @@ def _preview(
     preview_result: Preview | None = None
     trouble: InbandError | None = None
     try:
-        layout = look(upload.path, _wishes(said), upload.name, complete=False)
-        preview_result = preview(_database(request), characteristic, upload.path, layout)
+        looked = look_apart(upload.path, _wishes(said), upload.name)
+        layout = looked.layout
+        preview_result = preview(_database(request), characteristic, upload.path, looked)
         trouble = preview_result.trouble
     except InbandError as error:
         trouble = error
@@ -181,12 +183,13 @@ def _wide_preview(request: Request, upload: Upload, said: Mapping[str, str], *, 
     chosen: dict[int, str] = {}
     results: list[ColumnResult] = []
     try:
-        layout = look(upload.path, _wishes(said), upload.name, complete=False)
+        looked = look_apart(upload.path, _wishes(said), upload.name)
+        layout = looked.layout
         if any(name.startswith("to_") for name in said):
             chosen = {column.place: column.characteristic for column in wide.columns_of(said, layout)}
         else:
             chosen = wide.columns_by_name(layout, known)
-        shown = first_lines(upload.path, layout)
+        shown = first_lines(looked)
         if chosen and upload.path.stat().st_size <= TRIED_WHOLE:
             results = wide.preview(_database(request), chosen, upload.path, layout, unit=_wishes(said).unit)
     except InbandError as error:
@@ -292,12 +295,20 @@ def import_it(
     if upload.is_aqdef:
         return _import_aqdef(request, caller, upload, form, characteristic)
     try:
-        layout = look(upload.path, _wishes(form), upload.name, complete=bool(characteristic))
+        layout = look_apart(upload.path, _wishes(form), upload.name).layout
         if not characteristic:
             return _import_wide(request, caller, upload, layout, form)
-        summary = import_readings(
-            _database(request), characteristic, upload.path, layout, actor=caller.name, source=upload.name
-        )
+        refuse_incomplete(layout)
+        with read_apart(upload.path, [layout]) as read:
+            summary = import_readings(
+                _database(request),
+                characteristic,
+                upload.path,
+                layout,
+                actor=caller.name,
+                source=upload.name,
+                read=read,
+            )
     except InbandError as error:
         if characteristic and not isinstance(error, Flawed):
             raise
@@ -323,7 +334,7 @@ def _import_aqdef(
 def _import_wide(
     request: Request, caller: Caller, upload: Upload, layout: Layout, form: Mapping[str, str]
 ) -> RedirectResponse:
-    results = wide.import_wide(
+    results = wide.import_apart(
         _database(request),
         wide.columns_of(form, layout),
         upload.path,

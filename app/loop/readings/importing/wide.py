@@ -1,5 +1,6 @@
 """Wide sheets: one column a characteristic, one row a part. All columns are imported or none."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,9 +15,10 @@ from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.readings import queries
+from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.history import MOST_FLAWS, Flawed, Progress, Summary, store_history
 from app.loop.readings.importing.layout import Layout, unit_of
-from app.loop.readings.importing.lines import Flaw, lines
+from app.loop.readings.importing.lines import Read, lines, read_apart
 from app.loop.readings.records import Entry
 
 
@@ -73,21 +75,25 @@ def import_wide(
     source: str,
     dry_run: bool = False,
     progress: Progress = lambda: None,
+    read: Read | None = None,
 ) -> list[ColumnResult]:
     """Import every column as history of its characteristic, in one transaction.
 
     dry_run: say for each column what would happen, also what stands against it. Raises `NotFound`, `Flawed` and `Invalid`
-    otherwise; then nothing is stored.
+    otherwise; then nothing is stored. read: the lines of each column, where they were read apart.
     """
     _refuse_twice(columns)
     with database.sessions() as session:
-        entries = [(column, _entry(session, column)) for column in columns]
+        entries = [(place, column, _entry(session, column)) for place, column in enumerate(columns)]
         results = []
         # In the order of the machines, as everybody takes their locks.
-        for column, entry in sorted(entries, key=lambda pair: pair[1].machine_id):
+        for place, column, entry in sorted(entries, key=lambda each: each[2].machine_id):
             with session.begin_nested() as part:
                 try:
-                    found = lines(path, layout_of(layout, column, unit), entry.characteristic)
+                    own = layout_of(layout, column, unit)
+                    found = (
+                        lines(path, own, entry.characteristic) if read is None else read(place, entry.characteristic)
+                    )
                     summary = store_history(session, entry, found, actor=actor, source=source, progress=progress)
                     results.append(ColumnResult(column, summary))
                 except InbandError as trouble:
@@ -101,18 +107,44 @@ def import_wide(
     return sorted(results, key=lambda result: result.column.place)
 
 
+def import_apart(
+    database: Database,
+    columns: Sequence[Column],
+    path: Path,
+    layout: Layout,
+    *,
+    unit: str | None,
+    actor: str = "",
+    source: str = "",
+    dry_run: bool = False,
+) -> list[ColumnResult]:
+    """The same with a file of somebody else, which is read once, in a process of its own."""
+    _refuse_twice(columns)
+    with read_apart(path, [_layout_of(layout, column, unit) for column in columns]) as read:
+        return import_wide(
+            database, columns, path, layout, unit=unit, actor=actor, source=source, dry_run=dry_run, read=read
+        )
+
+
+def _layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
+    """The same for a column whose unit nobody knows: it is refused when its turn comes, with its name."""
+    try:
+        return layout_of(layout, column, unit)
+    except Invalid:
+        return layout_of(layout, column, "mm")
+
+
 def preview(
     database: Database, chosen: Mapping[int, str], path: Path, layout: Layout, *, unit: str | None
 ) -> list[ColumnResult]:
     """The result that each column would have. Stores nothing."""
     columns = [Column(place, key) for place, key in chosen.items()]
-    return import_wide(database, columns, path, layout, unit=unit, actor="", source="", dry_run=True)
+    return import_apart(database, columns, path, layout, unit=unit, dry_run=True)
 
 
 def _refuse_twice(columns: Sequence[Column]) -> None:
-    keys = [column.characteristic for column in columns]
-    for key in keys:
-        if keys.count(key) > 1:
+    for key, count in Counter(column.characteristic for column in columns).items():
+        if count > 1:
             raise Invalid.at("columns", _("{key} is named for two columns; name it for one").format(key=key))
     if not columns:
         raise Invalid.at("columns", _("No column is said to be a characteristic; say which is which"))

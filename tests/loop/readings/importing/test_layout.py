@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from app.errors import Invalid
+from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.layout import MOST_COLUMNS, Wishes, look
-from app.loop.readings.importing.lines import Flaw, Line, lines
+from app.loop.readings.importing.lines import Line, lines
 
 NOW = datetime(2026, 11, 21, 12, tzinfo=UTC)
 

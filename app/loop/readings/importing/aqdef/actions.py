@@ -25,8 +25,8 @@ from app.loop.readings.importing.aqdef import matching
 from app.loop.readings.importing.aqdef.content import Readings, Wishes, put_down
 from app.loop.readings.importing.aqdef.matching import NEW, Content
 from app.loop.readings.importing.aqdef.queries import count_alike, remembered
+from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.history import Flawed, Summary, store_history
-from app.loop.readings.importing.lines import Flaw
 from app.loop.readings.records import Entry
 from app.loop.tables.readings import ImportMapping, Reading
 

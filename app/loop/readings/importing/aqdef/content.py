@@ -22,8 +22,9 @@ from app.files.formats.aqdef_times import DayOrder, Slashed, WallClock, slashed
 from app.files.formats.aqdef_values import Value
 from app.language.i18n import _, ngettext
 from app.loop.readings.importing.aqdef.matching import Content
+from app.loop.readings.importing.cells import Flaw, fingerprint
 from app.loop.readings.importing.history import MOST_FLAWS
-from app.loop.readings.importing.lines import Flaw, Line, fingerprint
+from app.loop.readings.importing.lines import Line
 from app.loop.readings.schemas import reading_of
 
 AT_ONCE = 20_000  # readings in memory before they are put down

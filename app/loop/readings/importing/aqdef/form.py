@@ -18,9 +18,9 @@ from app.loop.readings.importing.aqdef import actions, matching
 from app.loop.readings.importing.aqdef.actions import Outcome, Result
 from app.loop.readings.importing.aqdef.content import Wishes
 from app.loop.readings.importing.aqdef.matching import NEW, Content
+from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.history import Flawed
 from app.loop.readings.importing.layout import wrong
-from app.loop.readings.importing.lines import Flaw
 from app.loop.readings.importing.preview import CHECKED_LINES, TRIED_WHOLE
 from app.loop.readings.importing.uploads import Upload
 

@@ -1,0 +1,294 @@
+"""The cells of a file as the fields of readings, or what is wrong with each: line, column, reason.
+
+It is read once, for however many columns. Imports little: files of others are read here in a process of their own.
+"""
+
+import hashlib
+import json
+import pickle  # of our own values, between two processes of ours
+from collections.abc import Callable, Iterator, Sequence
+from datetime import datetime
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from app.files.formats import cell_values, delimited, spreadsheet
+from app.files.formats.cell_values import Unreadable
+from app.files.formats.delimited import Row, Unusable
+from app.files.formats.units import LENGTHS
+from app.language.i18n import _
+from app.loop.readings.importing.layout import Layout, Wishes, look, rows_of
+
+SHOWN = 60  # characters of a wrong value
+SHOWN_LINES = 12
+SHOWN_CELL = 40
+AT_ONCE = 20_000  # items in memory before they are put down
+
+
+class Flaw(NamedTuple):
+    """The error of a line."""
+
+    line: int
+    column: str
+    value: str
+    reason: str
+
+    def __str__(self) -> str:
+        where = _("line {line}").format(line=self.line) + (f", {self.column}" if self.column else "")
+        return f"{where}: {f'{self.value!r} ' if self.value else ''}{self.reason}"
+
+
+class Item(NamedTuple):
+    """The fields of a reading. place: of its layout among those that are asked for. number: of its line."""
+
+    place: int
+    number: int
+    fields: "dict[str, Any] | Flaw"
+
+
+class Looked(NamedTuple):
+    """A file that was looked at: how it is read, and its first lines as they stand in it, by number."""
+
+    layout: Layout
+    first: list[tuple[int, list[str]]]
+
+
+def looked(path: Path, wishes: Wishes, name: str) -> Looked:
+    """Look at a file. Raises `Invalid`."""
+    layout = look(path, wishes, name, complete=False)
+    return Looked(layout, list(islice(_first(path, layout), SHOWN_LINES)))
+
+
+def put_down(
+    path: Path, layouts: Sequence[Layout], folder: Path, most: int | None, spend: Callable[[int], None]
+) -> None:
+    """Write the items of each layout, of the first `most` lines, into a file of the folder; `taken` reads it."""
+    waiting: dict[int, list[tuple[int, Any]]] = {}
+    count = 0
+    for item in _until(items(path, layouts), most):
+        waiting.setdefault(item.place, []).append(item[1:])
+        count += 1
+        if count >= AT_ONCE:
+            _write(waiting, folder, spend)
+            count = 0
+    _write(waiting, folder, spend)
+
+
+def _until(found: Iterator[Item], most: int | None) -> Iterator[Item]:
+    lines, last = 0, -1
+    for item in found:
+        lines += item.number != last
+        last = item.number
+        if most is not None and lines > most:
+            return
+        yield item
+
+
+def _write(waiting: dict[int, list[tuple[int, Any]]], folder: Path, spend: Callable[[int], None]) -> None:
+    for place, pairs in waiting.items():
+        content = pickle.dumps(pairs)
+        spend(len(content))
+        with (folder / str(place)).open("ab") as file:
+            file.write(content)
+    waiting.clear()
+
+
+def taken(path: Path) -> Iterator[tuple[int, "dict[str, Any] | Flaw"]]:
+    """The items of one layout that were put down, by the numbers of their lines."""
+    if not path.exists():
+        return
+    with path.open("rb") as file:
+        while True:
+            try:
+                yield from pickle.load(file)  # noqa: S301 - see above
+            except EOFError:
+                return
+
+
+def fingerprint(path: Path) -> str:
+    """Names the content of a file: the same content has the same, whatever the file is called."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:20]
+
+
+def items(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
+    """Every line that is not empty, for each of these layouts, which differ in nothing but columns and units."""
+    return _csv(path, layouts) if layouts[0].is_table else _json(path, layouts)
+
+
+def _first(path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:
+    try:
+        if layout.is_table:
+            for row in delimited.rows(path, layout.encoding, layout.delimiter):
+                if row.line != layout.header_line:  # lines above it too, so that people see which line is the header
+                    yield row.line, [_short(cell) for cell in row.cells]
+        else:
+            for number, value in objects(path, layout.kind):
+                known = value if isinstance(value, dict) else {}
+                yield number, [_short(known.get(name)) for name in layout.header]
+    except Unusable as error:
+        yield error.line or 0, [_("cannot be read")]
+
+
+def _short(value: object) -> str:
+    text = "" if value is None else str(value).strip()
+    return text if len(text) <= SHOWN_CELL else f"{text[:SHOWN_CELL]}…"
+
+
+def shown(value: Any) -> str:
+    text = "" if value is None else value if isinstance(value, str) else str(value)
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
+
+
+def _csv(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
+    readers = [_readers(layout) for layout in layouts]
+    layout = layouts[0]
+    width = len(layout.header)
+    try:
+        for row in rows_of(path, layout):
+            if len(row.cells) < width or any(cell.strip() for cell in row.cells[width:]):
+                flaw = Flaw(row.line, "", "", _width(len(row.cells), width, layout.delimiter))
+                yield from (Item(place, row.line, flaw) for place in range(len(layouts)))
+                continue
+            for place, own in enumerate(layouts):
+                yield from (Item(place, row.line, found) for found in _of_row(row, own, readers[place]))
+    except Unusable as error:
+        line = error.line or 0
+        yield from (Item(place, line, Flaw(line, "", "", str(error))) for place in range(len(layouts)))
+
+
+def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator["dict[str, Any] | Flaw"]:
+    if layout.skips_blank and not any(row.cells[place].strip() for place in layout.columns["measured"]):
+        return
+    values: dict[str, Any] = {}
+    flawed = False
+    for name, places, read in readers:
+        text = " ".join(row.cells[place] for place in places).strip()
+        try:
+            if layout.kind == "sheet":
+                _refuse_error(text)
+            values[name] = read(text)
+        except Unreadable as error:
+            flawed = True
+            yield Flaw(row.line, layout.named(name), shown(text), str(error))
+    if not flawed:
+        yield values
+
+
+_Reader = tuple[str, tuple[int, ...], Callable[[str], Any]]
+
+
+def _refuse_error(text: str) -> None:
+    """Raises `Unreadable` for a cell of a workbook that has no result."""
+    if text == spreadsheet.NO_RESULT:
+        raise Unreadable(
+            _("is a formula without a result in the file; open the workbook in a spreadsheet program and save it")
+        )
+    if text in spreadsheet.ERRORS:
+        raise Unreadable(_("is an error of the workbook; correct or clear the cell"))
+
+
+def _width(cells: int, width: int, delimiter: str) -> str:
+    sign = {"\t": _("tabulator"), ",": _("comma"), ";": _("semicolon")}.get(delimiter, delimiter)
+    text = _("has {cells} columns, the header has {width}; the column separator is {sign}.").format(
+        cells=cells, width=width, sign=sign
+    )
+    if delimiter == "," and cells > width:
+        text += " " + _(
+            "A decimal comma parts a cell too: put such numbers in quotation marks, or name another delimiter."
+        )
+    return text
+
+
+def _readers(layout: Layout) -> list[_Reader]:
+    scale, decimal, zone, pattern = LENGTHS[layout.unit], layout.decimal, layout.zone, layout.time_format
+
+    def length(text: str) -> float:
+        value = cell_values.number(text, decimal)
+        return value if scale == 1.0 else round(value * scale, 9)
+
+    def time(text: str) -> datetime:
+        return cell_values.moment(text, zone, pattern)
+
+    def whole(text: str) -> int | None:
+        if text and not (text.isascii() and text.isdigit()):
+            raise Unreadable(_("is not the number of a correction"))
+        return int(text) if text else None
+
+    kinds: dict[str, Callable[[str], Any]] = {
+        "measured": length,
+        "measured_at": time,
+        "machined_at": lambda text: time(text) if text else None,
+        "correction_in_effect": whole,
+        "touches": _touches,
+        "context": _context,
+    }
+    return [(name, places, kinds.get(name, lambda text: text or None)) for name, places in layout.columns.items()]
+
+
+def _touches(text: str) -> Any:
+    try:
+        return json.loads(text) if text else None
+    except (ValueError, RecursionError):
+        raise Unreadable(_("is not a list of touches such as [[39.998, 39.9982]]")) from None
+
+
+def _context(text: str) -> Any:
+    try:
+        return json.loads(text) if text else None
+    except (ValueError, RecursionError):
+        raise Unreadable(_("is not an object such as {example}").format(example='{"order": "A-77"}')) from None
+
+
+def _json(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
+    for number, value in objects(path, layouts[0].kind):
+        for place, layout in enumerate(layouts):
+            yield from (Item(place, number, found) for found in _of_object(number, value, layout))
+
+
+def _of_object(number: int, value: Any, layout: Layout) -> Iterator["dict[str, Any] | Flaw"]:
+    if isinstance(value, Flaw):
+        yield value
+        return
+    if not isinstance(value, dict):
+        yield Flaw(number, "", shown(value), _("is not a JSON object with the fields of a reading"))
+        return
+    values = {
+        name: value.get(layout.header[places[0]])
+        for name, places in layout.columns.items()
+        if value.get(layout.header[places[0]]) is not None
+    }
+    flaws = list(_converted(values, layout, number))
+    yield from flaws or [values]
+
+
+def objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:
+    """Yield the content of each line of a file of JSON objects, or in each place of a JSON list."""
+    if kind == "list":
+        yield from enumerate(json.loads(path.read_text("utf-8-sig")), start=1)
+        return
+    number = 0
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            for number, line in enumerate(file, start=1):
+                if not line.strip():
+                    continue
+                try:
+                    yield number, json.loads(line)
+                except (ValueError, RecursionError) as error:
+                    yield number, Flaw(number, "", shown(line.strip()), _("is not JSON: {error}").format(error=error))
+    except UnicodeDecodeError:
+        yield number + 1, Flaw(number + 1, "", "", _("JSON files are UTF-8 text; this is not."))
+
+
+def _converted(values: dict[str, Any], layout: Layout, number: int) -> Iterator[Flaw]:
+    """Bring lengths to mm and times to their zone; what is of the wrong kind is told with the other fields."""
+    scale = LENGTHS[layout.unit]
+    if scale != 1.0 and isinstance(values.get("measured"), int | float) and abs(values["measured"]) < 1e300:
+        values["measured"] = round(values["measured"] * scale, 9)
+    for name in ("measured_at", "machined_at"):
+        if isinstance(values.get(name), str):
+            try:
+                values[name] = cell_values.moment(values[name], layout.zone, layout.time_format)
+            except Unreadable as error:
+                yield Flaw(number, layout.named(name), shown(values[name]), str(error))
