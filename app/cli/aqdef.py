@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from app.db.engine import Database
     from app.loop.readings.importing.aqdef.actions import Outcome, Result
-    from app.loop.readings.importing.aqdef.content import Wishes
     from app.loop.readings.importing.aqdef.matching import Content
+    from app.loop.readings.importing.aqdef.sorting import Wishes
 
 
 def is_aqdef(file: Path) -> bool:
@@ -32,7 +32,7 @@ def is_aqdef(file: Path) -> bool:
 def wishes_for(zone: ZoneInfo, unit: str | None, encoding: str | None, *, day_first: bool | None) -> "Wishes":
     """The choices that options say."""
     from app.files.formats.aqdef_times import day_order
-    from app.loop.readings.importing.aqdef.content import Wishes
+    from app.loop.readings.importing.aqdef.sorting import Wishes
 
     return Wishes(zone, day_order(day_first), unit, encoding)
 

@@ -19,7 +19,7 @@ from app.language.i18n import _, ngettext
 from app.language.times import MINUTES, in_zone, plant_zone, written
 
 if TYPE_CHECKING:
-    from app.loop.readings.importing.aqdef.content import Wishes as AqdefWishes
+    from app.loop.readings.importing.aqdef.sorting import Wishes as AqdefWishes
     from app.loop.readings.importing.cells import Flaw
     from app.loop.readings.importing.history import Flawed, Summary
     from app.loop.readings.importing.layout import Layout, Wishes

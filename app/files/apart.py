@@ -55,12 +55,13 @@ _free = threading.BoundedSemaphore(MOST_AT_ONCE)
 _room: int | None = None  # bytes that this process may still write; None: no limit
 
 
-def apart(work: Callable[..., Result], *given: Any, limits: Limits = LIMITS) -> Result:
+def apart(work: Callable[..., Result], *given: Any, limits: Limits | None = None) -> Result:
     """The result of a function, called in a process of its own.
 
     work: of a module that imports little. Raises what it raises of ours, `Unusable` at a limit, `TooManyRequests` while others
     are read, and `OSError` for a full disk.
     """
+    limits = limits or LIMITS
     if not _free.acquire(timeout=WAIT):
         raise TooManyRequests(
             _("Other files are being read at the moment."), _("Send it again in a moment."), retry_after=10

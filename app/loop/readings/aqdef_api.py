@@ -21,8 +21,8 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.readings.aqdef_export import write_aqdef
 from app.loop.readings.importing.aqdef import actions, matching
 from app.loop.readings.importing.aqdef.actions import Outcome, Result
-from app.loop.readings.importing.aqdef.content import Wishes
 from app.loop.readings.importing.aqdef.matching import Content
+from app.loop.readings.importing.aqdef.sorting import Wishes
 from app.web.api import api_router, problems
 from app.web.deps import SessionDep
 from app.web.downloads import download
@@ -150,11 +150,12 @@ def import_aqdef(request: Request, session: SessionDep, caller: Engineer, given:
     database: Database = request.app.state.database
     with TemporaryDirectory() as folder:
         source = _written(Path(folder), given)
-        description = actions.describe(source)
+        session.commit()  # nothing is kept open while the file is read
+        description = actions.describe(source, foreign=True)
         found = matching.contents(description, wishes.unit)
-        chosen = _chosen(actions.guess(session, found), given, found)
-        machine = actions.machine_for(session, found, given.machine)
-        session.commit()  # the import has a transaction of its own, and takes a while
+        with database.sessions() as looking:
+            chosen = _chosen(actions.guess(looking, found), given, found)
+            machine = actions.machine_for(looking, found, given.machine)
         outcome = Outcome(remarks=[str(each) for each in description.remarks])
         if chosen or not given.dry_run:
             outcome = actions.import_aqdef(
@@ -167,6 +168,7 @@ def import_aqdef(request: Request, session: SessionDep, caller: Engineer, given:
                 actor=caller.name,
                 name=given.name,
                 dry_run=given.dry_run,
+                foreign=True,
             )
     results = {each.content.index: each for each in outcome.results}
     return AqdefResult(

@@ -8,8 +8,8 @@ from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from app.language.i18n import _
 from app.loop.readings import queries
-from app.loop.readings.importing.cells import Flaw
-from app.loop.readings.importing.history import MOST_FLAWS, Flawed, Progress, Summary, store_history
+from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
+from app.loop.readings.importing.history import Flawed, Progress, Summary, store_history
 from app.loop.readings.importing.layout import Layout
 from app.loop.readings.importing.lines import Line, Read, lines
 from app.loop.readings.records import Entry

@@ -19,6 +19,7 @@ from app.files.formats.units import LENGTHS
 from app.language.i18n import _
 from app.loop.readings.importing.layout import Layout, Wishes, look, rows_of
 
+MOST_FLAWS = 200
 SHOWN = 60  # characters of a wrong value
 SHOWN_LINES = 12
 SHOWN_CELL = 40
@@ -259,7 +260,9 @@ def _of_object(number: int, value: Any, layout: Layout) -> Iterator["dict[str, A
         if value.get(layout.header[places[0]]) is not None
     }
     flaws = list(_converted(values, layout, number))
-    yield from flaws or [values]
+    yield from flaws
+    if not flaws:
+        yield values
 
 
 def objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:

@@ -27,7 +27,7 @@ from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.machines import queries as machines
-from app.loop.readings.importing.cells import Flaw
+from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
 from app.loop.readings.importing.lines import Line
 from app.loop.readings.records import Entry
 from app.loop.readings.wording import touch_problem
@@ -35,7 +35,6 @@ from app.loop.readings.writer.save import full_blocks
 from app.loop.readings.writer.statements import as_json
 from app.loop.tables.tools import AverageMemory
 
-MOST_FLAWS = 200
 Progress = Callable[[], None]
 
 STAGE = """

@@ -7,8 +7,8 @@ from typing import NamedTuple
 from app.db.engine import Database
 from app.errors import InbandError
 from app.loop.readings.importing.actions import import_readings
-from app.loop.readings.importing.cells import Flaw, Looked
-from app.loop.readings.importing.history import MOST_FLAWS, Flawed, Summary
+from app.loop.readings.importing.cells import MOST_FLAWS, Flaw, Looked
+from app.loop.readings.importing.history import Flawed, Summary
 from app.loop.readings.importing.lines import Line, read_apart
 
 TRIED_WHOLE = 5_000_000  # bytes: a longer file is only begun before it is imported

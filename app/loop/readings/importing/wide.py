@@ -15,8 +15,8 @@ from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.readings import queries
-from app.loop.readings.importing.cells import Flaw
-from app.loop.readings.importing.history import MOST_FLAWS, Flawed, Progress, Summary, store_history
+from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
+from app.loop.readings.importing.history import Flawed, Progress, Summary, store_history
 from app.loop.readings.importing.layout import Layout, unit_of
 from app.loop.readings.importing.lines import Read, lines, read_apart
 from app.loop.readings.records import Entry

@@ -1,7 +1,8 @@
 """AQDEF files: several characteristics in each, which may be set up out of the file.
 
 matching.py   what the file's characteristics are: lengths in mm, limits, and which of them are known here
-content.py    the values of each, as readings with keys of their own, or what is wrong with them
+sorting.py    the values of each put down beside, with keys of their own, or what is wrong with them
+content.py    those values as readings
 form.py       what is chosen on the page
 actions.py    set up what is missing, store as history, exclude what the file marks, remember what belongs together
 """

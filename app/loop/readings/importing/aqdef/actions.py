@@ -1,6 +1,7 @@
 """Import of an AQDEF file: all of it or nothing, as history of each characteristic (decision 15)."""
 
 import unicodedata
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -11,7 +12,7 @@ from sqlalchemy.orm import Session
 
 from app.db.engine import Database
 from app.errors import FieldError, InbandError, Invalid
-from app.files.formats import aqdef
+from app.files.apart import apart
 from app.files.formats.aqdef import Description, Source
 from app.files.formats.cell_values import folded
 from app.files.formats.delimited import Unusable
@@ -22,9 +23,10 @@ from app.loop.machines import queries as machines
 from app.loop.readings import queries
 from app.loop.readings.actions import exclude_all
 from app.loop.readings.importing.aqdef import matching
-from app.loop.readings.importing.aqdef.content import Readings, Wishes, put_down
+from app.loop.readings.importing.aqdef.content import Readings, put_down
 from app.loop.readings.importing.aqdef.matching import NEW, Content
 from app.loop.readings.importing.aqdef.queries import count_alike, remembered
+from app.loop.readings.importing.aqdef.sorting import Wishes, described
 from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.history import Flawed, Summary, store_history
 from app.loop.readings.records import Entry
@@ -70,17 +72,17 @@ class Outcome:
         return sum(each.summary.repeated for each in self.results if each.summary)
 
 
-def describe(source: Source) -> Description:
-    """The description of a file. Raises `Invalid`."""
+def describe(source: Source, *, foreign: bool = False) -> Description:
+    """The description of a file; of a foreign one by a process of its own. Raises `Invalid`."""
     try:
-        return aqdef.describe(source)
+        return apart(described, source) if foreign else described(source)
     except Unusable as error:
         raise _unusable(error) from None
 
 
 def _unusable(error: Unusable) -> Invalid:
     where = _("line {line}").format(line=error.line) if error.line else "file"
-    return Invalid.at(where, str(error))
+    return Invalid.at(where, str(error).removesuffix("."))
 
 
 def guess(session: Session, found: Sequence[Content]) -> dict[int, str]:
@@ -120,11 +122,12 @@ def import_aqdef(
     dry_run: bool = False,
     most: int | None = None,
     progress: Callable[[], None] = lambda: None,
+    foreign: bool = False,
 ) -> Outcome:
     """Import the characteristics that are chosen, in one transaction.
 
     chosen: the key of the characteristic here for each index of the file, or `NEW` to set it up on the machine. dry_run: say
-    what would happen, for each also what stands against it. Raises `Invalid`, `Flawed`, `NotFound` and `Conflict`.
+    what would happen, for each also what stands against it. foreign: read in a process of its own. Raises `Invalid`, `Flawed`, `NotFound` and `Conflict`.
     """
     found = {each.index: each for each in matching.contents(description, wishes.unit)}
     _refuse(chosen, found)
@@ -132,12 +135,12 @@ def import_aqdef(
     outcome = Outcome()
     try:
         with (
-            put_down(source, description, wanted, wishes, progress, most) as readings,
+            put_down(source, wanted, wishes, progress, most, foreign=foreign) as readings,
             database.sessions() as session,
         ):
-            if readings.flaws:
-                raise Flawed(readings.flaws, readings.flaw_count)
-            if not readings.counted.total() and not readings.missing.total():
+            if readings.found.flaws:
+                raise Flawed(readings.found.flaws, readings.found.flaw_count)
+            if not readings.found.counted.total() and not readings.found.missing.total():
                 raise Invalid.at(
                     "file",
                     _("it holds no value of what is chosen; the values of a .dfd lie in the .dfx that belongs to it"),
@@ -168,7 +171,7 @@ def _refuse(chosen: Mapping[int, str], found: Mapping[int, Content]) -> None:
                 *(FieldError("file", reason) for reason in reasons[:20] if not reason.endswith(": ")),
             ],
         )
-    keys = [key for key in chosen.values() if key != NEW]
+    keys = Counter(key for key in chosen.values() if key != NEW)
     for index, key in chosen.items():
         content = found.get(index)
         if content is None:
@@ -176,7 +179,7 @@ def _refuse(chosen: Mapping[int, str], found: Mapping[int, Content]) -> None:
         reason = content.obstacle or (content.not_new if key == NEW else "")
         if reason:
             raise Invalid.at(content.title, reason)
-        if keys.count(key) > 1:
+        if keys[key] > 1:
             raise Invalid.at("characteristics", _("{key} is named for two characteristics of the file").format(key=key))
 
 
@@ -213,13 +216,13 @@ def _store(
 ) -> Result:
     current = characteristic_queries.characteristic_named(session, entry.characteristic)
     doubts = tuple(matching.doubts(content, current.parameters))
-    if not readings.counted[content.index]:
+    if not readings.found.counted[content.index]:
         return Result(content, entry.characteristic, created, Summary(), doubts=doubts)
     with session.begin_nested() as part:
         try:
             lines = readings.lines(content.index, entry.characteristic)
             summary = store_history(session, entry, lines, actor=actor, source=name, progress=lambda: None)
-            excluded = _exclude(session, entry, readings.excluded.get(content.index, {}), summary, actor, name)
+            excluded = _exclude(session, entry, readings.found.excluded.get(content.index, {}), summary, actor, name)
         except InbandError as trouble:
             part.rollback()
             return Result(content, entry.characteristic, created, doubts=doubts, trouble=trouble)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from app.db.engine import Database
 from app.errors import InbandError
@@ -16,8 +17,8 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.machines import queries as machines
 from app.loop.readings.importing.aqdef import actions, matching
 from app.loop.readings.importing.aqdef.actions import Outcome, Result
-from app.loop.readings.importing.aqdef.content import Wishes
 from app.loop.readings.importing.aqdef.matching import NEW, Content
+from app.loop.readings.importing.aqdef.sorting import Wishes
 from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.history import Flawed
 from app.loop.readings.importing.layout import wrong
@@ -41,10 +42,13 @@ class Form:
     machines: list[tuple[str, str]] = field(default_factory=list)
     known: list[tuple[str, str]] = field(default_factory=list)
 
+    @cached_property
+    def _results(self) -> dict[int, Result]:
+        return {each.content.index: each for each in (self.outcome.results if self.outcome else [])}
+
     def result(self, index: int) -> Result | None:
         """The result of one characteristic."""
-        results = self.outcome.results if self.outcome else []
-        return next((each for each in results if each.content.index == index), None)
+        return self._results.get(index)
 
     @property
     def flaws(self) -> list[Flaw]:
@@ -74,7 +78,7 @@ def look(database: Database, upload: Upload, said: Mapping[str, str], characteri
         form.machines = [(each.key, each.name) for each in machines.machines(session)]
     try:
         source, wishes = _source(upload, said), _wishes(said)
-        form.description = description = actions.describe(source)
+        form.description = description = actions.describe(source, foreign=True)
         form.found = matching.contents(description, wishes.unit)
         with database.sessions() as session:
             form.chosen = _chosen(said) if _has_choice(said) else actions.guess(session, form.found)
@@ -100,6 +104,7 @@ def look(database: Database, upload: Upload, said: Mapping[str, str], characteri
                 name=upload.name,
                 dry_run=True,
                 most=form.checked,
+                foreign=True,
             )
     except InbandError as error:
         form.trouble = error
@@ -109,7 +114,7 @@ def look(database: Database, upload: Upload, said: Mapping[str, str], characteri
 def store(database: Database, upload: Upload, said: Mapping[str, str], actor: str) -> Outcome:
     """Import what is chosen. Raises `InbandError`."""
     source = _source(upload, said)
-    description = actions.describe(source)
+    description = actions.describe(source, foreign=True)
     return actions.import_aqdef(
         database,
         source,
@@ -119,6 +124,7 @@ def store(database: Database, upload: Upload, said: Mapping[str, str], actor: st
         machine=said.get("machine") or None,
         actor=actor,
         name=upload.name,
+        foreign=True,
     )
 
 

@@ -20,8 +20,8 @@ from app.loop.machines import actions as machines
 from app.loop.machines.schemas import MachineIn
 from app.loop.readings.importing.aqdef import actions, matching
 from app.loop.readings.importing.aqdef.actions import Outcome
-from app.loop.readings.importing.aqdef.content import Wishes
 from app.loop.readings.importing.aqdef.matching import NEW
+from app.loop.readings.importing.aqdef.sorting import Wishes
 from app.loop.readings.importing.history import Flawed
 from tests.forked import inband
 from tests.loop.readings.importing.test_history import scalar, set_up, stored
