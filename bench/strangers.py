@@ -43,7 +43,7 @@ HEAD = "POST /api/v1/notes HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 class Waited(NamedTuple):
     """Waiting times of readings (ms) at two quantiles, and the number of readings."""
 
-    count: int
+    number: int
     median: float
     p99: float
 
@@ -227,12 +227,12 @@ def main(seconds: float) -> int:
         idle = push(running.url, keys, seconds, "idle")
         told = json.dumps([running.key, tablet, file])
         print(f"{'':8} {'readings':>9} {'median':>9} {'p99':>9} {'p99 / idle':>10}  strangers were answered")
-        print(f"{'idle':8} {idle.count:9} {idle.median:6.1f} ms {idle.p99:6.1f} ms")
+        print(f"{'idle':8} {idle.number:9} {idle.median:6.1f} ms {idle.p99:6.1f} ms")
         for which in ("silent", "slow", "guesses", "imports", "reports", "all"):
             waited, got = beside(running, keys, told, which, seconds)
             ratio = waited.p99 / idle.p99
             words = ", ".join(f"{what} × {many}" for what, many in sorted(got.items()))
-            print(f"{which:8} {waited.count:9} {waited.median:6.1f} ms {waited.p99:6.1f} ms {ratio:10.1f}  {words}")
+            print(f"{which:8} {waited.number:9} {waited.median:6.1f} ms {waited.p99:6.1f} ms {ratio:10.1f}  {words}")
     print(f"p99 with all of them / idle: {ratio:.1f}, wanted below {WANTED:.0f}")
     return int(ratio >= WANTED)
 
