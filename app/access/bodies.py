@@ -4,6 +4,7 @@ So a stranger's body is not read at all, but for a few kB on the pages that are 
 keeps nothing waiting but itself: it is complete before a route begins, which takes a thread, a session and a connection.
 """
 
+import asyncio
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -21,6 +22,10 @@ from app.web.limits import DEFAULT, FORM, Takes, taken_by, too_large
 def read_after_recognition(app: FastAPI) -> None:
     """Put `BodyLimit` around the routes that the application has, where what it raises becomes an answer."""
     app.router.middleware_stack = BodyLimit(app.router.middleware_stack, app.router.routes)
+
+
+PIECE = 8000
+"""Bytes of a form that are taken apart in one turn of the event loop: some milliseconds."""
 
 
 class Allowance(NamedTuple):
@@ -52,7 +57,7 @@ class BodyLimit:
         elif request.headers.get("content-type", "").startswith("multipart/"):
             receive = _counted(receive, allowance)
         else:
-            receive = await _read(receive, allowance)
+            receive = await _read(receive, allowance, _is_form(request))
         await self.app(scope, receive, send)
 
     def _taken(self, scope: Scope) -> Takes:
@@ -120,8 +125,12 @@ def _counted(receive: Receive, allowance: Allowance) -> Receive:
     return counted
 
 
-async def _read(receive: Receive, allowance: Allowance) -> Receive:
-    """A body that has been read to its end, or as far as it is allowed."""
+def _is_form(request: Request) -> bool:
+    return request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded")
+
+
+async def _read(receive: Receive, allowance: Allowance, form: bool) -> Receive:
+    """A body that has been read to its end, or as far as it is allowed. form: handed on in pieces, each with a turn of its own."""
     parts: list[bytes] = []
     total, more = 0, True
     while more:
@@ -133,11 +142,25 @@ async def _read(receive: Receive, allowance: Allowance) -> Receive:
         if total > allowance.most:
             return _refusing(allowance.beyond)
         parts.append(part)
-    whole: Message | None = message if more else {"type": "http.request", "body": b"".join(parts), "more_body": False}
+    if more:
+        return _replayed(receive, [message])
+    body = b"".join(parts)
+    size = PIECE if form else max(total, 1)
+    pieces = [body[at : at + size] for at in range(0, total, size)] or [b""]
+    last = len(pieces) - 1
+    return _replayed(
+        receive,
+        [{"type": "http.request", "body": piece, "more_body": at < last} for at, piece in enumerate(pieces)],
+    )
+
+
+def _replayed(receive: Receive, messages: list[Message]) -> Receive:
+    heard = iter(messages)
 
     async def replay() -> Message:
-        nonlocal whole
-        first, whole = whole, None
-        return await receive() if first is None else first
+        await asyncio.sleep(0)
+        for message in heard:
+            return message
+        return await receive()
 
     return replay

@@ -26,6 +26,9 @@ DEEPEST = 20
 ON_THE_LOOP = 16_000
 """Bytes of a body that are read where they come in, which takes some milliseconds; a larger one is read on a thread."""
 MOST_ERRORS = 100
+MOST_CONTAINERS = 50_000
+"""Lists and objects of one body: Python makes each while everybody else waits, and of what else there is many at once."""
+_TEXT = re.compile(rb'"(?:[^"\\]|\\.)*+\\?(?:"|\Z)', re.DOTALL)
 _SURROGATE = re.compile("[\ud800-\udfff]")
 
 
@@ -42,6 +45,12 @@ def read_json(body: bytes, content_type: str | None) -> Any:
             "Content-Type",
             _("must be application/json"),
             _("Send JSON, with the header Content-Type: application/json (curl: -H 'Content-Type: application/json')."),
+        )
+    if _containers(body) > MOST_CONTAINERS:
+        raise _refused(
+            "body",
+            _("holds more than {most} lists and objects").format(most=MOST_CONTAINERS),
+            _("Send it in several requests."),
         )
     try:
         value = json.loads(body.decode("utf-8"), object_pairs_hook=_unique)
@@ -71,6 +80,15 @@ def read_json(body: bytes, content_type: str | None) -> Any:
             errors=problems,
         )
     return value
+
+
+def _containers(body: bytes) -> int:
+    """The number of lists and objects, or one that is larger if it does not matter: brackets in texts are no lists."""
+    count = body.count(b"[") + body.count(b"{")
+    if count > MOST_CONTAINERS:
+        outside = _TEXT.sub(b"", body)
+        count = outside.count(b"[") + outside.count(b"{")
+    return count
 
 
 def _refused(field: str, message: str, what_to_do: str | None) -> Invalid:

@@ -169,6 +169,18 @@ class TestBodies:
             read_json(f'{{{names},"last":1,"last":2}}'.encode(), "application/json")
         assert refusal.value.errors == [FieldError("body", 'says "last" twice; say it once')]
 
+    def test_lists_by_the_ten_thousand_are_not_made(self) -> None:
+        """Python makes them while everybody waits. Brackets in a text are no lists, however it ends."""
+        for lists in (b"[" + b"[]," * 60_000 + b"[]]", b"[" * 60_000, b'{"a":' * 60_000):
+            with pytest.raises(Invalid) as refusal:
+                read_json(lists, "application/json")
+            assert "50000 lists" in refusal.value.errors[0].message
+        text = '[mm] {5} "quoted" \\' * 30_000
+        assert read_json(json.dumps({"content": text}).encode(), "application/json") == {"content": text}
+        for cut in (json.dumps(text).encode()[:-1], b'"' + b'\\"[' * 60_000, b'"[' * 60_000 + b"\\"):
+            with pytest.raises(Invalid):
+                read_json(cut, "application/json")
+
     def test_a_hundred_thousand_mistakes_are_not_all_named(self) -> None:
         with pytest.raises(Invalid) as refusal:
             read_json(b"[" + b"NaN," * 100_000 + b"1]", "application/json")
