@@ -3,13 +3,13 @@
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
-from app.bridge import guided_test
-from app.bridge.links import LinkError, Misconfigured, look_who_answers, silence
+from app.bridge import guided_test, log_lines
+from app.bridge.links import LinkError, Misconfigured, Order, look_who_answers, silence
 from app.bridge.moments import wrong_date
 from app.bridge.store_lock import StoreError
 from app.bridge.unit import Unit
@@ -37,6 +37,7 @@ class Beside:
     def __init__(self, unit: Unit) -> None:
         self.unit = unit
         self.failed: dict[str, Failed] = {}
+        self.offered: Sequence[Order] = ()
 
     async def do(self, name: str, of: object, work: Callable[[], Awaitable[T]]) -> T | None:
         """Do it, unless it has just failed. Raises what may have left the connection behind in disorder."""
@@ -55,6 +56,15 @@ class Beside:
             return None
         self.failed.pop(name, None)
         return found
+
+    def note_offered(self, orders: Sequence[Order]) -> None:
+        """Log what the control can take now and could not before."""
+        if "offer" in self.failed:
+            return
+        for order in orders:
+            if order not in self.offered:
+                log_lines.offered(self.unit.machine.key, order)
+        self.offered = orders
 
     def words(self) -> tuple[str, str]:
         """The state and the sentences of what fails time and again; empty if nothing does."""
@@ -128,7 +138,7 @@ async def _connected(unit: Unit, beside: Beside) -> None:
         if received:
             if unit.context is not None:
                 received = unit.context.with_parts(received)
-            await store.add(machine.key, received)
+            log_lines.readings(machine.key, received, await store.add(machine.key, received))
             position = received[-1].position or position
             unit.news.set()
             async with asyncio.timeout(machine.patience):
@@ -140,6 +150,7 @@ async def _connected(unit: Unit, beside: Beside) -> None:
                 if order is not None or outcome.number not in answered:
                     if noted := await store.answered(machine.key, outcome):
                         memory = noted
+                        log_lines.answered(machine.key, outcome)
                         unit.to_tell = True
                         unit.news.set()
                     answered.add(outcome.number)
@@ -148,6 +159,7 @@ async def _connected(unit: Unit, beside: Beside) -> None:
                 unit.orders = tuple(each for each in unit.orders if each.tool_memory != memory)
         offered = tuple(unit.offered)
         await beside.do("offer", offered, partial(link.offer, offered))
+        beside.note_offered(offered)
         if time.monotonic() >= offsets_at:
             offsets = await beside.do("offsets", None, link.offsets) or {}
             if unit.test is not None and unit.test.changed:

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from app import __version__
-from app.bridge import guided_test, offering
+from app.bridge import guided_test, log_lines, offering
 from app.bridge.configuration import Server
 from app.bridge.offering import MOST_REASON, REFUSED, line, not_from_inband
 from app.bridge.offset_change import writes_offsets
@@ -116,6 +116,8 @@ async def _push_all(unit: Unit, client: AsyncClient, rows: Sequence[Waiting]) ->
             pass  # one of them: each by itself, below
         else:
             await unit.store.sent(unit.machine.key, [row.id for row in rows])
+            for row, decided in zip(rows, batch.decisions, strict=False):
+                log_lines.decision(unit.machine.key, row.key, decided)
             return batch.decisions
     return [decision for row in rows if (decision := await _push(unit, client, row))]
 
@@ -134,6 +136,7 @@ async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | Non
         reason = f"Characteristic {row.body.get('characteristic')!r} is another machine's: correct it in {named}."
     else:
         await unit.store.sent(unit.machine.key, [row.id])
+        log_lines.decision(unit.machine.key, row.key, decision)
         return decision
     await unit.store.refuse(unit.machine.key, row.id, reason)
     log.warning("%s: reading %s is in the quarantine: %s", unit.machine.key, row.key, reason)

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import logging
 import signal
 from collections.abc import Callable, Coroutine
 from datetime import datetime
@@ -11,7 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from app import logs
 from app.cli.base import cli, say
+from app.cli.serve import LogForm, LogLevel
 from app.errors import InbandError
 
 if TYPE_CHECKING:
@@ -60,14 +61,15 @@ def _with_store(
 
 
 @bridge.callback()
-def run_bridge(context: typer.Context, config: ConfigFile = PLANT) -> None:
+def run_bridge(
+    context: typer.Context, config: ConfigFile = PLANT, log_level: LogLevel = None, log_format: LogForm = None
+) -> None:
     """Run the bridge: fetch readings from the machines, send them to the server, bring corrections back."""
     if context.invoked_subcommand is not None:
         return
     from app.bridge import program
 
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s")
-    logging.getLogger("httpx").setLevel(logging.WARNING)
+    logs.configure(log_level or "info", log_format or "text")
 
     async def work(configuration: "Configuration", store: "Store") -> None:
         running = asyncio.create_task(program.run(configuration, store))
@@ -283,6 +285,8 @@ def quarantine(
     config: ConfigFile = PLANT,
 ) -> None:
     """List the readings that the server has refused, with the reason; send them again, or drop them."""
+    from app.bridge.store import NUMBER
+
     if send and drop:
         raise typer.BadParameter("Choose one of --send and --drop.")
 
@@ -293,11 +297,18 @@ def quarantine(
             number = await store.release(named, key, drop=drop, named=names)
             say(f"{number} readings {'dropped' if drop else 'wait to be sent again'}.")
             return
-        for each in await store.quarantine(named, 1000):
+        held = await store.quarantine(named, 1000)
+        if not held:
+            say(f"The quarantine of {named} is empty.")
+            return
+        rows: list[tuple[str, ...]] = [("KEY", "CAME AT", "CHARACTERISTIC", "MEASURED", "REASON")]
+        for each in held:
             at = datetime.fromtimestamp(each.at).astimezone().isoformat(timespec="seconds")
-            typer.echo(
-                f"{each.key}\t{at}\t{each.body.get('characteristic')}\t{each.body.get('measured')}\t{each.reason}"
-            )
+            name, size = each.body.get("characteristic") or each.body.get(NUMBER), each.body.get("measured")
+            rows.append((each.key, at, *("-" if cell is None else str(cell) for cell in (name, size)), each.reason))
+        widths = [max(map(len, column)) for column in list(zip(*rows, strict=True))[:-1]]
+        for row in rows:
+            typer.echo("\t".join([*(cell.ljust(width) for cell, width in zip(row, widths, strict=False)), row[-1]]))
 
     _with_store(config, work)
 

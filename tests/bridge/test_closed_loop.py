@@ -1,5 +1,8 @@
 """The whole way: the model measures, the bridge sends, the server decides, the bridge offers, the model takes it."""
 
+import json
+import logging
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +10,7 @@ import pytest
 
 from app.bridge.simulators.model import Feature, Model
 from app.core.ring import Register, Unit
+from app.logs import JsonLines
 from tests.bridge.plant import bridge, location, parts, store_in, unit_of, until
 from tests.loops import run
 from tests.shop import Shop
@@ -24,7 +28,10 @@ QUIET = Feature(bias=0.006, wear=0.0, noise=0.0)
     ids=["diameter in mm", "radius in mm", "other sign, in inches"],
 )
 @pytest.mark.parametrize("mode", ["control", "direct"])
-def test_a_size_comes_back_to_its_target(shop: Shop, tmp_path: Path, feature: Feature, unit: Unit, mode: str) -> None:
+def test_a_size_comes_back_to_its_target(
+    shop: Shop, tmp_path: Path, feature: Feature, unit: Unit, mode: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, "app.bridge")
     model = Model((feature,), unit=unit)
 
     async def loop() -> None:
@@ -64,6 +71,18 @@ def test_a_size_comes_back_to_its_target(shop: Shop, tmp_path: Path, feature: Fe
     assert correction["status"] == "applied"
     assert correction["offset_after"] == pytest.approx(-0.006, abs=within)
     assert shop.call("GET", "/alarms?state=active&machine=" + shop.machine)["items"] == []
+    said = [each.getMessage().removeprefix(f"{shop.machine}: ") for each in caplog.records]
+    for line in (
+        rf"reading \S+:1: {shop.characteristic}, 40\.\d+ mm, part 1(, |$)",
+        r"decision on \S+:1: \w+, correct; correction 1 of -0\.006\S* mm for tool memory 3",
+        r"correction 1 is offered: tool memory 3 from 0 to -0\.006",
+        r"correction 1 is applied; the control holds -0\.00",
+        r"decision on \S+:3: zero, none",
+    ):
+        assert len([each for each in said if re.match(line, each)]) == 1, (line, said)
+    [record] = [each for each in caplog.records if "correction 1 is applied" in each.getMessage()]
+    told = json.loads(JsonLines().format(record))
+    assert (told["level"], told["machine"], told["correction"], told["applied"]) == ("info", shop.machine, 1, True)
 
 
 @pytest.mark.parametrize("mode", ["control", "direct"])
