@@ -10,6 +10,11 @@ INDEX_ANGLES = (0.0, 359.5)  # degrees, R26 of the variants that index the part
 CALIBRATION_RANGES = {"path_factor": (1, 10)}  # where L92 has another range than L93
 
 
+SAME_PLACE = 0.05  # degrees between two places that are one
+COARSEST, COARSEST_SHARE = 1.0, 0.05  # mm, and share of the nominal: larger deviations are questioned
+NEAR = (0.5, 1.5)  # deviation / nominal, where it may be a limit of size
+
+
 def unusual(values: Mapping[str, Any]) -> Iterator[Problem]:
     """Values that the measuring cycles of the sources would not take: ranges, and variants that do not fit together."""
     for field in FIELDS:
@@ -21,12 +26,50 @@ def unusual(values: Mapping[str, Any]) -> Iterator[Problem]:
     if variant in (Variant.INDEXED, Variant.ROUND, Variant.ALONG) and values["axis"] != Axis.X:
         data = {"variant": str(variant), "axis": str(values["axis"])}
         yield Problem("axis", "variant_axis", data, warning=True)
+    yield from _places(values)
+    yield from _limits_as_sizes(values)
+    yield from _averages_never(values)
     window, confidence = values["path_factor"], values.get("confidence_limit")
     if confidence is not None and nanometres(confidence) > nanometres(window):
         data = {"value": confidence, "window": window}
         yield Problem("confidence_limit", "out_of_reach", data, warning=True)
     if variant in (Variant.ROUND, Variant.ALONG) and max(points, values["accept_m"]) < 2:
         yield Problem("points", "points_missing", {"variant": str(variant)}, warning=True)
+
+
+def _places(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """Warn of points whose places (R26) are not known, or are the same."""
+    variant, index = values["variant"], values.get("index")
+    points = max(values["points"], values["accept_m"], 2 if variant == Variant.INDEXED else 1)
+    if variant == Variant.ALONG and points > 1 and not index:
+        yield Problem("index", "spacing_missing", {}, warning=True)
+    if variant in (Variant.INDEXED, Variant.ROUND) and index is not None:
+        turned = next((n for n in range(1, points) if abs((n * index + 180) % 360 - 180) < SAME_PLACE), None)
+        if turned is not None:
+            yield Problem("index", "places_coincide", {"value": index, "point": turned + 1}, warning=True)
+
+
+def _limits_as_sizes(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """Warn of deviations (R40, R41) as large as sizes: the source calls them limits, and drawings have limits, too."""
+    nominal, upper, lower = (values.get(name) for name in ("nominal", "upper_deviation", "lower_deviation"))
+    if nominal is None or upper is None or lower is None:
+        return
+    largest = max(COARSEST_SHARE * abs(nominal), COARSEST)
+    near = nominal != 0 and all(NEAR[0] <= deviation / nominal <= NEAR[1] for deviation in (upper, lower))
+    if near or max(abs(upper), abs(lower)) > largest:
+        data = {"nominal": nominal, "upper": upper, "lower": lower}
+        yield Problem("upper_deviation", "limits_as_sizes", data, warning=True)
+
+
+def _averages_never(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """Warn of k with no memory (R11 = 0): M is D/k then, and has to pass R33 before D has passed R34."""
+    zero, averaging, k = (values.get(name) for name in ("zero_range", "averaging_limit", "weighting_factor"))
+    if not zero or averaging is None or values["average_memory"] != 0 or k == 1:
+        return
+    corrects = values["tool_memory"] != 0 and values["mode"] != Mode.MEASURE_ONLY
+    if corrects and nanometres(k * zero) >= nanometres(averaging):
+        data = {"k": k, "reach": k * zero, "averaging": averaging}
+        yield Problem("average_memory", "averages_never", data, warning=True)
 
 
 def _outside(name: str, value: float, usual: tuple[float, float]) -> Iterator[Problem]:

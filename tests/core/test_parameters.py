@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.fits import fit_of
-from app.core.parameters import BY_R, FIELDS, ParameterError, Parameters, Variant, read, unusual_switch
+from app.core.parameters import BY_NAME, BY_R, FIELDS, ParameterError, Parameters, Variant, read, unusual_switch
 from tests.core.conftest import SHAFT
 
 
@@ -45,6 +45,49 @@ def test_r24_wins_over_r25_in_any_order(switches: dict[str, Any], variant: str, 
     for each in (switches, dict(reversed(switches.items()))):
         assert read(SHAFT | each)[0].variant == variant
         assert [problem.code for problem in unusual_switch(SHAFT | each)] == warned
+
+
+@pytest.mark.parametrize(
+    ("drawing", "asked"),
+    [
+        ((40, 40.010, 39.990), True),  # the limits of the source, typed as sizes
+        ((0.5, 0.51, 0.49), True),
+        ((40, 0, -39.99), True),
+        ((-12.5, -12.4, -12.6), True),
+        ((40, 0.0, -0.016), False),
+        ((2, 0.1, -0.2), False),  # coarse, but a tolerance
+        ((0, 0.01, -0.01), False),  # a length from the zero of the part
+        ((300, 2, -2), False),
+    ],
+)
+def test_limits_typed_as_sizes_are_questioned(drawing: tuple[float, float, float], asked: bool) -> None:  # noqa: FBT001
+    names = ("nominal", "upper_deviation", "lower_deviation")
+    wide = {"averaging_limit": None, "zero_range": 0, "wear_limit": 1000, "confidence_limit": 1000}
+    _parameters, warnings = read(SHAFT | wide | dict(zip(names, drawing, strict=True)))
+    assert ("limits_as_sizes" in {warning.code for warning in warnings}) is asked
+
+
+@pytest.mark.parametrize(
+    ("changes", "warned"),
+    [
+        ({"R29": 4, "R33": 0.003, "average_memory": 0}, ["averages_never"]),
+        ({"R29": 4, "R33": 0.003}, []),
+        ({"R29": 4, "R33": 0.003, "average_memory": 0, "mode": "measure_only"}, []),
+        ({"R29": 2, "R33": 0.001, "average_memory": 0}, []),
+        ({"R25": 3, "R23": 3}, ["spacing_missing"]),
+        ({"R25": 3, "R23": 3, "R26": 0}, ["spacing_missing"]),
+        ({"R25": 3, "R23": 3, "R26": -8}, []),
+        ({"R25": 2, "R23": 4}, []),
+        ({"R25": 2, "R23": 4, "R26": 0}, ["places_coincide"]),
+        ({"R25": 2, "R23": 5, "R26": 90}, ["places_coincide"]),
+        ({"R25": 2, "R23": 4, "R26": 90}, []),
+        ({"R25": 1, "R26": 180}, []),
+        ({"R25": 1, "R26": 0}, ["places_coincide"]),
+    ],
+)
+def test_what_can_never_work_is_warned_of(changes: dict[str, Any], warned: list[str]) -> None:
+    given = {name: value for name, value in SHAFT.items() if BY_NAME[name].r not in changes}
+    assert [warning.code for warning in read(given | changes)[1]] == warned
 
 
 @pytest.mark.parametrize("value", [[], "", "1", {}, float("nan"), float("inf"), 10**400])

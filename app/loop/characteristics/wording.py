@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from app.core.parameters import BY_NAME, TWO_POINT_SWITCH, Field, FieldKind, Problem, Variant
+from app.core.parameters import BY_NAME, TWO_POINT_SWITCH, Field, FieldKind, Problem, Variant, mean_nominal
 from app.errors import FieldError
 from app.language.i18n import _
 from app.language.numbers import typed_length
@@ -210,6 +210,15 @@ def sentence(problem: Problem) -> str:
             variant=choice("variant", data.get("variant", ""))
         ),
         "out_of_reach": _out_of_reach(problem, name),
+        "spacing_missing": _(
+            "R26 is missing: along the part it is the distance between two points in mm, without which there is no taper per mm"
+        ),
+        "places_coincide": _(
+            "With R26 = {value}° point {point} lies where the first one does: one place is touched twice and says nothing "
+            "about roundness"
+        ).format(value=data.get("value"), point=data.get("point")),
+        "limits_as_sizes": _limits_as_sizes(problem),
+        "averages_never": _averages_never(problem),
         "switch_value": _(
             "R24 = {value} is taken as two-point measurement; the cycles know 0 (off) and 1 (on). Check the number"
         ).format(value=data.get("value")),
@@ -247,6 +256,33 @@ def _out_of_reach(problem: Problem, name: str) -> str:
         "{name} {value} lies beyond ±a = {window} (R28), so touches never reach it: one outside ±a is a probe fault already. "
         "Raise R28, or lower R36"
     ).format(name=name, value=millimetres(problem.data["value"]), window=millimetres(problem.data["window"]))
+
+
+def _limits_as_sizes(problem: Problem) -> str:
+    if problem.code != "limits_as_sizes":
+        return ""
+    nominal, upper, lower = (problem.data[name] for name in ("nominal", "upper", "lower"))
+    return _(
+        "R40 {upper} and R41 {lower} are large for deviations from R42 {nominal}: the target would be {target}. Are they limits "
+        "of size? As deviations those are {up} and {low}"
+    ).format(
+        upper=millimetres(upper),
+        lower=millimetres(lower),
+        nominal=millimetres(nominal),
+        target=millimetres(mean_nominal(nominal, upper, lower)[0]),
+        up=millimetres(round(upper - nominal, 9)),
+        low=millimetres(round(lower - nominal, 9)),
+    )
+
+
+def _averages_never(problem: Problem) -> str:
+    if problem.code != "averages_never":
+        return ""
+    data = problem.data
+    return _(
+        "Without an average memory (R11 = 0) k = {k} only damps: a deviation must pass k × R33 = {reach} to be corrected, and "
+        "the averaging zone ends at R34 = {averaging}. Give it a memory, or k = 1"
+    ).format(k=f"{data['k']:.10g}", reach=millimetres(data["reach"]), averaging=millimetres(data["averaging"]))
 
 
 def _not_a_number(problem: Problem, name: str) -> str:
