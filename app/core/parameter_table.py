@@ -129,7 +129,7 @@ FIELDS: tuple[Field, ...] = (
     Field("index", "R26", FieldKind.NUMBER, lowest=-100_000, highest=100_000),
     Field("wait", "R04", FieldKind.NUMBER, lowest=0, highest=3600),
     Field("axis", "R30", FieldKind.CHOICE, default="X", choices=_choices(Axis), codes=(1, 2)),
-    Field("direction", "R31", FieldKind.CHOICE, default="positive", choices=_choices(Direction), codes=(0, 1)),
+    Field("direction", "R31", FieldKind.CHOICE, choices=_choices(Direction), codes=(0, 1)),
     Field("feature", None, FieldKind.CHOICE, default="outside", choices=_choices(Feature)),
     Field("nominal", "R42", FieldKind.LENGTH),
     Field("upper_deviation", "R40", FieldKind.LENGTH),

@@ -91,7 +91,7 @@ class Parameters:
     index: float | None = None
     wait: float | None = None
     axis: Axis = Axis.X
-    direction: Direction = Direction.POSITIVE
+    direction: Direction | None = None
     feature: Feature = Feature.OUTSIDE
     path_factor: float = 1.0
     nominal: float | None = None
@@ -148,7 +148,7 @@ class Parameters:
         values = dict(stored)
         accept = values.pop("accept")
         for name, enum in ENUMS.items():
-            if name in values:
+            if values.get(name) is not None:
                 values[name] = enum(values[name])
         return cls(**values, accept_n=accept["n"], accept_m=accept["m"])
 
@@ -211,7 +211,8 @@ def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
     if problems:
         raise ParameterError(problems)
     for name, enum in ENUMS.items():
-        values[name] = enum(values[name])
+        if name in values:
+            values[name] = enum(values[name])
     return Parameters(**values), list(unusual(values))
 
 

@@ -132,6 +132,8 @@ def start_and_end(parameters: Parameters) -> Travel:
     Travel(start=60.0, end=64.0)
     >>> start_and_end(read(bore | {"feature": "outside"})[0])
     Travel(start=-64.0, end=-60.0)
+    >>> start_and_end(read(bore | {"feature": "outside", "R31": None})[0])
+    Travel(start=64.0, end=60.0)
     """
     forward = _forward(parameters)
     surface = _side(parameters) * parameters.target
@@ -141,8 +143,15 @@ def start_and_end(parameters: Parameters) -> Travel:
     )
 
 
+def direction_of(parameters: Parameters) -> Direction:
+    """Direction of the measuring move: R31, and where it is not given from the free side, in the positive half (L93)."""
+    if parameters.direction is not None:
+        return parameters.direction
+    return Direction.POSITIVE if parameters.feature is Feature.INSIDE else Direction.NEGATIVE
+
+
 def _forward(parameters: Parameters) -> float:
-    return 1.0 if parameters.direction is Direction.POSITIVE else -1.0
+    return 1.0 if direction_of(parameters) is Direction.POSITIVE else -1.0
 
 
 def _side(parameters: Parameters) -> float:

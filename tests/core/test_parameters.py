@@ -60,7 +60,7 @@ def test_r24_wins_over_r25_in_any_order(switches: dict[str, Any], variant: str, 
         ((300, 2, -2), False),
     ],
 )
-def test_limits_typed_as_sizes_are_questioned(drawing: tuple[float, float, float], asked: bool) -> None:  # noqa: FBT001
+def test_limits_typed_as_sizes_are_questioned(drawing: tuple[float, float, float], asked: bool) -> None:
     names = ("nominal", "upper_deviation", "lower_deviation")
     wide = {"averaging_limit": None, "zero_range": 0, "wear_limit": 1000, "confidence_limit": 1000}
     _parameters, warnings = read(SHAFT | wide | dict(zip(names, drawing, strict=True)))

@@ -118,6 +118,10 @@ def test_sections_of_two_points_each_are_distances(shaft: Made) -> None:
 @pytest.mark.parametrize(
     ("given", "expected"),
     [
+        # nobody gave R31: start = programmed + a, in the positive half (L93)
+        ({"feature": "outside"}, (41.992, 37.992)),
+        ({"feature": "inside"}, (37.992, 41.992)),
+        ({"axis": "Z"}, (41.992, 37.992)),
         # by hand, a = 1 mm x 2: an outside surface is free outward, a bore inward
         ({"feature": "outside", "direction": "negative"}, (41.992, 37.992)),
         ({"feature": "inside", "direction": "positive"}, (37.992, 41.992)),

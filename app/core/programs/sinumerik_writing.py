@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from app.core.parameters import BY_R, FIELDS, TWO_POINT_SWITCH, FieldKind, Parameters, Variant
+from app.core.parameters import BY_R, FIELDS, TWO_POINT_SWITCH, Direction, FieldKind, Parameters, Variant
+from app.core.probing import direction_of
 from app.core.programs import unit_check
 from app.core.programs.lines import describing, settings, written
 
@@ -62,6 +63,7 @@ def write_calibration(calibration: Calibration, about: Mapping[str, str]) -> str
         "R21": 1 if calibration.free else 0,
         "R22": 2 if calibration.radial else 1,
         "R23": 0 if calibration.free else 1,
+        "R31": list(Direction).index(direction_of(calibration.parameters)),  # the control keeps the last one there
         "R32": calibration.gauge,
     }
     comments = [*describing(about)]

@@ -56,6 +56,10 @@ def explanation(name: str) -> str | None:
         "repeats": _("At the same point; the mean counts. Usual: 1 to 10."),
         "index": _("Degrees between points, or mm along Z."),
         "wait": _("Seconds before measuring goes on after indexing."),
+        "direction": _(
+            "Where it is not given, the probe comes from the free side in the positive half: negative on an outside surface, "
+            "positive on an inside one."
+        ),
         "feature": _(
             "The part from outside or inside (with the direction it says where the probe starts), or the tool itself: its length "
             "or radius tells its wear."
@@ -384,7 +388,7 @@ def worded(name: str, parameters: Mapping[str, Any]) -> str:
     value = parameters.get(name)
     field = BY_NAME.get(name)
     if value is None:
-        return "–"
+        return _("not given") if name == "direction" else "–"
     if name == "accept":
         return _("{n} of {m}").format(n=value["n"], m=value["m"])
     if isinstance(value, bool):

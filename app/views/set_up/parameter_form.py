@@ -48,7 +48,10 @@ def _input(field: Field) -> Input:
         explanation(field.name),
         "mm" if field.kind is FieldKind.LENGTH else units.get(field.name),
         not field.required and field.default is None and field.name not in {*DRAWING, *DIRECT, "factor"},
-        [(value, choice(field.name, value)) for value in field.choices],
+        [
+            *([("", _("Not given"))] if field.default is None else []),
+            *((value, choice(field.name, value)) for value in field.choices),
+        ],
     )
 
 

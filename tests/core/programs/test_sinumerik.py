@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.parameters import Parameters, read
+from app.core.probing import direction_of
 from app.core.programs import sinumerik
 from app.core.programs.lines import LineVerdict, ProgramError, ProgramKind, ProgramText, written
 from app.core.programs.sinumerik_writing import Calibration, write_calibration, write_measuring
@@ -346,9 +347,10 @@ def test_a_calibration_survives_its_program_text(
         "gauge": gauge,
         "surface": "free" if free else "groove",
         "probe": "radial" if radial else "axial",
+        "direction": direction_of(parameters),
         **{
             name: getattr(parameters, name)
-            for name in ("average_memory", "repeats", "axis", "direction", "weighting_factor", "path_factor")
+            for name in ("average_memory", "repeats", "axis", "weighting_factor", "path_factor")
             + ("zero_range", "averaging_limit", "confidence_limit")
         },
     }
@@ -369,7 +371,7 @@ def test_the_blocks_are_those_of_the_source() -> None:
         "(LENGTHS ARE MM: RUN IT WITH G71 ACTIVE)",
         "(INBAND NAME=Seat {D8}40)",
         "(INBAND FACTOR=-1)",
-        "N5 R10=3 R11=5 R24=0 R25=1 R26=180 R27=3 R28=1 R29=2 R30=1 R31=0",
+        "N5 R10=3 R11=5 R24=0 R25=1 R26=180 R27=3 R28=1 R29=2 R30=1",
         "N10 R33=0.001 R34=0.0053 R36=1 R37=0.3 R40=0 R41=-0.016 R42=40",
         "N15 L75",
         "N20 L93",
@@ -380,7 +382,7 @@ def test_the_blocks_are_those_of_the_source() -> None:
         "(LENGTHS ARE MM: RUN IT WITH G71 ACTIVE)",
         "N5 M73 (PROBE RECEIVER ON)",
         "N10 G4 X5",
-        "N15 R11=5 R21=1 R22=1 R23=0 R27=3 R28=1 R29=2 R30=1 R31=0",
+        "N15 R11=5 R21=1 R22=1 R23=0 R27=3 R28=1 R29=2 R30=1 R31=1",
         "N20 R32=199.852 R33=0.001 R34=0.0053 R36=1",
         "N25 L92",
         "N30 M17",
