@@ -6,6 +6,7 @@
     ├── NotFound           404
     ├── MethodNotAllowed   405  with Allow
     ├── Conflict           409  the state of things does not permit it
+    ├── ChangedMeanwhile   412  If-Match names a state that is gone
     ├── TooLarge           413
     ├── Invalid            422  the payload; `errors` names each field
     ├── TooManyRequests    429  with Retry-After
@@ -129,6 +130,14 @@ class Conflict(InbandError):
     status = 409
     kind = "conflict"
     title = "Conflicts with the present state"
+
+
+class ChangedMeanwhile(InbandError):
+    """Somebody has changed it since the state that If-Match names; nothing was changed by this request."""
+
+    status = 412
+    kind = "changed-meanwhile"
+    title = "Changed meanwhile"
 
 
 class TooLarge(InbandError):

@@ -12,6 +12,7 @@ from app.errors import NotFound
 from app.language.i18n import _
 from app.web.api import Limit, SerialAfter, api_router, problems
 from app.web.deps import AddressDep, SessionDep
+from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import LARGEST_SERIAL, Page, page_of
 
 router = api_router("people")
@@ -31,13 +32,15 @@ def get_me(session: SessionDep, caller: AnyCaller) -> PersonOut:
     return PersonOut.model_validate(_found(queries.person(session, caller.person_id or 0)))
 
 
-@router.get("/people/{person}", dependencies=[require("admin")], responses=problems(404))
+@router.get("/people/{person}", dependencies=[require("admin")], responses=problems(404) | TAGGED)
+@tagged
 def get_person(session: SessionDep, person: PersonId) -> PersonOut:
     """One person."""
     return PersonOut.model_validate(_found(queries.person(session, person)))
 
 
-@router.patch("/people/{person}", responses=problems(404, 409))
+@router.patch("/people/{person}", responses=problems(404, 409, 412))
+@guarded(get_person, queries.hold_person)
 def change_person(session: SessionDep, caller: Admin, person: PersonId, change: PersonChange) -> PersonOut:
     """Give another role, end or restore access. The last administrator cannot be lost: 409."""
     row = _found(queries.person(session, person))

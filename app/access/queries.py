@@ -89,6 +89,11 @@ def person(session: Session, person_id: int) -> Person | None:
     return session.get(Person, person_id)
 
 
+def hold_person(session: Session, given: Mapping[str, Any]) -> None:
+    """Hold the person whom a route names until the transaction ends (`app.web.etags`)."""
+    session.get(Person, given["person"], with_for_update=True)
+
+
 def badges(session: Session, person_id: int) -> int:
     """Number of badges that identify this person."""
     return session.scalar(select(func.count()).where(Badge.person_id == person_id)) or 0

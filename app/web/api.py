@@ -10,6 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from app.charts import Chart, ThemeName, to_plotly
 from app.errors import (
     PROBLEM_JSON,
+    ChangedMeanwhile,
     Conflict,
     DatabaseAway,
     FieldError,
@@ -100,6 +101,7 @@ EVERY_ERROR: dict[int | str, dict[str, Any]] = {
         NotAllowed("This needs the role engineer; ana has the role operator.", "Ask an administrator for the role."),
         NotFound("There is no machine 'lathe-9'.", "Check the key; GET /api/v1/machines lists them."),
         Conflict("There is a machine 'lathe-1' already.", "Choose another key."),
+        ChangedMeanwhile("It has changed since you looked.", "Get it again and repeat your change with the new ETag."),
         TooLarge("The request is larger than the 1 MB that are taken here.", "Send it in several smaller requests."),
         Invalid(
             "parameters.averaging_limit: R34 averaging limit 0.0090 mm must not be larger than R35/2 = 0.0080 mm.",

@@ -35,6 +35,9 @@ Errors are `{PROBLEM_JSON}` (RFC 9457) with what is wrong, where, and what to do
 Unknown fields of a body and unknown parameters of a query are 422. The filter of states is `status` in some lists and `state` in \
 others; each takes both names.
 
+What is edited answers `GET` with an `ETag`. Sent with the change as `If-Match`, it makes that 412 where somebody else has changed the \
+thing meanwhile; without it nothing is compared.
+
 Lists answer `items` and `next`: pass `next` as the cursor of the following page (`after`, or `before` where the newest come first) \
 until it is null."""
 

@@ -21,7 +21,7 @@ from app.geometry.rotary_axes.drift_answers import (
 from app.geometry.rotary_axes.result_values import UNITS
 from app.geometry.rotary_axes.schemas import EnterIn, KinematicsPlanIn, RestoreIn, RunIn
 from app.language.i18n import _
-from app.loop.machines.queries import machine_for, machine_named, only_machine
+from app.loop.machines.queries import hold_machine, machine_for, machine_named, only_machine
 from app.loop.readings import actions as readings
 from app.loop.timeline.queries import with_events_of_machine
 from app.web.api import (
@@ -37,6 +37,7 @@ from app.web.api import (
     sent_again,
 )
 from app.web.deps import SessionDep
+from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import Page, ReasonIn, Text200, page_of
 
 router = api_router("kinematics")
@@ -184,7 +185,8 @@ def kinematics_run_figure(
 # --- machines
 
 
-@router.get("/machines/{machine}/kinematics", responses=problems(404))
+@router.get("/machines/{machine}/kinematics", responses=problems(404) | TAGGED)
+@tagged
 def get_kinematics(
     session: SessionDep,
     caller: AnyCaller,
@@ -196,7 +198,8 @@ def get_kinematics(
     return machine_state(session, machine_row, head)
 
 
-@router.put("/machines/{machine}/kinematics", responses=problems(404))
+@router.put("/machines/{machine}/kinematics", responses=problems(404, 412))
+@guarded(get_kinematics, hold_machine)
 def plan_kinematics(
     session: SessionDep, caller: Engineer, machine: MachineKey, body: KinematicsPlanIn
 ) -> MachineKinematicsOut:

@@ -19,7 +19,7 @@ from app.geometry.work_zero.answers import (
 )
 from app.geometry.work_zero.figures import Mark
 from app.geometry.work_zero.schemas import FixtureIn, ZeroIn, ZeroRecomputeIn
-from app.loop.machines.queries import machine_for, machine_of, only_machine
+from app.loop.machines.queries import hold_machine, machine_for, machine_of, only_machine
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
 from app.loop.readings import actions as readings
 from app.loop.timeline.queries import with_events_of_machine
@@ -38,6 +38,7 @@ from app.web.api import (
 )
 from app.web.deps import SessionDep
 from app.web.downloads import download
+from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import Control, Page, Slug, page_of
 from app.web.warnings import WarningsAcknowledgeIn
 
@@ -84,14 +85,16 @@ def list_fixtures(session: SessionDep, caller: AnyCaller) -> Page[FixtureOut]:
     return Page(items=[fixture_out(row) for row in queries.fixtures(session, caller.only_machine)])
 
 
-@router.get("/work-zeros/fixtures/{machine}/{fixture}", responses=problems(404))
+@router.get("/work-zeros/fixtures/{machine}/{fixture}", responses=problems(404) | TAGGED)
+@tagged
 def get_fixture(session: SessionDep, caller: AnyCaller, machine: MachineKey, fixture: FixtureKey) -> FixtureOut:
     """One fixture; its zeros: `GET /work-zeros?machine=…&fixture=…`."""
     machine_for(session, caller, machine, "viewer")
     return fixture_out(queries.fixture_of(session, machine, fixture))
 
 
-@router.put("/work-zeros/fixtures/{machine}/{fixture}", responses=problems(404))
+@router.put("/work-zeros/fixtures/{machine}/{fixture}", responses=problems(404, 412))
+@guarded(get_fixture, hold_machine)
 def watch_fixture(
     session: SessionDep, caller: Engineer, machine: MachineKey, fixture: FixtureKey, body: FixtureIn
 ) -> FixtureOut:

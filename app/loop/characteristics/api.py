@@ -17,6 +17,7 @@ from app.loop.characteristics.schemas import (
 from app.loop.machines import queries as machines
 from app.web.api import CharacteristicKey, KeyAfter, Limit, SerialBefore, api_router, problems
 from app.web.deps import SessionDep
+from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import Page, page_of
 
 router = api_router("characteristics")
@@ -46,14 +47,16 @@ def list_characteristics(
     return page_of([characteristic_out(row) for row in rows], limit, lambda row: row.key)
 
 
-@router.get("/characteristics/{characteristic}", responses=problems(404))
+@router.get("/characteristics/{characteristic}", responses=problems(404) | TAGGED)
+@tagged
 def get_characteristic(session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey) -> CharacteristicOut:
     """One characteristic with its parameters in force."""
     current = queries.characteristic_for(session, caller, characteristic, "viewer")
     return characteristic_out(current)
 
 
-@router.patch("/characteristics/{characteristic}", responses=problems(404, 409))
+@router.patch("/characteristics/{characteristic}", responses=problems(404, 409, 412))
+@guarded(get_characteristic, queries.hold_characteristic)
 def change_characteristic(
     session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, change: CharacteristicChange
 ) -> CharacteristicOut:

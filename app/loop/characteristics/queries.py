@@ -11,6 +11,7 @@ from app.core.parameters import Parameters
 from app.db.text import holds_words
 from app.errors import NotFound
 from app.language.i18n import _
+from app.loop.machines.queries import lock_machines
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
 from app.loop.tables.connections import Connection
 from app.loop.tables.machines import Machine
@@ -63,6 +64,11 @@ def characteristic_named(session: Session, key: str) -> CurrentCharacteristic:
             _("Check the key; GET /api/v1/characteristics lists them."),
         )
     return CurrentCharacteristic(*row)
+
+
+def hold_characteristic(session: Session, given: Mapping[str, Any]) -> None:
+    """Hold the machine of the characteristic that a route names until the transaction ends (`app.web.etags`)."""
+    lock_machines(session, [characteristic_named(session, given["characteristic"]).machine.id])
 
 
 def characteristic_for(session: Session, caller: Caller, key: str, role: Role) -> CurrentCharacteristic:

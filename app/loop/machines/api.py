@@ -7,6 +7,7 @@ from app.loop.machines import actions, queries
 from app.loop.machines.schemas import MachineChange, MachineIn, MachineOut
 from app.web.api import KeyAfter, Limit, MachineKey, api_router, problems
 from app.web.deps import SessionDep
+from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import Page, page_of
 
 router = api_router("machines")
@@ -34,13 +35,15 @@ def list_machines(
     return page_of([MachineOut.model_validate(row) for row in rows], limit, lambda machine: machine.key)
 
 
-@router.get("/machines/{machine}", responses=problems(404))
+@router.get("/machines/{machine}", responses=problems(404) | TAGGED)
+@tagged
 def get_machine(session: SessionDep, caller: AnyCaller, machine: MachineKey) -> MachineOut:
     """One machine."""
     return MachineOut.model_validate(queries.machine_for(session, caller, machine, "viewer"))
 
 
-@router.patch("/machines/{machine}", responses=problems(404))
+@router.patch("/machines/{machine}", responses=problems(404, 412))
+@guarded(get_machine, queries.hold_machine)
 def change_machine(session: SessionDep, caller: Engineer, machine: MachineKey, change: MachineChange) -> MachineOut:
     """Give it another name or control, another path of the probe's signal, another expiry of corrections, or other limits of
     what is plausible on it.

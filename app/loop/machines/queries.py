@@ -1,6 +1,7 @@
 """Queries of machines, and the one lock that orders everything that happens to a machine."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
@@ -60,6 +61,11 @@ def machines(session: Session, after: str = "", limit: int = 1000, only: int | N
 def machine_keys_by_id(session: Session) -> dict[int, str]:
     """The keys of all machines by their ids."""
     return {row.id: row.key for row in session.execute(select(Machine.id, Machine.key))}
+
+
+def hold_machine(session: Session, given: Mapping[str, Any]) -> None:
+    """Hold the machine that a route names until the transaction ends (`app.web.etags`)."""
+    lock_machines(session, [machine_named(session, given["machine"]).id])
 
 
 def lock_machines(session: Session, machine_ids: Iterable[int]) -> dict[int, MachineState]:

@@ -7,7 +7,7 @@ from fastapi import Path, Query, Response
 from app.access.deps import AnyCaller, Operator
 from app.core.parameters import MOST_LOCATIONS
 from app.core.plausibility import empirical_value_warnings, offset_warnings
-from app.loop.machines.queries import machine_for, machine_named
+from app.loop.machines.queries import hold_machine, machine_for, machine_named
 from app.loop.timeline.figures import MANUAL_EDIT, TOOL_CHANGE
 from app.loop.timeline.queries import with_events_of_machine
 from app.loop.tools import actions, applying, queries, wording
@@ -36,6 +36,7 @@ from app.loop.tools.schemas import (
 )
 from app.web.api import FIGURE, Limit, MachineKey, SerialAfter, Theme, api_router, chart_answer, problems
 from app.web.deps import DoorSessionDep, SessionDep
+from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import Page, page_of
 
 router = api_router("offsets")
@@ -62,7 +63,8 @@ def list_tools(
     return page_of([tool_out(row, machine_row.key) for row in rows], limit, lambda tool: tool.tool_memory)
 
 
-@router.get("/machines/{machine}/tools/{tool}", responses=problems(404))
+@router.get("/machines/{machine}/tools/{tool}", responses=problems(404) | TAGGED)
+@tagged
 def get_tool(session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, tool: R10) -> ToolOut:
     """One location of the tool memory."""
     machine_row = machine_for(session, caller, machine, "viewer")
@@ -70,7 +72,8 @@ def get_tool(session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, to
     return tool_out(queries.tools(session, machine_row, only=tool)[0], machine_row.key)
 
 
-@router.put("/machines/{machine}/tools/{tool}", responses=problems(404))
+@router.put("/machines/{machine}/tools/{tool}", responses=problems(404, 412))
+@guarded(get_tool, hold_machine)
 def edit_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, edit: ToolEdit) -> ToolSet:
     """Say what the offset was set to by hand.
 
@@ -155,7 +158,8 @@ def list_averages(
     return page_of([average_out(row, machine_row.key) for row in rows], limit, lambda average: average.average_memory)
 
 
-@router.get("/machines/{machine}/averages/{location}", responses=problems(404))
+@router.get("/machines/{machine}/averages/{location}", responses=problems(404) | TAGGED)
+@tagged
 def get_average(session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11) -> AverageOut:
     """One location of the average memory."""
     machine_row = machine_for(session, caller, machine, "viewer")
@@ -163,7 +167,8 @@ def get_average(session: SessionDep, caller: AnyCaller, machine: MachineKey, loc
     return average_out(queries.averages(session, machine_row, only=location)[0], machine_row.key)
 
 
-@router.put("/machines/{machine}/averages/{location}", responses=problems(404))
+@router.put("/machines/{machine}/averages/{location}", responses=problems(404, 412))
+@guarded(get_average, hold_machine)
 def set_empirical_value(
     session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11, value: EmpiricalValueIn
 ) -> AverageSet:

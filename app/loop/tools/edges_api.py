@@ -3,9 +3,9 @@
 from fastapi import Response
 
 from app.access.deps import AnyCaller, Operator
-from app.loop.machines.queries import machine_for, machine_named
+from app.loop.machines.queries import hold_machine, machine_for, machine_named
 from app.loop.tools import queries
-from app.loop.tools.api import R10
+from app.loop.tools.api import R10, get_tool
 from app.loop.tools.edge_schemas import LivesOut, SisterIn, SwitchedOut, ToolSettings, lives_out
 from app.loop.tools.edges import describe_tool
 from app.loop.tools.figures import LifeBar, lives_figure
@@ -14,11 +14,13 @@ from app.loop.tools.schemas import ToolOut, tool_out
 from app.loop.tools.sisters import switch_to_sister
 from app.web.api import FIGURE, MachineKey, Theme, api_router, chart_answer, problems
 from app.web.deps import SessionDep
+from app.web.etags import guarded
 
 router = api_router("offsets")
 
 
-@router.patch("/machines/{machine}/tools/{tool}", responses=problems(404))
+@router.patch("/machines/{machine}/tools/{tool}", responses=problems(404, 412))
+@guarded(get_tool, hold_machine)
 def describe(session: SessionDep, caller: Operator, machine: MachineKey, tool: R10, settings: ToolSettings) -> ToolOut:
     """Say what is in the location: edge, name, planned life, sister tool. What is left out stays, null takes it away."""
     machine_row = machine_named(session, machine)

@@ -12,19 +12,22 @@ from app.quality.control_charts.rules_actions import set_rules
 from app.quality.control_charts.rules_schemas import PreviewOut, RulesIn, RulesOut
 from app.web.api import CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
+from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import LARGEST_ID
 
 router = api_router("control charts")
 
 
-@router.get("/characteristics/{characteristic}/rules", responses=problems(404))
+@router.get("/characteristics/{characteristic}/rules", responses=problems(404) | TAGGED)
+@tagged
 def get_rules(session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey) -> RulesOut:
     """List the rules that watch the charts of a characteristic, and the rules that could: those that make sense there."""
     row = characteristics.characteristic_for(session, caller, characteristic, "viewer").characteristic
     return RulesOut.of(row.key, rules_queries.rules_in_force(session, row), baseline_in_force(session, row))
 
 
-@router.put("/characteristics/{characteristic}/rules", responses=problems(404, 409))
+@router.put("/characteristics/{characteristic}/rules", responses=problems(404, 409, 412))
+@guarded(get_rules, characteristics.hold_characteristic)
 def put_rules(session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, given: RulesIn) -> RulesOut:
     """These rules watch from the next reading on, and no others; a new version, unless nothing is changed.
 

@@ -13,6 +13,7 @@ from app.quality.gauge_studies.figures import figure_of
 from app.quality.gauge_studies.schemas import CorrectionIn, FromReadingsIn, StudyIn
 from app.web.api import FIGURE, Limit, Theme, api_router, chart_answer, problems, sent_again
 from app.web.deps import SessionDep
+from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import LARGEST_ID, Page, page_of
 
 router = api_router("gauges")
@@ -67,7 +68,8 @@ def list_gauge_studies(
     return page_of([study_out(row, None) for row in rows], limit, lambda made: made.id)
 
 
-@router.get("/gauge-studies/{study}", responses=problems(404))
+@router.get("/gauge-studies/{study}", responses=problems(404) | TAGGED)
+@tagged
 def get_gauge_study(session: SessionDep, caller: AnyCaller, study: Number, revision: Revision = None) -> StudyOut:
     """One study with what it says and what it suggests for R33."""
     row = queries.study(session, study, revision)
@@ -75,7 +77,8 @@ def get_gauge_study(session: SessionDep, caller: AnyCaller, study: Number, revis
     return study_out(row, queries.advice(session, row))
 
 
-@router.put("/gauge-studies/{study}", responses=problems(404))
+@router.put("/gauge-studies/{study}", responses=problems(404, 412))
+@guarded(get_gauge_study, queries.hold_study)
 def correct_gauge_study(session: SessionDep, caller: Engineer, study: Number, given: CorrectionIn) -> StudyOut:
     """Put a study right, with the reason: it becomes a new revision, the one before stays on record."""
     row = actions.correct_study(session, study, given, caller)

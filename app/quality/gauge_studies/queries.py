@@ -19,6 +19,7 @@ from app.errors import Invalid, NotFound
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
+from app.loop.machines.queries import lock_machines
 from app.loop.summaries import queries as statistics
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
 from app.loop.tables.machines import Machine
@@ -105,6 +106,11 @@ def _rows() -> Select[Any]:
             ),
         )
     )
+
+
+def hold_study(session: Session, given: Mapping[str, Any]) -> None:
+    """Hold the machine of the study that a route names until the transaction ends (`app.web.etags`)."""
+    lock_machines(session, [study(session, given["study"]).machine.id])
 
 
 def study(session: Session, number: int, revision: int | None = None) -> StudyRow:
