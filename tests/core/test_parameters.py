@@ -25,7 +25,7 @@ def test_every_r_number_says_the_same_as_its_name() -> None:
 
 def test_codes_of_the_control_are_understood() -> None:
     parameters, _warnings = read(SHAFT | {"R25": 1, "R30": 2, "R31": 1, "R23": 2})
-    assert (parameters.variant.value, parameters.axis.value, parameters.direction.value) == ("indexed", "Z", "negative")
+    assert (parameters.variant, parameters.axis, parameters.direction) == ("indexed", "Z", "negative")
     assert read(SHAFT | {"R24": 1})[0].variant is Variant.TWO_POINT
     assert read(SHAFT | {"R24": 0})[0].variant is Variant.SINGLE
 
