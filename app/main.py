@@ -318,8 +318,16 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     )
     replica = _replica(settings, database, waits.labels("replica").observe)
     keys, directory = KeyRing(doors, caller_of_key), Directory(doors)
-    writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(database, jobs_of(settings))
-    report_worker = ReportWorker(database, replica)
+    # What works on its own holds a connection for as long as that takes; it has a few threads of its own.
+    background = Database(
+        settings.database_url,
+        pool_size=2,
+        overflow=-1,
+        connections=connections,
+        waited=waits.labels("background").observe,
+    )
+    writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(background, jobs_of(settings))
+    report_worker = ReportWorker(background, replica)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
@@ -337,6 +345,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
         await writer.stop()
         if replica is not None:
             replica.stop()
+        background.close()
         doors.close()
         database.close()
         connections.stop()

@@ -52,7 +52,7 @@ class Held(NamedTuple):
 
 def bodies(size: int) -> Iterator[tuple[str, str, bytes]]:
     """Name, media type and bytes of each body, of this size or little less."""
-    names = min(100_000, size // 12)
+    names = min(100_000, size // 13)
     yield "lists in lists", JSON, b"[" + b"[]," * (size // 3 - 2) + b"[]]"
     yield "lists 100,000 deep", JSON, b"[" * min(100_000, size)
     yield "100,000 names", JSON, b"{" + b",".join(b'"%x":1' % n for n in range(names)) + b',"z":1,"z":2}'

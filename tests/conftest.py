@@ -73,13 +73,15 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """`make test` leaves out what is slow by nature; `make test-long` runs that, and all that is tried at random."""
-    long = config.getoption("--long")
-    left_out = [each for each in items if not _runs(each, long=long)]
-    items[:] = [each for each in items if _runs(each, long=long)]
+    long, one = config.getoption("--long"), config.getoption("--one-connection")
+    left_out = [each for each in items if not _runs(each, long=long, one=one)]
+    items[:] = [each for each in items if _runs(each, long=long, one=one)]
     config.hook.pytest_deselected(items=left_out)
 
 
-def _runs(item: pytest.Item, *, long: bool) -> bool:
+def _runs(item: pytest.Item, *, long: bool, one: bool) -> bool:
+    if one and item.get_closest_marker("several_connections"):
+        return False
     if item.get_closest_marker("long"):
         return long
     return not long or item.get_closest_marker("hypothesis") is not None

@@ -131,6 +131,7 @@ def waiting(server: Server) -> int:
     return int(found)
 
 
+@pytest.mark.several_connections
 def test_what_one_approves_another_cannot_reject_at_the_same_moment(ran: Shop, server: Server) -> None:
     made = propose(ran)
     client = server.client(server.key("engineer"))
