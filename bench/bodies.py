@@ -58,13 +58,13 @@ def bodies(size: int) -> Iterator[tuple[str, str, bytes]]:
     yield "100,000 names", JSON, b"{" + b",".join(b'"%x":1' % n for n in range(names)) + b',"z":1,"z":2}'
     yield "long numbers", JSON, b"[" + b",".join([b"9" * 4000] * (size // 4001)) + b"]"
     yield "one number", JSON, b"9" * size
-    yield "a long text", JSON, json.dumps({"text": "\N{CYRILLIC SMALL LETTER ZHE}" * (size // 6)}).encode()
+    yield "a long text", JSON, json.dumps({"text": "\N{CYRILLIC SMALL LETTER ZHE}" * (size // 6 - 3)}).encode()
     yield "fields", FORM, b"&".join(b"f%d=1" % n for n in range(size // 9))
-    yield "signs", FORM, b"text=" + b"%D0%96" * (size // 6)
+    yield "signs", FORM, b"text=" + b"%D0%96" * (size // 6 - 1)
     yield (
         "parts",
         FILE,
-        b"".join(b'--b\r\nContent-Disposition: form-data; name="f%d"\r\n\r\n1\r\n' % n for n in range(size // 56)),
+        b"".join(b'--b\r\nContent-Disposition: form-data; name="f%d"\r\n\r\n1\r\n' % n for n in range(size // 58)),
     )
 
 
