@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 from functools import partial
 
 from fastapi import APIRouter, FastAPI, Request
+from prometheus_client import Histogram
 from starlette.middleware.gzip import GZipMiddleware
 
 from app.access import api as people
@@ -295,37 +296,33 @@ async def process(ending: Callable[[], None]) -> AsyncIterator[None]:
     await compiling
 
 
+def _pools(settings: Settings, connections: Connections, waits: Histogram) -> tuple[Database, Database, Database]:
+    """The database of pages and programs, of machines at their doors, and of what works in the background.
+
+    Requests that work for seconds may hold every connection of the first. Of the other two there are as many connections as
+    threads that ask: where the database is away, nobody waits half a minute for a connection of somebody else.
+    """
+    url = settings.database_url or ""
+
+    def database(name: str, pool_size: int, overflow: int | None = -1) -> Database:
+        waited = waits.labels(name).observe
+        return Database(url, pool_size=pool_size, overflow=overflow, connections=connections, waited=waited)
+
+    return (
+        database("pages", settings.pool_size, settings.pool_overflow),
+        database("doors", settings.door_pool_size),
+        database("background", 2),
+    )
+
+
 def create_plant(settings: Settings, prefix: str = "") -> Application:
     """Make the application of one plant. prefix: the path below which it is served, where there are several."""
     assert settings.database_url is not None
     connections = Connections(settings.database_url, settings.database_patience)
     waits = health.pool_waits()
-    database = Database(
-        settings.database_url,
-        pool_size=settings.pool_size,
-        overflow=settings.pool_overflow,
-        connections=connections,
-        waited=waits.labels("pages").observe,
-    )
-    # Machines come in by connections of their own: pages that work for seconds may hold all the others. There are as many
-    # as threads that ask: where the database is away, nobody waits half a minute for a connection of somebody else.
-    doors = Database(
-        settings.database_url,
-        pool_size=settings.door_pool_size,
-        overflow=-1,
-        connections=connections,
-        waited=waits.labels("doors").observe,
-    )
+    database, doors, background = _pools(settings, connections, waits)
     replica = _replica(settings, database, waits.labels("replica").observe)
     keys, directory = KeyRing(doors, caller_of_key), Directory(doors)
-    # What works on its own holds a connection for as long as that takes; it has a few threads of its own.
-    background = Database(
-        settings.database_url,
-        pool_size=2,
-        overflow=-1,
-        connections=connections,
-        waited=waits.labels("background").observe,
-    )
     writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(background, jobs_of(settings))
     report_worker = ReportWorker(background, replica)
 
