@@ -3,7 +3,7 @@
 Sixteen machines send a reading, wait for the answer, and send the next 200 ms after the last. First nobody else is there, then:
 1,000 connections that are silent or keep half a head back, bodies that come ten bytes at a time, guesses of keys, passwords
 and badges, two imports one after the other without end, and 20 requests for reports. Everything is bounded in number and time
-and goes to this computer only; the strangers run at the lowest priority, as they would use processors of their own.
+and goes to this computer only; the strangers run at a lower priority, as they would use processors of their own.
 
 ``python -m bench.strangers [--seconds 20]`` ends with 1 where the ratio is 5 or more.
 """
@@ -35,6 +35,7 @@ WANTED = 5.0
 SILENT, SLOW = 1000, 100  # connections
 GUESSERS, IMPORTERS, REPORTS = 8, 2, 20
 ROWS = 2000  # of the file that is imported
+PAUSE = 1.0  # s until a stranger who was refused comes again
 MOST_TIMES = 5000  # that one stranger does its thing
 STRANGERS_MOST = 3.0  # s that ending all of them may take
 HEAD = "POST /api/v1/notes HTTP/1.1\r\nHost: 127.0.0.1\r\n"
@@ -113,7 +114,7 @@ class Strangers:
                 await what(number)
             except (OSError, httpx.HTTPError) as error:
                 self.got[f"{what.__name__} {type(error).__name__}"] += 1
-                await asyncio.sleep(0.5)
+            await asyncio.sleep(PAUSE)
 
     async def silent(self, number: int) -> None:
         """Open a connection, say nothing or half a head, and keep it until the server closes it."""
@@ -238,7 +239,7 @@ def main(seconds: float) -> int:
 
 
 async def load(url: str, which: str, seconds: float) -> None:
-    os.nice(19)
+    os.nice(5)
     engineer, tablet, file = json.loads(sys.stdin.read())
     strangers = Strangers(url, engineer, tuple(tablet), file)
     print("begun", flush=True)
