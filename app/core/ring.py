@@ -30,8 +30,8 @@ from typing import Final, NamedTuple
 SLOTS: Final = 8
 SLOT_SIZE: Final = 10
 FIRST_SLOT: Final = 16
-SIZE: Final = FIRST_SLOT + SLOTS * SLOT_SIZE
-"""Registers of the whole block."""
+SIZE: Final = FIRST_SLOT + SLOTS * SLOT_SIZE + 2
+"""Registers of the whole block: heads, slots, decision."""
 LAYOUT: Final = 2
 """Version of this layout, in register `Register.LAYOUT`; 0 there: the NC program has never set the block up.
 
@@ -60,7 +60,11 @@ INCH: Final = 25.4
 
 
 class Register(IntEnum):
-    """Offsets of the registers in the block. Those up to ``UNIT`` but ``ACK`` are the NC's, the mailbox is the bridge's."""
+    """Offsets of the registers in the block. Those up to ``UNIT`` but ``ACK`` are the NC's, the mailbox is the bridge's.
+
+    The decision lies behind the slots: ``DECIDED`` is the last sequence that the server has decided, ``ACTION`` (`Told`) what the NC
+    has not acted upon yet. The bridge writes the action first, and never lowers it; the NC sets it to 0 when it acts.
+    """
 
     ACK = 0
     EPOCH = 1
@@ -78,6 +82,8 @@ class Register(IntEnum):
     MAIL_CHECK = 13
     MAIL_NUMBER = 14
     LAYOUT = 15
+    DECIDED = 96
+    ACTION = 97
 
 
 class Field(IntEnum):
@@ -118,6 +124,14 @@ class Answer(IntEnum):
     NOT_POSSIBLE = 3
     STEP_TOO_LARGE = 4
     ON_HOLD = 9
+
+
+class Told(IntEnum):
+    """A decision as the NC finds it. HOLD: a person decides, the machine goes on; STOP: nothing more is cut."""
+
+    NONE = 0
+    HOLD = 1
+    STOP = 2
 
 
 class Status(IntEnum):
@@ -319,7 +333,7 @@ def read_block(registers: Sequence[float]) -> Block:
         raise BlockError("The first registers of the block hold no whole numbers: the first register is wrong.")
     ack, epoch, written, applied, answered, answer, unit = (number or 0 for number in heads)
     known = Unit(unit) if unit in set(Unit) else Unit.MM
-    found = [read_slot(registers[first : first + SLOT_SIZE], known) for first in range(FIRST_SLOT, SIZE, SLOT_SIZE)]
+    found = [read_slot(registers[first : first + SLOT_SIZE], known) for first in range(FIRST_SLOT, Register.DECIDED, SLOT_SIZE)]
     slots = sorted((slot for slot in found if slot is not None), key=lambda slot: slot.sequence)
     mail = Mail(
         _whole(registers[Register.MAIL_NUMBER]) or 0,

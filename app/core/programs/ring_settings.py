@@ -41,6 +41,8 @@ class Wear(NamedTuple):
 
 TOOLS: Final = 99
 """Tools for which the number of the correction in effect is kept."""
+MAIL_TIME: Final = {RingControl.SINUMERIK: 1.0, RingControl.FANUC: 1.0, RingControl.HAAS: 3.0}
+"""Seconds without mail behind a correction that was taken, after which the program goes on. Haas is read number by number."""
 MOST_PARTS: Final = 9_999_999
 MOST_CHARACTERISTICS: Final = 9_999
 LONGEST_SIZE: Final = 9_999
@@ -108,10 +110,12 @@ def offsets_of(control: RingControl, machine: MachineType) -> Offsets:
 class RingSettings:
     """Settings of the programs.
 
-    first_register: of the block; behind its 96 stand, from the next hundred on, the numbers of the corrections in effect, one
+    first_register: of the block; behind its 98 stand, from the next hundred on, the numbers of the corrections in effect, one
     for each tool. number: the characteristic's in the ring. tool, measured: for the call behind the measuring, the location
     and the word that holds the size. time_out: seconds after which the program no longer waits for the bridge; it stops then,
-    or writes on (go_on). largest_step: mm. first_program: number of the first program on Fanuc and Haas.
+    or writes on (go_on). largest_step: mm. first_program: number of the first program on Fanuc and Haas. decision_time: seconds that
+    a reading waits for the server's decision; without one the program goes on, or stops (decision_stops), and a decision that
+    comes late counts at the next reading or correction. hold_stops: a hold stops the machine as a stop does.
 
     Raises `RingError` where the control does not have these registers.
     """
@@ -126,6 +130,9 @@ class RingSettings:
     go_on: bool = False
     largest_step: float = 0.1
     first_program: int = 9820
+    decision_time: float = 3.0
+    decision_stops: bool = False
+    hold_stops: bool = False
 
     def __post_init__(self) -> None:
         if (self.control, self.offsets) not in WEARS:

@@ -53,7 +53,7 @@ class Sinumerik(Dialect):
         arguments = ",".join(f"{_kind(name)} {self.name(name)}" for name in program.arguments)
         own = [name for name in self.names if name not in program.arguments]
         first = self.settings.first_register
-        where = "INBAND[0] TO [95], INBAND_EFFECT" if not first else f"R{first} TO R{first + SIZE - 1}"
+        where = f"INBAND[0] TO [{SIZE - 1}], INBAND_EFFECT" if not first else f"R{first} TO R{first + SIZE - 1}"
         lines = [
             f"PROC {_called(program)}{f'({arguments})' if arguments else ''}",
             f"; INBAND: {program.title}. LAYOUT {LAYOUT}. BLOCK: {where}",

@@ -19,6 +19,7 @@ from typing import NamedTuple
 from app.core.programs.lines import MM_PER_INCH, written
 from app.core.programs.ring_settings import (
     LONGEST_SIZE,
+    MAIL_TIME,
     MOST_CHARACTERISTICS,
     MOST_PARTS,
     TOLERANCE,
@@ -113,6 +114,9 @@ class Alarm(Enum):
     IN_USE = (6, "INBAND REGISTERS IN USE")
     MIXED_UNIT = (7, "INBAND UNITS ARE MIXED")
     NOT_FETCHED = (8, "INBAND OLD READINGS WAIT")
+    STOP = (9, "INBAND SAYS STOP")
+    HOLD = (10, "INBAND SAYS HOLD")
+    NOT_DECIDED = (11, "INBAND HAS NOT DECIDED")
 
 
 class Stop(NamedTuple):
@@ -245,6 +249,8 @@ def _older() -> Iterator[Step]:
     yield Let("count", "count+1")
     yield If(f"count<{SLOTS}", "LEFT")
     yield Let("block[MAIL_NUMBER]", "block[ANSWERED]")
+    yield Let("block[DECIDED]", "0")
+    yield Let("block[ACTION]", "0")
     yield Do.SYNC
     yield Let("block[LAYOUT]", str(LAYOUT), "LAST")
 
@@ -283,14 +289,51 @@ def _reading(settings: RingSettings) -> Iterator[Step]:
     yield Label("LATE")
     yield If("goon<0.5", "STOPPED")
     yield from _slot()
+    yield from _decision(settings)
     yield from _stops(
         ("STOPPED", Alarm.NOT_FETCHING),
+        *ACTED,
+        ("OPEN", Alarm.NOT_DECIDED),
         ("UNSET", Alarm.NOT_SET_UP),
         ("UNITS", Alarm.OTHER_UNIT),
         ("MIXED", Alarm.MIXED_UNIT),
         ("WRONG", Alarm.WRONG_ARGUMENT),
         ("EPOCHS", Alarm.NEW_EPOCH),
     )
+
+
+ACTED = (("HALT", Alarm.STOP), ("HOLDS", Alarm.HOLD))
+
+
+def _decision(settings: RingSettings) -> Iterator[Step]:
+    """Wait for the decision on this reading, and do what it says; one on an earlier reading that came late counts, too."""
+    yield Let("limit", written(settings.decision_time / PAUSE), f"LOOKS, {written(PAUSE)} S APART, FOR THE DECISION")
+    yield Let("count", "0")
+    yield Label("JUDGE")
+    yield Do.SYNC
+    yield If("block[DECIDED]-next>-0.5", "JUDGED")
+    yield If("count>=limit", "TIMEOUT")
+    yield Do.PAUSE
+    yield Let("count", "count+1")
+    yield Goto("JUDGE")
+    yield Label("TIMEOUT")
+    yield Let("stops", str(int(settings.decision_stops)), "1: STOP WITHOUT A DECISION. 0: GO ON")
+    yield If("block[ACTION]>1.5", "JUDGED")
+    yield If("stops>0.5", "OPEN")
+    yield Label("JUDGED")
+    yield from _acted(settings)
+
+
+def _acted(settings: RingSettings) -> Iterator[Step]:
+    """Act once upon what the server has decided."""
+    yield Let("action", "block[ACTION]", "0 GO ON, 1 HOLD, 2 STOP")
+    yield If("action<0.5", "GOES")
+    yield Let("block[ACTION]", "0", "SEEN")
+    yield Do.SYNC
+    yield If("action>1.5", "HALT")
+    if settings.hold_stops:
+        yield Goto("HOLDS")
+    yield Label("GOES")
 
 
 def _arguments() -> Iterator[Step]:
@@ -335,17 +378,23 @@ def _slot() -> Iterator[Step]:
 
 
 def _correction(settings: RingSettings) -> Iterator[Step]:
-    yield Let("step", written(settings.largest_step), "MM: THE LARGEST STEP THAT IS TAKEN")
-    yield Let("near", written(TOLERANCE), "MM: OFFSETS AS NEAR AS THIS ARE THE SAME")
+    wait = MAIL_TIME[settings.control]
+    yield Let("limit", written(wait / PAUSE), f"LOOKS, {written(PAUSE)} S APART, FOR MORE MAIL")
+    yield Let("count", "limit", "THE FIRST LOOK DOES NOT WAIT")
     yield Do.SYNC
     yield If(f"abs(block[LAYOUT]-{LAYOUT})>0.5", "UNSET")
+    yield from _acted(settings)
+    yield Label("AGAIN")
+    yield Do.SYNC
+    yield Let("step", written(settings.largest_step), "MM: THE LARGEST STEP THAT IS TAKEN")
+    yield Let("near", written(TOLERANCE), "MM: OFFSETS AS NEAR AS THIS ARE THE SAME")
     yield Let("number", "block[MAIL_NUMBER]")
     yield Remark("NO MAIL, OR ANSWERED BEFORE")
-    yield If("number<0.5", "DONE")
+    yield If("number<0.5", "NOMAIL")
     yield Let("answer", "2", "THE MAIL IS DAMAGED")
     yield If(f"number>{HIGHEST_SEQUENCE}.5", "LATER")
     yield Let("number", "round(number)")
-    yield If("abs(number-block[ANSWERED])<0.5", "DONE")
+    yield If("abs(number-block[ANSWERED])<0.5", "NOMAIL")
     yield Do.READ_UNIT
     yield If("abs(unit-block[UNIT])>0.5", "UNITS")
     yield from _steps_of_unit()
@@ -386,13 +435,21 @@ def _correction(settings: RingSettings) -> Iterator[Step]:
     yield Let("block[ANSWER]", "answer")
     yield Do.SYNC
     yield Let("block[ANSWERED]", "number", "LAST")
-    yield Goto("DONE")
+    yield Remark(f"MAIL FOR THE NEXT TOOL, IF IT COMES WITHIN {written(wait)} S")
+    yield Let("count", "0")
+    yield Goto("AGAIN")
+    yield Label("NOMAIL")
+    yield If("count>=limit", "DONE")
+    yield Do.PAUSE
+    yield Let("count", "count+1")
+    yield Goto("AGAIN")
     yield Label("LATER")
     yield Remark("NOT ANSWERED: IT IS LOOKED AT AGAIN THE NEXT TIME")
     yield Let("block[ANSWER]", "answer")
     yield Label("DONE")
     yield Do.SYNC
-    yield from _stops(("UNSET", Alarm.NOT_SET_UP), ("UNITS", Alarm.OTHER_UNIT), ("MIXED", Alarm.MIXED_UNIT))
+    stops = (("UNSET", Alarm.NOT_SET_UP), ("UNITS", Alarm.OTHER_UNIT), ("MIXED", Alarm.MIXED_UNIT), *ACTED)
+    yield from _stops(*stops)
 
 
 def _mail() -> Iterator[Step]:
@@ -409,8 +466,8 @@ def _mail() -> Iterator[Step]:
     for name in lengths:
         yield Let(name, f"round(steps*block[MAIL_{name.upper()}])")
     yield Do.SYNC
-    yield Remark("IT IS BEING WRITTEN JUST NOW: NEXT TIME")
-    yield If("abs(block[MAIL_NUMBER]-number)>0.5", "DONE")
+    yield Remark("IT IS BEING WRITTEN JUST NOW")
+    yield If("abs(block[MAIL_NUMBER]-number)>0.5", "NOMAIL")
     yield Let("offset", "0")
     yield Remark("CHECK SUM")
     yield Let("sum", "0-check")

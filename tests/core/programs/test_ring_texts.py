@@ -22,6 +22,7 @@ from app.core.ring import (
     Mail,
     Register,
     Slot,
+    Told,
     Unit,
     mail_registers,
     read_block,
@@ -443,6 +444,84 @@ def test_the_power_may_go_at_any_block_of_a_correction(control: RingControl, dat
         assert seen <= {before, offset}
         assert (block(made).answered, block(made).answer, block(made).applied) == (number, Answer.APPLIED, number)
         assert made.wear(3) == pytest.approx(offset, abs=1e-6)
+
+
+@every_control
+def test_one_run_takes_the_mail_of_every_tool(control: RingControl) -> None:
+    """The bridge posts the next one when it has seen the answer; the program waits for it, and not for ever."""
+    made, bridge = ready(control)
+    orders = [mail(made, 7, 0.0, -0.01), mail(made, 2, 0.0, 0.02, tool=5), mail(made, 8, -0.01, -0.02)]
+    bridge.post(orders.pop(0))
+    taken: list[int] = []
+
+    def look() -> None:
+        found = block(made)
+        if found.answered == found.mail.number and orders:
+            taken.append(found.answered)
+            bridge.post(orders.pop(0))
+
+    made.waited = look
+    made.take()
+    found = block(made)
+    assert (taken, found.answered, found.answer, found.applied) == ([7, 2], 8, Answer.APPLIED, 8)
+    assert made.wear(3) == pytest.approx(-0.02)
+    assert made.wear(5) == pytest.approx(0.02)
+    last = 6 if control is RingControl.HAAS else 2
+    assert made.pauses == 2 + last
+    made.take()
+    assert made.pauses == 2 + last, "without mail the program waits for none"
+
+
+# --- decisions
+
+
+@every_control
+def test_a_stop_reaches_the_program_that_waits_for_the_decision(control: RingControl) -> None:
+    made, bridge = ready(control, decision_time=3.0)
+
+    def decide(action: Told) -> None:
+        bridge.look()
+        made.write(Register.ACTION, action)
+        made.write(Register.DECIDED, len(bridge.stored))
+
+    made.waited = lambda: decide(Told.NONE) if made.pauses == 2 else None
+    made.send(40.0, 1)
+    assert made.pauses == 2
+    made.waited = lambda: decide(Told.HOLD)
+    made.send(40.0, 2)  # goes on: a person decides
+    assert made.registers()[Register.ACTION] == Told.NONE
+    made.waited = lambda: decide(Told.STOP)
+    with pytest.raises(Stopped, match="INBAND SAYS STOP"):
+        made.send(40.0, 3)
+    assert made.registers()[Register.ACTION] == Told.NONE, "once"
+    bridge.look()
+    assert [slot.part for slot in bridge.stored] == [1, 2, 3]
+
+
+@every_control
+def test_a_decision_that_comes_late_stops_before_the_next_part(control: RingControl) -> None:
+    made, _ = ready(control, decision_time=2.0)
+    made.send(40.0, 1)
+    assert made.pauses == 4, "nobody has decided: it goes on"
+    made.write(Register.ACTION, Told.STOP)
+    made.write(Register.DECIDED, 1)
+    with pytest.raises(Stopped, match="INBAND SAYS STOP"):
+        made.take()
+    made.write(Register.ACTION, Told.STOP)
+    with pytest.raises(Stopped, match="INBAND SAYS STOP"):
+        made.send(40.0, 2)
+    assert block(made).written == 2, "the reading is sent before"
+
+
+@every_control
+def test_the_program_may_stop_without_a_decision_or_on_a_hold(control: RingControl) -> None:
+    made, _ = ready(control, decision_time=1.0, decision_stops=True, hold_stops=True)
+    with pytest.raises(Stopped, match="HAS NOT DECIDED"):
+        made.send(40.0, 1)
+    made.write(Register.ACTION, Told.HOLD)
+    made.write(Register.DECIDED, 2)
+    with pytest.raises(Stopped, match="INBAND SAYS HOLD"):
+        made.send(40.0, 2)
 
 
 @every_control
