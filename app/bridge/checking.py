@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from app.bridge.configuration import Configuration, Machine
 from app.bridge.kinds.mtconnect import AgentError, Context
-from app.bridge.links import Link, LinkError, Position, look_who_answers, silence
+from app.bridge.links import Link, LinkError, Position, carries_decisions, look_who_answers, silence
 from app.bridge.moments import wrong_date
 from app.bridge.program import link_of
 from app.bridge.server_side import TRUST
@@ -130,6 +130,12 @@ async def _control(machine: Machine, *, alone: bool) -> AsyncIterator[Finding]:
         look_who_answers(identity, machine.identity)
         named = "" if machine.identity else f"; put identity = {identity!r} into the configuration"
         yield Finding(machine.key, f"the control answers as {identity!r}{named}", True)
+        if not carries_decisions(link):
+            yield Finding(
+                machine.key,
+                "this machine cannot be stopped by Inband: a decision to stop is an alarm, and nothing more",
+                True,
+            )
         if by_date := wrong_date(link.clock):
             yield Finding(machine.key, by_date, False)
         async with asyncio.timeout(machine.patience):

@@ -6,10 +6,19 @@ import time
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from app.bridge import guided_test, log_lines
-from app.bridge.links import LinkError, Misconfigured, Order, look_who_answers, silence
+from app.bridge.links import (
+    STOPPING,
+    DecisionCarrier,
+    LinkError,
+    Misconfigured,
+    Order,
+    carries_decisions,
+    look_who_answers,
+    silence,
+)
 from app.bridge.moments import wrong_date
 from app.bridge.store_lock import StoreError
 from app.bridge.unit import Unit
@@ -108,6 +117,20 @@ async def _closed(unit: Unit) -> None:
         log.exception("%s: closing the connection", unit.machine.key)
 
 
+async def _decide(unit: Unit, beside: Beside) -> None:
+    """Tell the control what was decided; whatever fails is told again."""
+    decided = tuple(unit.decisions)
+    if not decided:
+        return
+    carrier = cast("DecisionCarrier", unit.link)  # decisions are kept for such links alone
+    await beside.do("decide", decided, partial(carrier.decide, decided))
+    if "decide" in beside.failed:
+        return
+    if stopping := [each.key for each in decided if each.action in STOPPING]:
+        await unit.store.carried(unit.machine.key, stopping)
+    del unit.decisions[: len(decided)]
+
+
 async def _connected(unit: Unit, beside: Beside) -> None:
     machine, link, store = unit.machine, unit.link, unit.store
     await guided_test.resume(unit)
@@ -115,6 +138,9 @@ async def _connected(unit: Unit, beside: Beside) -> None:
         unit.identity = await link.connect()
     look_who_answers(unit.identity, machine.identity)
     position = await store.position(machine.key)
+    if carries_decisions(link):
+        known = {each.key for each in unit.decisions}
+        unit.decisions[:0] = [each for each in await store.decisions(machine.key) if each.key not in known]
     answered: set[int] = set()
     offsets_at = full_at = 0.0
     full = False
@@ -160,6 +186,7 @@ async def _connected(unit: Unit, beside: Beside) -> None:
         offered = tuple(unit.offered)
         await beside.do("offer", offered, partial(link.offer, offered))
         beside.note_offered(offered)
+        await _decide(unit, beside)
         if time.monotonic() >= offsets_at:
             offsets = await beside.do("offsets", None, link.offsets) or {}
             if unit.test is not None and unit.test.changed:

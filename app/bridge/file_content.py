@@ -52,7 +52,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     ``measured`` holds for the lines below. decimal, delimiter, encoding: of the text; the last two are found out if they are
     left out. times: the form of times, as strptime has it. zone: of times without an offset. day_first: in dates
     with strokes, AQDEF only. others: readings of a characteristic that has no name in ``characteristics`` make the file fail,
-    or are passed over.
+    or are passed over. decisions: an absolute path, of a file that says `stop` or `hold`; whoever acts on it removes it.
     """
 
     path: str
@@ -73,6 +73,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     zone: str | None = None
     day_first: bool | None = None
     others: Literal["fail", "skip"] = "fail"
+    decisions: str | None = None
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself."""
@@ -80,6 +81,12 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
             raise ValueError(f"path = {self.path!r} is not absolute: name it from the root or the drive on")
         if {Path(self.path, self.done), Path(self.path, self.failed)} & {Path(self.path)} or self.done == self.failed:
             raise ValueError("done and failed are two other folders than path")
+        if self.decisions is not None:
+            place = Path(self.decisions)
+            if not place.is_absolute() or place.parent == Path(self.path):
+                raise ValueError(
+                    f"decisions = {self.decisions!r}: an absolute path of a file, in another folder than path"
+                )
         for name in self.columns.keys() - set(FIELDS):
             raise ValueError(f"columns.{name} is no field; fields are {', '.join(FIELDS)}")
         if self.zone is not None:

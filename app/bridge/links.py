@@ -121,6 +121,20 @@ class Outcome:
     differs: bool = False
 
 
+STOPPING: frozenset[str] = frozenset({"hold", "stop"})
+"""Actions that a control must hear of, however often the bridge is started anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decided:
+    """The server's decision on a reading. key, characteristic: of the reading; reason: a code, such as ``probe_fault``."""
+
+    key: str
+    characteristic: str
+    action: str
+    reason: str = ""
+
+
 @dataclass(slots=True)
 class Clock:
     """The control's clock minus the bridge's. offset: s, None until it is known. days: whole days of it, by the control's date."""
@@ -157,6 +171,18 @@ class Link(Protocol):
 
     async def offsets(self) -> dict[int, float]:
         """The offsets that the control holds, by tool memory, mm; empty where they cannot be read."""
+
+
+class DecisionCarrier(Protocol):
+    """A link that carries decisions to the control; without one the machine cannot be stopped by Inband."""
+
+    async def decide(self, decided: Sequence[Decided]) -> None:
+        """Tell the control, oldest first. Telling the same again does no harm."""
+
+
+def carries_decisions(link: object) -> bool:
+    """Tell if `stop` and `hold` reach the control through this link."""
+    return bool(getattr(link, "carries_decisions", hasattr(link, "decide")))
 
 
 class OffsetAccess(Protocol):

@@ -14,6 +14,7 @@ from app.bridge.links import (
     Clock,
     ControlAway,
     CountersLost,
+    Decided,
     LinkError,
     Misconfigured,
     NotNow,
@@ -36,6 +37,7 @@ from app.core.ring import (
     Mail,
     Register,
     Slot,
+    Told,
     Unit,
     in_steps,
     mail_registers,
@@ -55,6 +57,7 @@ HEADS_EVERY = 10.0  # s: all heads are read again at the latest
 UNREADABLE_AFTER = 5.0  # s: no NC program writes that long at a slot which it has counted
 SLOTS_AT_ONCE = 4  # where registers are read one by one, so that a call does not take too long
 MAILBOX = tuple(place for place, _ in mail_registers(Mail(0, 0, 0, 0, 0.0, 0.0)))
+TOLD = {"hold": Told.HOLD, "stop": Told.STOP}
 UNITS = {"mm": Unit.MM, "inch": Unit.INCH}
 HALF_A_STEP = 0.5 / max(STEPS.values())
 FRESH = 2.0  # polls: a reading that was not there so long ago was measured just now
@@ -395,6 +398,33 @@ class RegisterLink:
             reason = f"The control holds {held:.4f}, expected was {before:.4f}."
             self._direct[order.number] = Outcome(order.number, False, offset, reason, differs=True)
 
+    # --- decisions
+
+    async def decide(self, decided: Sequence[Decided]) -> None:
+        """Write what the NC program may wait for: the action first, then the last sequence that is decided.
+
+        The action is never lowered: the NC program clears it when it acts, also on one that came too late to be waited for.
+        """
+        block = self._block
+        if block is None:
+            return
+        known, lying = (round(value) for value in await self.registers.read((Register.DECIDED, Register.ACTION)))
+        new: dict[int, Told] = {}
+        for each in decided:
+            _, epoch, sequence = each.key.rsplit(":", 2)
+            if epoch.partition(".")[0] == str(block.epoch) and int(sequence) > known:
+                new[int(sequence)] = TOLD.get(each.action, Told.NONE)
+        if not new:
+            return
+        action = max(new.values())
+        if action > lying:
+            await self.registers.write(Register.ACTION, float(action))
+            await self.registers.shown(Register.ACTION, float(action))
+            [found] = await self.registers.read((Register.ACTION,))
+            if round(found) not in {action, Told.NONE}:  # 0: it has acted already
+                raise ControlAway(f"Register +{Register.ACTION} (action) holds {found:g} after {action} was written.")
+        await self._write(Register.DECIDED, max(new))
+
     # --- offsets
 
     async def offsets(self) -> dict[int, float]:
@@ -443,7 +473,7 @@ class RegisterLink:
         """
         for place, value in content:
             await self.registers.write(place, float(value))
-            if self._heads:
+            if self._heads and place < FIRST_SLOT:
                 self._heads[place] = float(value)
         for place, value in content:
             await self.registers.shown(place, float(value))

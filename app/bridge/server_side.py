@@ -12,6 +12,7 @@ from typing import Any
 from app import __version__
 from app.bridge import guided_test, log_lines, offering
 from app.bridge.configuration import Server
+from app.bridge.links import STOPPING, Decided, carries_decisions
 from app.bridge.offering import MOST_REASON, REFUSED, line, not_from_inband
 from app.bridge.offset_change import writes_offsets
 from app.bridge.store_lock import StoreError
@@ -115,6 +116,7 @@ async def _push_all(unit: Unit, client: AsyncClient, rows: Sequence[Waiting]) ->
         except (*REFUSED, Forbidden):
             pass  # one of them: each by itself, below
         else:
+            await _decided(unit, list(zip(rows, batch.decisions, strict=True)))
             await unit.store.sent(unit.machine.key, [row.id for row in rows])
             for row, decided in zip(rows, batch.decisions, strict=False):
                 log_lines.decision(unit.machine.key, row.key, decided)
@@ -135,12 +137,27 @@ async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | Non
         named = f"machine.{unit.machine.key}.characteristics"
         reason = f"Characteristic {row.body.get('characteristic')!r} is another machine's: correct it in {named}."
     else:
+        await _decided(unit, [(row, decision)])
         await unit.store.sent(unit.machine.key, [row.id])
         log_lines.decision(unit.machine.key, row.key, decision)
         return decision
     await unit.store.refuse(unit.machine.key, row.id, reason)
     log.warning("%s: reading %s is in the quarantine: %s", unit.machine.key, row.key, reason)
     return None
+
+
+async def _decided(unit: Unit, pairs: Sequence[tuple[Waiting, Decision]]) -> None:
+    """Note for the control what the server has decided; a stop outlives the bridge. What is sent again was decided before."""
+    if not carries_decisions(unit.link):
+        return
+    decided = [
+        Decided(row.key, decision.characteristic, decision.action, decision.reason.code)
+        for row, decision in pairs
+        if not row.again
+    ]
+    if stopping := [each for each in decided if each.action in STOPPING]:
+        await unit.store.keep_decisions(unit.machine.key, stopping)
+    unit.decisions += decided
 
 
 async def _told(unit: Unit, client: AsyncClient, row: Waiting) -> dict[str, Any]:
@@ -248,6 +265,7 @@ async def heartbeat(unit: Unit) -> dict[str, Any]:
         "started_at": unit.started_at,
         "mapping": machine.mapping_hash(),
         "hold_all": unit.held,
+        "carries_decisions": carries_decisions(unit.link),
         "held_back": [
             {"tool_memory": each.tool_memory, "number": each.number, "reason": line(each.reason, MOST_REASON)}
             for each in unit.held_back[:MOST_HELD_BACK]

@@ -20,7 +20,7 @@ from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 from app.bridge.guards import Known
-from app.bridge.links import Order, Outcome, Position, Received
+from app.bridge.links import Decided, Order, Outcome, Position, Received
 from app.bridge.store_lock import alone_with, in_words
 from app.bridge.store_tables import LATER_COLUMNS, SCHEMA, Counts, Intent, Quarantined, Waiting, in_effect
 
@@ -113,11 +113,12 @@ class Store:
         """The oldest readings that the server does not have yet."""
         rows = await self._run(
             lambda database: database.execute(
-                "SELECT id, key, body, at FROM reading WHERE machine = ? AND state = 'waiting' ORDER BY id LIMIT ?",
+                "SELECT id, key, body, at, sent_at IS NOT NULL FROM reading WHERE machine = ? AND state = 'waiting'"
+                " ORDER BY id LIMIT ?",
                 (machine, most),
             ).fetchall()
         )
-        return [Waiting(number, key, json.loads(body), at) for number, key, body, at in rows]
+        return [Waiting(number, key, json.loads(body), at, bool(again)) for number, key, body, at, again in rows]
 
     async def sent(self, machine: str, numbers: Sequence[int]) -> None:
         """The server has these: seen by every later call, durable with the next commit. Raises `StoreError` if the last one failed."""
@@ -142,7 +143,7 @@ class Store:
         return await self._run(
             lambda database: (
                 database.execute(
-                    "UPDATE reading SET state = 'waiting', sent_at = NULL WHERE machine = ? AND state = 'sent'",
+                    "UPDATE reading SET state = 'waiting' WHERE machine = ? AND state = 'sent'",
                     (machine,),
                 ).rowcount
             )
@@ -330,6 +331,27 @@ class Store:
         None where nothing is known of it: corrections of several locations are not applied in the order of their numbers.
         """
         return await self._run(lambda database: in_effect(database, machine, tool_memory, number))
+
+    # --- decisions
+
+    async def keep_decisions(self, machine: str, decided: Sequence[Decided]) -> None:
+        """Keep decisions until the control has heard of them."""
+        rows = [(machine, each.key, each.characteristic, each.action, each.reason) for each in decided]
+        insert = "INSERT INTO decision VALUES (?, ?, ?, ?, ?) ON CONFLICT (machine, key) DO NOTHING"
+        await self._run(lambda database: database.executemany(insert, rows))
+
+    async def decisions(self, machine: str) -> list[Decided]:
+        """The decisions that are kept, oldest first."""
+        query = "SELECT key, characteristic, action, reason FROM decision WHERE machine = ? ORDER BY rowid"
+        return [
+            Decided(*row) for row in await self._run(lambda database: database.execute(query, (machine,)).fetchall())
+        ]
+
+    async def carried(self, machine: str, keys: Sequence[str]) -> None:
+        """The control has heard of these."""
+        rows = [(machine, key) for key in keys]
+        delete = "DELETE FROM decision WHERE machine = ? AND key = ?"
+        await self._run(lambda database: database.executemany(delete, rows))
 
     # --- locations and facts
 

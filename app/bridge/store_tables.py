@@ -27,6 +27,10 @@ CREATE TABLE IF NOT EXISTS location (
     machine TEXT NOT NULL, tool_memory INTEGER NOT NULL, held REAL, told REAL, proved TEXT, proved_at REAL,
     PRIMARY KEY (machine, tool_memory)
 );
+CREATE TABLE IF NOT EXISTS decision (
+    machine TEXT NOT NULL, key TEXT NOT NULL, characteristic TEXT NOT NULL, action TEXT NOT NULL, reason TEXT NOT NULL,
+    PRIMARY KEY (machine, key)
+);
 CREATE TABLE IF NOT EXISTS fact (machine TEXT NOT NULL, name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (machine, name));
 """
 
@@ -36,12 +40,13 @@ LATER_COLUMNS: Final = (("intent", "merged", "TEXT"), ("intent", "turn", "INTEGE
 
 
 class Waiting(NamedTuple):
-    """A reading that the server does not have yet."""
+    """A reading that the server does not have yet. again: it had it, before it went back in time."""
 
     id: int
     key: str
     body: dict[str, Any]
     at: float
+    again: bool = False
 
 
 class Quarantined(NamedTuple):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from app.bridge.configuration import Machine
 from app.bridge.kinds.mtconnect import Context
-from app.bridge.links import Link, Order
+from app.bridge.links import Decided, Link, Order
 from app.bridge.offset_change import Change
 from app.bridge.store import Store
 
@@ -66,7 +66,7 @@ class Unit:
 
     hold_all: by the configuration; held: by that or by command. orders: those that passed the guards, one for each location; the
     control side offers them until they are too old. taken: tool memories that the control has answered an order for since the
-    server was asked last. news: something waits for the server; to_tell: an answer of the control is among it. state and
+    server was asked last. decisions: what the control has to hear of. news: something waits for the server; to_tell: an answer of the control is among it. state and
     detail: the control's side, as the heartbeat tells it. held_back: why corrections wait. tool_memories: by characteristic, as
     the server said at locations_at (of the monotonic clock). trouble: the server's side, None while it answers. context: what an
     MTConnect agent tells of the machine. test: the touch test that is open; no correction is offered meanwhile; test_open: there
@@ -81,6 +81,7 @@ class Unit:
     identity: str | None = None
     orders: Sequence[Order] = ()
     taken: set[int] = field(default_factory=set)
+    decisions: list[Decided] = field(default_factory=list)
     news: asyncio.Event = field(default_factory=asyncio.Event)
     to_tell: bool = False
     state: str = "starting"

@@ -115,6 +115,19 @@ def write_program(
         float,
         typer.Option(envvar="INBAND_LARGEST_STEP", min=0.001, max=10, help="Ring: largest step of an offset, mm."),
     ] = 0.1,
+    decision_time: Annotated[
+        float,
+        typer.Option(
+            envvar="INBAND_DECISION_TIME", min=0, max=600, help="Ring: seconds that a reading waits for its decision."
+        ),
+    ] = 3.0,
+    decision_stops: Annotated[
+        bool,
+        typer.Option("--decision-stops", envvar="INBAND_DECISION_STOPS", help="Ring: stop without a decision then."),
+    ] = False,
+    hold_stops: Annotated[
+        bool, typer.Option("--hold-stops", envvar="INBAND_HOLD_STOPS", help="Ring: a hold stops the machine, too.")
+    ] = False,
     measured: Annotated[
         str | None, typer.Option(envvar="INBAND_MEASURED", help="Ring: where the measuring cycle leaves the size.")
     ] = None,
@@ -149,6 +162,9 @@ def write_program(
                 largest_step=largest_step,
                 measured=measured,
                 offsets=offsets,
+                decision_time=decision_time,
+                decision_stops=decision_stops,
+                hold_stops=hold_stops,
             )
             if folder is None:
                 sys.stdout.write(ring_queries.ring_text(current, ring_of, "all").text)

@@ -333,7 +333,10 @@ def read_block(registers: Sequence[float]) -> Block:
         raise BlockError("The first registers of the block hold no whole numbers: the first register is wrong.")
     ack, epoch, written, applied, answered, answer, unit = (number or 0 for number in heads)
     known = Unit(unit) if unit in set(Unit) else Unit.MM
-    found = [read_slot(registers[first : first + SLOT_SIZE], known) for first in range(FIRST_SLOT, Register.DECIDED, SLOT_SIZE)]
+    found = [
+        read_slot(registers[first : first + SLOT_SIZE], known)
+        for first in range(FIRST_SLOT, Register.DECIDED, SLOT_SIZE)
+    ]
     slots = sorted((slot for slot in found if slot is not None), key=lambda slot: slot.sequence)
     mail = Mail(
         _whole(registers[Register.MAIL_NUMBER]) or 0,

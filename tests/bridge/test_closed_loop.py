@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.bridge.simulators.model import Feature, Model
-from app.core.ring import Register, Unit
+from app.core.ring import Register, Told, Unit
 from app.logs import JsonLines
 from tests.bridge.plant import bridge, location, parts, store_in, unit_of, until
 from tests.loops import run
@@ -109,7 +109,7 @@ def test_one_program_run_takes_the_corrections_of_every_tool(shop: Shop, tmp_pat
         async with bridge(shop, one):
             await parts(model, 1)
             if mode == "direct":
-                await until(lambda: sum(1 for value in model.offsets.values() if value) == 5, "five offsets")
+                await until(lambda: model.registers[Register.APPLIED] == 6, "five offsets are set")
             else:
                 await until(lambda: len(one.orders) == 5 and model.registers[Register.MAIL_NUMBER], "corrections")
             model.mail_wait = 0.3
@@ -134,3 +134,22 @@ def test_one_program_run_takes_the_corrections_of_every_tool(shop: Shop, tmp_pat
     ]
     assert sorted(set(statuses)) == [(tool, "pending" if tool == 3 else "applied") for tool in range(1, 7)]
     assert shop.call("GET", "/alarms?state=active&machine=" + shop.machine)["items"] == []
+
+
+def test_a_stop_reaches_the_program_that_waits_for_the_decision(shop: Shop, tmp_path: Path) -> None:
+    """The size is 10 mm off: the probe cannot be believed, and nothing more is cut."""
+    model = Model((replace(QUIET, bias=-10.0),), decision_wait=30.0)
+
+    async def loop() -> None:
+        store = store_in(tmp_path)
+        one = unit_of(
+            model, store, key=shop.machine, characteristics={"1": shop.characteristic}, location=(location(QUIET),)
+        )
+        async with bridge(shop, one):
+            await parts(model, 1)
+        assert await store.decisions(shop.machine) == []
+        store.close()
+
+    run(loop())
+    assert model.told == [Told.STOP]
+    assert [alarm["kind"] for alarm in shop.alarms()] == ["probe_fault"]

@@ -11,10 +11,10 @@ import pytest
 
 from app.bridge import registers as registers_module
 from app.bridge.configuration import Location
-from app.bridge.links import ControlAway, CountersLost, Misconfigured, Order, Outcome, Position
+from app.bridge.links import ControlAway, CountersLost, Decided, Misconfigured, Order, Outcome, Position
 from app.bridge.registers import RegisterLink
 from app.bridge.simulators.model import Feature, Model
-from app.core.ring import SIZE, Answer, Register, Status, Unit
+from app.core.ring import SIZE, Answer, Register, Status, Told, Unit
 from tests.bridge.plant import ModelRegisters, location, machine, store_in
 from tests.loops import run
 
@@ -547,3 +547,33 @@ def test_locations_are_known_by_tool_edge_and_register() -> None:
         assert model.offsets[4, 1, "wear_length_1"] == pytest.approx(0.01)
 
     run(story())
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_decision_is_written_action_first_and_never_lowered(*, whole: bool) -> None:
+    model = Model((Feature(),))
+    for _ in range(3):
+        for _ in model.part():
+            pass
+    epoch = round(model.registers[Register.EPOCH])
+
+    def decided(sequence: int, action: str, of: int = epoch) -> Decided:
+        return Decided(f"lathe-1:{of}:{sequence}", "shaft-1", action)
+
+    async def work() -> None:
+        registers = ModelRegisters(model, whole=whole)
+        link = RegisterLink(machine(model), registers)
+        await link.connect()
+        await link.fetch(Position())
+        registers.writes.clear()
+        await link.decide([decided(1, "none"), decided(9, "stop", epoch + 1)])
+        assert registers.writes == [(Register.DECIDED, 1.0)]
+        await link.decide([decided(2, "stop")])
+        await link.decide([decided(3, "hold"), decided(1, "stop")])
+        assert registers.writes[1:] == [(Register.ACTION, 2.0), (Register.DECIDED, 2.0), (Register.DECIDED, 3.0)]
+
+    run(work())
+    assert model.registers[Register.ACTION] == Told.STOP
+    for _ in model.part():
+        pass
+    assert (model.told, model.registers[Register.ACTION]) == ([Told.STOP], 0.0)

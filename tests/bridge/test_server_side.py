@@ -13,7 +13,7 @@ import pytest
 
 from app.bridge import offering, server_side
 from app.bridge.configuration import Server
-from app.bridge.links import Order, Outcome, Position, Received
+from app.bridge.links import Decided, Order, Outcome, Position, Received
 from app.bridge.simulators.model import Feature, Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit, ended
@@ -560,3 +560,23 @@ def test_an_edit_is_told_though_each_reading_asks_for_corrections(tmp_path: Path
             await ended(tasks)
 
     run(story())
+
+
+def test_a_stop_is_kept_for_the_control_and_what_is_sent_again_stops_nothing(tmp_path: Path) -> None:
+    server = Scripted()
+    server.decision = replace(server.decision, action="stop", reason=Reason(code="probe_fault"))
+
+    async def before(store: Store) -> None:
+        await store.add(M, [Received("lathe-1:7:1", {"measured": 30.0}, Position(7, 1))])
+
+    unit = story(tmp_path, server, before)
+    stop = Decided("lathe-1:7:1", "shaft-1", "stop", "probe_fault")
+    assert unit.decisions == [stop]
+    assert run(unit.store.decisions(M)) == [stop], "a bridge that is started anew tells it, too"
+    assert run(server_side.heartbeat(unit))["carries_decisions"] is True
+    run(unit.store.carried(M, [stop.key]))
+    unit.decisions.clear()
+    run(unit.store.send_again(M))
+    run(server_side._forward(unit, cast("AsyncClient", server)))
+    assert server.heard.count(("push", "lathe-1:7:1")) == 2
+    assert (unit.decisions, run(unit.store.decisions(M))) == ([], [])

@@ -9,20 +9,23 @@ the bridge read what only the bridge may.
 import asyncio
 import contextlib
 import hashlib
+import json
 import logging
 import os
 import tempfile
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict
 from datetime import datetime
 from fnmatch import fnmatch
+from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
 from app.bridge.configuration import Machine
 from app.bridge.file_content import NAMES, NOT_ALONE, Content, Fault, Settings, read_content
-from app.bridge.links import Clock, ControlAway, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.links import STOPPING, Clock, ControlAway, Decided, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.moments import learn_ahead
 from app.bridge.plain_files import NotPlain, is_plain, read_plain, write_new
 
@@ -129,6 +132,31 @@ class Folder:
 
     async def offer(self, orders: Sequence[Order]) -> None:
         """Nothing goes back to a measuring machine."""
+
+    @property
+    def carries_decisions(self) -> bool:
+        """A stop reaches whoever looks at the file."""
+        return self.settings.decisions is not None
+
+    async def decide(self, decided: Sequence[Decided]) -> None:
+        """Write the file that says `stop` or `hold`, as a whole; a stop that nobody has removed stays."""
+        stopping = [each for each in decided if each.action in STOPPING]
+        if stopping and self.settings.decisions is not None:
+            worst = max(reversed(stopping), key=lambda each: each.action == "stop")
+            await self._in_thread(partial(self._write_decision, Path(self.settings.decisions), worst))
+
+    def _write_decision(self, place: Path, decided: Decided) -> None:
+        try:
+            if decided.action != "stop" and place.exists():
+                return
+            new = place.with_name(f"{place.name}.new")
+            write_new(new, json.dumps(asdict(decided)).encode())
+            new.replace(place)
+        except OSError as error:
+            raise ControlAway(
+                f"The decision {decided.action} cannot be written to {place}: {error.strerror or error}. May the bridge write"
+                " there?"
+            ) from error
 
     async def outcomes(self) -> Sequence[Outcome]:
         """None."""

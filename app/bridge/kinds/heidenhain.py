@@ -11,7 +11,7 @@ import re
 import socket
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path, PureWindowsPath
 from typing import Annotated, Any, NamedTuple, Protocol, TypeVar
@@ -21,7 +21,7 @@ import pyLSV2
 from msgspec import Meta
 
 from app.bridge.configuration import Location, Machine
-from app.bridge.links import Clock, ControlAway, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.links import Clock, ControlAway, Decided, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.moments import Prints
 from app.bridge.plain_files import read_plain, write_new
 from app.bridge.slots import printed_reading
@@ -35,6 +35,7 @@ REGISTER = re.compile(r"QR([1-9]\d{1,2})")
 FIRST_REGISTER, LAST_REGISTER = 10, 499  # QR0 to QR9 are for the counters
 ANSWER = re.compile(r"INBANS N([0-9]+) A([0-9]) R([0-9]+) V(-?[0-9]+[.]([0-9]+)) U([12]) K([0-9]+) FIN")
 REASONS = {1: "The control holds another offset than expected.", 4: "The NC program refused the step (answer 4)."}
+MOST_ANSWERS = 100  # the newest that are handed on
 T = TypeVar("T")
 for _name in ("LSV2 Client", "LSV2 TCP"):
     logging.getLogger(_name).setLevel(logging.CRITICAL)  # what it logs is said here in a sentence
@@ -88,39 +89,57 @@ def answers_in(text: str) -> list[Answered]:
     return found
 
 
-def correction_program(order: Order | None, location: Location | None, unit: str, name: str) -> str:
-    """The program that sets an offset once, if the expected one is there, and answers; without an order it does nothing."""
+def correction_program(
+    orders: Sequence[Order], locations: Mapping[int, Location], unit: str, name: str, stop: int | None = None
+) -> str:
+    """The program that sets each offset once, if the expected one is there, and answers; without orders it does nothing.
+
+    locations: by tool memory. stop: the sequence of a reading behind which the machine has to stop, once.
+    """
     lines = ["; Inband writes this program anew. Do not edit it."]
-    if order is not None and location is not None:
-        register = location.register
-        before, after = (round(location.to_control(each, unit), 6) + 0.0 for each in (order.before, order.after))
-        tolerance = TOLERANCE if unit == "mm" else TOLERANCE / 25.4
+    if stop is not None:
         lines += [
-            f"; Correction {order.number}: tool {location.tool}",
-            f"FN 9: IF +QR4 EQU +{order.number} GOTO LBL 9 ; answered before",
-            f"Q1610 = ABS ( {register} - {_signed(before)} )",
-            f"FN 12: IF +Q1610 LT +{tolerance:.6f} GOTO LBL 1 ; as expected",
-            f"Q1610 = ABS ( {register} - {_signed(after)} )",
-            f"FN 12: IF +Q1610 LT +{tolerance:.6f} GOTO LBL 2 ; set before, power was lost",
-            "Q1611 = +1 ; another offset: it stays",
-            "FN 9: IF +0 EQU +0 GOTO LBL 3",
-            "LBL 1",
-            f"{register} = {_signed(after)}",
-            "LBL 2",
-            f"QR3 = +{order.number}",
-            "Q1611 = +0",
-            "LBL 3",
-            f"Q1612 = +{order.number}",
-            f"Q1613 = {register}",
-            f"Q1614 = +{register[2:]}",
-            "CALL PGM TNC:\\inband\\answer.h",
-            f"QR4 = +{order.number}",
-            "LBL 9",
+            f"FN 9: IF +QR5 EQU +{stop} GOTO LBL 8 ; stopped before",
+            f"QR5 = +{stop}",
+            "STOP ; Inband says stop: look at its alarm",
+            "LBL 8",
         ]
+    ordered = sorted(orders, key=lambda order: order.number)  # QR3 ends with the highest number
+    if ordered:
+        lines.append(f"FN 9: IF +QR4 EQU +{ordered[-1].number} GOTO LBL 9 ; answered before")
+        for at, order in enumerate(ordered, start=1):
+            lines += _set_once(order, locations[order.tool_memory], unit, 10 * at)
+        lines += [f"QR4 = +{ordered[-1].number}", "LBL 9"]
     inside = PureWindowsPath(name).stem.upper()
     measure = "MM" if unit == "mm" else "INCH"
     lines = [f"BEGIN PGM {inside} {measure}", *lines, f"END PGM {inside} {measure}"]
     return "".join(f"{number} {line}\r\n" for number, line in enumerate(lines))
+
+
+def _set_once(order: Order, location: Location, unit: str, label: int) -> list[str]:
+    register = location.register
+    before, after = (round(location.to_control(each, unit), 6) + 0.0 for each in (order.before, order.after))
+    tolerance = TOLERANCE if unit == "mm" else TOLERANCE / 25.4
+    expected, is_set, answer = (f"LBL {label + step}" for step in (1, 2, 3))
+    return [
+        f"; Correction {order.number}: tool {location.tool}",
+        f"Q1610 = ABS ( {register} - {_signed(before)} )",
+        f"FN 12: IF +Q1610 LT +{tolerance:.6f} GOTO {expected} ; as expected",
+        f"Q1610 = ABS ( {register} - {_signed(after)} )",
+        f"FN 12: IF +Q1610 LT +{tolerance:.6f} GOTO {is_set} ; set before, power was lost",
+        "Q1611 = +1 ; another offset: it stays",
+        f"FN 9: IF +0 EQU +0 GOTO {answer}",
+        expected,
+        f"{register} = {_signed(after)}",
+        is_set,
+        f"QR3 = +{order.number}",
+        "Q1611 = +0",
+        answer,
+        f"Q1612 = +{order.number}",
+        f"Q1613 = {register}",
+        f"Q1614 = +{register[2:]}",
+        "CALL PGM TNC:\\inband\\answer.h",
+    ]
 
 
 def _signed(value: float) -> str:
@@ -353,6 +372,7 @@ class TncLink:
         self._highest: tuple[int, int] | None = None
         self._answers: list[Answered] = []
         self._lying: str | None = None
+        self._stop: int | None = None
         self._looked = False
         self._since = time.monotonic()
         self._missing = 0
@@ -456,17 +476,16 @@ class TncLink:
         del self._unstored[: len(received)]
 
     async def offer(self, orders: Sequence[Order]) -> None:
-        """Write the oldest order as a program, or one that does nothing; only if another lies there."""
-        if self.machine.corrections == "none":
+        """Write all orders as a program, or one that does nothing; only if another lies there."""
+        if self.machine.corrections == "none" and self._stop is None:
             return
-        last = self._answers[-1].number if self._answers else 0
-        order = orders[0] if orders else None
-        if order is not None and order.number == last:
+        answered = {answer.number for answer in self._answers}
+        if orders and all(order.number in answered for order in orders):
             return
-        location = None
-        if order is not None:
-            location = next((each for each in self.machine.location if each.tool_memory == order.tool_memory), None)
-        text = correction_program(order, location, self.machine.unit, self.machine.settings.corrections)
+        open_ones = [order for order in orders if order.number not in answered]
+        locations = {place.tool_memory: place for place in self.machine.location}
+        settings = self.machine.settings
+        text = correction_program(open_ones, locations, self.machine.unit, settings.corrections, self._stop)
         if text != self._lying:
             self._lying = None
             await asyncio.to_thread(self._open_files().put, text)
@@ -480,19 +499,29 @@ class TncLink:
         return [wrong] if wrong else []
 
     async def outcomes(self) -> Sequence[Outcome]:
-        """The NC program's last answer."""
-        if not self._answers or self.machine.corrections == "none":
+        """The NC program's answers, of each correction the first: it may be cut off, and run again."""
+        if self.machine.corrections == "none":
             return []
-        last = self._answers[-1]
+        first: dict[int, Answered] = {}
+        for answered in self._answers:
+            first.setdefault(answered.number, answered)
+        return [self._outcome(answered) for answered in list(first.values())[-MOST_ANSWERS:]]
+
+    def _outcome(self, answered: Answered) -> Outcome:
         held = None
         for location in self.machine.location:
-            unit = "mm" if last.unit is Unit.MM else "inch"
-            if location.register == f"QR{last.register}":
-                held = location.from_control(last.held, unit)
-        if last.answer == 0:
-            return [Outcome(last.number, applied=True, offset=held)]
-        reason = REASONS.get(last.answer, f"The NC program refused it (answer {last.answer}).")
-        return [Outcome(last.number, False, held, reason, last.answer == 1)]
+            if location.register == f"QR{answered.register}":
+                held = location.from_control(answered.held, "mm" if answered.unit is Unit.MM else "inch")
+        if answered.answer == 0:
+            return Outcome(answered.number, applied=True, offset=held)
+        reason = REASONS.get(answered.answer, f"The NC program refused it (answer {answered.answer}).")
+        return Outcome(answered.number, False, held, reason, answered.answer == 1)
+
+    async def decide(self, decided: Sequence[Decided]) -> None:
+        """A stop goes into the program of corrections: the next call of it stops, before the next part is cut."""
+        stops = [int(each.key.rsplit(":", 1)[1].partition(":")[0]) for each in decided if each.action == "stop"]
+        if stops:
+            self._stop = stops[-1]
 
     async def offsets(self) -> dict[int, float]:
         """Nothing can be read; an edit is noticed at the next correction."""

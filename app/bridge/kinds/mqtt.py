@@ -1,7 +1,7 @@
-"""Machines and gateways that speak MQTT 5 over a broker, by five topics; library aiomqtt, an extra.
+"""Machines and gateways that speak MQTT 5 over a broker, by six topics; library aiomqtt, an extra.
 
 Below ``inband/v1/{machine}/``: ``readings`` come in; ``stored`` answers each with its key, once it is stored durably;
-``corrections`` is the list that is pending now, retained; ``applied`` is the machine's answer to one of them; ``offsets`` is what
+``corrections`` is the list that is pending now, retained; ``applied`` is the machine's answer to one of them; ``decisions`` are the server's on each reading; ``offsets`` is what
 the machine holds, if it says so. A message is acknowledged to the broker when it is stored, not before: what this bridge
 did not store, the broker of a persistent session delivers again. The broker itself may lose messages that it has
 acknowledged (it writes them to its disk now and then): a machine sends a reading until ``stored`` names its key.
@@ -28,7 +28,7 @@ from paho.mqtt.properties import Properties
 
 from app.bridge.configuration import Location, Machine, Number, Positive
 from app.bridge.json_text import read_json
-from app.bridge.links import Clock, ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.links import Clock, ControlAway, Decided, LinkError, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.moments import learn_ahead
 from app.core.ring import INCH
 
@@ -403,6 +403,26 @@ class MqttLink:
         if refused is None:
             return Outcome(number, applied=True, offset=offset)
         return Outcome(number, False, offset, str(refused)[:500], differs=body.get("differs") is True)
+
+    # --- decisions
+
+    async def decide(self, decided: Sequence[Decided]) -> None:
+        """Publish the decision on each reading."""
+        self._there()
+        await asyncio.gather(
+            *(
+                self._publish(
+                    "decisions",
+                    {
+                        "key": each.key,
+                        "characteristic": each.characteristic,
+                        "action": each.action,
+                        "reason": each.reason,
+                    },
+                )
+                for each in decided
+            )
+        )
 
     # --- offsets
 

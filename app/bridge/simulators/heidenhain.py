@@ -127,6 +127,7 @@ class TncSimulator:
         self._writers: set[asyncio.StreamWriter] = set()
         self._task: asyncio.Task[None] | None = None
         self._printed = 0
+        self._answered: set[int] = set()
         self._last = b""
 
     async def start(self, port: int) -> None:
@@ -234,12 +235,16 @@ class TncSimulator:
         """The correction program as the model's mailbox: the program's statements are what the mailbox says."""
         registers = self.model.registers
         text = self.files.get(CORRECTIONS, b"").decode("cp1252")
-        number = re.search(r"QR3 = \+(\d+)", text)
-        expected = re.search(r"ABS \( QR(\d+) - ([+-][\d.]+) \)", text)
-        value = re.search(r"\bQR\d\d+ = ([+-][\d.]+)", text)
         if not text.rstrip().endswith("END PGM CORR MM") and not text.rstrip().endswith("END PGM CORR INCH"):
             return
-        if not (number and expected and value):
+        self._answered.add(round(registers[Register.ANSWERED]))
+        for part in re.split(r"; Correction \d+", text)[1:]:
+            number = re.search(r"QR3 = \+(\d+)", part)
+            expected = re.search(r"ABS \( QR(\d+) - ([+-][\d.]+) \)", part)
+            value = re.search(r"\bQR\d\d+ = ([+-][\d.]+)", part)
+            if number and expected and value and int(number[1]) not in self._answered:
+                break
+        else:
             registers[Register.MAIL_NUMBER] = registers[Register.ANSWERED]
             return
         parameter = int(expected[1])

@@ -26,6 +26,7 @@ from app.core.ring import (
     Register,
     Slot,
     Status,
+    Told,
     Unit,
     in_steps,
     read_block,
@@ -72,7 +73,8 @@ class Applied(NamedTuple):
 class Model:
     """A machine. seed: None for another noise, and another epoch, each time. history: every change of an offset, before and after,
     by the NC program or by hand. mail_wait: s that the NC program waits for the next correction after each that it has taken;
-    idle: it waits.
+    decision_wait: s that it waits for the decision on each reading; told: holds and stops that it has acted upon; idle:
+    it waits.
     """
 
     features: tuple[Feature, ...] = (Feature(),)
@@ -88,6 +90,8 @@ class Model:
     tool_in_spindle: int = 0
     on_hold: bool = False
     mail_wait: float = 0.0
+    decision_wait: float = 0.0
+    told: list[Told] = field(default_factory=list)
     idle: bool = False
     written: list[tuple[int, Slot]] = field(default_factory=list)
     applied: list[Applied] = field(default_factory=list)
@@ -156,6 +160,14 @@ class Model:
         self.written.append((round(self.registers[Register.EPOCH]), slot))
         self.registers[Register.WRITTEN] = float(sequence)
         yield
+        until = time.monotonic() + self.decision_wait
+        while self.registers[Register.DECIDED] < sequence and time.monotonic() < until:
+            self.idle = True
+            yield
+        self.idle = False
+        if action := round(self.registers[Register.ACTION]):
+            self.registers[Register.ACTION] = 0.0
+            self.told.append(Told(action))
 
     def take_corrections(self) -> Steps:
         """Take mail until none has come for `mail_wait` seconds after the last one."""

@@ -20,7 +20,7 @@ import aiomqtt
 from app.bridge.simulators import NoPlace
 from app.bridge.simulators.model import Feature, Model
 from app.bridge.unit import ended
-from app.core.ring import Answer, Mail, Register, Slot, Unit, mail_registers
+from app.core.ring import Answer, Mail, Register, Slot, Told, Unit, mail_registers
 
 AT = "the broker as host:port; mosquitto is started if left out"
 AGAIN = 3.0  # s until what was not stored is sent again
@@ -30,6 +30,9 @@ REFUSALS = {
     Answer.OFFSET_DIFFERS: "The offset is not the one that was expected.",
     Answer.NOT_POSSIBLE: "Tool or register is not known.",
 }
+
+
+TOLD = {"hold": Told.HOLD, "stop": Told.STOP}
 
 
 class MqttSimulator:
@@ -90,7 +93,7 @@ class MqttSimulator:
                     self.host, self.port, identifier=self.name, clean_session=False, timeout=ANSWER, keepalive=5
                 ) as client:
                     self._sent.clear()
-                    for topic in ("stored", "corrections"):
+                    for topic in ("stored", "corrections", "decisions"):
                         await client.subscribe(f"inband/v1/{self.name}/{topic}", qos=1)
                     listening = asyncio.create_task(self._listen(client))
                     try:
@@ -130,6 +133,9 @@ class MqttSimulator:
             if message.topic.matches("+/+/+/stored"):
                 self.outbox.pop(body["key"], None)
                 self.stored.add(body["key"])
+            elif message.topic.matches("+/+/+/decisions"):
+                if action := TOLD.get(body["action"]):
+                    self.model.told.append(action)
             else:
                 self._pending = body["corrections"]
                 wanted = {each["number"] for each in self._pending}
@@ -137,13 +143,13 @@ class MqttSimulator:
                 self._mail()
 
     def _mail(self) -> None:
-        """Put the first of the list into the mailbox of the NC, unless it has expired."""
+        """Put the first of the list that has no answer into the mailbox of the NC, unless it has expired."""
         registers = self.model.registers
         if not self._pending:
             registers[Register.MAIL_NUMBER] = registers[Register.ANSWERED]
             return
-        first = self._pending[0]
-        if datetime.fromisoformat(first["expires_at"]) < datetime.now(UTC) or first["number"] in self._answers:
+        first = next((each for each in self._pending if each["number"] not in self._answers), None)
+        if first is None or datetime.fromisoformat(first["expires_at"]) < datetime.now(UTC):
             return
         if registers[Register.MAIL_NUMBER] == first["number"]:
             return
@@ -174,6 +180,7 @@ class MqttSimulator:
             answer |= {"refused": REFUSALS.get(reason, "Not taken."), "offset": registers[Register.OFFSET]}
             answer["differs"] = reason is Answer.OFFSET_DIFFERS
         self._answers[number] = answer
+        self._mail()
 
 
 def _body(key: str, slot: Slot) -> dict[str, object]:

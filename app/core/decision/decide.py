@@ -8,7 +8,7 @@ average            <= R34         by M_new if \\|M_new\\| > R33, else none      
 full               <= R35/2       by D in full                                0
 out of tolerance   < R37          by D in full, alarm                         0
 wear               < R36          computed in full, held, alarm               unchanged
-probe fault        >= R36         none, alarm, machine told to stop           unchanged
+probe fault        >= R36         none, alarm, the decision is to stop        unchanged
 =================  =============  ==========================================  ====================
 
 ``M_new = M_old - M_old/k + D/k`` from 0: an exponentially weighted average with lambda = 1/k (R29).

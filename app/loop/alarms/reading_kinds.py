@@ -1,11 +1,15 @@
 """Alarm kinds that a reading raises: the signals of the decision (`app.core.decision.decide.ReadingAlarm`)."""
 
+from sqlalchemy import select
+from sqlalchemy.orm import object_session
+
 from app.core.probing import TouchError
 from app.language.i18n import _
 from app.language.numbers import um, um_limit
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.readings.wording import first_move_sentence, touch_problem
 from app.loop.tables.alarms import Alarm
+from app.loop.tables.connections import Connection
 
 
 def _deviation(alarm: Alarm, text: str) -> str:
@@ -68,16 +72,24 @@ TOOL_WORN = register(
 
 def _probe_fault(alarm: Alarm) -> str:
     if alarm.data.get("first_move_triggered"):
-        return f"{first_move_sentence(alarm.data.get('feature'))} {_('Compensation is paused.')}"
+        return f"{first_move_sentence(alarm.data.get('feature'))} {_('Compensation is paused.')}{_cannot_be_stopped(alarm)}"
     if "touch" in alarm.data:
-        return f"{touch_problem(TouchError(**alarm.data['touch']))} {_('Compensation is paused.')}"
-    return _deviation(
-        alarm,
-        _(
-            "Deviation {deviation} cannot be: it has reached the confidence limit {limit}. The probe or the program "
-            "is wrong; compensation is paused."
-        ),
+        return f"{touch_problem(TouchError(**alarm.data['touch']))} {_('Compensation is paused.')}{_cannot_be_stopped(alarm)}"
+    text = _(
+        "Deviation {deviation} cannot be: it has reached the confidence limit {limit}. The probe or the program "
+        "is wrong; compensation is paused."
     )
+    return f"{_deviation(alarm, text)}{_cannot_be_stopped(alarm)}"
+
+
+def _cannot_be_stopped(alarm: Alarm) -> str:
+    """A sentence where the machine has a bridge that does not carry the decision to stop."""
+    session = object_session(alarm)
+    carries = select(Connection.carries_decisions).where(Connection.machine_id == alarm.machine_id)
+    row = None if session is None else session.execute(carries).one_or_none()
+    if row is None or row.carries_decisions:
+        return ""
+    return " " + _("This machine cannot be stopped by Inband: stop it by hand.")
 
 
 PROBE_FAULT = register(

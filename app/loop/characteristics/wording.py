@@ -70,7 +70,7 @@ def explanation(name: str) -> str | None:
         "zero_range": _("Up to here a deviation is scatter: nothing is corrected."),
         "averaging_limit": _("Up to here the running average decides. Empty: a third of the tolerance."),
         "wear_limit": _("From here on the tool is worn: an operator decides."),
-        "confidence_limit": _("From here on probe or program is wrong: the machine stops."),
+        "confidence_limit": _("From here on probe or program is wrong: the decision is to stop."),
         "weighting_factor": _(
             "1 takes the last reading whole; larger follows slower and scatters less. Usual: 1 to 4."
         ),

@@ -71,6 +71,16 @@ def write_program(
     largest_step: Annotated[
         float, Query(description="Ring: largest step of an offset, mm.", gt=0, le=10, allow_inf_nan=False)
     ] = 0.1,
+    decision_time: Annotated[
+        float,
+        Query(description="Ring: seconds that a reading waits for its decision.", ge=0, le=600, allow_inf_nan=False),
+    ] = 3.0,
+    decision_stops: Annotated[
+        bool, Query(description="Ring: stop without a decision in that time; else go on.")
+    ] = False,
+    hold_stops: Annotated[
+        bool, Query(description="Ring: a hold stops the machine as a stop does; else it goes on.")
+    ] = False,
     offsets: Annotated[
         Offsets | None, Query(description="Ring: place of the wear; if left out, as such a machine has it.")
     ] = None,
@@ -96,6 +106,9 @@ def write_program(
             largest_step=largest_step,
             measured=measured,
             offsets=offsets,
+            decision_time=decision_time,
+            decision_stops=decision_stops,
+            hold_stops=hold_stops,
         )
         text = ring_queries.ring_text(current, settings, ring)
         return download(text.text, text.file)

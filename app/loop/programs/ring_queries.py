@@ -45,6 +45,9 @@ def ring_settings(
     largest_step: float = 0.1,
     measured: str | None = None,
     offsets: Offsets | None = None,
+    decision_time: float = 3.0,
+    decision_stops: bool = False,
+    hold_stops: bool = False,
 ) -> RingSettings:
     """Settings of the programs for the machine of a characteristic; offsets: as on such a machine if left out.
 
@@ -61,6 +64,9 @@ def ring_settings(
             time_out,
             go_on,
             largest_step,
+            decision_time=decision_time,
+            decision_stops=decision_stops,
+            hold_stops=hold_stops,
         )
     except RingError as error:
         raise Invalid.at(error.field, _refused(error)) from None

@@ -148,7 +148,7 @@ def _sentence(record: Record, parameters: Parameters) -> str:
         case Code.PROBE_FAULT:
             text = _(
                 "Deviation %(raw)s has reached the confidence limit %(confidence)s: the probe or the program is wrong. "
-                "The machine is told to stop, and compensation pauses until the alarm is acknowledged."
+                "The decision is to stop, and compensation pauses until the alarm is acknowledged."
             )
         case Code.FIRST_MOVE_TRIGGERED:
             text = f"{first_move_sentence(parameters.feature)} {_stopped()}"
@@ -190,7 +190,7 @@ def _sentence(record: Record, parameters: Parameters) -> str:
 
 
 def _stopped() -> str:
-    return _("The machine is told to stop, and compensation pauses until the alarm is acknowledged.")
+    return _("The decision is to stop, and compensation pauses until the alarm is acknowledged.")
 
 
 def _touch_fault(parameters: Parameters, touches: Touches | None) -> str:

@@ -343,5 +343,5 @@ def code_word(action: str) -> str:
         "none": _("No correction"),
         "correct": _("Corrected"),
         "hold": _("Correction held"),
-        "stop": _("Machine told to stop"),
+        "stop": _("Stop asked for"),
     }.get(action, action)

@@ -294,6 +294,7 @@ RING_FIELDS: dict[str, tuple[float, float, bool]] = {
     "number": (1, MOST_CHARACTERISTICS, True),
     "first_register": (0, HIGHEST_OF_ALL, True),
     "time_out": (1, 3600, False),
+    "decision_time": (0, 600, False),
     "largest_step": (0.001, 10, False),
 }
 """Fields of the form: lowest and highest value, and whether it is whole."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from app.bridge.configuration import ConfigurationError, Machine, configuration_from
 from app.bridge.kinds.heidenhain import Answered, Settings, TncLink, answer_check, answers_in, correction_program
@@ -95,8 +96,10 @@ def execute(text: str, registers: dict[str, float]) -> int:
             registers[assignment[1]] = registers[word] if word in registers else float(word)
         elif line.startswith("CALL PGM"):
             answers += 1
+        elif line == "STOP":
+            registers["stops"] = registers.get("stops", 0.0) + 1
         else:
-            assert re.fullmatch(r"|LBL \d|(BEGIN|END) PGM CORR MM", line), line
+            assert re.fullmatch(r"|LBL \d+|(BEGIN|END) PGM CORR MM", line), line
     return answers
 
 
@@ -122,7 +125,7 @@ def test_no_damaged_answer_counts() -> None:
 def test_the_correction_program_sets_the_expected_offset_and_no_other(
     held: float, answered: int, after: float, answer: int
 ) -> None:
-    text = correction_program(ORDER, tnc(Settings(folder="x")).location[0], "mm", CORRECTIONS)
+    text = correction_program([ORDER], {3: tnc(Settings(folder="x")).location[0]}, "mm", CORRECTIONS)
     registers = {"QR31": held, "QR3": 0.0, "QR4": float(answered), "Q1610": 0.0, "Q1611": 0.0}
     assert execute(text, registers) == 1
     assert (registers["QR31"], registers["Q1611"], registers["QR4"]) == (after, answer, 12)
@@ -130,6 +133,20 @@ def test_the_correction_program_sets_the_expected_offset_and_no_other(
     registers["QR31"] = 0.0
     assert execute(text, registers) == 0  # answered once
     assert registers["QR31"] == 0.0
+
+
+def test_one_program_sets_the_offset_of_every_location_and_stops_once() -> None:
+    one = tnc(Settings(folder="x")).location[0]
+    places = {memory: replace(one, tool_memory=memory, register=f"QR{28 + memory}") for memory in (3, 4, 5)}
+    orders = [Order(12, 3, 0.0, -0.02), Order(7, 4, 0.01, 0.03, (5,)), Order(9, 5, 0.0, 0.01)]
+    text = correction_program(orders, places, "mm", CORRECTIONS, stop=41)
+    names = ("QR3", "QR4", "QR5", "QR31", "QR32", "QR33", "Q1610", "Q1611")
+    registers = dict.fromkeys(names, 0.0) | {"QR32": 0.005, "QR33": 0.5}
+    assert execute(text, registers) == 3
+    assert [registers[f"QR{number}"] for number in (31, 32, 33)] == [-0.01, 0.015, 0.5], "the third was edited by hand"
+    assert (registers["QR3"], registers["QR4"], registers["stops"]) == (12, 12, 1)
+    assert execute(text, registers) == 0
+    assert registers["stops"] == 1
 
 
 def test_readings_arrive_once_and_in_order_through_cuts(tmp_path: Path) -> None:
