@@ -48,7 +48,7 @@ lint: $(VENV)/installed-dev
 	wait $$types
 
 bench: $(VENV)/installed-dev $(VENV)/browser
-	@for each in cli single batch bodies chart memory spc history replay pages; do $(BIN)/python -m bench.$$each; done
+	@for each in cli single batch bodies chart memory spc history replay pages outcome; do $(BIN)/python -m bench.$$each; done
 
 messages: $(VENV)/installed
 	@$(BIN)/pybabel -q extract -F pyproject.toml --project Inband -o frontend/locale/inband.pot .

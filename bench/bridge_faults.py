@@ -23,6 +23,7 @@ import time
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -67,6 +68,7 @@ KINDS = {
     "mqtt": Kind(ordered=False),
     "opcua": Kind({"register": "wear_length_1", "parameter": 12}),
 }
+OUT = 0.008  # mm: the tolerance
 FAULTS = {
     "bridge killed": 5,
     "server killed": 1,
@@ -519,7 +521,28 @@ class Campaign:
         assert [reading["sequence"] for reading in readings] == list(range(1, len(readings) + 1)), "numbers have gaps"
         if control.kind.corrections:
             self._compare_corrections(control)
-        return {"readings": len(readings), "corrections": len(model.applied), **self.faults}
+        return {"readings": len(readings), "corrections": len(model.applied), **self._outcome(control), **self.faults}
+
+    def _outcome(self, control: Control) -> dict[str, int]:
+        """Figures of the parts, as `bench.outcome` prints them; edits by hand, and parts cut while all was cut off, are among them."""
+        deviations = [abs(slot.measured - control.feature.nominal) for _, slot in control.model.written]
+        figures = {
+            "parts out of tolerance": sum(each > OUT for each in deviations),
+            "largest deviation, µm": round(1000 * max(deviations)),
+        }
+        if not control.kind.corrections:
+            return figures
+        issued = list(self._corrections().values())
+        applied = [each for each in issued if each["status"] == "applied"]
+        ages = [
+            datetime.fromisoformat(each["applied_at"]) - datetime.fromisoformat(each["created_at"]) for each in applied
+        ]
+        oldest = max((age.total_seconds() for age in ages), default=0.0)
+        return figures | {
+            "corrections issued": len(issued),
+            "corrections applied": len(applied),
+            "worst age, s": round(oldest),
+        }
 
     def _compare_corrections(self, control: Control) -> None:
         model, scale = control.model, 2.0 if control.feature.holds == "radius" else 1.0

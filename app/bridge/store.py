@@ -6,7 +6,6 @@ one commit: a thread of its own takes whatever waits, writes it in one transacti
 """
 
 import asyncio
-import hashlib
 import json
 import queue
 import sqlite3
@@ -22,14 +21,20 @@ from typing import Any, Final, TypeVar
 from app.bridge.guards import Known
 from app.bridge.links import Decided, Order, Outcome, Position, Received
 from app.bridge.store_lock import alone_with, in_words
-from app.bridge.store_tables import LATER_COLUMNS, SCHEMA, Counts, Intent, Quarantined, Waiting, in_effect
+from app.bridge.store_tables import (
+    ADD,
+    LATER_COLUMNS,
+    SCHEMA,
+    Counts,
+    Intent,
+    Quarantined,
+    Waiting,
+    contradictions,
+    in_effect,
+)
 
 T = TypeVar("T")
 Job = tuple[Callable[[sqlite3.Connection], Any], Future[Any]]
-ADD: Final = (
-    "INSERT INTO reading (machine, key, body, state, reason, at) VALUES (?, ?, ?, ?, ?, ?)"
-    " ON CONFLICT (machine, key) DO NOTHING"
-)
 NOTE: Final = "INSERT INTO fact (machine, name, value) VALUES (?, ?, ?) ON CONFLICT (machine, name) DO UPDATE SET value = excluded.value"
 PAGE_ROWS: Final = 200
 GIVE_UP: Final = (
@@ -40,7 +45,6 @@ GIVEN_UP, MOST_GIVEN_UP = 500, 20_000
 NUMBER: Final = "number"
 """In the body of a reading whose characteristic has no name: the number by which the control knows it."""
 EMPTY: Final[Mapping[str, str]] = MappingProxyType({})
-MOST_REASON: Final = 500  # characters
 ANSWERS_KEPT: Final = 90 * 86_400.0  # s
 
 
@@ -98,7 +102,7 @@ class Store:
             database.executemany(ADD, rows)
             added = database.total_changes - before
             if added < len(rows):
-                added += _contradictions(database, machine, received, now)
+                added += contradictions(database, machine, received, now)
             if last := received[-1].position:
                 database.execute(
                     "INSERT INTO ring (machine, epoch, sequence, generation) VALUES (?, ?, ?, ?)"
@@ -488,26 +492,6 @@ class Store:
                 self._database.execute("ROLLBACK")
             raise
         return results
-
-
-def _contradictions(database: sqlite3.Connection, machine: str, received: Sequence[Received], now: float) -> int:
-    """Put readings into the quarantine whose key another size has; how many are new there."""
-    before = database.total_changes
-    for each in received:
-        [text] = database.execute(
-            "SELECT body FROM reading WHERE machine = ? AND key = ?", (machine, each.key)
-        ).fetchone()
-        known, size = (content.get("measured", content.get("touches")) for content in (json.loads(text), each.body))
-        if known == size:
-            continue
-        reason = (
-            f"Key {each.key} came with {known} before, and with {size} now: one of the two is wrong, or the machine counts"
-            " again what it had counted."
-        )
-        told = size if not isinstance(size, list) else hashlib.sha256(json.dumps(size).encode()).hexdigest()[:16]
-        row = (machine, f"{each.key}:{told}", json.dumps(each.body), "quarantined", reason[:MOST_REASON], now)
-        database.execute(ADD, row)
-    return database.total_changes - before
 
 
 def _settle(done: "Future[Any]", result: Any = None, error: BaseException | None = None) -> None:

@@ -1,9 +1,12 @@
 """Tables of the store, and what is read out of them."""
 
+import hashlib
+import json
 import sqlite3
+from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
-from app.bridge.links import Order, Outcome
+from app.bridge.links import Order, Outcome, Received
 
 SCHEMA: Final = """
 CREATE TABLE IF NOT EXISTS reading (
@@ -35,6 +38,11 @@ CREATE TABLE IF NOT EXISTS fact (machine TEXT NOT NULL, name TEXT NOT NULL, valu
 """
 
 
+ADD: Final = (
+    "INSERT INTO reading (machine, key, body, state, reason, at) VALUES (?, ?, ?, ?, ?, ?)"
+    " ON CONFLICT (machine, key) DO NOTHING"
+)
+MOST_REASON: Final = 500  # characters
 LATER_COLUMNS: Final = (("intent", "merged", "TEXT"), ("intent", "turn", "INTEGER"))
 """Those that a store of an older bridge does not have. merged: numbers that an order takes along; turn: answers in their order."""
 
@@ -94,3 +102,23 @@ def in_effect(database: sqlite3.Connection, machine: str, tool_memory: int, numb
     merged = "min(coalesce(json_extract(merged, '$[0]'), number))"
     [first] = database.execute(f"SELECT {merged} {applied} > (?, ?)", place).fetchone()
     return None if first is None else int(first) - 1
+
+
+def contradictions(database: sqlite3.Connection, machine: str, received: Sequence[Received], now: float) -> int:
+    """Put readings into the quarantine whose key another size has; how many are new there."""
+    before = database.total_changes
+    for each in received:
+        [text] = database.execute(
+            "SELECT body FROM reading WHERE machine = ? AND key = ?", (machine, each.key)
+        ).fetchone()
+        known, size = (content.get("measured", content.get("touches")) for content in (json.loads(text), each.body))
+        if known == size:
+            continue
+        reason = (
+            f"Key {each.key} came with {known} before, and with {size} now: one of the two is wrong, or the machine counts"
+            " again what it had counted."
+        )
+        told = size if not isinstance(size, list) else hashlib.sha256(json.dumps(size).encode()).hexdigest()[:16]
+        row = (machine, f"{each.key}:{told}", json.dumps(each.body), "quarantined", reason[:MOST_REASON], now)
+        database.execute(ADD, row)
+    return database.total_changes - before

@@ -107,9 +107,16 @@ def simulate(
         str | None,
         typer.Option("--at", envvar="INBAND_AT", help="Folder, or broker as host:port: kinds folder and mqtt."),
     ] = None,
+    six_tools: Annotated[
+        bool,
+        typer.Option(
+            "--six-tools", envvar="INBAND_SIX_TOOLS", help="Eight characteristics on six tools, one without a location."
+        ),
+    ] = False,
 ) -> None:
     """Start a simulated control that makes and measures parts; its table for the configuration goes to standard output."""
     from app.bridge.simulators import NoPlace, simulator_named
+    from app.bridge.simulators import model as simulated
     from app.bridge.simulators.model import Feature, Model, live
     from app.core.ring import Unit
 
@@ -122,7 +129,9 @@ def simulate(
 
     async def work() -> None:
         features = getattr(module, "FEATURES", (Feature(),))
-        model = Model(features, unit=Unit.INCH if inch else Unit.MM)
+        if six_tools:
+            features = simulated.six_tools(features[0])
+        model = Model(features, unit=Unit.INCH if inch else Unit.MM, mail_wait=1.0)
         simulator = await (module.serve(model, port) if at is None else module.serve(model, port, at))
         typer.echo(toml_of(model.serial.lower(), simulator.table()))
         where = f" listens on port {simulator.port}" if simulator.port else " runs"

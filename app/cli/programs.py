@@ -83,6 +83,20 @@ def read_program(
         raise typer.Exit(1)
 
 
+DecisionTime = Annotated[
+    float,
+    typer.Option(
+        envvar="INBAND_DECISION_TIME", min=0, max=600, help="Ring: seconds that a reading waits for its decision."
+    ),
+]
+DecisionStops = Annotated[
+    bool, typer.Option("--decision-stops", envvar="INBAND_DECISION_STOPS", help="Ring: stop without a decision then.")
+]
+HoldStops = Annotated[
+    bool, typer.Option("--hold-stops", envvar="INBAND_HOLD_STOPS", help="Ring: a hold stops the machine, too.")
+]
+
+
 @program.command("write")
 def write_program(
     characteristic: Annotated[str, typer.Argument(help="The key of the characteristic.")],
@@ -115,19 +129,9 @@ def write_program(
         float,
         typer.Option(envvar="INBAND_LARGEST_STEP", min=0.001, max=10, help="Ring: largest step of an offset, mm."),
     ] = 0.1,
-    decision_time: Annotated[
-        float,
-        typer.Option(
-            envvar="INBAND_DECISION_TIME", min=0, max=600, help="Ring: seconds that a reading waits for its decision."
-        ),
-    ] = 3.0,
-    decision_stops: Annotated[
-        bool,
-        typer.Option("--decision-stops", envvar="INBAND_DECISION_STOPS", help="Ring: stop without a decision then."),
-    ] = False,
-    hold_stops: Annotated[
-        bool, typer.Option("--hold-stops", envvar="INBAND_HOLD_STOPS", help="Ring: a hold stops the machine, too.")
-    ] = False,
+    decision_time: DecisionTime = 3.0,
+    decision_stops: DecisionStops = False,
+    hold_stops: HoldStops = False,
     measured: Annotated[
         str | None, typer.Option(envvar="INBAND_MEASURED", help="Ring: where the measuring cycle leaves the size.")
     ] = None,

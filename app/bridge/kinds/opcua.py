@@ -501,7 +501,7 @@ def _hint(identifier: str) -> str:
     if identifier.startswith("/Tool/"):
         return "Is there such a tool, by its internal T number, and such an edge?"
     if identifier.startswith("/NC/"):
-        return f"Is INBAND[{SIZE}] defined (UGUD.DEF is GD3, MGUD.DEF is GD2), and the definition activated?"
+        return f"Is INBAND[{SIZE}] defined (UGUD.DEF is GD3, MGUD.DEF is GD2), and active? Older ring programs had 96."
     if identifier.startswith(R_PARAMETERS):
         return "Has the channel so many R parameters (MD 28050)?"
     return "Look for a typing error."

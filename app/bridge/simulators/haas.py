@@ -53,7 +53,6 @@ class HaasSimulator:
 
     def table(self) -> dict[str, object]:
         """The table of a machine in the configuration."""
-        feature = self.model.features[0]
         return {
             "kind": "haas",
             "unit": "inch" if self.model.unit == Unit.INCH else "mm",
@@ -62,12 +61,8 @@ class HaasSimulator:
             "haas": {"address": "127.0.0.1", "port": self.port, "first_register": self.first},
             "characteristics": {str(each.number): f"characteristic-{each.number}" for each in self.model.features},
             "location": [
-                {
-                    "tool_memory": feature.tool,
-                    "tool": feature.tool,
-                    "register": feature.register,
-                    "holds": feature.holds,
-                }
+                {"tool_memory": each.tool, "tool": each.tool, "register": each.register, "holds": each.holds}
+                for each in self.model.places
             ],
         }
 

@@ -167,7 +167,7 @@ class TncSimulator:
             "characteristics": {str(each.number): f"characteristic-{each.number}" for each in self.model.features},
             "location": [
                 {"tool_memory": each.tool, "tool": each.tool, "register": each.register, "holds": each.holds}
-                for each in self.model.features
+                for each in self.model.places
             ],
         }
 

@@ -9,7 +9,7 @@ import asyncio
 import random
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from typing import Final, NamedTuple
 
@@ -61,6 +61,27 @@ class Feature:
     noise: float = 0.0008
 
 
+OWNERS: Final = (1, 1, 2, 2, 3, 4, 5, 6)
+"""Tool of each characteristic of a machine with six tools."""
+UNMAPPED: Final = 6
+"""The one of them that no configuration names: nothing corrects it."""
+
+
+def six_tools(feature: Feature) -> tuple[Feature, ...]:
+    """Eight characteristics on six tools, with a feature's words for the offset: a TNC has a QR parameter for each tool."""
+    one_each = feature.register == f"QR{feature.parameter}"
+    return tuple(
+        replace(
+            feature,
+            number=number,
+            tool=tool,
+            register=f"QR{30 + tool}" if one_each else feature.register,
+            parameter=30 + tool if one_each else feature.parameter,
+        )
+        for number, tool in enumerate(OWNERS, start=1)
+    )
+
+
 class Applied(NamedTuple):
     """A correction that the NC program has put into an offset."""
 
@@ -104,6 +125,14 @@ class Model:
         self.chance = random.Random(self.seed)  # noqa: S311 - noise of a measurement
         for feature in self.features:
             self.offsets.setdefault(_place(feature), 0.0)
+
+    @property
+    def places(self) -> tuple[Feature, ...]:
+        """A feature for each location of the bridge's configuration; one tool of six has none."""
+        named = {
+            _place(each): each for each in self.features if len(self.features) < len(OWNERS) or each.tool != UNMAPPED
+        }
+        return tuple(named.values())
 
     # --- the NC program
 

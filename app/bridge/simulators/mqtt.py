@@ -68,21 +68,16 @@ class MqttSimulator:
 
     def table(self) -> dict[str, object]:
         """The table of a machine in the configuration."""
-        feature = self.model.features[0]
         return {
             "kind": "mqtt",
             "unit": "inch" if self.model.unit == Unit.INCH else "mm",
             "secret_file": "machine.key",
             "proof_needed": False,
             "mqtt": {"host": self.host, "port": self.port, "name": self.name},
-            "characteristics": {str(each.number): "shaft-1" for each in self.model.features},
+            "characteristics": {str(each.number): f"shaft-{each.number}" for each in self.model.features},
             "location": [
-                {
-                    "tool_memory": feature.tool,
-                    "tool": feature.tool,
-                    "register": feature.register,
-                    "holds": feature.holds,
-                }
+                {"tool_memory": each.tool, "tool": each.tool, "register": each.register, "holds": each.holds}
+                for each in self.model.places
             ],
         }
 

@@ -385,7 +385,7 @@ class SimulatedSinumerik:
                     "holds": each.holds,
                     "sign": each.sign,
                 }
-                for each in model.features
+                for each in model.places
             ],
         }
 

@@ -77,7 +77,7 @@ WEARS: Final[dict[tuple[RingControl, Offsets], tuple[Wear, ...]]] = {
     ),
 }
 FIRST_REGISTERS: Final = {RingControl.SINUMERIK: 0, RingControl.FANUC: 700, RingControl.HAAS: 10800}
-"""Where the block begins if nothing is said; 0: in `INBAND[96]`, a field of its own."""
+"""Where the block begins if nothing is said; 0: in `INBAND[98]`, a field of its own."""
 NOT_FREE: Final = {
     RingControl.SINUMERIK: (range(100),),
     RingControl.FANUC: (range(500), range(598, 600)),

@@ -1,6 +1,7 @@
 """Folders of measuring machines: files that are half there, locked, empty, delivered twice; and what lines become."""
 
 import asyncio
+import json
 import os
 import threading
 import time
@@ -15,7 +16,7 @@ from app.bridge.configuration import ConfigurationError, Machine, configuration_
 from app.bridge.file_content import Content, read_content
 from app.bridge.kinds import folder
 from app.bridge.kinds.folder import Folder
-from app.bridge.links import ControlAway, Misconfigured, Position, Received
+from app.bridge.links import ControlAway, Decided, Misconfigured, Position, Received, carries_decisions
 from app.bridge.simulators.folder import FolderSimulator
 from app.bridge.simulators.model import Model
 from app.bridge.store import Store
@@ -650,3 +651,21 @@ def test_every_part_of_the_simulated_machine_arrives_once(tmp_path: Path) -> Non
         store.close()
 
     run(work())
+
+
+def test_a_stop_lies_in_a_file_until_somebody_removes_it(tmp_path: Path) -> None:
+    place = tmp_path / "cell" / "decision.json"
+    place.parent.mkdir()
+
+    def told(*actions: str) -> str | None:
+        run(link.decide([Decided(f"k{n}", "shaft-1", action, "x") for n, action in enumerate(actions)]))
+        return json.loads(place.read_text())["action"] if place.exists() else None
+
+    link = Folder(machine(tmp_path, decisions=str(place)))
+    assert carries_decisions(link)
+    assert [told("none"), told("hold"), told("none", "stop", "hold"), told("hold")] == [None, "hold", "stop", "stop"]
+    place.unlink()
+    assert told("hold") == "hold"
+    assert not carries_decisions(Folder(machine(tmp_path)))
+    with pytest.raises(ConfigurationError, match="in another folder than path"):
+        machine(tmp_path, decisions=str(tmp_path / "decision.json"))

@@ -12,11 +12,12 @@ import pytest
 from msgspec.structs import replace
 
 from app.bridge.configuration import ConfigurationError, Machine, configuration_from
-from app.bridge.kinds.heidenhain import Answered, Settings, TncLink, answer_check, answers_in, correction_program
+from app.bridge.kinds.heidenhain import Answered, Settings, TncLink, answer_check, answers_in
 from app.bridge.links import ControlAway, LinkError, Order, Outcome, Position
 from app.bridge.simulators.heidenhain import CORRECTIONS, FEATURES, READINGS, TncSimulator, serve
 from app.bridge.simulators.model import Model
 from app.bridge.store import Store
+from app.bridge.tnc_program import correction_program
 from app.bridge.unit import Unit as Tasks
 from app.core.printed_line import Printed, line_of
 from app.core.ring import Slot, Unit

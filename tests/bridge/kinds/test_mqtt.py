@@ -15,7 +15,17 @@ import pytest
 
 from app.bridge.configuration import ConfigurationError, Machine, configuration_from
 from app.bridge.kinds.mqtt import AT_ONCE, MqttLink, link
-from app.bridge.links import ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.links import (
+    ControlAway,
+    Decided,
+    LinkError,
+    Misconfigured,
+    Order,
+    Outcome,
+    Position,
+    Received,
+    carries_decisions,
+)
 from app.bridge.simulators.model import Model
 from app.bridge.simulators.mqtt import MqttSimulator, free_port, mosquitto, start_broker
 from app.bridge.store import Store
@@ -225,6 +235,24 @@ def test_answers_to_corrections_are_read(tmp_path: Path) -> None:
                 return await there.offsets() == {3: 0.05}
 
             await until(offsets, "the offsets")
+
+    run(work())
+
+
+def test_decisions_are_published_and_the_list_is_in_the_order_of_the_numbers(tmp_path: Path) -> None:
+    async def work() -> None:
+        async with Broker(tmp_path) as broker, connected(machine(broker.port)) as there:
+            assert carries_decisions(there)
+            async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+                for topic in ("decisions", "corrections"):
+                    await client.subscribe(f"{TOPIC}/{topic}", qos=1)
+                messages = aiter(client.messages)
+                await there.decide([Decided("k1", "shaft-1", "stop", "probe_fault")])
+                told = json.loads(bytes((await anext(messages)).payload))
+                assert told == {"key": "k1", "characteristic": "shaft-1", "action": "stop", "reason": "probe_fault"}
+                await there.offer([Order(7, 3, 0.01, 0.002), Order(5, 3, 0.0, 0.01)])
+                listed = json.loads(bytes((await anext(messages)).payload))["corrections"]
+                assert [each["number"] for each in listed] == [5, 7]
 
     run(work())
 

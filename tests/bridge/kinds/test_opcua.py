@@ -272,9 +272,9 @@ def test_unknown_identifiers_are_named() -> None:
     async def scenario() -> None:
         async with control(Model((QUIET,))) as simulator:
             cases: list[tuple[dict[str, Any], str, str]] = [
-                ({"opcua": {"gud": "/NC/_N_CH_GD2_ACX/INBAND"}}, "/NC/_N_CH_GD2_ACX/INBAND[u1,1,#96]", "UGUD.DEF"),
-                ({"opcua": {"first_r": 950}}, "/Channel/Parameter/R[u1,950,#96]", "28050"),
-                ({"opcua": {"channel": 2}}, "/NC/_N_CH_GD3_ACX/INBAND[u2,1,#96]", "BadAttributeIdInvalid"),
+                ({"opcua": {"gud": "/NC/_N_CH_GD2_ACX/INBAND"}}, "/NC/_N_CH_GD2_ACX/INBAND[u1,1,#98]", "UGUD.DEF"),
+                ({"opcua": {"first_r": 950}}, "/Channel/Parameter/R[u1,950,#98]", "28050"),
+                ({"opcua": {"channel": 2}}, "/NC/_N_CH_GD3_ACX/INBAND[u2,1,#98]", "BadAttributeIdInvalid"),
                 ({"opcua": {"serial": "/Nck/State/serial"}}, "/Nck/State/serial", "BadNodeIdUnknown"),
             ]
             for changed, identifier, hint in cases:

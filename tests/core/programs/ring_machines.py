@@ -105,10 +105,8 @@ def machine(control: RingControl, *, inch: bool = False, **settings: Any) -> Mac
     """A control with the programs in it, on which nothing was run yet."""
     offsets = {RingControl.SINUMERIK: Offsets.EDGES, RingControl.FANUC: Offsets.LATHE, RingControl.HAAS: Offsets.MILL}
     kind = {RingControl.SINUMERIK: Sinumerik, RingControl.FANUC: Fanuc, RingControl.HAAS: Haas}[control]
-    return kind(
-        RingSettings(control, **({"offsets": offsets[control], "measured": "0", "decision_time": 0.0} | settings)),
-        inch=inch,
-    )
+    chosen: dict[str, Any] = {"offsets": offsets[control], "measured": "0", "decision_time": 0.0}
+    return kind(RingSettings(control, **(chosen | settings)), inch=inch)
 
 
 # --- Sinumerik

@@ -191,3 +191,19 @@ def test_the_list_goes_on_by_pages(server: Server) -> None:
         after = page["next"]
     assert seen == sorted(seen)
     assert {shop.machine for shop in shops} <= set(seen)
+
+
+def test_a_machine_that_cannot_be_stopped_is_named_in_the_alarm(shop: Shop) -> None:
+    shop.read(2000)
+    [alarm] = shop.alarms()
+    said = "This machine cannot be stopped by Inband"
+
+    def text() -> str:
+        return str(shop.call("GET", f"/alarms/{alarm['id']}")["text"])
+
+    assert said not in text(), "over REST the answer says stop"
+    beat(shop, carries_decisions=False)
+    assert said in text()
+    assert connection(shop)["carries_decisions"] is False
+    beat(shop, carries_decisions=True)
+    assert said not in text()

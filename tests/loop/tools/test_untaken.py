@@ -35,12 +35,16 @@ def runs(shop: Shop) -> Runs:
 
 def waited(shop: Shop, minutes: int) -> None:
     """Let the pending corrections of this machine be as old as that."""
-    with psycopg.connect(shop.server.database.dsn) as connection:
+    age_corrections(shop.server.database.dsn, shop.machine, minutes)
+
+
+def age_corrections(dsn: str, machine: str, minutes: int) -> None:
+    with psycopg.connect(dsn) as connection:
         connection.execute("SET session_replication_role = replica")  # else it is refused: a correction is a fact
         connection.execute(
             "UPDATE correction SET created_at = now() - make_interval(mins => %s)"
             " WHERE machine_id = (SELECT id FROM machine WHERE key = %s)",
-            [minutes, shop.machine],
+            [minutes, machine],
         )
 
 
