@@ -197,7 +197,8 @@ class _Describing:
 
     def __init__(self, found: Description) -> None:
         self.found = found
-        self._part = 1
+        self._part = self._last_part = 1
+        self._described: set[int] = set()  # parts that have characteristics
         self._values_came = self._any = False
         self._lines: dict[tuple[str, int], int] = {}
         self._nodes: dict[str, dict[int, list[int]]] = {}
@@ -255,10 +256,10 @@ class _Describing:
         if not indexed:
             index = self._part
             before = self.found.parts.get(index, {})
-            described = any(each.part == index for each in self.found.characteristics.values())
-            if key in before and described and before[key] != value and key == "K1001":
-                index = max(self.found.parts) + 1
+            if key == "K1001" and before.get(key, value) != value and index in self._described:
+                index = self._last_part + 1
         self._part = index
+        self._last_part = max(self._last_part, index)
         self._put(line, key, index, value, self.found.parts.setdefault(index, {}))
 
     def _of_characteristic(self, line: int, key: str, index: int, value: str) -> None:
@@ -274,6 +275,7 @@ class _Describing:
             if len(self.found.characteristics) >= MOST_CHARACTERISTICS:
                 raise _too_many(line)
             known = self.found.characteristics[index] = Characteristic(index, self._part)
+            self._described.add(self._part)
         self._put(line, key, index, value, known.fields)
 
     def _put(self, line: int, key: str, index: int, value: str, fields: dict[str, str]) -> None:
@@ -310,14 +312,13 @@ class _Describing:
 
     def _tell_of_bare_parts(self) -> None:
         used = {each.part for each in self.found.characteristics.values()}
+        others = ", ".join(self._name_of(each) for each in sorted(used)[:20])
         for part in self.found.parts.keys() - used:
             self._remark(
                 self._lines.get(("K1001", part), 0),
                 f"K1001/{part}",
                 self._name_of(part),
-                _("has no characteristic below it: those of the file count as parts of {other}").format(
-                    other=", ".join(self._name_of(each) for each in sorted(used))
-                ),
+                _("has no characteristic below it: those of the file count as parts of {other}").format(other=others),
             )
 
     def _remark(self, line: int, key: str, value: str, reason: str) -> None:

@@ -114,6 +114,7 @@ class _Reading:
         self._above: set[str] = set()  # fields for all that stand above their values, as above the first ones
         self._waiting: Remark | None = None  # the last of them, until its values come
         self._closed = False  # by a field for all: what comes next is another row
+        self._told: set[str] = set()  # fields for all since it was closed
         self._held: dict[str, str] = {}
         self._begins: str | None = None
 
@@ -262,12 +263,16 @@ class _Reading:
             if self._open and key in self._above:
                 yield from self._all_open()
                 self._for_all = {}
+            if not self._closed:
+                self._told.clear()
             self._closed = bool(self._open)
             if not self._open:
                 self._for_all[key] = value
                 self._waiting = Remark(number, f"{key}/0", value[:40], "", wrong=True)
-            for each in self._open.values():
-                each.fields.setdefault(key, value)
+            if key not in self._told:  # the same field once more says nothing new to those that are open
+                self._told.add(key)
+                for each in self._open.values():
+                    each.fields.setdefault(key, value)
             return
         if index not in self._characteristics:
             yield self._nobody(number, index, value)

@@ -19,6 +19,10 @@ _ISO = re.compile(
 _COUNT = re.compile(
     r"(days|seconds) since (1899-12-30|1904-01-01|1970-01-01)"
 )  # spreadsheets, old ones of the Mac, Unix
+_OPENING, _CLOSING = re.compile(r"[\[(<]"), re.compile(r"[\])>]")
+LONGEST_NAME = (
+    1_000  # characters that are compared: Unicode sorts the accents of a letter in the square of their number
+)
 
 
 class Unreadable(ValueError):
@@ -152,6 +156,15 @@ def folded(text: str) -> str:
     >>> folded("Izmerjena  vrednost [mm]"), folded("Čas_meritve")
     ('izmerjena vrednost', 'cas meritve')
     """
-    text = re.sub(r"[\[(<].*?[\])>]", " ", text.replace("_", " ").replace("-", " ").replace(".", " "))
+    text = _without_brackets(text[:LONGEST_NAME]).replace("_", " ").replace("-", " ").replace(".", " ")
     decomposed = unicodedata.normalize("NFD", text.casefold().replace("đ", "d"))
     return " ".join("".join(c for c in decomposed if unicodedata.category(c) != "Mn").split())
+
+
+def _without_brackets(text: str) -> str:
+    """The text with a blank for each bracket and what stands in it, up to the first sign that closes one."""
+    kept, end = [], 0
+    while (opened := _OPENING.search(text, end)) and (closed := _CLOSING.search(text, opened.end())):
+        kept += [text[end : opened.start()], " "]
+        end = closed.end()
+    return "".join([*kept, text[end:]])

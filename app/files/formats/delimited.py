@@ -147,7 +147,7 @@ def _is_header(first: Row, below: Row) -> bool:
 
 
 def _is_number(cell: str) -> bool:
-    return re.fullmatch(r"\s*[+\-\N{MINUS SIGN}]?\d*[.,]?\d+\s*", cell) is not None
+    return re.fullmatch(r"\s*[+\-\N{MINUS SIGN}]?(?:\d+(?:[.,]\d+)?|[.,]\d+)\s*", cell) is not None
 
 
 def _rows(path: Path, encoding: str, delimiter: str) -> Iterator[Row]:

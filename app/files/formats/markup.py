@@ -52,6 +52,7 @@ CELLS = frozenset({"td", "th"})
 SILENT = frozenset({"script", "style", "svg", "template", "noscript"})
 MOST_ROWS = 20_000
 LONGEST = 2_000  # characters of a cell; the rest of a longer one is no value
+DEEPEST = 100  # of silent elements within each other
 MOST_BREAKS = 20  # places of broken markup that are skipped; a file with more is no document
 
 
@@ -79,7 +80,8 @@ class _Reader(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: object) -> None:
         if tag in SILENT:
-            self._silent.append(tag)
+            if len(self._silent) < DEEPEST:
+                self._silent.append(tag)
         elif tag in CELLS:
             self._table_row = True
             self._end_cell()
@@ -140,8 +142,11 @@ def rows_of(text: str) -> tuple[list[Row], list[int]]:
     for _again in range(MOST_BREAKS + 1):
         reader = _Reader()
         reader.first_line = line
-        reader.feed(text)  # without close(): what is unfinished stays in rawdata, and costs no more than its length
-        left = reader.rawdata
+        try:
+            reader.feed(text)  # without close(): what is unfinished stays in rawdata, and costs no more than its length
+            left = reader.rawdata
+        except AssertionError:  # a declaration that html.parser gives up at, in this line of the text
+            left = "\n".join(text.split("\n")[reader.getpos()[0] - 1 :])
         if left and "<" not in left:
             reader.handle_data(left)
             left = ""

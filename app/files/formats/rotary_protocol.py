@@ -30,7 +30,9 @@ _NUMBER = re.compile(
 )
 _COORDINATE = re.compile(r"\b([xyz])\s*[=:]?\s*([+-]?[\d.,]{1,26}(?<![.,]))\s*(mm|um|µm|μm)?", re.IGNORECASE)
 _DEVIATION = re.compile(r"\be([xyz])([abc])\b")
-_BLANKS = re.compile(r"\s*([^\d+\N{MINUS SIGN}]*[^\W\d]\)?)\s+([+\N{MINUS SIGN}-]?\d.*)")  # Startwinkel  -90,000 °
+_WORDS = re.compile(r"[^\d+\N{MINUS SIGN}]*")
+_LAST_WORD = re.compile(r"[^\W\d]\)?\Z")
+_VALUE = re.compile(r"[+\N{MINUS SIGN}-]?\d")
 _THOUSANDS = re.compile(r"\d[ '’]\d{3}(?!\d)")
 _CLOCK = re.compile(r"\d{1,2}:\d{2}")
 _ALONE = re.compile(r"(?:[a-z]{1,20} ){0,2}(?:[a-z]{0,20}achse|axis|os)(?: of rotation)?")  # Vermessene Rotationsachse
@@ -40,7 +42,7 @@ _ERROR = re.compile(
     re.IGNORECASE,
 )
 _CYCLE = re.compile(r"\b45[0-3]\b")
-_WORD_BEFORE_TIME = re.compile(r"\s*[,;]?\s*\b(?:uhrzeit|um|time|at|čas|cas|ura|ob)\b\s*:?\s*(?=\d)", re.IGNORECASE)
+_WORD_BEFORE_TIME = re.compile(r"\s?[,;]?\s?\b(?:uhrzeit|um|time|at|čas|cas|ura|ob)\b\s*:?\s*(?=\d)", re.IGNORECASE)
 VECTORS = frozenset({"correction", "before", "after"})
 _PARAMETER = re.compile(r"\b(QS?1[0-9]{2})\b", re.IGNORECASE)
 SIGNS = {"+": 1, "-": -1, "positiv": 1, "negativ": -1, "positive": 1, "negative": -1, "pozitivna": 1, "negativna": -1}
@@ -154,9 +156,24 @@ def _split(row: Row) -> tuple[str, list[str]]:
         at = text.find(mark)
         if at > 0 and not (mark == ":" and clock is not None and clock.start() < at < clock.end()):
             return text[:at].strip(), [text[at + 1 :].strip()] if text[at + 1 :].strip() else []
-    if (blanks := _BLANKS.fullmatch(text)) and _key(folded(blanks[1][:LONGEST_LABEL]), "") is not None:
-        return blanks[1], [blanks[2]]
+    if (parted := _by_blanks(text)) and _key(folded(parted[0][:LONGEST_LABEL]), "") is not None:
+        return parted[0], [parted[1]]
     return text.strip(), []
+
+
+def _by_blanks(text: str) -> tuple[str, str] | None:
+    """A label and its value where only blanks part them.
+
+    >>> _by_blanks("Startwinkel  -90,000 °"), _by_blanks("Lose 0"), _by_blanks("45"), _by_blanks("Lose0")
+    (('Startwinkel', '-90,000 °'), ('Lose', '0'), None, None)
+    """
+    words = _WORDS.match(text)
+    end = words.end() if words else 0
+    end -= text[:end].endswith("-")  # a sign
+    label = text[:end].strip()
+    if not text[:end][-1:].isspace() or not _LAST_WORD.search(label[-2:]) or not _VALUE.match(text, end):
+        return None
+    return label, text[end:]
 
 
 def _heading(words: str, label: str, values: Sequence[str]) -> str:

@@ -16,6 +16,7 @@ from app.core.warning import as_stored
 from app.db.events import publish
 from app.errors import Conflict, Invalid
 from app.files.formats.cell_values import Unreadable, moment, zone_named
+from app.files.formats.rotary_protocol import Protocol
 from app.geometry.rotary_axes import queries, refusals, wording
 from app.geometry.rotary_axes.alarm_kinds import DRIFT
 from app.geometry.rotary_axes.evaluation import evaluate
@@ -37,10 +38,12 @@ from app.web.fields import AHEAD, EARLIEST
 SETTINGS = ("ball_radius", "max_modification", "max_modification_angle", "max_dev_cal_ball")
 
 
-def take(session: Session, machine: Machine, body: RunIn, caller: Caller) -> Created[RunRow]:
+def take(
+    session: Session, machine: Machine, body: RunIn, caller: Caller, protocol: Protocol | None = None
+) -> Created[RunRow]:
     """Evaluate a run and keep it; a refused one is kept as well and counts for nothing.
 
-    Raises `Invalid` for what determines nothing; `Conflict` for a key that was used otherwise.
+    protocol: that of the run, where it is read already. Raises `Invalid` for what determines nothing; `Conflict` for a key that was used otherwise.
     """
     lock_machines(session, [machine.id])
     sent = body.model_dump(mode="json", exclude={"machine", "key", "confirm"}, exclude_none=True)
@@ -50,7 +53,7 @@ def take(session: Session, machine: Machine, body: RunIn, caller: Caller) -> Cre
         return sent_before(before, body.key, _("run"), same=same, run=before.run.id)
     plan = queries.plan(session, machine.id)
     limits = limits_of(plan)
-    evaluated = evaluate(body, limits)
+    evaluated = evaluate(body, limits, protocol)
     warnings = [] if evaluated.outcome == "refused" else queries.warnings_of(evaluated.results, machine, sent)
     head = body.head or ""
     stated_time = body.measured_at or _said_time(evaluated, body.timezone)

@@ -9,6 +9,7 @@ from app.access.deps import AnyCaller, Caller, Engineer, Operator
 from app.errors import Invalid
 from app.geometry.rotary_axes import actions, figures, queries, run_history
 from app.geometry.rotary_axes.answers import RecomputedOut, RunOut, axis_out, run_out
+from app.geometry.rotary_axes.control_results import protocol_apart
 from app.geometry.rotary_axes.drift import drift
 from app.geometry.rotary_axes.drift_answers import (
     BackupOut,
@@ -58,9 +59,12 @@ def take_kinematics_run(session: SessionDep, caller: AnyCaller, body: RunIn, res
     maxModification, and one with `warnings` (an axis further off than is plausible on this machine), waits to be confirmed
     (`"status": "to_confirm"`). What of a protocol was not understood is answered.
     """
+    machine_for(session, caller, body.machine, "operator")
+    session.commit()  # nothing is kept open while a protocol is read
+    protocol = protocol_apart(body.protocol)
     with readings.pushing(session) as own:
         machine = machine_for(own, caller, body.machine, "operator")
-        created = actions.take(own, machine, body, caller)
+        created = actions.take(own, machine, body, caller, protocol)
     response.status_code = 200 if created.again else 201
     return run_out(queries.run(session, created.row.run.id))
 

@@ -8,6 +8,8 @@ from app.core.programs.lines import written
 from app.core.rotary.axis import AXES, ERRORS, AxisName
 from app.core.rotary.results import MEASURED, OFFSETS, OPTIMISED, SCALARS, STRINGS, Results, read_results
 from app.errors import FieldError, Invalid
+from app.files.apart import apart
+from app.files.formats.delimited import Unusable
 from app.files.formats.rotary_protocol import AxisProtocol, Protocol, read_protocol
 from app.geometry.rotary_axes import wording
 from app.geometry.rotary_axes.outcome import LETTERS, Evaluated, correction
@@ -150,8 +152,19 @@ def _moved(axis_protocol: AxisProtocol) -> tuple[float, float, float] | None:
 # --- the control's protocol
 
 
-def of_protocol(text: str) -> Evaluated:
-    protocol: Protocol = read_protocol(text)
+def protocol_apart(text: str | None) -> Protocol | None:
+    """The control's protocol, read in a process of its own: no transaction should be open meanwhile. Raises `Invalid`."""
+    if text is None:
+        return None
+    try:
+        return apart(read_protocol, text)
+    except Unusable as error:
+        raise Invalid.at("protocol", str(error).removesuffix(".")) from None
+
+
+def of_protocol(text: str, protocol: Protocol | None = None) -> Evaluated:
+    """Evaluate a protocol. protocol: the same, where it is read already. Raises `Invalid`."""
+    protocol = protocol or read_protocol(text)
     if protocol.is_foreign:
         raise Invalid.at(
             "protocol",

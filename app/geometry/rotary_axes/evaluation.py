@@ -10,6 +10,7 @@ from app.core.rotary.axis import AxisErrors, Estimate, NoAxis, Position, estimat
 from app.core.rotary.results import OFFSETS, read_results
 from app.core.rotary.sphere import FEWEST, NoSphere, Sphere, fit_sphere, radius_is_wrong
 from app.errors import Invalid
+from app.files.formats.rotary_protocol import Protocol
 from app.geometry.rotary_axes import wording
 from app.geometry.rotary_axes.control_results import of_parameters, of_protocol, results_of
 from app.geometry.rotary_axes.outcome import LETTERS, Evaluated, Limits
@@ -21,10 +22,10 @@ from app.language.i18n import _
 APPROACHES = {"positive": 1, "negative": -1, None: 0}
 
 
-def evaluate(body: RunIn, limits: Limits) -> Evaluated:
-    """Evaluate a run. Raises `Invalid` for points or positions that determine nothing, or text without values."""
+def evaluate(body: RunIn, limits: Limits, protocol: Protocol | None = None) -> Evaluated:
+    """Evaluate a run. protocol: that of the run, where it is read already. Raises `Invalid` for points or positions that determine nothing, or text without values."""
     if body.protocol is not None:
-        evaluated = of_protocol(body.protocol)
+        evaluated = of_protocol(body.protocol, protocol)
     elif body.results is not None:
         evaluated = of_parameters(results_of(body.results), "results")
     elif body.pasted is not None:

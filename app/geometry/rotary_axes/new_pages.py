@@ -12,6 +12,7 @@ from starlette.responses import RedirectResponse
 from app.access.deps import Caller, Operator, require
 from app.errors import Invalid, NotFound
 from app.geometry.rotary_axes import actions, form_reader, queries
+from app.geometry.rotary_axes.control_results import protocol_apart
 from app.geometry.rotary_axes.evaluation import evaluate
 from app.geometry.rotary_axes.outcome import Evaluated
 from app.geometry.rotary_axes.schemas import MOST_PROTOCOL, RunIn
@@ -84,12 +85,15 @@ def _send(request: Request, session: Session, caller: Caller, form: dict[str, st
         return _form(request, session, form)
     try:
         body = _given(form)
+        machine_named(session, body.machine)
+        session.commit()  # nothing is kept open while a protocol is read
+        protocol = protocol_apart(body.protocol)
         machine = machine_named(session, body.machine)
         if form.get("do") == "look":
             limits = actions.limits_of(queries.plan(session, machine.id))
-            return _form(request, session, form, evaluated=evaluate(body, limits))
+            return _form(request, session, form, evaluated=evaluate(body, limits, protocol))
         with readings.pushing(session) as own:
-            created = actions.take(own, machine, body, caller)
+            created = actions.take(own, machine, body, caller, protocol)
             number = created.row.run.id
     except (Invalid, NotFound) as error:
         return _form(request, session, form, error)

@@ -1,0 +1,137 @@
+"""Expressions and loops over text of others take ten times as long for ten times the text, not a hundred times.
+
+The limits are seconds of a processor, a hundred times what is needed; what grows with the square of its input needs minutes.
+"""
+
+import importlib
+import pkgutil
+import re
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.core import number_text
+from app.errors import Invalid
+from app.files import formats
+from app.files.formats import aqdef, aqdef_times, aqdef_values, cell_values, delimited, markup, units
+from app.files.formats.aqdef import Source
+from app.files.formats.rotary_protocol import read_protocol
+from app.loop.readings.importing.layout import Wishes, look
+
+MOST = 3.0  # s of a processor
+LONG = 100_000  # characters: a cell of CSV may have 131,072
+CELL = markup.LONGEST  # of a protocol, whatever is longer is cut
+OF_CELLS = {"rotary_protocol", "rotary_words", "rotary_stems"}
+TEXTS = (
+    "1", "1 ", "1.", "1,", "1/2,", "-1", "+", " ", "\t", "(", "[(<", "( ", "a", "a ", "a.", "Ä", "_m", "=", ";+", ";+1", "K1001 ",
+    "K0001/1/", "¤", "\x0f", "\x14", "\n", '"', "e", "1e", ":", "1:1", "x=1 ", "ex0c ", "achse ", "\u0316\u0301", "<a ", "mm ",
+)  # fmt: skip
+"""Repeated, and with a sign behind them that fits nowhere."""
+MODULES = [importlib.import_module(f"app.files.formats.{each.name}") for each in pkgutil.iter_modules(formats.__path__)]
+EXPRESSIONS = {
+    f"{module.__name__.rpartition('.')[2]}.{name}": value
+    for module in [*MODULES, number_text]
+    for name, value in vars(module).items()
+    if isinstance(value, re.Pattern)
+}
+
+
+def seconds(call: Callable[..., Any], *given: Any) -> float:
+    begun = time.thread_time()
+    with suppress(ValueError, Invalid):
+        call(*given)
+    return time.thread_time() - begun
+
+
+@pytest.mark.parametrize("name", EXPRESSIONS)
+def test_every_expression(name: str) -> None:
+    expression = EXPRESSIONS[name]
+    most = CELL if name.partition(".")[0] in OF_CELLS else LONG // 5
+    for text in TEXTS:
+        long = text * (most // len(text)) + "\x00"
+        for way in (expression.search, expression.fullmatch, expression.match):
+            assert seconds(way, long) < MOST / 6, (name, way.__name__, text)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        cell_values.folded,
+        units.unit_in,
+        units.length_unit,
+        delimited.is_value,
+        delimited.defused,
+        lambda text: delimited.decimal_of([text]),
+        lambda text: cell_values.number(text, "."),
+        lambda text: cell_values.moment(text, None),
+        lambda text: cell_values.moment(text, None, "%d.%m.%Y %H:%M"),
+        aqdef_times.time_of,
+        aqdef_times.slashed,
+        aqdef_values.number_of,
+        aqdef_values.process_of,
+        aqdef_values._with_separators,
+        aqdef_values._several,
+        aqdef_values._entry,
+        number_text.has_broken_number,
+    ],
+)
+def test_what_is_made_of_a_cell(call: Callable[[str], Any]) -> None:
+    for text in TEXTS:
+        long = text * (LONG // len(text)) + "x"
+        with suppress(units.UnknownUnit):
+            assert seconds(call, long) < MOST, text
+
+
+HEADS = "".join(f"K2001/{index} D{index}\n" for index in range(1, 9_001))
+AQDEF = {
+    "parts without a number": "K1001 a\n" + "".join(f"K1001 p{n}\nK2001/{n + 1} x\n" for n in range(9_000)),
+    "parts without characteristics": HEADS + "".join(f"K1001/{n} p{n}\n" for n in range(2, 30_000)),
+    "fields for all that are open": HEADS + "\x0f".join(["1"] * 9_000) + "\n" + "K0014/0 x\n" * 20_000,
+    "short lines of many characteristics": HEADS + "1\n" * 30_000,
+    "K lines of many characteristics": HEADS + "".join(f"K0001/{n % 9_000 + 1} 1\n" for n in range(30_000)),
+    "a tree": HEADS + "".join(f"K5111/{n} 1\nK5103/{n} {n + 1}\nK5102/{n} 1\n" for n in range(20_000)),
+    "fields by the numbers of values": HEADS + "".join(f"K0014/1/{n} x\n" for n in range(30_000)) + "1\n" * 30_000,
+}
+
+
+@pytest.mark.parametrize("name", AQDEF)
+def test_loops_over_aqdef(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "a.dfq"
+    path.write_text(AQDEF[name])
+    source = Source(path, None, "utf-8")
+
+    def read() -> None:
+        for _value in aqdef_values.values(source, aqdef.describe(source)):
+            pass
+
+    assert seconds(read) < MOST
+
+
+@pytest.mark.parametrize(
+    "text", ["(" * LONG + ";b", "1" * LONG + "x;1", '"' * LONG, ";" * 400 + "\n", "(a;" * 400 + "\n"]
+)
+def test_the_beginning_of_a_table(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"{text}\n" * 60)
+    assert seconds(lambda: look(path, Wishes(), complete=False)) < MOST
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *TEXTS, "<", "<!--", "<![", "<!DOCTYPE a [", "<?", "</", "<a b=", '<a b="', "<script>", "<svg>", "&", "&#", "<td>1</td>",
+        "Lose: 0,1\n", "C-Achse\n", "<td>EXC</td>", "<svg></style>", "<![\n",
+    ],
+)  # fmt: skip
+def test_a_protocol(text: str) -> None:
+    long = text * (LONG // len(text))
+    assert seconds(read_protocol, long) < MOST
+    assert seconds(read_protocol, "<h2>C-Achse</h2><table><tr><td>Lose</td>" + long) < MOST
+
+
+def test_silent_elements_within_each_other() -> None:
+    assert seconds(markup.rows_of, "<svg>" * LONG + "</style>" * LONG) < MOST
