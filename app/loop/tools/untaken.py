@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from datetime import datetime, timedelta
 from typing import Any, NamedTuple
 
-from sqlalchemy import Row, func, select
+from sqlalchemy import ColumnElement, Row, func, or_, select
 from sqlalchemy.orm import Session
 
 from app.db.events import publish
@@ -98,14 +98,13 @@ class Watch:
 
     def _found(self, session: Session) -> list[tuple[int, str, int, str]]:
         waiting = untaken(session)
+        told_of: list[ColumnElement[bool]] = [Alarm.acknowledged_at.is_(None)]
+        if waiting:
+            told_of.append(Alarm.raised_at >= min(each.since for each in waiting))
         told = (
             select(Alarm, Machine.key)
             .join(Machine, Machine.id == Alarm.machine_id)
-            .where(
-                Alarm.kind == CORRECTIONS_NOT_TAKEN.name,
-                Alarm.acknowledged_at.is_(None)
-                | (Alarm.raised_at >= min((each.since for each in waiting), default=None)),
-            )
+            .where(Alarm.kind == CORRECTIONS_NOT_TAKEN.name, or_(*told_of))
             .order_by(Alarm.id)
             .execution_options(populate_existing=True)
         )

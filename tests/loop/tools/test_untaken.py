@@ -4,6 +4,7 @@ from typing import Any
 
 import psycopg
 import pytest
+from sqlalchemy.orm import Session
 
 from app.jobs.actions import run_jobs
 from app.loop.tools.untaken import Watch
@@ -122,3 +123,7 @@ def test_set_up_warns_of_a_tool_memory_without_a_location(shop: Shop) -> None:
     [warning] = [each for each in answer["warnings"] if each["code"] == "not_mapped"]
     assert warning["field"] == "parameters.tool_memory"
     assert f"[[machine.{shop.machine}.location]]" in warning["text"]
+
+
+def test_in_a_plant_where_nothing_waits_there_is_nothing_to_do(session: Session) -> None:
+    assert Watch(1800.0, 5).due(session) == []
