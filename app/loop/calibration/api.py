@@ -237,7 +237,7 @@ def calibration_figure(
     changes = queries.value_changes(session, machine_row, location, limit)
     marks = [mark_of(row) for row in reversed(rows)]
     chart = figures.gauge_figure(marks, sorted((change.since, change.value) for change in changes), value)
-    return chart_answer(with_events_of_machine(session, machine_row, chart, without=(CALIBRATION,)), theme)
+    return chart_answer(with_events_of_machine(session, machine_row, chart, place=place, without=(CALIBRATION,)), theme)
 
 
 @router.get("/machines/{machine}/tools/{tool}/calibration-figure", responses=problems(404) | FIGURE)
@@ -255,4 +255,4 @@ def ring_figure(
     queries.value_of(session, machine_row, place)
     rows = queries.calibrations(session, machine_row, place, newest_first=True, limit=limit)
     chart = figures.ring_figure([mark_of(row) for row in reversed(rows)])
-    return chart_answer(with_events_of_machine(session, machine_row, chart, without=(CALIBRATION,)), theme)
+    return chart_answer(with_events_of_machine(session, machine_row, chart, place=place, without=(CALIBRATION,)), theme)

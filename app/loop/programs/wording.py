@@ -233,7 +233,7 @@ def variable(r: str) -> str:
     return {
         "R21": _("surface"),
         "R22": _("probe"),
-        "R24": _("two points"),
+        "R24": _("two-point measurement, 0 off"),
         "R42": _("nominal"),
         "R43": _("measured"),
         "R44": _("difference"),

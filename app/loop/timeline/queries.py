@@ -67,24 +67,34 @@ def with_events_of_machine(
     width: int = 1240,
     *,
     tool: int | None = None,
+    place: tuple[str, int] | None = None,
     without: Collection[str] = (),
 ) -> Chart:
     """A chart over time with the events of the machine above it: alarms, calibrations, tool changes, notes.
 
-    width: in pixels, about. tool: only of this one. without: kinds that the chart draws itself.
+    width: in pixels, about. tool: only of this one. place: memory and location that the chart is about; alarms that name
+    another one stand there. without: kinds that the chart draws itself.
     """
     span = span_of(chart)
     if span is None:
         return chart
     period = _period(span)
     happened = [
-        *_alarms(session, machine, true() if tool is None else Alarm.tool_memory == tool, period),
+        *_alarms(session, machine, _of_place(place) if tool is None else Alarm.tool_memory == tool, period),
         *(_calibrations(session, machine, true(), period) if tool is None else ()),
         *_tool_events(session, machine, true() if tool is None else ToolEvent.number == tool, period),
         *_notes(session, machine, true() if tool is None else Note.characteristic_id.is_(None), period.holds(Note.at)),
     ]
     events = [each.event for each in happened if each.event.kind not in without]
     return with_lane(chart, events, width, lines=False)
+
+
+def _of_place(place: tuple[str, int] | None) -> ColumnElement[bool]:
+    """Alarms that name no location of a memory, or this one."""
+    if place is None:
+        return true()
+    memory = Alarm.data["memory"].astext
+    return memory.is_(None) | ((memory == place[0]) & (Alarm.data["location"].astext == str(place[1])))
 
 
 def _period(span: tuple[float, float]) -> Period:
@@ -158,6 +168,7 @@ def _of_characteristic(
     concerned = or_(
         Alarm.characteristic_id == current.characteristic.id,
         Alarm.characteristic_id.is_(None)
+        & (_of_place(("average", parameters.average_memory)) | (Alarm.data["memory"].astext == "tool"))
         & (Alarm.tool_memory.is_(None) | (Alarm.tool_memory == parameters.tool_memory)),
     )
     place = (CalibrationRecord.memory == "average") & (CalibrationRecord.location == parameters.average_memory)

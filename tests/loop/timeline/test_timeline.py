@@ -117,3 +117,24 @@ def test_a_machines_charts_over_time_show_its_alarms(shop: Shop) -> None:
     words = " ".join(said(events))
     assert "Oversize" in words
     assert "Calibration" not in words  # the chart draws them itself
+
+
+def test_an_alarm_of_another_location_stands_on_its_own_chart_only(shop: Shop) -> None:
+    """A key calibrates two locations; the second is refused by a touch far outside the window."""
+    calibrations = f"/machines/{shop.machine}/calibrations"
+    shop.call("POST", calibrations, 201, **GAUGE)
+    shop.call("POST", calibrations, 201, **GAUGE | {"average_memory": 6})
+    shop.read(0.1)
+    shop.call("POST", calibrations, 201, **GAUGE | {"average_memory": 6, "touches": [209.0]})
+    shop.read(12.5)
+    shop.call("POST", calibrations, 201, **GAUGE)
+    shop.call("POST", calibrations, 201, **GAUGE | {"average_memory": 6})
+
+    def words(path: str) -> str:
+        return " ".join(said(events_of(shop.call("GET", path))))
+
+    own, other = (f"/machines/{shop.machine}/averages/{location}/calibration-figure" for location in (6, 5))
+    assert "refused" in words(own)
+    assert "refused" not in words(other)
+    assert "Oversize" in words(other)
+    assert "refused" not in words(f"/characteristics/{shop.characteristic}/figures/zones"), "its R11 is 5"
