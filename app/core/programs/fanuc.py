@@ -123,10 +123,11 @@ class _Reader:
         body = _COMMENT.sub(" ", text)
         if has_printed_minus(body):
             notes.append(Note("printed_minus", {}))
-        body = re.sub(r"^/?\s*(?:[NO]\s*\d+)?\s*", "", plain(body), flags=re.IGNORECASE)
+        numbered = plain(body)
+        body = re.sub(r"^/?\s*(?:[NO]\s*\d+)?\s*", "", numbered, flags=re.IGNORECASE)
         self._words(number, self._steps(body, notes), notes)
         if not notes:
-            notes.append(Note("words", {"words": body}) if body else Note("empty", {}))
+            notes.append(Note("words", {"words": numbered}) if numbered else Note("empty", {}))
 
     def _steps(self, body: str, notes: list[Note]) -> str:
         """Note the steps of a printed macro; return what else stands in the block."""

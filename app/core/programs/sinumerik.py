@@ -140,8 +140,8 @@ class _Reader:
         if begins[1]:
             notes.append(Note("skip_block", {}))
         self._words(number, body[begins.end() :], notes)
-        if not notes or (not body and not comments):
-            notes.append(Note("empty" if not comments else "comment", {}))
+        if not notes:
+            notes.append(Note("words", {"words": body}) if body else Note("empty", {}))
         self.now.last_line = number
         if ending := _ENDING.search(body):
             self._end(number)

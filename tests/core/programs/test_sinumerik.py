@@ -113,6 +113,11 @@ class TestSource:
         assert [line.verdict for line in text.lines] == [LineVerdict.NOT_UNDERSTOOD] * 3
         assert [note.data["r"] for line in text.lines for note in line.notes] == ["R11", "R21", "R32", "R33", "R32"]
 
+    def test_a_step_of_a_macro_and_a_number_alone_are_no_empty_lines(self) -> None:
+        text = sinumerik.read("R20=R20+1\nN1000\n\nN5 R33=0.001\nN25 L92")
+        assert codes(text, 1) == ["step"]
+        assert (codes(text, 2), codes(text, 3)) == (["words"], ["empty"])
+
     def test_its_explanations_are_named(self) -> None:
         text = sinumerik.read("N5 M73 uključivanje IC kamere\nN25 L92")
         assert codes(text, 1) == ["words", "unknown"]
