@@ -94,7 +94,7 @@ def _of_place(place: tuple[str, int] | None) -> ColumnElement[bool]:
     if place is None:
         return true()
     memory = Alarm.data["memory"].astext
-    return memory.is_(None) | ((memory == place[0]) & (Alarm.data["location"].astext == str(place[1])))
+    return or_(memory.is_(None), and_(memory == place[0], Alarm.data["location"].astext == str(place[1])))
 
 
 def _period(span: tuple[float, float]) -> Period:
