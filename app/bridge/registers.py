@@ -408,7 +408,10 @@ class RegisterLink:
         block = self._block
         if block is None:
             return
-        known, lying = (round(value) for value in await self.registers.read((Register.DECIDED, Register.ACTION)))
+        places = (Register.DECIDED, Register.ACTION)
+        whole = self.registers.whole
+        held = [self._numbers[place] for place in places] if whole else await self.registers.read(places)
+        known, lying = (round(value) if isfinite(value) else 0 for value in held)
         new: dict[int, Told] = {}
         for each in decided:
             _, epoch, sequence = each.key.rsplit(":", 2)
@@ -423,7 +426,7 @@ class RegisterLink:
             [found] = await self.registers.read((Register.ACTION,))
             if round(found) not in {action, Told.NONE}:  # 0: it has acted already
                 raise ControlAway(f"Register +{Register.ACTION} (action) holds {found:g} after {action} was written.")
-        await self._write(Register.DECIDED, max(new))
+        await self.registers.write(Register.DECIDED, float(max(new)))  # one that gets lost costs the program a wait
 
     # --- offsets
 

@@ -111,8 +111,9 @@ def _concerns(decision: Decision) -> bool:
 
 async def _push_all(unit: Unit, client: AsyncClient, rows: Sequence[Waiting]) -> Sequence[Decision]:
     if len(rows) > 1:
+        bodies = [await _told(unit, client, row) for row in rows]
         try:
-            batch = await client.push_many([await _told(unit, client, row) for row in rows])
+            batch = await client.push_many(bodies)
         except (*REFUSED, Forbidden):
             pass  # one of them: each by itself, below
         else:
@@ -125,8 +126,9 @@ async def _push_all(unit: Unit, client: AsyncClient, rows: Sequence[Waiting]) ->
 
 
 async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | None:
+    body = await _told(unit, client, row)
     try:
-        decision = await client.push(await _told(unit, client, row))
+        decision = await client.push(body)
     except REFUSED as error:
         if not_from_inband(error):
             raise

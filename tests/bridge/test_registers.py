@@ -568,8 +568,9 @@ def test_a_decision_is_written_action_first_and_never_lowered(*, whole: bool) ->
         registers.writes.clear()
         await link.decide([decided(1, "none"), decided(9, "stop", epoch + 1)])
         assert registers.writes == [(Register.DECIDED, 1.0)]
-        await link.decide([decided(2, "stop")])
-        await link.decide([decided(3, "hold"), decided(1, "stop")])
+        for later in ([decided(2, "stop")], [decided(3, "hold"), decided(1, "stop")]):
+            await link.fetch(Position())
+            await link.decide(later)
         assert registers.writes[1:] == [(Register.ACTION, 2.0), (Register.DECIDED, 2.0), (Register.DECIDED, 3.0)]
 
     run(work())
