@@ -106,6 +106,7 @@ class Watch:
             connection.request("GET", "/health/live")
             connection.getresponse().read()
             self.worst = max(self.worst, (time.perf_counter() - began, beside))
+        connection.close()
 
 
 def send(url: str, request: Request, headers: dict[str, str]) -> int:
@@ -114,7 +115,9 @@ def send(url: str, request: Request, headers: dict[str, str]) -> int:
     connection = http.client.HTTPConnection(address.hostname or "", address.port, timeout=120)
     with contextlib.closing(connection), contextlib.suppress(OSError, http.client.HTTPException):
         connection.request(request.method, request.path, request.body, headers | {"Content-Type": request.kind})
-        return connection.getresponse().status
+        with connection.getresponse() as answer:
+            answer.read()
+            return answer.status
     return 0
 
 
