@@ -328,6 +328,7 @@ def test_the_table_of_the_simulator_is_a_configuration(tmp_path: Path) -> None:
                 "✓ mill-1: the control answers as 'SIM-0001'",
                 "✓ mill-1: 1 readings can be fetched now",
                 "✓ mill-1: tool memory 3 holds 0.0000 mm",
+                "✓ mill-1: what the bridge will write there can be written",
             ]
         finally:
             await simulator.stop()
