@@ -169,6 +169,8 @@ async def _connected(unit: Unit, beside: Beside) -> None:
             unit.news.set()
             async with asyncio.timeout(machine.patience):
                 await link.acknowledge(received)
+        if unit.refused:
+            await beside.do("refusals", None, partial(_tell_refused, unit))
         async with asyncio.timeout(machine.patience):
             for outcome in await link.outcomes():
                 order = next((each for each in unit.orders if each.number == outcome.number), None)
@@ -203,3 +205,12 @@ async def _connected(unit: Unit, beside: Beside) -> None:
             " ".join(filter(None, (failed, waits, remark, wrong_date(link.clock)))),
         )
         await asyncio.sleep(_until_next(machine.interval))
+
+
+async def _tell_refused(unit: Unit) -> None:
+    """Tell a machine that listens which of its readings the server has refused."""
+    tell = getattr(unit.link, "tell_refused", None)
+    while unit.refused:
+        if tell is not None:
+            await tell(*unit.refused[0])
+        del unit.refused[0]

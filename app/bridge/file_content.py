@@ -9,7 +9,6 @@ its time of modification too.
 import hashlib
 import io
 import json
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
@@ -19,23 +18,19 @@ from typing import Any, Final, Literal, NamedTuple
 from msgspec import Struct
 
 from app.bridge.configuration import Machine, Positive
+from app.bridge.fields import EVERY, FIELDS, Form
 from app.bridge.json_text import read_json
 from app.bridge.links import Received
+from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
 from app.core.ring import INCH
 from app.files.formats import aqdef, aqdef_values, delimited
 from app.files.formats.aqdef_context import context_of
 from app.files.formats.aqdef_keys import Keys
 from app.files.formats.aqdef_times import WallClock, day_order, slashed
-from app.files.formats.cell_values import Unreadable, moment, number, zone_named
+from app.files.formats.cell_values import Unreadable, zone_named
 from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_in
 
-FIELDS: Final = ("characteristic", "measured", "measured_at", "machined_at", "part", "correction_in_effect", "key")
-"""What a column, or a named group of a regular expression, may be."""
 NAMES: Final = {"csv": "*.csv", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
-EVERY: Final = "*"
-"""The name in ``characteristics`` that stands for readings whose line names none."""
-LONGEST_LINE: Final = 10_000
-HIGHEST_NUMBER: Final = 2_147_483_647
 NOT_ALONE: Final = 2  # files of a pair
 
 
@@ -101,20 +96,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
         if self.delimiter is not None and len(self.delimiter) != 1:
             raise ValueError("delimiter is one character")
         if self.format == "text":
-            _check_expressions(self.lines)
-
-
-def _check_expressions(lines: tuple[str, ...]) -> None:
-    groups: set[str] = set()
-    for text in lines:
-        try:
-            groups |= set(re.compile(text).groupindex)
-        except re.error as error:
-            raise ValueError(f"lines: {text!r} is no regular expression: {error}") from None
-    for name in groups - set(FIELDS):
-        raise ValueError(f"lines: the group {name!r} is no field; fields are {', '.join(FIELDS)}")
-    if "measured" not in groups:
-        raise ValueError("lines: one expression needs the group (?P<measured>…), the size")
+            check_expressions(self.lines)
 
 
 class Fault(NamedTuple):
@@ -210,6 +192,7 @@ class _Reader:
         self.path = next((path for path in paths if path.suffix.lower() != ".dfd"), paths[0])
         self.scale = INCH if machine.unit == "inch" else 1.0
         self.zone = None if settings.zone is None else zone_named(settings.zone)
+        self.form = Form(self.scale, settings.decimal, settings.times, self.zone)
         self.encoding = settings.encoding or (
             aqdef.encoding_of(self.path) if settings.format == "aqdef" else delimited.encoding_of(self.path)
         )
@@ -326,20 +309,17 @@ class _Reader:
     # --- text protocols
 
     def _text(self) -> None:
-        expressions = [re.compile(text) for text in self.settings.lines]
-        held: dict[str, str] = {}
+        patterns = Patterns(self.settings.lines)
         for line, text in enumerate(self.lines, 1):
             if len(text) > LONGEST_LINE:
                 self._fault(line, "", f"is longer than {LONGEST_LINE} characters: is this the right file?")
                 continue
-            for expression in expressions:
-                if match := expression.search(text.rstrip("\n")):
-                    groups = {name: value for name, value in match.groupdict().items() if value is not None}
-                    if "measured" in groups:
-                        fields = held | groups
-                        self._take(line, fields.get("characteristic", EVERY).strip(), fields, fields)
-                    else:
-                        held |= groups
+            try:
+                for fields in patterns.find(text.rstrip("\n")):
+                    self._take(line, fields.get("characteristic", EVERY).strip(), fields, fields)
+            except TooSlow as error:
+                self._fault(line, "", str(error))
+                return  # the next line would take as long
 
     # --- AQDEF
 
@@ -439,6 +419,7 @@ class _Reader:
             self._nobody(line, name)
             return
         body: dict[str, Any] = {"characteristic": key}
+        form = self.form if scale is None else self.form._replace(scale=scale)
         own = None
         for field_, value in fields.items():
             if field_ == "characteristic" or value is None or (value == "" and field_ != "measured"):
@@ -447,31 +428,12 @@ class _Reader:
                 if field_ == "key":
                     own = str(value)
                 else:
-                    body[field_] = self._value(field_, value, self.scale if scale is None else scale)
+                    body[field_] = form.value(field_, value)
             except Unreadable as error:
                 column = self.settings.columns.get(field_, field_ if name == EVERY or "measured" in fields else name)
                 self._fault(line, column, f"{str(value)[:40]!r} {error}.")
                 return
         self._add(line, name, body, raw, own)
-
-    def _value(self, field_: str, value: Any, scale: float) -> Any:
-        text = str(value).strip()
-        if field_ == "measured":
-            if isinstance(value, bool) or not isinstance(value, int | float | str):
-                raise Unreadable("is not a number")
-            size = value if isinstance(value, int | float) else number(text, self.settings.decimal)
-            if not isfinite(size * scale):
-                raise Unreadable("is not a number")
-            return round(size * scale, 9)
-        if field_ in {"measured_at", "machined_at"}:
-            return moment(text, self.zone, self.settings.times).isoformat()
-        if field_ == "correction_in_effect":
-            if not text.isascii() or not text.isdigit() or int(text) > HIGHEST_NUMBER:
-                raise Unreadable("is not the number of a correction, such as 12")
-            return int(text)
-        if not 1 <= len(text) <= 128:
-            raise Unreadable("is longer than 128 characters" if text else "is empty")
-        return text
 
     def _add(
         self,

@@ -144,6 +144,7 @@ async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | Non
         log_lines.decision(unit.machine.key, row.key, decision)
         return decision
     await unit.store.refuse(unit.machine.key, row.id, reason)
+    unit.refused.append((row.key, reason))
     log.warning("%s: reading %s is in the quarantine: %s", unit.machine.key, row.key, reason)
     return None
 

@@ -71,6 +71,7 @@ class Unit:
     the server said at locations_at (of the monotonic clock). trouble: the server's side, None while it answers. context: what an
     MTConnect agent tells of the machine. test: the touch test that is open; no correction is offered meanwhile; test_open: there
     is one. beat_now: the heartbeat waits no longer.
+    refused: keys of readings that the server has refused, and the reasons: the machine has not heard of it yet.
     """
 
     machine: Machine
@@ -96,6 +97,7 @@ class Unit:
     test: Guided | None = None
     test_open: asyncio.Event = field(default_factory=asyncio.Event)
     beat_now: asyncio.Event = field(default_factory=asyncio.Event)
+    refused: list[tuple[str, str]] = field(default_factory=list)
 
     @property
     def offered(self) -> Sequence[Order]:

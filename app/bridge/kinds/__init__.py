@@ -16,6 +16,7 @@ KINDS: Final[dict[str, str]] = {
     "heidenhain": "app.bridge.kinds.heidenhain",
     "mqtt": "app.bridge.kinds.mqtt",
     "opcua": "app.bridge.kinds.opcua",
+    "text": "app.bridge.kinds.text",
 }
 """Names and modules."""
 EXTRAS: Final = {"opcua": "opcua", "mqtt": "mqtt", "heidenhain": "heidenhain"}

@@ -19,7 +19,7 @@ import time
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import aiomqtt
 from msgspec import Struct
@@ -27,27 +27,14 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from app.bridge.configuration import Location, Machine, Number, Positive
-from app.bridge.json_text import read_json
+from app.bridge.fields import FIELDS, Form
 from app.bridge.links import Clock, ControlAway, Decided, LinkError, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.messages import foreign_readings, object_in, own_reading
 from app.bridge.moments import learn_ahead
 from app.core.ring import INCH
+from app.files.formats.cell_values import zone_named
 
 log = logging.getLogger(__name__)
-FIELDS: Final = {
-    "characteristic": str,
-    "measured": (int, float),
-    "touches": list,
-    "measured_at": str,
-    "machined_at": str,
-    "part": str,
-    "key": str,
-    "correction_in_effect": int,
-    "first_move_triggered": bool,
-    "context": dict,
-}
-"""What the body of a reading may hold."""
-LONGEST_KEY: Final = 128
-LARGEST: Final = 65_536  # bytes of a message
 IN_FLIGHT: Final = 200  # messages that the broker may send before the first is acknowledged
 AT_ONCE: Final = 50  # readings of a poll: a broker that is slow has to answer for all of them before a call is given up
 AT_LEAST_ONCE: Final = 1
@@ -65,6 +52,9 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     file or in a variable of the environment. tls, ca: a file with the authority of the broker's certificate, if it is one of
     the plant's own. certificate, private_key: files of the client's own. session: s that the broker keeps messages for a
     bridge that is away. valid: s after which a list of corrections that was not renewed counts no longer. keepalive: s.
+
+    fields: members of messages of another form by field of `app.bridge.fields.FIELDS`, see `app.bridge.messages`; readings: their
+    topic, if it is another; decimal, times and zone of what they say in texts.
     """
 
     host: str
@@ -82,6 +72,11 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     session: Number = 7 * 86_400
     valid: Positive = 600.0
     keepalive: Number = 20
+    fields: dict[str, str] = {}
+    readings: str | None = None
+    decimal: Literal[".", ","] = "."
+    times: str | None = None
+    zone: str | None = None
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself."""
@@ -89,7 +84,11 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
             raise ValueError("ca and certificate need tls = true")
         if (self.certificate is None) != (self.private_key is None):
             raise ValueError("certificate and private_key belong together")
-        for word in (self.prefix, self.name or ""):
+        for name in self.fields.keys() - set(FIELDS):
+            raise ValueError(f"fields.{name} is no field; fields are {', '.join(FIELDS)}")
+        if self.zone is not None:
+            zone_named(self.zone)
+        for word in (self.prefix, self.name or "", self.readings or ""):
             if set(word) & set("+#\0") or word.startswith("/"):
                 raise ValueError(f"{word!r} is no part of a topic: without + and #, not beginning with /")
         if self.password_file and self.password_env:
@@ -119,7 +118,10 @@ class MqttLink:
         self.base = f"{self.settings.prefix}/{self.settings.name or machine.key}"
         self.port = self.settings.port or (8883 if self.settings.tls else 1883)
         self.where = f"{self.settings.host}:{self.port}"
-        self.scale = INCH if machine.unit == "inch" else 1.0
+        self.readings = self.settings.readings or f"{self.base}/readings"
+        zone = None if self.settings.zone is None else zone_named(self.settings.zone)
+        scale = INCH if machine.unit == "inch" else 1.0
+        self._form = Form(scale, self.settings.decimal, self.settings.times, zone)
         self._client: Client | None = None
         self._listening: asyncio.Task[None] | None = None
         self._readings: list[aiomqtt.Message] = []
@@ -157,11 +159,11 @@ class MqttLink:
             await client.__aenter__()
             self._client = client
             self._listening = asyncio.create_task(self._listen(client))
-            for topic in ("readings", "applied", "offsets"):
-                [reason, *_] = await client.subscribe(f"{self.base}/{topic}", qos=AT_LEAST_ONCE)
+            for topic in (self.readings, f"{self.base}/applied", f"{self.base}/offsets"):
+                [reason, *_] = await client.subscribe(topic, qos=AT_LEAST_ONCE)
                 if getattr(reason, "value", reason) >= REFUSED:
                     raise Misconfigured(
-                        f"The broker {self.where} does not let the bridge read {self.base}/{topic}: {reason}. Look at its"
+                        f"The broker {self.where} does not let the bridge read {topic}: {reason}. Look at its"
                         " list of rights."
                     )
         except aiomqtt.MqttError as error:
@@ -184,14 +186,14 @@ class MqttLink:
 
     async def _listen(self, client: aiomqtt.Client) -> None:
         async for message in client.messages:
-            match str(message.topic).rpartition("/")[2]:
-                case "readings":
-                    self._readings.append(message)
-                case "applied":
-                    self._answers.append(message)
-                case _:
-                    self._take_offsets(message)
-                    self._done(message)
+            topic = str(message.topic)
+            if topic == self.readings:
+                self._readings.append(message)
+            elif topic == f"{self.base}/applied":
+                self._answers.append(message)
+            else:
+                self._take_offsets(message)
+                self._done(message)
 
     def _there(self) -> Client:
         """The client; raises where the connection has ended."""
@@ -293,35 +295,27 @@ class MqttLink:
         del stored
         self._there()
         messages, self._readings = self._readings[:AT_ONCE], self._readings[AT_ONCE:]
-        received = [self._received(message) for message in messages]
+        received = [each for message in messages for each in self._received(message)]
         if received:
             learn_ahead(self.clock, received, datetime.now().astimezone())
         return received
 
-    def _received(self, message: aiomqtt.Message) -> Received:
-        payload = bytes(message.payload)
-        body, fault = _read(payload)
-        key: Any = body.get("key")
-        if fault is None and not (isinstance(key, str) and 1 <= len(key) <= LONGEST_KEY):
-            fault = f"The reading has no key of 1 to {LONGEST_KEY} characters: without one nobody can tell a repeat from a reading."
-        if fault is not None:
-            digest = hashlib.sha256(payload).hexdigest()[:32]
-            name = key if isinstance(key, str) and 1 <= len(key) <= LONGEST_KEY else None
+    def _received(self, message: aiomqtt.Message) -> list[Received]:
+        payload, machine = bytes(message.payload), self.machine
+        if self.settings.fields:
+            found = foreign_readings(payload, machine.key, self.settings.fields, machine.characteristics, self._form)
+        else:
+            found = [own_reading(payload, machine.characteristics, self._form)]
+        received = []
+        for index, each in enumerate(found):
+            if each.fault is None and each.key is not None:
+                received.append(Received(each.key, each.body, mark=(message, each.said)))
+                continue
+            digest = hashlib.sha256(payload + bytes(index)).hexdigest()[:32]
             shown = {"message": payload[:200].decode("utf-8", "replace")}
-            return Received(f"{self.machine.key}:refused:{digest}", shown, fault=fault, mark=(message, name))
-        name = str(body["characteristic"])
-        content = {each: value for each, value in body.items() if each != "key"}
-        content["characteristic"] = self.machine.characteristics.get(name, name)
-        for each in ("measured", "touches"):
-            if each in content:
-                content[each] = self._in_mm(content[each])
-        return Received(key, content, mark=(message, key))
-
-    def _in_mm(self, value: Any) -> Any:
-        if isinstance(value, list):
-            return [self._in_mm(each) for each in value]
-        is_length = isinstance(value, int | float) and not isinstance(value, bool)
-        return round(value * self.scale, 9) if is_length and self.scale != 1.0 else value
+            key = f"{machine.key}:refused:{digest}"
+            received.append(Received(key, shown, fault=each.fault, mark=(message, each.said)))
+        return received
 
     async def acknowledge(self, received: Sequence[Received]) -> None:
         """Tell the machine which keys are stored, then the broker that the messages are done.
@@ -334,8 +328,12 @@ class MqttLink:
             refused = {"refused": each.fault} if each.fault or key is None else {}
             answers.append(self._publish("stored", {"key": key} | refused))
         await asyncio.gather(*answers)
-        for each in received:
-            self._done(each.mark[0])
+        for message in {id(each.mark[0]): each.mark[0] for each in received}.values():
+            self._done(message)
+
+    async def tell_refused(self, key: str, reason: str) -> None:
+        """Tell the machine that a reading, whose key it was told as stored, was refused by the server."""
+        await self._publish("stored", {"key": key, "refused": reason})
 
     # --- corrections
 
@@ -383,7 +381,7 @@ class MqttLink:
         found = []
         for message in messages:
             try:
-                found.append(self._outcome(_object(bytes(message.payload))))
+                found.append(self._outcome(object_in(bytes(message.payload))))
             except ValueError as error:
                 log.warning("%s: an answer on %s/applied is passed over: %s", self.machine.key, self.base, error)
         return found
@@ -432,7 +430,7 @@ class MqttLink:
 
     def _take_offsets(self, message: aiomqtt.Message) -> None:
         try:
-            body = _object(bytes(message.payload))
+            body = object_in(bytes(message.payload))
         except ValueError as error:
             log.warning("%s: %s/offsets is passed over: %s", self.machine.key, self.base, error)
             return
@@ -447,44 +445,6 @@ def _connect_properties(session: int) -> Properties:
     properties.SessionExpiryInterval = session
     properties.ReceiveMaximum = IN_FLIGHT
     return properties
-
-
-def _object(payload: bytes) -> dict[str, Any]:
-    """The JSON object of a message. Raises `ValueError` with a sentence."""
-    if len(payload) > LARGEST:
-        raise ValueError(f"The message has {len(payload)} bytes, the most is {LARGEST}.")
-    try:
-        content = read_json(payload)
-    except UnicodeDecodeError:
-        raise ValueError("The message is not UTF-8.") from None
-    except json.JSONDecodeError as error:
-        raise ValueError(f"The message is no JSON: {error}. Was it cut off?") from None
-    except ValueError as error:
-        raise ValueError(f"The message {error}.") from None
-    if not isinstance(content, dict):
-        raise ValueError("The message is no JSON object {…}.")  # noqa: TRY004 - as above
-    return content
-
-
-def _read(payload: bytes) -> tuple[dict[str, Any], str | None]:
-    """The body of a reading, and what is wrong with it."""
-    try:
-        body = _object(payload)
-    except ValueError as error:
-        return {}, str(error)
-    if unknown := sorted(body.keys() - FIELDS.keys()):
-        return body, f"The reading has a field that is not known: {unknown[0]!r}. Known are {', '.join(FIELDS)}."
-    for name, value in body.items():
-        wanted: Any = FIELDS[name]
-        if value is not None and (
-            not isinstance(value, wanted) or (isinstance(value, bool) and name != "first_move_triggered")
-        ):
-            return body, f"{name} = {str(value)[:40]!r} is not of the kind that a reading has there."
-    if not body.get("characteristic"):
-        return body, "The reading has no characteristic."
-    if (body.get("measured") is None) == (body.get("touches") is None) and not body.get("first_move_triggered"):
-        return body, "The reading has either measured or touches."
-    return {name: value for name, value in body.items() if value is not None}, None
 
 
 def link(machine: Machine) -> MqttLink:

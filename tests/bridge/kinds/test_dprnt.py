@@ -17,10 +17,11 @@ import serial
 from typer.testing import CliRunner
 
 from app.bridge.configuration import Machine, configuration_from
-from app.bridge.kinds.dprnt import PrintedLink, Settings, Source
+from app.bridge.kinds.dprnt import PrintedLink, Settings
 from app.bridge.links import ControlAway, LinkError, Misconfigured, Position, Received
 from app.bridge.simulators.dprnt import PrintingSimulator, serve
 from app.bridge.simulators.model import Model
+from app.bridge.sources import Source
 from app.bridge.store import Store
 from app.bridge.unit import Unit as Tasks
 from app.cli.bridge import bridge as commands
@@ -202,7 +203,7 @@ def test_a_file_that_grows_shrinks_and_is_read_again_after_a_restart(tmp_path: P
     run(work())
 
 
-class Canned(Source):
+class Canned(Source[Printed]):
     """A source of lines that are given."""
 
     def __init__(self, *batches: bytes) -> None:

@@ -161,7 +161,10 @@ def test_what_was_not_stored_comes_again_from_the_broker(tmp_path: Path) -> None
         (b'{"characteristic": "1", "measured": 1, "key": "\\udfff"}', "half a character"),
         (b'{"characteristic": "1", "measured": 1}', "has no key"),
         (b'{"characteristic": "1", "key": "a"}', "has either measured or touches"),
-        (b'{"characteristic": "1", "measured": "40,01", "key": "a"}', "measured = '40,01' is not of the kind"),
+        (
+            b'{"characteristic": "1", "measured": "40,01", "key": "a"}',
+            'measured = "40,01" is not of the kind that a reading has there: a whole number or a number',
+        ),
         (b'{"characteristic": "1", "measured": 1, "size": 2, "key": "a"}', "not known: 'size'"),
         (b'{"measured": 1, "key": "a"}', "has no characteristic"),
     ],
@@ -181,6 +184,56 @@ def test_what_is_no_reading_goes_to_the_quarantine(tmp_path: Path, payload: byte
         assert words in bad.reason
         assert [row.key for row in await store.waiting("lathe-1")] == ["good"]
         store.close()
+
+    run(work())
+
+
+def test_what_the_server_refuses_later_is_told_the_machine(tmp_path: Path) -> None:
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        async with Broker(tmp_path) as broker, fetching(machine(broker.port), store) as unit:
+            await until(lambda: unit.state == "online", "the bridge is connected")
+            async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+                await client.subscribe(f"{TOPIC}/stored", qos=1)
+                await say(broker.port, "readings", {"characteristic": 1, "measured": 40, "key": 7, "part": 812})
+                assert await said(client) == {"key": 7}
+                [row] = await store.waiting("lathe-1")
+                assert (row.key, row.body["characteristic"], row.body["part"]) == ("7", "shaft-1", "812")
+                unit.refused.append(("7", "There is no characteristic 'shaft-1'."))  # as the server's side notes it
+                assert await said(client) == {"key": "7", "refused": "There is no characteristic 'shaft-1'."}
+        store.close()
+
+    run(work())
+
+
+async def said(client: aiomqtt.Client) -> Any:
+    async with asyncio.timeout(PATIENCE):
+        return json.loads(bytes((await anext(aiter(client.messages))).payload))
+
+
+def test_messages_of_another_form_and_topic_become_readings(tmp_path: Path) -> None:
+    settings: dict[str, Any] = {
+        "readings": "gauges/line-3/result",
+        "fields": {"measured": "values.d40", "measured_at": "time", "part": "serial", "characteristic": "feature"},
+        "times": "seconds since 1970-01-01",
+    }
+
+    async def work() -> None:
+        async with Broker(tmp_path) as broker:
+            chosen = machine(broker.port, **settings)
+            async with connected(chosen) as there, aiomqtt.Client("127.0.0.1", broker.port) as client:
+                message = {"feature": 1, "values": {"d40": 40.01, "unit": "mm"}, "time": 1_780_000_000, "serial": 17}
+                for _ in range(2):
+                    await client.publish("gauges/line-3/result", json.dumps(message), qos=1)
+                first, again = await fetched(there, 2)
+                assert first.key == again.key
+                assert first.body == {
+                    "characteristic": "shaft-1",
+                    "measured": 40.01,
+                    "measured_at": "2026-05-28T20:26:40+00:00",
+                    "part": "17",
+                }
+                await there.acknowledge([first, again])
 
     run(work())
 

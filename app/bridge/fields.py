@@ -1,0 +1,43 @@
+"""Fields of readings as others write them, in files, lines and messages; as ``POST /readings`` takes them."""
+
+from math import isfinite
+from typing import Any, Final, NamedTuple
+from zoneinfo import ZoneInfo
+
+from app.files.formats.cell_values import Unreadable, moment, number
+
+FIELDS: Final = ("characteristic", "measured", "measured_at", "machined_at", "part", "correction_in_effect", "key")
+"""What a column, a member, or a named group of a regular expression may be."""
+EVERY: Final = "*"
+"""The name in ``characteristics`` that stands for readings that name none."""
+HIGHEST_NUMBER: Final = 2_147_483_647
+LONGEST_TEXT: Final = 128
+
+
+class Form(NamedTuple):
+    """The form of values. scale: mm in a unit of the sizes. times: as strptime has it. zone: of times without an offset."""
+
+    scale: float
+    decimal: str = "."
+    times: str | None = None
+    zone: ZoneInfo | None = None
+
+    def value(self, field: str, value: Any) -> Any:
+        """The value of a field but ``characteristic``. Raises `Unreadable`, whose words go behind the value."""
+        text = str(value).strip()
+        if field == "measured":
+            if isinstance(value, bool) or not isinstance(value, int | float | str):
+                raise Unreadable("is not a number")
+            size = value if isinstance(value, int | float) else number(text, self.decimal)
+            if not isfinite(size * self.scale):
+                raise Unreadable("is not a number")
+            return round(size * self.scale, 9)
+        if field in {"measured_at", "machined_at"}:
+            return moment(text, self.zone, self.times).isoformat()
+        if field == "correction_in_effect":
+            if not text.isascii() or not text.isdigit() or int(text) > HIGHEST_NUMBER:
+                raise Unreadable("is not the number of a correction, such as 12")
+            return int(text)
+        if not 1 <= len(text) <= LONGEST_TEXT:
+            raise Unreadable(f"is longer than {LONGEST_TEXT} characters" if text else "is empty")
+        return text
