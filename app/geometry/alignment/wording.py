@@ -12,6 +12,8 @@ from app.language.numbers import MINUS, short
 GOOD, WEAK = 10.0, 100.0  # conditions
 WORTH_A_TOUCH = 1.05  # by less, a touch more makes nothing more certain that anybody would see
 
+SHIFT_ALONE = 3  # points that find the shift of a part, one on each base
+
 
 def kind_word(kind: str) -> str:
     """Name of a kind of alignment."""
@@ -147,7 +149,11 @@ def loose(problem: NotLaidOut) -> tuple[str, str]:
             wrong = _("{have} points cannot determine {needed} motions").format(
                 have=problem.have, needed=problem.needed
             )
-            moving = ""
+            moving = (
+                _('Or find the shift alone: Unknowns X, Y and Z, no turn (`"solve_for": ["a", "b", "c"]`).')
+                if problem.have == SHIFT_ALONE
+                else ""
+            )
         case Loose.PARALLEL_NORMALS:
             wrong = _("no point determines the {motion}: too many faces are parallel (points {at})").format(
                 motion=motion(problem.free), at=at

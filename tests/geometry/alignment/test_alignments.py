@@ -180,6 +180,7 @@ class TestRefused:
         [
             ({}, "touches", "is needed", "points"),
             ({"touches": SIX[:5]}, "touches", "5 points cannot determine 6 motions", "A point near"),
+            ({"touches": [SIX[0], SIX[3], SIX[5]]}, "touches", "3 points cannot determine", "solve_for"),
             ({"touches": [*touches([0.0] * 3, [([x, x, 0.0], "+Z") for x in (0.0, 50.0, 90.0)]), *SIX[3:]]}, "touches[0]", "one line", "Move point 2"),
             ({"touches": [*SIX[:4], SIX[3] | {"nominal": [20.0, 0.0, -40.0]}, SIX[5]]}, "touches[3]", "same place", "Move point 5"),
             ({"touches": [*SIX[:5], SIX[4] | {"nominal": [50.0, 0.0, -4.0]}]}, "touches[3]", "shift in X", "another face"),
