@@ -304,7 +304,7 @@ def _resume(session: Session, row: AlarmRow) -> Outcome:
     paused = session.scalars(
         update(Stream)
         .filter_by(**at)
-        .values(paused_by=None)
+        .values(paused_by=None, gain_from=Stream.sequence)
         .returning(Stream.characteristic_id)
         .execution_options(synchronize_session=False)
     ).all()

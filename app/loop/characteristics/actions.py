@@ -227,7 +227,8 @@ def _change_parameters(
     if other_tool:
         values["sequence_at_tool_change"] = Stream.sequence  # parts cut with the other tool are not this one's
     if any(getattr(new, name) != getattr(old, name) for name in OF_LEVEL):
-        values |= {"level": None, "level_sequence": None}  # what was expected was expected under the old ones
+        # What was expected was expected under the old ones.
+        values |= {"level": None, "level_sequence": None, "gain_from": Stream.sequence}
     session.execute(
         update(Stream)
         .where(Stream.machine_id == machine.id, Stream.characteristic_id == characteristic.id)

@@ -70,6 +70,7 @@ def _as_if_done(pending: PendingWrites, stream: PendingStream) -> None:
     """Everything this reading asked for has been done when the next one comes, and is forgotten."""
     stream.paused_by = None
     stream.alarms.clear()
+    stream.parts.clear()  # the sizes are as they were with other corrections: they say nothing of the effect of these
     pending.tool_alarms.clear()
     pending.raised.clear()
     pending.issued.clear()

@@ -57,6 +57,7 @@ class Stream(Base):
     last_zone: Mapped[str | None]
     level: Mapped[float | None]  # the deviation expected without any correction of the tool (plausible_jump)
     level_sequence: Mapped[int | None] = mapped_column(BigInteger)  # the reading that moved it last
+    gain_from: Mapped[int] = mapped_column(BigInteger, server_default="0")  # up to this one, none tells of the gain
 
 
 class Reading(Base):

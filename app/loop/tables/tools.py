@@ -10,6 +10,8 @@ from app.db.base import Base
 
 OUTSTANDING = ("awaiting_approval", "pending")  # issued, not yet in effect
 OPEN = ("held", *OUTSTANDING)
+OPPOSITE = "opposite_effect"  # the alarm of corrections that did the opposite of what they asked
+OPPOSED = "opposite effect, alarm:"  # why corrections fell, as it is stored; the number of the alarm goes with it
 
 
 class Tool(Base):
@@ -27,7 +29,9 @@ class Tool(Base):
     total: Mapped[float] = mapped_column(server_default="0")  # applied corrections since the tool was changed
     changed_at: Mapped[datetime | None]  # tool changed
     reset_at: Mapped[datetime | None]  # tool changed or offset edited by hand: parts cut before say nothing
-    paused_by: Mapped[int | None] = mapped_column(BigInteger)  # the alarm that asks which offset is true
+    paused_by: Mapped[int | None] = mapped_column(
+        BigInteger
+    )  # the alarm that must be answered before anything is corrected
     parts_kept: Mapped[int] = mapped_column(server_default="0")  # cut by characteristics that have left this tool
     edge: Mapped[str | None]  # D number, or what the cutting edge is called
     name: Mapped[str | None]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any, Literal, NamedTuple
 
-from sqlalchemy import select, update
+from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
@@ -27,6 +27,7 @@ from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Reading, Stream
 from app.loop.tables.tools import OPEN, AverageMemory, Correction, Tool, ToolEvent
 from app.loop.tools import queries, wording
+from app.loop.tools.alarm_kinds import PAUSING
 from app.loop.tools.events import average_changed, correction_changed, tool_changed
 from app.loop.tools.sisters import on_tool, switch_to_sister
 from app.loop.tools.superseding import supersede
@@ -155,7 +156,7 @@ def _set_offset(
     parts = parts_cut(session, machine.id, number)
     tool.offset, tool.reset_at = rounded(offset), now
     on_it = (Stream.machine_id == machine.id) & (Stream.tool_memory == number)
-    begun: dict[str, Any] = {"level": None, "level_sequence": None}
+    begun: dict[str, Any] = {"level": None, "level_sequence": None, "gain_from": Stream.sequence}
     if kind == "change":
         tool.total, tool.changed_at, tool.parts_kept, tool.life_told = 0.0, now, 0, False
         begun["sequence_at_tool_change"] = Stream.sequence
@@ -209,7 +210,7 @@ def set_empirical_value(
     session.execute(
         update(Stream)
         .where(Stream.machine_id == machine.id, Stream.average_memory == location)
-        .values(level=None, level_sequence=None)
+        .values(level=None, level_sequence=None, gain_from=Stream.sequence)
         .execution_options(synchronize_session=False)
     )
     session.refresh(memory)
@@ -221,17 +222,40 @@ def set_empirical_value(
 
 
 def resume_tools(session: Session, machine: Machine, alarm: int) -> list[int]:
-    """Correcting goes on through the tools that this alarm has paused; their locations. The machine is locked."""
+    """Correcting goes on through the tools that this alarm has paused; their locations. The machine is locked.
+
+    A tool that another active alarm pauses as well stays paused by that one.
+    """
+    other = (
+        select(func.max(Alarm.id))
+        .where(
+            Alarm.machine_id == machine.id,
+            Alarm.tool_memory == Tool.number,
+            Alarm.kind.in_(PAUSING),
+            Alarm.acknowledged_at.is_(None),
+            Alarm.id != alarm,
+        )
+        .correlate(Tool)
+        .scalar_subquery()
+    )
     resumed = sorted(
-        session.scalars(
+        number
+        for number, waits in session.execute(
             update(Tool)
             .where(Tool.machine_id == machine.id, Tool.paused_by == alarm)
-            .values(paused_by=None)
-            .returning(Tool.number)
+            .values(paused_by=other)
+            .returning(Tool.number, Tool.paused_by)
             .execution_options(synchronize_session=False)
         )
+        if waits is None
     )
     if resumed:
+        session.execute(
+            update(Stream)
+            .where(Stream.machine_id == machine.id, Stream.tool_memory.in_(resumed))
+            .values(gain_from=Stream.sequence)
+            .execution_options(synchronize_session=False)
+        )
         publish(session, *(tool_changed(machine, number) for number in resumed))
     return resumed
 

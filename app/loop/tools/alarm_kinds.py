@@ -3,10 +3,11 @@
 from datetime import datetime
 
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, um, um_limit
+from app.language.numbers import NOTHING, PLUS_MINUS, fixed, mm, signed, um, um_limit
 from app.language.times import MINUTES, written
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.tables.alarms import Alarm
+from app.loop.tables.tools import OPPOSITE
 
 
 def _differs(alarm: Alarm) -> str:
@@ -39,6 +40,51 @@ def _life(alarm: Alarm) -> str:
     )
 
 
+def _opposed(alarm: Alarm) -> str:
+    data = alarm.data
+    steps = [
+        _("correction {numbers} of {amount} asked for {asked} and the size changed by {done}").format(
+            numbers="+".join(map(str, each.get("numbers") or ())) or NOTHING,
+            amount=um(each.get("amount")),
+            asked=um(each.get("asked")),
+            done=um(each.get("done")),
+        )
+        for each in data.get("corrections", ())
+    ]
+    return _(
+        "Two corrections in a row moved {characteristic} the wrong way: {steps}. The gain is {gain} {pm} {error}, it should be "
+        "1. Nothing is corrected through tool {tool} until this alarm is answered."
+    ).format(
+        characteristic=data.get("characteristic"),
+        steps="; ".join(steps),
+        gain=signed(data.get("gain"), 2),
+        pm=PLUS_MINUS,
+        error=fixed(data.get("error"), 2),
+        tool=alarm.tool_memory,
+    )
+
+
+OPPOSITE_EFFECT = register(
+    AlarmKind(
+        OPPOSITE,
+        word=lambda: _("Opposite effect"),
+        sentence=_opposed,
+        what_to_do=lambda: _(
+            "Check the sign of the factor of the characteristic, the sign and the offset register at the control, and which tool "
+            "cuts it. Then answer the alarm: corrections before it no longer count."
+        ),
+        tone="stop",
+        actions=("noted", "tool_replaced", "sister_tool"),
+        comments={
+            "noted": lambda: [
+                _("Sign of the factor corrected"),
+                _("Offset register corrected"),
+                _("Another tool cuts it"),
+                _("Edge chipped, replaced later"),
+            ]
+        },
+    )
+)
 OFFSET_DIFFERS = register(
     AlarmKind(
         "offset_differs",
@@ -91,6 +137,7 @@ CORRECTIONS_NOT_TAKEN = register(
         outcomes={"corrections_taken": lambda _item: _("No correction waits too long any more.")},
     )
 )
+PAUSING = (OFFSET_DIFFERS.name, OPPOSITE_EFFECT.name)  # nothing is corrected through the tool until they are answered
 TOOL_LIFE = register(
     AlarmKind(
         "tool_life",

@@ -194,7 +194,9 @@ def report_offset(
     if explained:
         return Report(tool, differs=False, explained_by=[correction.number for correction in explained])
     asked = session.get(Alarm, (machine.id, tool.paused_by)) if tool.paused_by else None
-    expected = tool.offset if asked is None else asked.data["expected"]  # a second report: still of the first question
+    expected = (
+        tool.offset if asked is None else asked.data.get("expected", tool.offset)
+    )  # a second report: still of the first question
     before, tool.offset = tool.offset, rounded(offset)
     _step(session, machine, tool, None, before, tool.offset, datetime.now(UTC), caller)
     alarm, fallen = _pause(session, machine, tool, expected, None)

@@ -53,7 +53,7 @@ class OffsetReportOut(BaseModel):
         list[int], Field(description="Pending corrections that lead to this offset: confirm them. Nothing was changed.")
     ]
     superseded: Annotated[list[int], Field(description="Corrections that must not be applied any more.")]
-    paused_by: Annotated[int | None, Field(description="Number of the alarm that asks which offset is true.")]
+    paused_by: Annotated[int | None, Field(description="Number of the alarm that pauses the tool.")]
     note: str | None = None
 
 
@@ -181,7 +181,7 @@ class ToolOut(BaseModel):
     parts_left: Annotated[int | None, Field(description="Parts until the planned life is reached, at the wear so far.")]
     paused_by: Annotated[
         int | None,
-        Field(description="Number of the alarm that asks which offset is true; nothing is corrected till then."),
+        Field(description="Number of the alarm that pauses the tool; nothing is corrected until it is answered."),
     ]
 
 

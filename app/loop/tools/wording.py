@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from app.language.i18n import _, ngettext
 from app.language.numbers import NOTHING, age, mm, um
 from app.language.times import in_sentence
-from app.loop.tables.tools import Correction
+from app.loop.tables.tools import OPPOSED, Correction
 from app.loop.tools.lives_queries import Life
 from app.loop.tools.queries import OffsetChange
 
@@ -25,6 +25,9 @@ def why(correction: Correction) -> str | None:
     if reason.startswith(PAUSED):
         alarm = reason.removeprefix(PAUSED).strip()
         return _("the machine holds another offset than it was computed for (alarm {alarm})").format(alarm=alarm)
+    if reason.startswith(OPPOSED):
+        alarm = reason.removeprefix(OPPOSED).strip()
+        return _("corrections before it did the opposite of what they asked (alarm {alarm})").format(alarm=alarm)
     return reason
 
 

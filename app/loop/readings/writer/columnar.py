@@ -16,6 +16,7 @@ from app.core.decision.decide import Decision, outstanding_effect
 from app.core.decision.limits import ZONES
 from app.core.decision.loops import SERIES, Quiet, Series, quiet_run, rows_of
 from app.core.decision.step import CODES, Action
+from app.core.gain import LONGEST, judge
 from app.errors import InbandError
 from app.loop.readings.records import Entry, Record
 from app.loop.readings.schemas import ReadingIn
@@ -34,6 +35,7 @@ from app.loop.readings.writer.binary_copy import (
 from app.loop.readings.writer.corrections_in_effect import CorrectionsInEffect, confirms, corrections_in_effect
 from app.loop.readings.writer.decide import decide_reading
 from app.loop.readings.writer.pending import PendingAverage, PendingStream, PendingWrites, Stored, Verdict
+from app.loop.readings.writer.snapshot import Part
 
 FEWEST = 64  # readings that are worth making columns of
 NEVER = -(2**62)
@@ -44,6 +46,7 @@ def compile_now() -> None:
     none = np.zeros(0, np.int64)
     quiet_run(0, np.zeros(0), none, rows_of([]), none, np.zeros(0), Quiet.room(0))
     table([fixed(none, ">i8")], 0)
+    judge(np.zeros(3), np.zeros(3), 1.0, 0, 1.0)
 
 
 class _Group:
@@ -104,6 +107,7 @@ class ColumnarReadings:
         self._of_stream = streams
         self._named = np.array([group.in_effect or 0 for group in self._groups])
         self._of_tool = np.array([0 if group.stream.tool is None else id(group.stream.tool) for group in self._groups])
+        self._remembered = [0] * len(self._streams)  # the position up to which a stream keeps its parts
         self._sequences = np.array([stream.sequence for _, stream in self._streams.values()], np.int64)
         self._averages = np.array([memory.average for _, memory in self._memories.values()] or [0.0])
         self._decided = Quiet.room(len(readings))
@@ -164,6 +168,20 @@ class ColumnarReadings:
         latest = int(self._latest[at])
         stream.last_measured_at = None if latest == NEVER else EPOCH + latest * MICROSECOND
         self._write_average(stream.average)
+        if stream.tool is not None:
+            stream.parts += self._parts(index, self._remembered[index], at)
+        self._remembered[index] = at + 1
+
+    def _parts(self, index: int, first: int, end: int) -> list[Part]:
+        """Return the quiet readings of a stream between two positions, at most as many as are looked at."""
+        quiet = self._quiet[first:end] & (self._stream_of[first:end] == index)
+        quiet &= self._times[first:end] >= self._latest[first:end]
+        parts = []
+        for at in (np.flatnonzero(quiet)[-LONGEST:] + first).tolist():
+            compensated = self._effects[self._effect_of[at]].compensated
+            if compensated is not None:
+                parts.append(Part(int(self._decided.sequence[at]), float(self._decided.deviation[at]), compensated))
+        return parts
 
     def _write_average(self, memory: PendingAverage | None) -> None:
         if memory is not None:

@@ -122,6 +122,7 @@ def confirm(pending: PendingWrites, stream: PendingStream, tool: PendingTool, in
         tool.offset = round(before + correction.amount, DECIMALS)
         tool.total = round(tool.total + correction.amount, DECIMALS)
         tool.changed = True
+        tool.applied.append((correction.number, correction.amount))
         actor = f"reading {stream.entry.characteristic} {stream.sequence + 1}"
         correction.status, correction.applied_at, correction.applied_by = "applied", at, actor
         correction.offset_after = tool.offset

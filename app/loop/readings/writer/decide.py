@@ -7,6 +7,7 @@ are decided by the same lines. A reading that is refused moves nothing.
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from functools import partial
 
 from app.core.decision.decide import Decision, LoopState, ReadingAlarm, decide, needs_approval, outstanding_effect
 from app.core.decision.step import DECIMALS, Action, Code, deviation_of
@@ -20,6 +21,7 @@ from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.wording import touch_problem
 from app.loop.readings.writer.corrections_in_effect import confirm, corrections_in_effect, issued_total
+from app.loop.readings.writer.opposed import pauses, remember
 from app.loop.readings.writer.pending import (
     PendingAlarm,
     PendingCorrection,
@@ -29,6 +31,7 @@ from app.loop.readings.writer.pending import (
     Stored,
     Verdict,
 )
+from app.loop.readings.writer.snapshot import Part
 
 
 def decide_one_by_one(
@@ -54,16 +57,8 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     if reading.key is not None and (first := _first_with_key(pending, entry, reading.key, reading)):
         return first
     measured, points, fault = _measured(parameters, reading)
-    tool = stream.tool
-    in_effect = reading.correction_in_effect
-    if in_effect is not None and in_effect > pending.last_number(entry.machine_id):
-        raise Invalid(
-            _("Machine %(machine)s has no correction %(number)s; its last one is %(last)s.")
-            % {"machine": entry.machine, "number": in_effect, "last": pending.last_number(entry.machine_id)},
-            _("Send the number of the last correction that the machine had applied when it cut this part."),
-            errors=[FieldError("correction_in_effect", _("There is no such correction yet."))],
-        )
-
+    tool, in_effect = stream.tool, reading.correction_in_effect
+    _refuse_unissued(pending, entry, in_effect)
     sequence = stream.sequence + 1
     measured_at = now if reading.measured_at is None else reading.measured_at.astimezone(UTC)
     if tool is not None and tool.corrections and in_effect is not None:
@@ -78,21 +73,29 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         course = uncorrected(deviation, compensated, parameters.factor)
     jump = course is not None and is_jump(course, stream.level, parameters.plausible_jump or 0.0)
     paused_by = stream.paused_by if tool is None or stream.paused_by is not None else tool.paused_by
-    decision = decide(
+    state = LoopState(
+        average.average if average else 0.0,
+        issued_total(pending, tool) if parameters.max_total is not None else 0.0,
+        paused_by is not None,
+    )
+    judged = partial(
+        decide,
         parameters,
-        LoopState(
-            average.average if average else 0.0,
-            issued_total(pending, tool) if parameters.max_total is not None else 0.0,
-            paused_by is not None,
-        ),
-        deviation,
+        deviation=deviation,
         outstanding=outstanding_effect(amounts, parameters.factor) if outstanding else 0.0,
         previous_tool=previous_tool,
         accepted=results is None or not results.rejected,
         jump=jump,
         fault=Code.FIRST_MOVE_TRIGGERED if reading.first_move_triggered else Code.TOUCH_FAULT if fault else None,
     )
+    decision, opposed = judged(state=state), None
+    late = stream.last_measured_at is not None and measured_at < stream.last_measured_at
+    if decision.amount is not None and compensated is not None and not (late or jump):
+        opposed = pauses(pending, stream, Part(sequence, deviation, compensated))
+    if opposed is not None:
+        paused_by, decision = opposed, judged(state=state._replace(paused=True))
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
+    alarms += [] if opposed is None else [opposed]
     correction = None
     if decision.amount is not None and tool is not None:
         correction = _issue(pending, stream, tool, sequence, decision)
@@ -103,10 +106,10 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         average.changed = True
     if decision.action is Action.STOP and stream.paused_by is None:
         stream.paused_by = next(alarm for alarm in alarms if alarm.kind == ReadingAlarm.PROBE_FAULT.value)
-    last = stream.last_measured_at
-    late = last is not None and measured_at < last
     if not late:
         stream.last_measured_at = measured_at
+        if not jump:
+            remember(stream, sequence, decision, compensated)
         if course is not None and not jump and decision.action is not Action.STOP:
             stream.level, stream.level_sequence, stream.level_moved = moved(stream.level, course), sequence, True
     verdict = Verdict(
@@ -133,6 +136,17 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     if reading.key is not None:
         pending.by_key[entry.characteristic_id, reading.key] = verdict
     return verdict
+
+
+def _refuse_unissued(pending: PendingWrites, entry: Entry, in_effect: int | None) -> None:
+    last = pending.last_number(entry.machine_id)
+    if in_effect is not None and in_effect > last:
+        raise Invalid(
+            _("Machine %(machine)s has no correction %(number)s; its last one is %(last)s.")
+            % {"machine": entry.machine, "number": in_effect, "last": last},
+            _("Send the number of the last correction that the machine had applied when it cut this part."),
+            errors=[FieldError("correction_in_effect", _("There is no such correction yet."))],
+        )
 
 
 def _measured(parameters: Parameters, reading: ReadingIn) -> Measured:

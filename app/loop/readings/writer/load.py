@@ -21,6 +21,7 @@ from app.loop.readings.writer.snapshot import (
     LoadedStream,
     LoadedTool,
     NamedCorrection,
+    Part,
     Snapshot,
 )
 from app.loop.readings.writer.statements import LOAD, LOCK, PARAMETERS, array, as_json
@@ -47,6 +48,9 @@ class _Stream(msgspec.Struct, array_like=True):
     level: float | None
     level_sequence: int | None
     corrections: list[LoadedCorrection] | None
+    applied: list[tuple[int, float]] | None
+    gain_from: int
+    parts: list[Part] | None
 
 
 class _Loaded(msgspec.Struct):
@@ -154,6 +158,7 @@ def _add_stream(
             row.corrections or (),
             number,
             since,
+            row.applied or (),
         )
     snapshot.streams[row.characteristic_id] = LoadedStream(
         entry,
@@ -166,4 +171,6 @@ def _add_stream(
         row.last_measured_at,
         row.level,
         row.level_sequence,
+        row.gain_from,
+        row.parts or (),
     )

@@ -11,19 +11,23 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from app.core.decision.decide import Decision
+from app.core.gain import LONGEST
 from app.core.parameters import Parameters
 from app.core.variants import Results
 from app.loop.readings.records import Entry, Record
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.snapshot import (
+    MOST_APPLIED,
     MOST_NAMED,
     LoadedAverage,
     LoadedCorrection,
     LoadedStream,
     LoadedTool,
     NamedCorrection,
+    Part,
     Snapshot,
 )
+from app.loop.tables.tools import OPEN, OPPOSED
 
 
 @dataclass(slots=True)
@@ -40,6 +44,11 @@ class PendingAlarm:
     count: int = 0  # readings that raised it now
     new: bool = True
     data: dict[str, Any] = field(default_factory=dict)
+
+
+def alarm_number(alarm: int | PendingAlarm | None) -> int | None:
+    """Return the number of an alarm, one that these readings raise included, which has it when they are saved."""
+    return alarm.id if isinstance(alarm, PendingAlarm) else alarm
 
 
 @dataclass(slots=True)
@@ -60,6 +69,7 @@ class PendingCorrection:
     applied_by: str | None = None
     offset_after: float | None = None
     superseded_by: int | None = None
+    reason: str | None = None
     new: bool = False
 
     def loaded(self) -> LoadedCorrection:
@@ -106,8 +116,9 @@ class PendingTool:
     offset: float
     total: float
     reset_at: datetime | None
-    paused_by: int | None = None
+    paused_by: int | PendingAlarm | None = None
     corrections: list[LoadedCorrection | PendingCorrection] = field(default_factory=list)
+    applied: list[tuple[int, float]] = field(default_factory=list)
     changed: bool = False
     # Worked out of `corrections`, and how many of the first ones are known not to be held.
     tallies: dict[int | None, EffectTally] = field(default_factory=dict)
@@ -133,6 +144,21 @@ class PendingTool:
                 fetched_at=correction.fetched_at,
             )
         return correction
+
+    def pause(self, alarm: PendingAlarm) -> None:
+        """Correct nothing through this tool until the alarm is answered; open corrections fall."""
+        self.paused_by, self.changed = alarm, True
+        for place, correction in enumerate(self.corrections):
+            if correction.status in OPEN:
+                self.changing(place).status = "superseded"
+        self.forget()
+
+    def give_reasons(self) -> None:
+        """Say why corrections fell: the alarm that paused the tool has its number by now."""
+        if isinstance(self.paused_by, PendingAlarm):
+            for correction in self.written():
+                if correction.status == "superseded" and correction.superseded_by is None:
+                    correction.reason = f"{OPPOSED} {self.paused_by.id}"
 
     def written(self) -> list[PendingCorrection]:
         """Return the corrections that were issued or changed."""
@@ -165,6 +191,8 @@ class PendingStream:
     level: float | None = None
     level_sequence: int | None = None
     level_moved: bool = False
+    gain_from: int = 0
+    parts: list[Part] = field(default_factory=list)
     alarms: dict[str, PendingAlarm] = field(default_factory=dict)
     before: int = 0  # sequence in the snapshot
     last: "Verdict | None" = None
@@ -178,10 +206,12 @@ class PendingStream:
             self.parameters,
             None if self.average is None else self.average.location,
             None if self.tool is None else self.tool.number,
-            self.paused_by.id if isinstance(self.paused_by, PendingAlarm) else self.paused_by,
+            alarm_number(self.paused_by),
             self.last_measured_at,
             self.level,
             self.level_sequence,
+            self.gain_from,
+            self.parts[-LONGEST:],
         )
 
 
@@ -240,6 +270,8 @@ class PendingWrites:
                 loaded.last_measured_at,
                 loaded.level,
                 loaded.level_sequence,
+                gain_from=loaded.gain_from,
+                parts=list(loaded.parts),
                 before=loaded.sequence,
             )
         return stream
@@ -262,6 +294,7 @@ class PendingWrites:
                 loaded.reset_at,
                 loaded.paused_by,
                 list(loaded.corrections),
+                list(loaded.applied),
             )
         return tool
 
@@ -302,6 +335,8 @@ class PendingWrites:
         return self.snapshot.tools[tool.machine_id, tool.number]._replace(
             offset=tool.offset,
             total=tool.total,
+            paused_by=alarm_number(tool.paused_by),
+            applied=tool.applied[-MOST_APPLIED:],
             corrections=[
                 c.loaded() if isinstance(c, PendingCorrection) else c
                 for c in tool.corrections
@@ -340,7 +375,6 @@ class Verdict:
 
     def _row(self) -> Record:
         d, r, entry = self.decision, self.reading, self.stream.entry
-        paused_by = self.paused_by.id if isinstance(self.paused_by, PendingAlarm) else self.paused_by
         return Record(
             entry.machine_id,
             entry.characteristic_id,
@@ -356,7 +390,7 @@ class Verdict:
             self.version,
             r.correction_in_effect,
             self.correction.number if self.correction else None,
-            paused_by,
+            alarm_number(self.paused_by),
             self.late,
             d.zone.value,
             d.action.value,

@@ -10,7 +10,7 @@ from typing import Any
 from app.db.pipeline import Pipeline, Step
 from app.loop.readings.records import Entry, Record
 from app.loop.readings.writer.binary_copy import array_of_int4
-from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
+from app.loop.readings.writer.pending import PendingStream, PendingTool, PendingWrites, alarm_number
 from app.loop.readings.writer.statements import (
     ACTIVE_ALARMS,
     ALARM_NUMBERS,
@@ -137,7 +137,7 @@ def _stream_row(stream: PendingStream) -> dict[str, Any]:
         "machine_id": stream.entry.machine_id,
         "characteristic_id": stream.entry.characteristic_id,
         "sequence": stream.sequence,
-        "paused_by": stream.paused_by.id if isinstance(stream.paused_by, PendingAlarm) else stream.paused_by,
+        "paused_by": alarm_number(stream.paused_by),
         "last_measured_at": stream.last_measured_at,
         "last_received_at": last.received_at,
         "last_measured": last.measured,
@@ -205,6 +205,8 @@ def _rarer(pending: PendingWrites) -> Iterable[tuple[str, list[Any]]]:
             [{"machine_id": m, "last_correction": pending.last_number(m)} for m in pending.touched_machines],
         )
         tools = _tools(pending)
+        for tool in tools:
+            tool.give_reasons()
         yield ISSUE, [c for tool in tools for c in tool.written() if c.new]
         yield (
             CHANGE_CORRECTIONS,
@@ -213,7 +215,13 @@ def _rarer(pending: PendingWrites) -> Iterable[tuple[str, list[Any]]]:
         yield (
             MOVE_TOOLS,
             [
-                {"machine_id": t.machine_id, "number": t.number, "offset": t.offset, "total": t.total}
+                {
+                    "machine_id": t.machine_id,
+                    "number": t.number,
+                    "offset": t.offset,
+                    "total": t.total,
+                    "paused_by": alarm_number(t.paused_by),
+                }
                 for t in tools
                 if t.changed
             ],

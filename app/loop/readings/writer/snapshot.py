@@ -16,6 +16,7 @@ from app.loop.readings.schemas import ReadingIn
 # A remembered tool's corrections grow in number; beyond this they are loaded again, and then are few again.
 MOST_CORRECTIONS = 100
 MOST_NAMED = 10_000
+MOST_APPLIED = 16  # corrections of a tool that an alarm about them can name
 
 
 class LoadedCorrection(NamedTuple):
@@ -45,8 +46,8 @@ class NamedCorrection(NamedTuple):
 class LoadedTool(NamedTuple):
     """One location of the tool memory (R10), with its corrections in the order of their numbers. mm.
 
-    paused_by: the alarm that asks which offset is true. Of the applied corrections there are those with a higher number
-    than `since_number`, and those applied after `since`.
+    paused_by: the alarm that pauses it. Of the applied corrections there are those with a higher number
+    than `since_number`, and those applied after `since`. applied: numbers and amounts of the newest, to name them by.
     """
 
     machine_id: int
@@ -58,6 +59,7 @@ class LoadedTool(NamedTuple):
     corrections: Sequence[LoadedCorrection] = ()
     since_number: int | None = None
     since: datetime | None = None
+    applied: Sequence[tuple[int, float]] = ()
 
 
 class LoadedAverage(NamedTuple):
@@ -69,11 +71,19 @@ class LoadedAverage(NamedTuple):
     empirical_value: float
 
 
+class Part(NamedTuple):
+    """A reading that tells of the gain of corrections: its deviation, and the sum of those its part was cut with, mm."""
+
+    sequence: int
+    deviation: float
+    compensated: float
+
+
 class LoadedStream(NamedTuple):
     """The state of one characteristic after its last reading.
 
     average, tool: locations, None without one. level: the deviation expected without corrections, mm; kept where jumps
-    are looked for.
+    are looked for. gain_from: readings up to this one say nothing of the gain of corrections; parts: the newest, in order.
     """
 
     entry: Entry
@@ -86,6 +96,8 @@ class LoadedStream(NamedTuple):
     last_measured_at: datetime | None = None
     level: float | None = None
     level_sequence: int | None = None
+    gain_from: int = 0
+    parts: Sequence[Part] = ()
 
 
 class KnownKey(NamedTuple):

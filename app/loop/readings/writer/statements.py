@@ -10,9 +10,11 @@ from typing import Any
 import msgspec
 
 from app.core.decision.limits import Zone
+from app.core.gain import LONGEST
 from app.core.variants import Results
 from app.db.events import CHANNEL, PUBLISHED
 from app.loop.readings.records import Record
+from app.loop.readings.writer.snapshot import MOST_APPLIED
 
 _json = msgspec.json.Encoder(enc_hook=list)  # a list that is shared by many rows
 
@@ -47,7 +49,7 @@ GUARD = f"WITH {_GUARD} SELECT * FROM guard"  # noqa: S608 - made of constants
 # they had waited for a person; `named` are the corrections that readings name as the last ones in effect.
 # The row comparison with the keys can only be had from their own index; plain equalities the planner may also answer by
 # walking the primary key through every reading of the characteristic.
-LOAD = """
+LOAD = f"""
 WITH doc AS MATERIALIZED (SELECT $1::json AS d),
 named AS MATERIALIZED (
     SELECT c.machine_id, c.number, c.applied_at, c.fetched_at,
@@ -77,6 +79,24 @@ SELECT json_build_object(
                             w.since, (SELECT min(n.applied_at) FROM named n WHERE n.machine_id = t.machine_id)
                         ), true) AND (number <= w.number OR w.number IS NULL)
                 ) c
+            ) END,
+            CASE WHEN t.number IS NOT NULL THEN (
+                SELECT json_agg(json_build_array(c.number, c.amount) ORDER BY c.number) FROM (
+                    SELECT number, amount FROM correction
+                    WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
+                    ORDER BY number DESC LIMIT {MOST_APPLIED}
+                ) c
+            ) END,
+            s.gain_from,
+            CASE WHEN t.number IS NOT NULL THEN (
+                SELECT json_agg(json_build_array(r.sequence, r.deviation, r.compensated) ORDER BY r.sequence) FROM reading r
+                WHERE r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
+                    AND r.sequence > s.sequence - {LONGEST} AND r.compensated IS NOT NULL AND NOT r.late
+                    AND r.zone <> 'probe_fault' AND r.code NOT IN ('implausible', 'imported')
+                    AND NOT EXISTS (
+                        SELECT FROM exclusion e WHERE e.machine_id = r.machine_id
+                            AND e.characteristic_id = r.characteristic_id AND e.sequence = r.sequence
+                    )
             ) END))
         FROM json_to_recordset((SELECT d -> 'streams' FROM doc))
             AS w(machine_id int, characteristic_id int, number int, since timestamptz)
@@ -95,7 +115,7 @@ SELECT json_build_object(
         ) r
         WHERE r.machine_id = w.machine_id AND r.characteristic_id = w.characteristic_id AND r.key = w.key
     ))::text
-"""
+"""  # noqa: S608 - made of constants
 ACTIVE_ALARMS = """
 SELECT machine_id, characteristic_id, CASE WHEN characteristic_id IS NULL THEN tool_memory END, kind, id FROM alarm
 WHERE machine_id = ANY($1::int[]) AND acknowledged_at IS NULL
@@ -160,24 +180,25 @@ FROM json_to_recordset($1) AS n(machine_id int, last_correction int) WHERE m.mac
 """
 ISSUE = """
 INSERT INTO correction (machine_id, number, characteristic_id, sequence, tool_memory, size_error, amount, status,
-    decided_at, superseded_by, applied_at, applied_by, offset_after)
+    decided_at, reason, superseded_by, applied_at, applied_by, offset_after)
 SELECT machine_id, number, characteristic_id, sequence, tool_memory, size_error, amount, status,
-    CASE WHEN superseded_by IS NOT NULL THEN now() END, superseded_by, applied_at, applied_by, offset_after
+    CASE WHEN status = 'superseded' THEN now() END, reason, superseded_by, applied_at, applied_by, offset_after
 FROM json_to_recordset($1) AS r(machine_id int, number int, characteristic_id int, sequence bigint,
-    tool_memory int, size_error float8, amount float8, status text, superseded_by int, applied_at timestamptz,
-    applied_by text, offset_after float8)
+    tool_memory int, size_error float8, amount float8, status text, reason text, superseded_by int,
+    applied_at timestamptz, applied_by text, offset_after float8)
 """
 CHANGE_CORRECTIONS = """
 UPDATE correction c SET status = n.status, superseded_by = n.superseded_by, applied_at = n.applied_at,
     applied_by = n.applied_by, offset_after = n.offset_after,
-    decided_at = CASE WHEN n.status = 'superseded' THEN now() ELSE c.decided_at END
-FROM json_to_recordset($1) AS n(machine_id int, number int, status text, superseded_by int, applied_at timestamptz,
+    decided_at = CASE WHEN n.status = 'superseded' THEN now() ELSE c.decided_at END,
+    decided_by = CASE WHEN n.reason IS NULL THEN c.decided_by END, reason = coalesce(n.reason, c.reason)
+FROM json_to_recordset($1) AS n(machine_id int, number int, status text, reason text, superseded_by int, applied_at timestamptz,
     applied_by text, offset_after float8)
 WHERE c.machine_id = n.machine_id AND c.number = n.number
 """
 MOVE_TOOLS = """
-UPDATE tool t SET "offset" = n."offset", total = n.total
-FROM json_to_recordset($1) AS n(machine_id int, number int, "offset" float8, total float8)
+UPDATE tool t SET "offset" = n."offset", total = n.total, paused_by = n.paused_by
+FROM json_to_recordset($1) AS n(machine_id int, number int, "offset" float8, total float8, paused_by bigint)
 WHERE t.machine_id = n.machine_id AND t.number = n.number
 """
 MOVE_LEVELS = """

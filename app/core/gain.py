@@ -1,0 +1,202 @@
+"""Gain of a tool's corrections: what the size did, over what each change of the offset asked of it.
+
+A correction of ``amount`` asks the size to change by ``-amount / factor`` (`decision.step.effect_of`); a gain of 1 is a size that
+does. A wrong sign makes it -1, a radius taken for a diameter 2 or 1/2, an offset that the control does not use 0. With D the
+deviation of a part and x = -S / factor, S the sum of the corrections it was cut with::
+
+    D_i = w_i + gain x_i,    w_i = level_i + scatter,    level_i+1 = level_i + random step
+
+`opposed` judges the two newest corrections, before a third goes out. One Kalman filter for a level that steps at random foretells
+D and x alike (Harvey 1989, Forecasting, structural time series models and the Kalman filter, sections 2.3 and 7.3). What it misses
+of D over what it misses of x is the gain, a weighted least-squares line::
+
+    gain = sum(v_D v_x / F) / sum(v_x^2 / F),    error = scatter / sqrt(sum(v_x^2 / F))
+
+over the parts since the first of the two; over those of one correction alone it is the gain of that correction. The scatter is the
+median step from part to part over that of a normal distribution, so wear from part to part is in it, and a chip or an edge that
+breaks is not. The limits below are those with which simulated tool lives are never paused (docs/reference/gain.md).
+
+A gain over many corrections, while the machine warms up, is told by `app.core.effect`. Lengths are mm.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.core.compiled import compiled
+
+Floats = NDArray[np.float64]
+
+LONGEST = 48  # parts that are looked at
+BEFORE, NEAR = (
+    3,
+    5,
+)  # parts before the first correction that count; on either side of a correction, that say what it did
+LEVEL_STEP = 0.1  # variance of a step of the level over that of the scatter
+OPPOSITE = -0.3  # the gain is below this: with wear, that of corrections that do nothing is a little below 0
+SURE_OPPOSITE, SURE_NOT_WEAK = 3.0, 5.0  # standard errors that the gain is below 0, and below half of what was asked
+LARGEST_ERROR = 0.27  # of the gain
+LEAST = 1.5  # times the scatter that each of the two asks for: smaller ones say nothing
+NOT_DONE, FARTHEST = 0.25, -3.5  # the gain of each of the two alone: beyond, something else has happened, an edge broke
+SURE_FIRST, SURE_SECOND = 1.9, 3.5  # standard errors that they are below 1, and below half
+KNOWN, FRESH = (
+    20,
+    8.0,
+)  # until so many parts have shown the scatter, the first correction is so many times what it seems to be
+PRIOR, FEW = 3.0, 1.0  # parts that the expected scatter is worth; by how much surer one must be while it is not known
+NM = 1e-6
+
+
+class Step(NamedTuple):
+    """A change of the corrections in effect. asked, done: change of size, mm. before, after: sums of corrections, mm of offset."""
+
+    asked: float
+    done: float
+    before: float
+    after: float
+
+
+class Opposed(NamedTuple):
+    """Two corrections in a row whose effect is against what they asked; the gain of both together and its standard error."""
+
+    first: Step
+    second: Step
+    gain: float
+    error: float
+
+
+class Judged(NamedTuple):
+    """The verdict, the first part of each of the two newest corrections (0: there are not two), gain and standard error."""
+
+    opposed: bool
+    first: int
+    second: int
+    gain: float
+    error: float
+
+
+def expected_scatter(zero_range: float, averaging_limit: float) -> float:
+    """The standard deviation to go by until parts have shown another: R33 is set so that scatter lies in it.
+
+    >>> round(expected_scatter(0.0012, 0.005), 6), round(expected_scatter(0.0, 0.005), 6)
+    (0.0005, 0.0005)
+    """
+    return max(zero_range / 3, averaging_limit / 10, 0.0001)
+
+
+def opposed(deviation: Floats, compensated: Floats, factor: float, begin: int, expected: float) -> Opposed | None:
+    """The two newest corrections, if what they did is clearly against what they asked.
+
+    deviation, compensated: of the newest parts, in order; those before `begin` were cut before a tool change, a manual edit or a
+    resume, and tell of the scatter alone. expected: the scatter to begin with (`expected_scatter`).
+
+    >>> d, s = np.array([0.005, 0.0103, 0.020]), np.array([0.0, 0.005, 0.0153])
+    >>> found = opposed(d, s, 1.0, 0, expected_scatter(0.001, 0.004))
+    >>> [(round(step.asked, 4), round(step.done, 4)) for step in (found.first, found.second)], round(found.gain, 2)
+    ([(-0.005, 0.0053), (-0.0103, 0.0097)], -0.97)
+    >>> opposed(np.array([0.005, 0.0003, 0.0052]), s, 1.0, 0, 0.0005) is None
+    True
+    """
+    judged = Judged(*judge(deviation, compensated, factor, begin, expected))
+    if not judged.opposed:
+        return None
+    ends = (begin, judged.first, judged.second, len(deviation))
+    steps = []
+    for low, at, high in zip(ends, ends[1:], ends[2:], strict=False):
+        done = deviation[at : min(high, at + NEAR)].mean() - deviation[max(low, at - NEAR) : at].mean()
+        before, after = float(compensated[at - 1]), float(compensated[at])
+        steps.append(Step((before - after) / factor, float(done), before, after))
+    return Opposed(steps[0], steps[1], judged.gain, judged.error)
+
+
+def newest_two(compensated: Floats, begin: int) -> tuple[int, int, int]:
+    """Return where the correction before the newest two, and those two, took effect; 0 where there are not two."""
+    first, second = 0, 0
+    for i in range(len(compensated) - 1, begin, -1):
+        if abs(compensated[i] - compensated[i - 1]) > NM:
+            if second == 0:
+                second = i
+            elif first == 0:
+                first = i
+            else:
+                return i, first, second
+    return begin, first, second
+
+
+def scatter_of(deviation: Floats, compensated: Floats, factor: float, expected: float) -> float:
+    """Return the standard deviation of the scatter: the median step from part to part over that of a normal distribution.
+
+    What corrections did is taken out by the line through all of them, whatever their gain; `expected` is worth `PRIOR` parts more.
+    It is never below half a step of what the readings are rounded to.
+    """
+    count = len(deviation)
+    xx, xd, smallest = 0.0, 0.0, np.inf
+    for i in range(1, count):
+        asked = (compensated[i - 1] - compensated[i]) / factor
+        step = deviation[i] - deviation[i - 1]
+        xx += asked * asked
+        xd += asked * step
+        if NM < abs(step) < smallest:
+            smallest = abs(step)
+    gain = xd / xx if xx > 0 else 0.0
+    steps = np.empty(count - 1)
+    for i in range(1, count):
+        asked = (compensated[i - 1] - compensated[i]) / factor
+        steps[i - 1] = abs(deviation[i] - deviation[i - 1] - gain * asked)
+    middle = float(np.median(steps)) * 1.4826 / sqrt(2.0)
+    if count >= KNOWN and smallest < np.inf:
+        middle = max(middle, smallest / 2)
+    freedom = count - 2.0
+    return sqrt((PRIOR * expected * expected + freedom * middle * middle) / (PRIOR + freedom))
+
+
+@compiled
+def judge(
+    deviation: Floats, compensated: Floats, factor: float, begin: int, expected: float
+) -> tuple[bool, int, int, float, float]:
+    """Judge as `opposed` does; the result is that of `Judged`."""
+    count = len(deviation)
+    start, first, second = newest_two(compensated, begin)
+    if first == 0:
+        return False, 0, 0, 0.0, 0.0
+    asked_first = (compensated[first - 1] - compensated[first]) / factor
+    asked_second = (compensated[second - 1] - compensated[second]) / factor
+    grown = deviation[count - 1] - deviation[first - 1]
+    if asked_first * asked_second < 0 or grown * asked_second >= 0 or deviation[count - 1] * asked_second >= 0:
+        return False, first, second, 0.0, 0.0
+    scatter = scatter_of(deviation, compensated, factor, expected)
+    start = max(start, first - BEFORE)
+    level_d, level_x = deviation[start], -compensated[start] / factor
+    p = 1.0 + LEVEL_STEP
+    xx, xd, xx_first, xd_first = 0.0, 0.0, 0.0, 0.0
+    for i in range(start + 1, count):
+        if i == second:
+            xx_first, xd_first = xx, xd
+        variance = p + 1.0
+        missed_d, missed_x = deviation[i] - level_d, -compensated[i] / factor - level_x
+        xx += missed_x * missed_x / variance
+        xd += missed_x * missed_d / variance
+        k = p / variance
+        level_d += k * missed_d
+        level_x += k * missed_x
+        p = p - k * p + LEVEL_STEP
+    gain, error = xd / xx, scatter / sqrt(xx)
+    first_gain, second_gain = xd_first / xx_first, (xd - xd_first) / (xx - xx_first)
+    surer = 1 + FEW / (PRIOR + count - 2)
+    clearly = (
+        gain < OPPOSITE
+        and gain + SURE_OPPOSITE * error < 0
+        and gain + SURE_NOT_WEAK * surer * error < 0.5
+        and error < LARGEST_ERROR
+        and min(abs(asked_first), abs(asked_second)) > LEAST * scatter
+        and (count >= KNOWN or abs(asked_first) > FRESH * scatter)
+    )
+    each = (
+        FARTHEST < first_gain < NOT_DONE
+        and FARTHEST < second_gain < NOT_DONE
+        and first_gain + SURE_FIRST * scatter / sqrt(xx_first) < 1
+        and second_gain + SURE_SECOND * scatter / sqrt(xx - xx_first) < 0.5
+    )
+    return clearly and each, first, second, gain, error

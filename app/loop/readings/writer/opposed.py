@@ -1,0 +1,88 @@
+"""The guard before each correction: two in a row that did the opposite of what they asked pause their tool.
+
+Judged by `app.core.gain` on the newest parts of the stream (`PendingStream.parts`), when the next correction would go out. A
+reading that asks for nothing is not judged, it is only remembered: the quiet readings of a batch included (`columnar`).
+"""
+
+from typing import Any
+
+import numpy as np
+
+from app.core.decision.decide import Decision
+from app.core.decision.limits import nanometres
+from app.core.decision.step import Action
+from app.core.gain import LONGEST, Step, expected_scatter, opposed
+from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
+from app.loop.readings.writer.snapshot import Part
+from app.loop.tables.tools import OPPOSITE
+
+
+def remember(stream: PendingStream, sequence: int, decision: Decision, compensated: float | None) -> None:
+    """Keep a reading that tells of the gain of corrections. compensated: the sum of those its part was cut with, mm."""
+    if stream.tool is not None and compensated is not None and decision.action is not Action.STOP:
+        stream.parts.append(Part(sequence, decision.deviation, compensated))
+
+
+def pauses(pending: PendingWrites, stream: PendingStream, newest: Part) -> PendingAlarm | None:
+    """Pause the tool if its two newest corrections did the opposite of what they asked; the alarm, or None.
+
+    newest: the reading that asks for the next correction.
+    """
+    tool = stream.tool
+    parts = [*stream.parts[1 - LONGEST :], newest]
+    begin = sum(part.sequence <= stream.gain_from for part in parts)
+    if tool is None or len(parts) - begin < 3:
+        return None
+    parameters = stream.parameters
+    found = opposed(
+        np.array([part.deviation for part in parts]),
+        np.array([part.compensated for part in parts]),
+        parameters.factor,
+        begin,
+        expected_scatter(parameters.zero_range, parameters.averaging_limit),
+    )
+    if found is None:
+        return None
+    alarm = PendingAlarm(
+        tool.machine_id,
+        None,
+        tool.number,
+        OPPOSITE,
+        sequence=newest.sequence,
+        last_sequence=newest.sequence,
+        count=1,
+        data={
+            "characteristic": stream.entry.characteristic,
+            "deviation": newest.deviation,
+            "factor": parameters.factor,
+            "gain": round(found.gain, 3),
+            "error": round(found.error, 3),
+            "corrections": [_said(tool, step) for step in (found.first, found.second)],
+        },
+    )
+    pending.raised.append(alarm)
+    pending.touched_machines.add(tool.machine_id)
+    tool.pause(alarm)
+    return alarm
+
+
+def _said(tool: PendingTool, step: Step) -> dict[str, Any]:
+    return {
+        "numbers": numbers_between(tool, step.before, step.after),
+        "amount": round(step.after - step.before, 9),
+        "asked": round(step.asked, 9),
+        "done": round(step.done, 9),
+    }
+
+
+def numbers_between(tool: PendingTool, before: float, after: float) -> list[int]:
+    """Return the numbers of the corrections that led from one sum of the tool's corrections to another; none if not known."""
+    running, numbers, found = tool.total, list[int](), False
+    for number, amount in reversed(tool.applied):
+        found = found or nanometres(running) == nanometres(after)
+        running -= amount
+        if found:
+            numbers.append(number)
+            if nanometres(running) == nanometres(before):
+                return numbers[::-1]
+    return []

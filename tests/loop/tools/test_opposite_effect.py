@@ -1,0 +1,115 @@
+"""A correction whose effect is opposite: its tool is paused before a third goes out, whichever way the machine confirms."""
+
+from typing import Any
+
+import pytest
+
+from tests.shop import Shop
+
+SHAFT = {"tolerance_width": 0.1, "averaging_limit": 0.004, "weighting_factor": 1, "factor": 1}
+"""The loop of cases/wrong-sign-loop.csv: the factor is +1, the tool needs -1."""
+
+
+@pytest.fixture
+def loop(shop: Shop) -> "Loop":
+    return Loop(shop)
+
+
+class Loop:
+    """A machine whose offset changes the size by `effect` times as much."""
+
+    def __init__(self, shop: Shop, effect: float = 1.0) -> None:
+        self.shop, self.effect = shop, effect
+        self.key = shop.another("wrong", tool_memory=4, average_memory=6, **SHAFT)
+        self.offset, self.size, self.last = 0.0, 5.0, 0
+
+    def part(self, scatter: float = 0.0, **more: Any) -> Any:
+        """One part: measured, corrected, confirmed by REST; sizes in µm."""
+        answer = self.shop.read(
+            round(self.size + self.effect * self.offset * 1000 + scatter, 3), self.key, correction_in_effect=self.last
+        )
+        if answer["correction"] and answer["action"] == "correct":
+            self.apply(answer["correction"])
+        return answer
+
+    def apply(self, correction: Any) -> None:
+        self.offset = round(self.offset + correction["amount"], 9)
+        self.last = correction["number"]
+        self.shop.correction(self.last, "applied", offset_after=self.offset, client=self.shop.machine_client)
+
+
+def test_a_wrong_sign_is_stopped_by_the_second_correction(loop: Loop) -> None:
+    shop = loop.shop
+    answers = [loop.part(scatter) for scatter in (0.0, 0.3, 0.0)]
+    assert [(each["action"], each["reason"]["code"]) for each in answers] == [
+        ("correct", "full_deviation"),
+        ("correct", "full_deviation"),
+        ("none", "paused"),
+    ]
+    (alarm,) = [each for each in shop.alarms() if each["kind"] == "opposite_effect"]
+    assert (alarm["tool_memory"], alarm["characteristic"]) == (4, None)
+    assert "correction 1 of +5.0\u00a0µm asked for −5.0\u00a0µm and the size changed by +5.3\u00a0µm" in alarm["text"]
+    assert (
+        "correction 2 of +10.3\u00a0µm asked for −10.3\u00a0µm and the size changed by +10.0\u00a0µm" in alarm["text"]
+    )
+    assert "sign of the factor" in alarm["what_to_do"]
+    assert "offset register" in alarm["what_to_do"]
+    assert shop.tool(4)["paused_by"] == alarm["id"]
+    assert f"paused by alarm {alarm['id']}" in answers[-1]["reason"]["text"]
+    assert shop.call("GET", f"/machines/{shop.machine}/corrections?status=pending")["items"] == []
+    assert loop.part()["reason"]["code"] == "paused"
+    assert shop.read(40.0, shop.characteristic)["action"] == "correct"  # another tool
+
+
+def test_what_was_before_the_resume_no_longer_counts(loop: Loop) -> None:
+    shop = loop.shop
+    for _part in range(3):
+        loop.part()
+    (alarm,) = [each for each in shop.alarms() if each["kind"] == "opposite_effect"]
+    shop.call("PATCH", f"/characteristics/{loop.key}", parameters={"factor": -1}, reason="sign corrected")
+    done = shop.acknowledge(alarm["id"], "noted")
+    assert [each["code"] for each in done["outcome"]] == ["tool_resumed"]
+    assert shop.tool(4)["paused_by"] is None
+    assert loop.part()["action"] == "correct"
+    assert loop.part()["zone"] == "zero"
+
+
+def test_resumed_without_a_remedy_it_takes_two_again(loop: Loop) -> None:
+    for _part in range(3):
+        loop.part()
+    (alarm,) = [each for each in loop.shop.alarms() if each["kind"] == "opposite_effect"]
+    loop.shop.acknowledge(alarm["id"], "noted")
+    assert [loop.part()["action"] for _part in range(3)] == ["correct", "correct", "none"]
+
+
+@pytest.mark.parametrize("happens", ["edit", "change"])
+def test_an_edit_and_a_tool_change_begin_the_evidence_again(loop: Loop, happens: str) -> None:
+    loop.part()
+    loop.part()
+    if happens == "edit":
+        loop.shop.call("PUT", f"/machines/{loop.shop.machine}/tools/4", offset=loop.offset, reason="looked at")
+    else:
+        loop.shop.call("POST", f"/machines/{loop.shop.machine}/tools/4/change", offset=loop.offset, reason="new")
+    assert [loop.part()["action"] for _part in range(3)] == ["correct", "correct", "none"]
+
+
+def test_corrections_that_were_never_applied_prove_nothing(shop: Shop) -> None:
+    key = shop.another("rejected", tool_memory=4, average_memory=6, **SHAFT)
+    for size in (5.0, 10.3, 20.0, 40.5):
+        answer = shop.read(size, key, correction_in_effect=0)
+        assert answer["action"] == "correct"
+        shop.correction(answer["correction"]["number"], "rejected", reason="not now")
+
+
+def test_a_batch_that_names_the_corrections_in_effect(shop: Shop) -> None:
+    """As a bridge or an import does that confirms by its readings, with quiet parts between: columns and single decisions agree."""
+    key = shop.another("batch", tool_memory=4, average_memory=6, **SHAFT)
+    quiet = [(i % 3 - 1) * 0.3 for i in range(80)]
+    shop.push([*quiet, 4.4, 8.7, 8.8, 17.6, 0.0], key, correction_in_effect=[0] * 81 + [1, 1, 2, 2])
+    (alarm,) = [each for each in shop.alarms() if each["kind"] == "opposite_effect"]
+    assert [each["numbers"] for each in alarm["data"]["corrections"]] == [[1], [2]]
+    assert [each["status"] for each in shop.call("GET", f"/machines/{shop.machine}/corrections")["items"]] == [
+        "applied",
+        "applied",
+    ]
+    assert shop.tool(4)["paused_by"] == alarm["id"]
