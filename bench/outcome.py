@@ -7,6 +7,7 @@ that takes longer for a part than the bridge for a poll. ``python -m bench.outco
 
 import argparse
 import asyncio
+import logging
 import random
 import ssl
 import tempfile
@@ -302,6 +303,7 @@ def main() -> None:
     parser.add_argument("--parts", type=int, default=300)
     parser.add_argument("--kind", choices=["rest", *sorted(KINDS)], help="all, one after the other, if left out")
     chosen = parser.parse_args()
+    logging.getLogger("app.bridge").setLevel(logging.ERROR)  # alarms of a part are no news here
     kinds = [chosen.kind] if chosen.kind else ["rest", *sorted(KINDS)]
     failed = []
     with plant() as running, tempfile.TemporaryDirectory(prefix="inband-outcome-") as folder:
