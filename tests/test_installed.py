@@ -269,12 +269,13 @@ class TestContainer:
         sent = {line[1:] for line in (HOUSE / ".dockerignore").read_text().splitlines() if line.startswith("!")}
         assert copied == sent
 
-    def test_the_dockerfile_reads_the_libraries_out_of_the_project(self) -> None:
-        (program,) = re.findall(
-            r"^RUN python -c '([^']+)' > libraries.txt", (HOUSE / "Dockerfile").read_text(), re.MULTILINE
-        )
-        done = subprocess.run([sys.executable, "-c", program], cwd=HOUSE, capture_output=True, text=True, check=True)
-        assert any(line.startswith("fastapi>=") for line in done.stdout.splitlines())
+    @pytest.mark.parametrize(("to", "library"), [("server", "fastapi"), ("building", "hatchling")])
+    def test_the_dockerfile_takes_the_libraries_by_hash(self, to: str, library: str) -> None:
+        (program,) = re.findall(rf"(sed [^&]+ constraints\.txt) > {to}\.txt", (HOUSE / "Dockerfile").read_text())
+        done = subprocess.run(["/bin/sh", "-c", program], cwd=HOUSE, capture_output=True, text=True, check=True)
+        found = re.search(rf"^{library}==\S+ \\\n    --hash=sha256:", done.stdout, re.MULTILINE)
+        assert found, done.stdout[:300]
+        assert "pytest==" not in done.stdout
 
     def test_compose_gives_the_server_no_rights_and_no_disk_but_its_data(self) -> None:
         services = yaml.safe_load((HOUSE / "docker-compose.yml").read_text())["services"]

@@ -73,7 +73,11 @@ Moment = Annotated[AwareDatetime, BeforeValidator(_written)]
 """A time with its offset from UTC."""
 
 EARLIEST = datetime(2000, 1, 1, tzinfo=UTC)
+"""Before it, the clock of a machine that reports was never set."""
+HISTORY_BEGINS = datetime(1900, 1, 1, tzinfo=UTC)
+"""No reading of a file is older."""
 AHEAD = timedelta(hours=24)
+"""Of this server's clock; more is a wrong clock, or a wrong unit of the time."""
 
 
 def _sensible(moment: datetime) -> datetime:

@@ -4,7 +4,8 @@ A filter that is ignored answers with everything, and a machine would take that 
 """
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from typing import get_args, get_origin
 from urllib.parse import urlencode
 
@@ -64,4 +65,6 @@ def _unknown(known: Mapping[str, bool]) -> str:
 
 
 def _is_list(annotation: object) -> bool:
-    return get_origin(annotation) is list or any(map(_is_list, get_args(annotation)))
+    kind = get_origin(annotation) or annotation
+    several = isinstance(kind, type) and issubclass(kind, Sequence | AbstractSet) and not issubclass(kind, str | bytes)
+    return several or any(map(_is_list, get_args(annotation)))

@@ -282,16 +282,16 @@ def test_migrate_and_check_look_at_every_plant(new_database: NewDatabase) -> Non
             )
         migrate.downgrade(in_schema(url, "west"), "0109")
         connection.execute("UPDATE east.alembic_version SET version_num = '9999'")
-    pending, checked = migrate.pending(in_schema(url, "west"))[0], inband("check", "--database-url", url)
+    pending, checked = migrate.pending(in_schema(url, "west")), inband("check", "--database-url", url)
     assert checked.returncode == 1
     assert "wrong plant east: the database is at revision 9999, which this Inband does not know" in checked.stderr
     assert f"ok    plant north: migrations: at {migrate.head()}, none to run" in checked.stderr
-    assert f"wrong plant west: 1 migration(s) to run: {pending}." in checked.stderr
+    assert f"wrong plant west: {len(pending)} migration(s) to run: {', '.join(pending)}." in checked.stderr
     migrated = inband("migrate", "--database-url", url)
     assert migrated.returncode == 1
     assert "plant east: the database is at revision 9999, which this Inband does not know" in migrated.stderr
     assert f"plant north: nothing to do: the database is at {migrate.head()}" in migrated.stderr
-    assert f"plant west: migrated: {pending}" in migrated.stderr
+    assert all(f"plant west: migrated: {each}" in migrated.stderr for each in pending)
     assert [migrate.current(in_schema(url, schema)) for schema in ("west", "public")] == [migrate.head(), None]
     drop_database(url)
 

@@ -163,8 +163,8 @@ def encoding_of(path: Path) -> str:
                 decoder.decode(block)
             decoder.decode(b"", final=True)
         except UnicodeDecodeError:
-            guessed = delimited.encoding_of(path)
-            return "cp1252" if guessed.startswith("utf-8") else guessed
+            guessed = delimited.letters_of(path)
+            return "cp1252" if guessed == "utf-8" else guessed
     return "utf-8-sig"
 
 

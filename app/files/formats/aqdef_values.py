@@ -116,6 +116,7 @@ class _Reading:
         self._closed = False  # by a field for all: what comes next is another row
         self._told: set[str] = set()  # fields for all since it was closed
         self._held: dict[str, str] = {}
+        self._longer = False  # a row with more fields than are known was remarked on
         self._begins: str | None = None
 
     def take(self, number: int, line: str) -> Iterator[Value | Remark]:
@@ -219,17 +220,13 @@ class _Reading:
             if characteristic is None:
                 yield self._nobody(number, index, portion.split(OF_FIELD)[0])
                 continue
-            cells = [cell.strip() for cell in portion.split(OF_FIELD)]
-            known = "K2004" in characteristic.fields
-            counts = characteristic.counts if known else len(cells) > len(FIELDS)
-            names = COUNTED + FIELDS[1:] if counts else FIELDS
-            if len(cells) > len(names):
-                yield Remark(
-                    number,
-                    "",
-                    portion[:40].replace(OF_FIELD, "|"),
-                    _("has more fields than are known; the rest is passed over"),
-                )
+            cells = [cell.strip() for cell in portion.rstrip(" \t" + OF_FIELD).split(OF_FIELD)]
+            names = COUNTED + FIELDS[1:] if _counts(characteristic, cells) else FIELDS
+            if len(cells) > len(names) and not self._longer:
+                self._longer = True
+                shown = portion[:40].replace(OF_FIELD, "|")
+                reason = _("has more fields than are known; the rest is passed over, here and in later lines")
+                yield Remark(number, "", shown, reason)
             fields = {name: cell for name, cell in zip(names, cells, strict=False) if name and cell}
             if "K0006" in fields:
                 fields["K0006"] = fields["K0006"].removeprefix("#")
@@ -369,6 +366,18 @@ def number_of(text: str) -> float:
     except NotANumber:
         reason = _("is empty") if not text.strip() else _("is not a number")
         raise Unreadable(reason) from None
+
+
+def _counts(characteristic: aqdef.Characteristic, cells: list[str]) -> bool:
+    """Tell if a row counts parts: K2004 says so; where it is missing, the place of the time does."""
+    if "K2004" in characteristic.fields:
+        return characteristic.counts
+    time_of_size, time_of_count = (FIELDS.index("K0004") + shift for shift in (0, len(COUNTED) - 1))
+    return (
+        len(cells) > time_of_count
+        and _CLOCK.search(cells[time_of_count]) is not None
+        and _CLOCK.search(cells[time_of_size]) is None
+    )
 
 
 def _extent(portion: str) -> tuple[int, int]:

@@ -66,6 +66,13 @@ def encoding_of(path: Path) -> str:
             return name
     if b"\0" in start:  # UTF-16 without its mark: of plain letters each has a zero before or behind it
         return "utf-16-be" if start[0::2].count(0) > start[1::2].count(0) else "utf-16-le"
+    return letters_of(path)
+
+
+def letters_of(path: Path) -> str:
+    """Encoding of a text in single bytes: UTF-8 if the beginning is, else the one whose letters fit best."""
+    with path.open("rb") as file:
+        start = file.read(LOOKED_AT)
     try:
         codecs.getincrementaldecoder("utf-8")().decode(start)
     except UnicodeDecodeError:

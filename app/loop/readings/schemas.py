@@ -6,7 +6,7 @@ everything that is wrong in words that a machinist understands.
 
 import json
 from collections.abc import Callable, Iterator
-from datetime import UTC, datetime, timedelta
+from datetime import datetime
 from math import isfinite
 from typing import Annotated, Any
 
@@ -16,11 +16,10 @@ from msgspec import Meta, Struct
 from app.core.parameters import LARGEST_LENGTH
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
+from app.web.fields import AHEAD, EARLIEST, HISTORY_BEGINS
 
 Length = Annotated[float, Meta(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 Moment = Annotated[datetime, Meta(tz=True)]
-EARLIEST = datetime(2000, 1, 1, tzinfo=UTC)
-AHEAD = timedelta(hours=24)  # of this server's clock; more is a wrong clock or a wrong unit
 MOST_POINTS, MOST_REPEATS = 100, 100
 
 
@@ -136,13 +135,13 @@ def decode_one(body: bytes, now: datetime) -> ReadingIn:
 
 
 def reading_of(fields: dict[str, Any], now: datetime) -> ReadingIn:
-    """The reading that these fields make, out of a file for example; times may be datetimes. Raises `Invalid`."""
+    """The reading of history that these fields make, out of a file; times may be datetimes, from 1900 on. Raises `Invalid`."""
     try:
         reading = msgspec.convert(fields, ReadingIn)
     except msgspec.ValidationError:
         written = {n: v.isoformat() if isinstance(v, datetime) else v for n, v in fields.items()}
         reading = _retry(written, "")
-    if not _plain(reading, now + AHEAD) and (errors := list(_sense(reading, now, ""))):
+    if not _plain(reading, now + AHEAD) and (errors := list(_sense(reading, now, "", HISTORY_BEGINS))):
         raise _invalid(errors)
     return reading
 
@@ -301,7 +300,7 @@ def _all_plain(readings: list[ReadingIn], latest: datetime) -> bool:
     )
 
 
-def _sense(reading: ReadingIn, now: datetime, prefix: str) -> Iterator[FieldError]:
+def _sense(reading: ReadingIn, now: datetime, prefix: str, earliest: datetime = EARLIEST) -> Iterator[FieldError]:
     """Check what the types alone cannot say."""
     if (reading.measured is None) == (reading.touches is None) and not (
         reading.first_move_triggered and reading.measured is None
@@ -334,11 +333,11 @@ def _sense(reading: ReadingIn, now: datetime, prefix: str) -> Iterator[FieldErro
                 )
                 % {"time": moment.isoformat()},
             )
-        elif moment < EARLIEST:
+        elif moment < earliest:
             yield FieldError(
                 f"{prefix}{name}",
-                _("%(time)s lies before the year 2000. Check the machine's clock and the unit of the time.")
-                % {"time": moment.isoformat()},
+                _("%(time)s lies before the year %(year)s. Check the machine's clock and the unit of the time.")
+                % {"time": moment.isoformat(), "year": earliest.year},
             )
     if reading.measured_at and reading.machined_at and reading.machined_at > reading.measured_at:
         yield FieldError(

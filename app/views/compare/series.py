@@ -18,7 +18,7 @@ from app.loop.tables.characteristics import ParametersVersion
 from app.loop.tables.readings import Reading
 from app.loop.tools.lives_queries import Life, lives
 from app.web.choice import Choice
-from app.web.fields import EARLIEST
+from app.web.fields import HISTORY_BEGINS
 
 MOST = 12  # series on a page
 MOST_EACH = 4  # versions or tools of one characteristic
@@ -121,7 +121,7 @@ def begin_before(start: datetime, end: datetime) -> datetime:
     try:
         return local(start) - (local(end) - local(start))
     except OverflowError:  # the calendar does not go so far, and readings go less far
-        return EARLIEST
+        return HISTORY_BEGINS
 
 
 def _by_period(session: Session, current: CurrentCharacteristic, choice: Choice) -> list[Compared]:
@@ -129,7 +129,7 @@ def _by_period(session: Session, current: CurrentCharacteristic, choice: Choice)
     now = statistics.window_of(session, current.characteristic, **choice._asdict())
     if choice.start is not None:
         start, end = choice.start, choice.end or datetime.now(UTC)
-        begin, until = begin_before(start, end), max(start, EARLIEST) - INSTANT
+        begin, until = begin_before(start, end), max(start, HISTORY_BEGINS) - INSTANT
         before = statistics.window_of(session, current.characteristic, start=begin, end=until)
     else:
         through = now.first - 1

@@ -86,7 +86,7 @@ def test_a_control_chart_has_their_points_which_are_what_they_are_in_any_window(
 
 
 def test_a_report_lists_the_decisions_and_corrections_of_them_alone(late: Shop) -> None:
-    whole = report(late, PERIOD + "&sections=decisions,corrections,numbers")
+    whole = report(late, PERIOD + "&section=decisions&section=corrections&section=numbers")
     assert [row["reading"]["value"] for row in table(whole, "decisions")] == MEANT[:-51:-1]
     decisions = next(each for each in whole["sections"] if each["key"] == "decisions")
     assert decisions["table"]["more"] == len(MEANT) - 50

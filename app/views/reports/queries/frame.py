@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from functools import cached_property
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from app.loop.summaries.queries import History, Numbers, Window
 from app.loop.tables.characteristics import ParametersVersion
 from app.loop.tables.readings import Reading
 from app.views.reports.request import ReportRequest
+from app.web.fields import HISTORY_BEGINS
 
 MOST_VERSIONS = 200
 
@@ -107,7 +108,7 @@ class Frame:
             start = start or min(self.ends[0].measured_at, self.ends[0].received_at)
             end = end or (self.now if self.window.reaches_now else self.ends[1].received_at)
         if start is None or end is None:
-            return (start or datetime(2000, 1, 1, tzinfo=UTC), end or self.now) if start or end else None
+            return (start or HISTORY_BEGINS, end or self.now) if start or end else None
         return start, end
 
     @cached_property

@@ -138,9 +138,18 @@ def import_aqdef(
             put_down(source, wanted, wishes, progress, most, foreign=foreign) as readings,
             database.sessions() as session,
         ):
-            if readings.found.flaws:
-                raise Flawed(readings.found.flaws, readings.found.flaw_count)
-            if not readings.found.counted.total() and not readings.found.missing.total():
+            found_there = readings.found
+            if found_there.flaws:
+                raise Flawed(found_there.flaws, found_there.flaw_count)
+            if not found_there.counted.total() and (missing := found_there.missing.total()):
+                raise Invalid.at(
+                    "file",
+                    _(
+                        "it holds no size of what is chosen: each of {count} values is empty, counts parts, or is marked as "
+                        "missing or deleted (K0002 = 255, 256)"
+                    ).format(count=missing),
+                )
+            if not found_there.counted.total():
                 raise Invalid.at(
                     "file",
                     _("it holds no value of what is chosen; the values of a .dfd lie in the .dfx that belongs to it"),

@@ -114,6 +114,46 @@ def test_like_parts_of_one_second_are_all_stored_wherever_they_stand(plant: Data
     assert (again.stored, again.repeated) == (1, 6)
 
 
+SEAT = ["K0100 1", "K2001/1 shaft-d40", "K2142/1 mm"]
+
+
+@pytest.mark.parametrize("kind", [[], ["K2004/1 0"]], ids=["unsaid", "variable"])
+def test_empty_fields_at_the_end_of_a_row_are_nothing(plant: Database, tmp_path: Path, kind: list[str]) -> None:
+    rows = [f"39.99{n}{F}0{F}18.11.2025/06:0{n}:00{F}{F}#{F}0{F}0{F}0{F}{F}0{F}{F}" for n in range(3)]
+    outcome = run(plant, written(tmp_path / "a.dfq", [*SEAT, *kind, *rows]))
+    assert (outcome.stored, outcome.remarks) == (3, [])
+
+
+def test_rows_that_count_parts_are_known_without_k2004(plant: Database, tmp_path: Path) -> None:
+    rows = [f"50{F}{n}{F}{F}0{F}18.11.2025/06:0{n}:00{F}{F}#7" for n in range(3)]
+    with pytest.raises(Invalid, match="no size of what is chosen: each of 3 values"):
+        run(plant, written(tmp_path / "a.dfq", [*SEAT, *rows]))
+    assert scalar(plant, "SELECT count(*) FROM reading") == 0
+
+
+def test_fields_that_nobody_knows_are_remarked_on_once(plant: Database, tmp_path: Path) -> None:
+    rows = [f"39.99{n}{F}0{F}18.11.2025/06:0{n}:00{F}{F}{F}{F}{F}{F}{F}{F}more" for n in range(3)]
+    outcome = run(plant, written(tmp_path / "a.dfq", [*SEAT, *rows]))
+    assert outcome.stored == 3
+    assert [remark for remark in outcome.remarks if "more fields than are known" in remark] == outcome.remarks[:1]
+
+
+def test_history_before_2000_is_history(plant: Database, tmp_path: Path) -> None:
+    outcome = run(plant, written(tmp_path / "a.dfq", [*SEAT, f"39.991{F}0{F}07.05.1992/13:43:21"]))
+    assert outcome.stored == 1
+    assert stored(plant)[0]["measured_at"].isoformat() == "1992-05-07T11:43:21+00:00"
+    with pytest.raises(Flawed) as refusal:
+        run(plant, written(tmp_path / "b.dfq", [*SEAT, f"39.992{F}0{F}07.05.1892/13:43:21"]))
+    assert [flaw for flaw in map(str, refusal.value.flaws) if "nothing was measured in the year 1892" in flaw]
+
+
+def test_bytes_of_graphics_make_no_other_encoding(plant: Database, tmp_path: Path) -> None:
+    path = tmp_path / "a.dfq"
+    lines = [*SEAT, "K2002/1 Sitz Ø40", "K5003/1 \0", "K5007/1 \xff\0\xff\xff", f"39.991{F}0{F}18.11.2025/06:05:00"]
+    path.write_bytes("\r\n".join([*lines, ""]).encode("latin-1"))
+    assert run(plant, path).stored == 1
+
+
 def test_a_value_that_another_program_writes_in_another_way_is_the_same(plant: Database, tmp_path: Path) -> None:
     head = [*HEAD[:3], "K2001/1 shaft-d40", "K2002/1 Seat", "K2142/1 mm"]
     first = run(plant, written(tmp_path / "a.dfq", [*head, f"39.991{F}0{F}02.03.2026/06:00:00{F}{F}#7"]))
