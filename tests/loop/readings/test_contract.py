@@ -272,12 +272,22 @@ class TestTouches:
             ([[], []], "Point 1 has 0 touches"),
         ],
     )
-    def test_wrong_touches_are_refused_by_name(self, shop: Shop, touches: list[list[float]], says: str) -> None:
+    def test_touches_that_are_missing_or_impossible_are_stored_as_a_fault(
+        self, shop: Shop, touches: list[list[float]], says: str
+    ) -> None:
         name = f"{shop.characteristic}-t"
         shop.add(name, variant="indexed", index=180, repeats=2, average_memory=0)
-        problem = refused(shop, 422, characteristic=name, touches=touches, measured=None)
-        assert fields(problem) == {"touches"}
-        assert says in problem["detail"]
+        told = shop.call("POST", "/readings", 201, characteristic=name, touches=touches)
+        assert (told["zone"], told["action"], told["correction"]) == ("probe_fault", "stop", None)
+        assert says in told["reason"]["text"]
+        assert [alarm["kind"] for alarm in told["alarms"]] == ["probe_fault"]
+        assert [each["sequence"] for each in shop.call("GET", f"/readings?characteristic={name}")["items"]] == [1]
+
+    @pytest.mark.parametrize("touches", [[[40.0, 40.0]] * 3, [[40.0, 40.0], [40.0, 40.0, 40.0]]])
+    def test_more_touches_than_there_can_be_are_refused_by_name(self, shop: Shop, touches: list[list[float]]) -> None:
+        name = f"{shop.characteristic}-t"
+        shop.add(name, variant="indexed", index=180, repeats=2, average_memory=0)
+        assert fields(refused(shop, 422, characteristic=name, touches=touches, measured=None)) == {"touches"}
         assert shop.call("GET", f"/readings?characteristic={name}")["items"] == []
 
 

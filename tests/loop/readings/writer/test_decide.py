@@ -107,7 +107,7 @@ def test_what_is_refused_leaves_the_state_as_it_was(drawn: list[ReadingIn]) -> N
     refusals = [
         ReadingIn("shaft", measured=40.0, correction_in_effect=99),
         ReadingIn("shaft", touches=[[40.0, 40.0]]),
-        ReadingIn("shaft", touches=[[45.0]]),
+        ReadingIn("shaft", touches=[[40.0], [40.0]]),
     ]
     for reading in drawn:
         decided(pending, [reading])
