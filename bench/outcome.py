@@ -188,7 +188,7 @@ class Play:
         if tool == UNMAPPED:
             return
         [place] = {(each.tool, each.edge, each.register) for each in self.process.features if each.tool == tool}
-        for each in self.call("GET", f"/machines/{self.machine}/corrections?status=pending")["items"]:
+        for each in self.call("GET", f"/machines/{self.machine}/corrections?status=pending&limit=1000")["items"]:
             if each["tool_memory"] == tool:
                 self.process.offsets[place] = each["offset_expected"]
                 self.call(
