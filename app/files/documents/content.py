@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import StrEnum
-from math import floor, isfinite
+from math import isfinite
 from typing import Any, Literal
 from zoneinfo import ZoneInfo
 
@@ -72,6 +72,8 @@ class Value:
 
         >>> Value("deviation", -0.0061).words(ZoneInfo("UTC")), Value("share", 0.99996).words(ZoneInfo("UTC"))
         ('−6.1\xa0µm', '99.9\xa0%')
+        >>> Value("share", 958 / 960).words(ZoneInfo("UTC")), Value("share", 1.0).words(ZoneInfo("UTC"))
+        ('99.8\xa0%', '100.0\xa0%')
         >>> Value("probability", 0.00001, 4).words(ZoneInfo("UTC"))
         '<\xa00.0001'
         """
@@ -85,8 +87,8 @@ class Value:
         match self.kind:
             case "count":
                 return f"{number:,}".replace(",", NO_BREAK_SPACE).replace("-", MINUS)
-            case "share":  # 99.96 % is not all of them
-                text = f"{floor(number * 10) / 10:.1f}"
+            case "share":  # 99.96 % is not all of them; 99.79 % is 99.8 %
+                text = f"{number if number >= 100 else min(number, 99.9):.1f}"
             case "deviation":
                 text = signed(number, self.decimals)
             case _:

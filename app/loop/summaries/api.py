@@ -1,6 +1,5 @@
 """JSON route: the numbers of a run of readings."""
 
-from dataclasses import replace
 from typing import Annotated
 
 from fastapi import Query
@@ -65,7 +64,7 @@ def get_statistics(
     """
     check_order(start, end)
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    window = replace(queries.window_of(session, current.characteristic, last=last), start=start, end=end)
+    window = queries.window_of(session, current.characteristic, last=last, start=start, end=end)
     numbers = queries.numbers_of(session, current.characteristic, window)
     rejects = of_tool = None
     if current.parameters.accept_m > 1:

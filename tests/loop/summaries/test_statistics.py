@@ -72,6 +72,13 @@ def test_an_empty_range_is_no_error(measured: Shop) -> None:
     assert (found["count"], found["mean"], sum(found["zones"].values())) == (0, None, 0)
 
 
+def test_a_period_names_the_first_and_last_of_what_it_counts(measured: Shop) -> None:
+    path = f"/readings?characteristic={measured.characteristic}"
+    times = {each["sequence"]: each["measured_at"] for each in measured.call("GET", path)["items"]}
+    found = statistics(measured, f"?from={times[2]}&to={times[4]}".replace("+", "%2B"))
+    assert (found["count"], found["first_sequence"], found["last_sequence"]) == (3, 2, 4)
+
+
 def test_the_excluded_are_left_out(measured: Shop) -> None:
     measured.call("POST", f"/readings/{measured.characteristic}/5/exclude", reason="chip on the stylus")
     found = statistics(measured)
