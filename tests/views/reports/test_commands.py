@@ -30,6 +30,8 @@ def written(shop: Shop, *arguments: object) -> CompletedProcess[str]:
 def test_one_as_pdf_xlsx_and_csv_by_the_name_of_the_file(story: Shop, tmp_path: Path) -> None:
     key, whole = story.characteristic, report(story, "last=200&section=numbers&section=capability")
     mean, ppk = facts(whole, "numbers")["mean"], facts(whole, "capability")["ppk"]
+    names = [fact["name"] for fact in facts(whole, "capability").values()]
+    assert sorted(set(names)) == sorted(names), "a sheet is looked up by name"
     for form in ("pdf", "xlsx", "csv"):
         path = tmp_path / f"r.{form}"
         done = written(story, key, "--last", 200, "--section", "numbers", "--section", "capability", "-o", path)

@@ -91,8 +91,13 @@ def _spread(study: Study) -> list[Fact]:
             facts.append(Fact(key, name, number(fallout.total, 1 if fallout.total < FEW else 0), note=note))
     for test in (study.anderson, study.shapiro):
         if not isinstance(test, Refused):
-            facts.append(Fact(test.test, wording.normality_name(test.test), number(test.statistic, 4)))
-            facts.append(Fact(f"{test.test}_p", _("p, normal distribution"), probability(test.p_value)))
+            name = wording.normality_name(test.test)
+            facts.append(Fact(test.test, name, number(test.statistic, 4)))
+            facts.append(
+                Fact(
+                    f"{test.test}_p", _("p of {test}, normal distribution").format(test=name), probability(test.p_value)
+                )
+            )
     for key, name, sequences in (
         ("excluded", _("Left out: excluded"), study.excluded),
         ("faults", _("Left out: probe faults"), study.faults),
