@@ -22,6 +22,7 @@ A local line is not quite what a machine does that warms up each morning. On sim
 it was off by up to 6 %, whatever the number of readings: `MODEL` is part of the interval. Lengths are mm.
 """
 
+from enum import StrEnum
 from itertools import product
 from math import hypot, inf, log, sqrt
 from typing import NamedTuple
@@ -45,6 +46,9 @@ MODEL = 0.06  # that the model alone may be off by, of 1
 STEPS_OF_LEVEL = (0.0, 0.001, 0.01, 0.05, 0.2, 1.0)  # variance of a step over that of the scatter
 STEPS_OF_SLOPE = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 PASSES = 4
+FEWEST_FOR_GAIN, FEWEST_PARTS = 4, 12
+STARTS = (1.0, 0.0, 0.5, 2.0, -1.0)
+CREDIBLE = 0.9999  # of confidence, two-sided, for a verdict on the gain
 
 
 class Effect(NamedTuple):
@@ -93,7 +97,86 @@ def measured_effect(deviation: Floats, compensated: Floats, factor: float, begin
     scatter = float(np.median(np.abs(np.diff(y - x)))) * 1.4826 / sqrt(2)
     if not varies(scatter, y, x):
         raise Refused(Reason.NO_VARIATION)
-    slope, line = 1.0, None
+    line, scatter = _estimated(y, x, begins, 1.0, scatter)
+    if not line.sxx > 0 or line.freedom < 1:
+        raise Refused(Reason.NO_VARIATION)
+    half = _half(line, LEVEL)
+    slope = line.slope
+    return Effect(slope, slope - half, slope + half, len(steps), len(y), float(np.median(steps)), scatter)
+
+
+class GainVerdict(StrEnum):
+    """Verdict on the gain of corrections, credible to `CREDIBLE`."""
+
+    OPPOSITE = "opposite"
+    NONE = "none"  # the control does not use this offset
+    WEAK = "weak"  # below 0.5
+    STRONG = "strong"  # above 1.5
+
+
+class Gain(NamedTuple):
+    """Gain of corrections, 1 where they act in full, with its 95 % interval, from so many changes of the offset and readings."""
+
+    value: float
+    low: float
+    high: float
+    corrections: int
+    readings: int
+    verdict: GainVerdict | None
+
+    @property
+    def half_width(self) -> float:
+        """Half the 95 % interval."""
+        return (self.high - self.low) / 2
+
+
+def gain_of(deviation: Floats, compensated: Floats, factor: float) -> Gain | None:
+    """The gain of the corrections of one edge, in the order of the readings; None where they do not tell it to within ±1.
+
+    As `measured_effect`, from fewer readings and from any gain, 0 and -1 included: of the lines that the filter finds from
+    each of `STARTS`, the likeliest.
+
+    >>> chance = np.random.default_rng(2)
+    >>> s = np.cumsum([0, 5, -5, 5, -4, 5, -6, 5, 4, -6, 5, -5]).repeat(3) * 0.001
+    >>> found = gain_of(chance.normal(0, 0.0005, 36) + 2 * s, s, -1.0)
+    >>> found.low < 2 < found.high, found.verdict.value, found.corrections
+    (True, 'strong', 11)
+    """
+    y, x = np.asarray(deviation, np.float64), -np.asarray(compensated, np.float64) / factor
+    begins = np.arange(len(y)) == 0
+    corrections = int((np.abs(np.diff(x)) > 1e-9).sum())
+    if corrections < FEWEST_FOR_GAIN or len(y) < FEWEST_PARTS:
+        return None
+    found: list[tuple[float, _Line]] = []
+    for start in STARTS:
+        scatter = float(np.median(np.abs(np.diff(y - start * x)))) * 1.4826 / sqrt(2)
+        if varies(scatter, y, x):
+            line, scatter = _estimated(y, x, begins, start, scatter)
+            found.append((line.unlikely + 2 * len(y) * log(scatter), line))
+    if not found:
+        return None
+    line = min(found, key=lambda each: each[0])[1]
+    if not line.sxx > 0 or line.freedom < 1 or _half(line, LEVEL) > 1:
+        return None
+    if line.left_out > max(
+        1, corrections // 4
+    ):  # steps of the process that corrections answer look like chips, and gain 0
+        return None
+    value, half, sure = line.slope, _half(line, LEVEL), _half(line, CREDIBLE)
+    return Gain(value, value - half, value + half, corrections, len(y), _verdict(value - sure, value + sure))
+
+
+def _verdict(low: float, high: float) -> GainVerdict | None:
+    if high < 0:
+        return GainVerdict.OPPOSITE
+    if high < 0.5:
+        return GainVerdict.NONE if low <= 0 else GainVerdict.WEAK
+    return GainVerdict.STRONG if low > 1.5 else None
+
+
+def _estimated(y: Floats, x: Floats, begins: Flags, start: float, scatter: float) -> tuple["_Line", float]:
+    """Return the line found from this slope on, and the scatter about it."""
+    slope = start
     for _pass in range(PASSES):
         lines = (
             _line(y / scatter, x / scatter, begins, steps_, slope) for steps_ in product(STEPS_OF_LEVEL, STEPS_OF_SLOPE)
@@ -103,10 +186,11 @@ def measured_effect(deviation: Floats, compensated: Floats, factor: float, begin
         scatter *= sqrt(line.variance) if line.variance > 0 else 1.0
         if abs(slope - before) < 0.001:
             break
-    if line is None or not line.sxx > 0 or line.freedom < 1:
-        raise Refused(Reason.NO_VARIATION)
-    half = hypot(MODEL, t_quantile(line.freedom, LEVEL) * sqrt(line.variance / line.sxx))
-    return Effect(slope, slope - half, slope + half, len(steps), len(y), float(np.median(steps)), scatter)
+    return line, scatter
+
+
+def _half(line: "_Line", level: float) -> float:
+    return hypot(MODEL, t_quantile(line.freedom, level) * sqrt(line.variance / line.sxx))
 
 
 class _Line(NamedTuple):
@@ -115,6 +199,7 @@ class _Line(NamedTuple):
     variance: float
     freedom: int
     unlikely: float
+    left_out: int
 
 
 def _line(y: Floats, x: Floats, begins: Flags, steps: tuple[float, float], slope: float) -> _Line:
@@ -123,14 +208,14 @@ def _line(y: Floats, x: Floats, begins: Flags, steps: tuple[float, float], slope
     dy, dx = missed_y[used] * weight, missed_x[used] * weight
     sxx, freedom = float(dx @ dx), len(dy) - 1
     if not sxx > 0 or freedom < 1:
-        return _Line(slope, 0.0, 0.0, freedom, inf)
+        return _Line(slope, 0.0, 0.0, freedom, inf, left_out)
     share = float(dx @ dy) / sxx
     left = dy - share * dx
     residual_variance = float(left @ left) / freedom
     unlikely = (
         len(dy) * log(max(residual_variance, 1e-12)) + float(np.log(variance[used]).sum()) + left_out * OUTLIER**2
     )
-    return _Line(share, sxx, residual_variance, freedom, unlikely)
+    return _Line(share, sxx, residual_variance, freedom, unlikely, left_out)
 
 
 @compiled

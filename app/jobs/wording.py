@@ -10,6 +10,7 @@ def job_word(name: str) -> str:
     """One line about the work of a job; its name if the job is of another version."""
     return {
         "corrections_expire": _("Expired corrections are withdrawn"),
+        "gains": _("Gain of corrections"),
         "tool_lives": _("Tool life alarms"),
         "wear_and_hunting": _("Wear forecast and over-correction"),
         "calibrations_due": _("Calibrations due"),

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from app.core.compiled import plain
-from app.core.effect import FEWEST_CORRECTIONS, FEWEST_READINGS, LONGEST, Effect, _missed, measured_effect
+from app.core.effect import FEWEST_CORRECTIONS, FEWEST_READINGS, LONGEST, Effect, _missed, gain_of, measured_effect
 from app.core.replay import Policy, ReplayedCharacteristic, run, without_events
 from app.core.spc.refusal import Reason, Refused
 from tests.core.conftest import SEAT
@@ -112,3 +112,37 @@ def test_a_filter_by_hand() -> None:
     assert used.tolist() == [False, False, True]
     assert missed[2] == pytest.approx(1.5)
     assert variance[2] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(("gain", "verdict"), [(-1.0, "opposite"), (0.0, "none"), (1.0, None), (2.0, "strong")])
+def test_a_gain_is_told_from_few_corrections_whatever_it_is(gain: float, verdict: str | None) -> None:
+    chance = np.random.default_rng(3)
+    offset = np.array([0, 4, -3, 5, -4, 4], np.float64).repeat(5) * 0.001
+    found = gain_of(chance.normal(0, 0.0003, 30) + np.arange(30) * 0.00005 + gain * offset, offset, -1.0)
+    assert found is not None
+    assert (found.verdict, found.corrections) == (verdict, 5)
+    assert found.low < gain < found.high
+
+
+def test_corrections_after_every_part_of_even_wear_tell_no_gain() -> None:
+    """The offset moves as evenly as the wear: nobody can say which of them moved the size."""
+    chance, offset = np.random.default_rng(6), -np.arange(60, dtype=np.float64) * 0.0003
+    found = gain_of(chance.normal(0.0003, 0.0005, 60), offset, -1.0)
+    assert found is None or found.verdict is None
+
+
+def test_steps_of_the_process_are_no_corrections_without_effect() -> None:
+    """Each step is corrected at once: the part after it looks as one after a chip does, whose correction did nothing."""
+    deviation, offset, steps = [], [], np.arange(48) // 6 * 0.005
+    sum_, chance = 0.0, np.random.default_rng(8)
+    for step in steps:
+        deviation.append(step + sum_ + chance.normal(0, 0.0003))
+        offset.append(sum_)
+        sum_ -= deviation[-1] if abs(deviation[-1]) > 0.001 else 0.0
+    found = gain_of(np.array(deviation), np.array(offset), -1.0)
+    assert found is None or found.verdict is None
+
+
+def test_of_too_few_no_gain_is_told() -> None:
+    assert gain_of(np.zeros(30), np.array([0, 0.001, 0.002]).repeat(10), -1.0) is None
+    assert gain_of(np.zeros(0), np.zeros(0), -1.0) is None

@@ -44,6 +44,21 @@ def _raised(session: Session, alarm: Alarm, data: dict[str, Any]) -> Alarm:
     return alarm
 
 
+def is_active(session: Session, machine_id: int, characteristic_id: int, kind: AlarmKind) -> bool:
+    """Tell if an alarm of this kind about a characteristic is active."""
+    return (
+        session.scalar(
+            select(Alarm.id).where(
+                Alarm.machine_id == machine_id,
+                Alarm.characteristic_id == characteristic_id,
+                Alarm.kind == kind.name,
+                Alarm.acknowledged_at.is_(None),
+            )
+        )
+        is not None
+    )
+
+
 def raise_for_characteristic(
     session: Session,
     machine_id: int,

@@ -137,6 +137,54 @@ CORRECTIONS_NOT_TAKEN = register(
         outcomes={"corrections_taken": lambda _item: _("No correction waits too long any more.")},
     )
 )
+
+
+def _unusual(alarm: Alarm) -> str:
+    data = alarm.data
+    values = {
+        "tool": alarm.tool_memory,
+        "gain": signed(data.get("gain"), 2),
+        "pm": PLUS_MINUS,
+        "error": fixed(data.get("error"), 2),
+        "n": data.get("corrections"),
+    }
+    text = {
+        "none": _(
+            "The corrections of tool {tool} change nothing: gain {gain} {pm} {error} from {n} corrections. The control does not "
+            "use this offset."
+        ),
+        "weak": _(
+            "The corrections of tool {tool} act too weakly: gain {gain} {pm} {error} from {n} corrections, it should be 1. "
+            "Diameter taken for radius?"
+        ),
+        "strong": _(
+            "The corrections of tool {tool} act too strongly: gain {gain} {pm} {error} from {n} corrections, it should be 1. "
+            "Radius taken for diameter?"
+        ),
+    }.get(
+        str(data.get("verdict")),
+        _(
+            "The corrections of tool {tool} do the opposite of what they ask: gain {gain} {pm} {error} from {n} corrections, it "
+            "should be 1. Wrong sign of the factor?"
+        ),
+    )
+    return text.format(**values)
+
+
+UNUSUAL_GAIN = register(
+    AlarmKind(
+        "unusual_gain",
+        word=lambda: _("Unusual gain"),
+        sentence=_unusual,
+        what_to_do=lambda: _(
+            "Check the factor of the characteristic (radius or diameter), the offset register at the control, and which tool "
+            "cuts it. Correcting goes on meanwhile."
+        ),
+        comments={
+            "noted": lambda: [_("Factor corrected"), _("Offset register corrected"), _("Another tool cuts it")],
+        },
+    )
+)
 PAUSING = (OFFSET_DIFFERS.name, OPPOSITE_EFFECT.name)  # nothing is corrected through the tool until they are answered
 TOOL_LIFE = register(
     AlarmKind(

@@ -10,7 +10,7 @@ from app.core.plausibility import empirical_value_warnings, offset_warnings
 from app.loop.machines.queries import hold_machine, machine_for, machine_named
 from app.loop.timeline.figures import MANUAL_EDIT, TOOL_CHANGE
 from app.loop.timeline.queries import with_events_of_machine
-from app.loop.tools import actions, applying, queries, wording
+from app.loop.tools import actions, applying, gain_queries, queries, wording
 from app.loop.tools.figures import OffsetChange, offset_figure
 from app.loop.tools.schemas import (
     AppliedIn,
@@ -69,7 +69,8 @@ def get_tool(session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, to
     """One location of the tool memory."""
     machine_row = machine_for(session, caller, machine, "viewer")
     queries.tool(session, machine_row, tool)
-    return tool_out(queries.tools(session, machine_row, only=tool)[0], machine_row.key)
+    row = queries.tools(session, machine_row, only=tool)[0]
+    return tool_out(row, machine_row.key, gain_queries.gains(session, machine_row, tool))
 
 
 @router.put("/machines/{machine}/tools/{tool}", responses=problems(404, 412))

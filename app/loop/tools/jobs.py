@@ -3,7 +3,7 @@
 from datetime import UTC, datetime
 from typing import NamedTuple
 
-from sqlalchemy import Select, func, or_, select, true
+from sqlalchemy import Select, exists, func, or_, select, true
 from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
@@ -15,12 +15,13 @@ from app.loop.machines.queries import lock_machines
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
 from app.loop.tables.tools import OUTSTANDING, Correction, Tool
-from app.loop.tools import wording
-from app.loop.tools.alarm_kinds import TOOL_LIFE
+from app.loop.tools import gain_queries, wording
+from app.loop.tools.alarm_kinds import TOOL_LIFE, UNUSUAL_GAIN
 from app.loop.tools.events import alarm_raised, correction_changed
 from app.loop.tools.lives_queries import plan_of
 
 ACTOR = "inband"
+LATELY = 15  # minutes
 
 
 def expired(session: Session) -> list[Unit]:
@@ -138,7 +139,54 @@ def _spent(session: Session, machine_id: int | None = None, number: int | None =
     return [tool for tool in judged if tool.use.spent]
 
 
+def corrected_tools(session: Session) -> list[Unit]:
+    """Tools to which a correction was applied lately, with readings since."""
+    since = func.clock_timestamp() - func.make_interval(0, 0, 0, 0, 0, LATELY)
+    lately = exists().where(
+        Correction.machine_id == Stream.machine_id,
+        Correction.tool_memory == Stream.tool_memory,
+        Correction.status == "applied",
+        Correction.applied_at > since,
+    )
+    found = session.execute(
+        select(Machine.key, Stream.machine_id, Stream.tool_memory)
+        .join(Machine, Machine.id == Stream.machine_id)
+        .where(Stream.tool_memory > 0, Stream.last_received_at > since, lately)
+        .distinct()
+        .order_by(Stream.machine_id, Stream.tool_memory)
+    )
+    return [Unit(f"tool/{key}/{number}", (machine_id, number), machine_id) for key, machine_id, number in found]
+
+
+def tell_gain(session: Session, unit: Unit) -> None:
+    """A gain that credibly lies outside 0.5 to 1.5 raises *unusual gain*, once until it is answered."""
+    machine_id, number = (int(part) for part in unit.key)
+    machine = session.get_one(Machine, machine_id)
+    told = [each for each in gain_queries.gains(session, machine, number) if each.gain and each.gain.verdict]
+    if not told:
+        return
+    lock_machines(session, [machine_id])
+    for characteristic_id, key, factor, gain in told:
+        if (
+            gain is None
+            or gain.verdict is None
+            or alarms.is_active(session, machine_id, characteristic_id, UNUSUAL_GAIN)
+        ):
+            continue
+        data = {
+            "characteristic": key,
+            "factor": factor,
+            "verdict": gain.verdict.value,
+            "gain": round(gain.value, 3),
+            "error": round(gain.half_width, 3),
+            "corrections": gain.corrections,
+        }
+        alarm = alarms.raise_for_characteristic(session, machine_id, characteristic_id, number, UNUSUAL_GAIN, data)
+        publish(session, alarm_raised(machine, alarm) | {"characteristic": key})
+
+
 JOBS = (
+    PeriodicJob("gains", corrected_tools, tell_gain),
     PeriodicJob("corrections_expire", expired, expire_correction),
     PeriodicJob("tool_lives", spent_tools, tell_tool_life),
 )

@@ -16,7 +16,7 @@ from app.language.i18n import _
 from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named
 from app.loop.tables.tools import OPEN
-from app.loop.tools import actions, confirmation, queries, sisters, wording
+from app.loop.tools import actions, confirmation, gain_queries, queries, sisters, wording
 from app.loop.tools.confirmation import Question
 from app.loop.tools.edge_schemas import SisterIn
 from app.loop.tools.form_reader import decide_as_typed
@@ -64,6 +64,7 @@ def memories(
         tools=tools,
         averages=queries.averages(session, machine_row),
         chosen=chosen,
+        gains=gain_queries.gains(session, machine_row, chosen.tool.number),
         steps=part_of(
             steps,
             STEPS_ON_PAGE,

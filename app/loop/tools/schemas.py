@@ -10,6 +10,7 @@ from app.core.tool_life import LifePlan, use_of
 from app.core.warning import CodedWarning
 from app.loop.tables.tools import Correction
 from app.loop.tools import wording
+from app.loop.tools.gain_queries import ToolGain
 from app.loop.tools.queries import AverageRow, CorrectionRow, ToolRow
 from app.loop.warnings.wording import sentence
 from app.web.fields import LARGEST_SERIAL, Body, LatelyOrNow, Length, MappingHash, Reason, answer_from
@@ -156,6 +157,21 @@ class CorrectionBrief(BaseModel):
     applied_at: datetime | None
 
 
+class GainOut(BaseModel):
+    """Change of the size over what the corrections of the tool asked for, as one characteristic shows it; 1 is right."""
+
+    characteristic: str
+    gain: Annotated[
+        float | None, Field(description="-1: wrong sign; 2 or 0.5: radius and diameter; null: not known yet.")
+    ]
+    uncertainty: Annotated[float | None, Field(description="Half the 95 % confidence interval.")]
+    corrections: Annotated[int | None, Field(description="Changes of the offset that it is told by.")]
+    verdict: Annotated[
+        Literal["opposite", "none", "weak", "strong"] | None,
+        Field(description="Where it credibly lies outside 0.5 to 1.5; `none`: corrections change nothing."),
+    ]
+
+
 class ToolOut(BaseModel):
     """One location of the tool memory."""
 
@@ -183,6 +199,9 @@ class ToolOut(BaseModel):
         int | None,
         Field(description="Number of the alarm that pauses the tool; nothing is corrected until it is answered."),
     ]
+    gains: Annotated[
+        list[GainOut] | None, Field(description="By each characteristic on it; of one tool asked for alone, else null.")
+    ] = None
 
 
 class ToolSet(ToolOut):
@@ -229,9 +248,21 @@ def _brief(c: Correction) -> CorrectionBrief:
     return CorrectionBrief.model_validate(c, from_attributes=True)
 
 
-def tool_out(row: ToolRow, machine: str) -> ToolOut:
+def tool_out(row: ToolRow, machine: str, gains: Sequence[ToolGain] | None = None) -> ToolOut:
     """A location of the tool memory as it is answered."""
-    return ToolOut.model_validate(_tool(row, machine))
+    told = None if gains is None else [_gain(each) for each in gains]
+    return ToolOut.model_validate(_tool(row, machine) | {"gains": told})
+
+
+def _gain(of: ToolGain) -> dict[str, Any]:
+    gain = of.gain
+    return {
+        "characteristic": of.characteristic,
+        "gain": None if gain is None else round(gain.value, 3),
+        "uncertainty": None if gain is None else round(gain.half_width, 3),
+        "corrections": None if gain is None else gain.corrections,
+        "verdict": None if gain is None or gain.verdict is None else gain.verdict.value,
+    }
 
 
 def tool_set(row: ToolRow, machine: str, superseded: list[int], warnings: Sequence[CodedWarning] = ()) -> ToolSet:

@@ -3,9 +3,10 @@
 from datetime import UTC, datetime
 
 from app.language.i18n import _, ngettext
-from app.language.numbers import NOTHING, age, mm, um
+from app.language.numbers import NOTHING, PLUS_MINUS, age, fixed, mm, um
 from app.language.times import in_sentence
 from app.loop.tables.tools import OPPOSED, Correction
+from app.loop.tools.gain_queries import ToolGain
 from app.loop.tools.lives_queries import Life
 from app.loop.tools.queries import OffsetChange
 
@@ -194,6 +195,15 @@ def lasted(life: Life) -> str:
     """Duration of an edge's life, so far if it is still in use."""
     duration = life.lasted(datetime.now(UTC))
     return NOTHING if duration is None else age(duration.total_seconds())
+
+
+def gain(of: ToolGain) -> str:
+    """The gain of a tool's corrections, its uncertainty, and from how many corrections."""
+    if of.gain is None:
+        return _("not known yet")
+    return ngettext(
+        "{gain} {pm} {error} from {n} correction", "{gain} {pm} {error} from {n} corrections", of.gain.corrections
+    ).format(gain=fixed(of.gain.value, 2), pm=PLUS_MINUS, error=fixed(of.gain.half_width, 2), n=of.gain.corrections)
 
 
 def event_word(kind: str) -> str:

@@ -2,9 +2,12 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 
-from tests.shop import Shop
+from app.jobs.actions import run_jobs
+from app.loop.tools.jobs import JOBS
+from tests.shop import Person, Shop
 
 SHAFT = {"tolerance_width": 0.1, "averaging_limit": 0.004, "weighting_factor": 1, "factor": 1}
 """The loop of cases/wrong-sign-loop.csv: the factor is +1, the tool needs -1."""
@@ -91,6 +94,53 @@ def test_an_edit_and_a_tool_change_begin_the_evidence_again(loop: Loop, happens:
     else:
         loop.shop.call("POST", f"/machines/{loop.shop.machine}/tools/4/change", offset=loop.offset, reason="new")
     assert [loop.part()["action"] for _part in range(3)] == ["correct", "correct", "none"]
+
+
+@pytest.mark.parametrize(
+    ("effect", "verdict", "said"),
+    [
+        (-2.0, "strong", "Radius taken for diameter?"),
+        (-0.2, "weak", "too weakly"),
+        (0.0, "none", "does not use this offset"),
+    ],
+)
+def test_an_unusual_gain_is_told_with_its_number(
+    shop: Shop, server: Any, effect: float, verdict: str, said: str
+) -> None:
+    loop, chance = Loop(shop, effect), np.random.default_rng(4)
+    shop.call("PATCH", f"/characteristics/{loop.key}", parameters={"factor": -1}, reason="as it is usual")
+    loop.effect = -effect
+    for _part in range(24):
+        loop.part(round(float(chance.normal(0, 0.3)), 2))
+    (told,) = shop.tool(4)["gains"]
+    assert told["verdict"] == verdict
+    assert told["gain"] == pytest.approx(-effect, abs=0.25)
+    assert told["corrections"] >= 4
+    run_jobs(server.database, JOBS)
+    run_jobs(server.database, JOBS)  # and says it once
+    (alarm,) = [each for each in shop.alarms() if each["kind"] == "unusual_gain"]
+    assert said in alarm["text"]
+    assert f"{told['corrections']} corrections" in alarm["text"]
+    assert shop.tool(4)["paused_by"] is None
+    page = Person(shop.server, "operator").open(f"/machines/{shop.machine}/tools?tool=4")
+    assert f"from {told['corrections']} corrections" in page
+
+
+def test_a_right_gain_raises_nothing(shop: Shop, server: Any) -> None:
+    loop, chance = Loop(shop, -1.0), np.random.default_rng(5)
+    shop.call("PATCH", f"/characteristics/{loop.key}", parameters={"factor": -1}, reason="as it is usual")
+    loop.effect = 1.0
+    assert shop.tool(4)["gains"] == [
+        {"characteristic": loop.key, "gain": None, "uncertainty": None, "corrections": None, "verdict": None}
+    ]
+    for part in range(40):
+        loop.size = 0.4 * part
+        loop.part(round(float(chance.normal(0, 0.3)), 2))
+    run_jobs(server.database, JOBS)
+    assert [each["kind"] for each in shop.alarms() if each["kind"] in {"unusual_gain", "opposite_effect"}] == []
+    (told,) = shop.tool(4)["gains"]
+    assert told["gain"] == pytest.approx(1, abs=0.3)
+    assert told["verdict"] is None
 
 
 def test_corrections_that_were_never_applied_prove_nothing(shop: Shop) -> None:

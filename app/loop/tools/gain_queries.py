@@ -1,0 +1,83 @@
+"""The gain of a tool's corrections, from the readings of each characteristic on it. Never writes. Lengths in mm."""
+
+from typing import NamedTuple
+
+import numpy as np
+from sqlalchemy import func, literal_column, select
+from sqlalchemy.orm import Session
+
+from app.core.effect import Gain, gain_of
+from app.core.parameters import Parameters
+from app.loop.tables.alarms import Alarm
+from app.loop.tables.characteristics import Characteristic, ParametersVersion
+from app.loop.tables.machines import Machine
+from app.loop.tables.readings import Exclusion, Reading, Stream
+from app.loop.tools.alarm_kinds import UNUSUAL_GAIN
+
+NEWEST = 200  # readings that are looked at
+NOT_OF_GAIN = ("implausible", "imported")  # codes of readings that say nothing of it
+
+
+class ToolGain(NamedTuple):
+    """The gain of the corrections of a tool, as one characteristic shows it; None where it does not tell."""
+
+    characteristic_id: int
+    characteristic: str
+    factor: float
+    gain: Gain | None
+
+
+def gains(session: Session, machine: Machine, number: int) -> list[ToolGain]:
+    """The gain of this tool's corrections by each characteristic on it, since the tool was changed or the pause before ended."""
+    streams = session.execute(
+        select(Stream, Characteristic.key, ParametersVersion.parameters)
+        .join(
+            Characteristic,
+            (Characteristic.machine_id == Stream.machine_id) & (Characteristic.id == Stream.characteristic_id),
+        )
+        .join(
+            ParametersVersion,
+            (ParametersVersion.machine_id == Stream.machine_id)
+            & (ParametersVersion.characteristic_id == Stream.characteristic_id)
+            & (ParametersVersion.version == Stream.parameters_version),
+        )
+        .where(Stream.machine_id == machine.id, Stream.tool_memory == number)
+        .order_by(Characteristic.key)
+    ).all()
+    found = []
+    for stream, key, stored in streams:
+        factor = Parameters.from_dict(stored).factor
+        found.append(ToolGain(stream.characteristic_id, key, factor, _gain(session, stream, factor)))
+    return found
+
+
+def _gain(session: Session, stream: Stream, factor: float) -> Gain | None:
+    at = (Reading.machine_id == stream.machine_id, Reading.characteristic_id == stream.characteristic_id)
+    answered = (
+        select(func.max(Alarm.acknowledged_at))
+        .where(
+            Alarm.machine_id == stream.machine_id,
+            Alarm.characteristic_id == stream.characteristic_id,
+            Alarm.kind == UNUSUAL_GAIN.name,
+        )
+        .scalar_subquery()
+    )
+    excluded = select(Exclusion.sequence).where(
+        Exclusion.machine_id == stream.machine_id, Exclusion.characteristic_id == stream.characteristic_id
+    )
+    rows = session.execute(
+        select(Reading.deviation, Reading.compensated)
+        .where(
+            *at,
+            Reading.sequence > max(stream.gain_from, stream.sequence - NEWEST),
+            Reading.compensated.is_not(None),
+            ~Reading.late,
+            Reading.zone != "probe_fault",
+            Reading.code.not_in(NOT_OF_GAIN),
+            Reading.sequence.not_in(excluded),
+            Reading.received_at > func.coalesce(answered, literal_column("'-infinity'::timestamptz")),
+        )
+        .order_by(Reading.sequence)
+    ).all()
+    table = np.array([tuple(row) for row in rows], np.float64).reshape(-1, 2)
+    return gain_of(table[:, 0], table[:, 1], factor)
