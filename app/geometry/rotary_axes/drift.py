@@ -8,6 +8,8 @@ from app.core.rotary.drift import Change, Trend, change, trend
 from app.geometry.rotary_axes.result_values import UNITS, deviations_of, values_of
 
 DAY = 86_400.0
+SHORTEST = 1 / 24
+"""Days: runs within an hour say how they repeat, not how the machine drifts in a day."""
 
 
 class Measured(NamedTuple):
@@ -65,7 +67,8 @@ def drift(name: str, runs: Sequence[Measured], limit: float | None) -> Drift:
             true = value + run.in_effect.get(name, 0.0)
             points.append(Reached(run.number, run.measured_at, value, true, deviations_of(run.results).get(name)))
     days = [point.at.timestamp() / DAY for point in points]
-    return Drift(name, limit, points, trend(days, [point.true for point in points]))
+    long = bool(days) and days[-1] - days[0] >= SHORTEST
+    return Drift(name, limit, points, trend(days, [point.true for point in points]) if long else None)
 
 
 def drifts(runs: Sequence[Measured], limits: Mapping[str, float]) -> list[Drift]:

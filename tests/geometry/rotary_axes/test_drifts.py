@@ -38,6 +38,12 @@ class TestDrift:
         assert found["true"] == pytest.approx(0.012, abs=0.002)  # what was entered is no movement of the axis
         assert found["last"] == pytest.approx(0.001, abs=0.001)
 
+    def test_runs_seconds_apart_say_nothing_of_a_day(self, shop: Shop) -> None:
+        for n, error in enumerate((0.001, 0.003, 0.002, 0.004, 0.003)):
+            take(shop, axes=[axis((error, 0, 0, 0), seed=n)], measured_at=f"2026-10-01T06:00:0{n}Z")
+        drifts = shop.call("GET", f"/machines/{shop.machine}/kinematics")["drift"]
+        assert {each["slope_per_day"] for each in drifts} == {None}
+
     def test_two_runs_side_by_side(self, shop: Shop) -> None:
         old, new = self.series(shop, 0.001, 0.011)
         for a, b in ((old, new), (new, old)):
