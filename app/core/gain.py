@@ -40,11 +40,18 @@ SURE_OPPOSITE, SURE_NOT_WEAK = 3.0, 5.0  # standard errors that the gain is belo
 LARGEST_ERROR = 0.27  # of the gain
 LEAST = 1.5  # times the scatter that each of the two asks for: smaller ones say nothing
 NOT_DONE, FARTHEST = 0.25, -3.5  # the gain of each of the two alone: beyond, something else has happened, an edge broke
+AGAIN = (
+    -0.25
+)  # and that of the second, the larger one where a sign is wrong: an edge that wears off quickly only seems to undo it
 SURE_FIRST, SURE_SECOND = 1.9, 3.5  # standard errors that they are below 1, and below half
 KNOWN, FRESH = (
     20,
     8.0,
 )  # until so many parts have shown the scatter, the first correction is so many times what it seems to be
+ITSELF = (
+    4.5  # standard deviations of a step from part to part: the size moved so far by itself, as where an edge breaks
+)
+ITSELF = 4.0  # standard deviations of a step between two parts of one correction: the process moved by itself, as where an edge breaks
 PRIOR, FEW = 3.0, 1.0  # parts that the expected scatter is worth; by how much surer one must be while it is not known
 NM = 1e-6
 
@@ -167,13 +174,18 @@ def judge(
     if asked_first * asked_second < 0 or grown * asked_second >= 0 or deviation[count - 1] * asked_second >= 0:
         return False, first, second, 0.0, 0.0
     scatter = scatter_of(deviation, compensated, factor, expected)
-    start = max(start, first - BEFORE)
+    start, itself = max(start, first - BEFORE), ITSELF * sqrt(2.0) * scatter
     level_d, level_x = deviation[start], -compensated[start] / factor
     p = 1.0 + LEVEL_STEP
     xx, xd, xx_first, xd_first = 0.0, 0.0, 0.0, 0.0
     for i in range(start + 1, count):
         if i == second:
             xx_first, xd_first = xx, xd
+        if abs(compensated[i] - compensated[i - 1]) <= NM and abs(deviation[i] - deviation[i - 1]) > itself:
+            if i > first:
+                return False, first, second, 0.0, 0.0
+            level_d, level_x, p = deviation[i], -compensated[i] / factor, 1.0 + LEVEL_STEP
+            continue
         variance = p + 1.0
         missed_d, missed_x = deviation[i] - level_d, -compensated[i] / factor - level_x
         xx += missed_x * missed_x / variance
@@ -195,7 +207,7 @@ def judge(
     )
     each = (
         FARTHEST < first_gain < NOT_DONE
-        and FARTHEST < second_gain < NOT_DONE
+        and FARTHEST < second_gain < AGAIN
         and first_gain + SURE_FIRST * scatter / sqrt(xx_first) < 1
         and second_gain + SURE_SECOND * scatter / sqrt(xx - xx_first) < 0.5
     )
