@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 from app.db.engine import Database
 from app.db.events import publish
 
-LOCKED = text("SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND classid = 7291")
+LOCKED = text("SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND classid = 7291 AND pid = pg_backend_pid()")
 
 
 def told(database: Database) -> list[list[str]]:
