@@ -21,7 +21,7 @@ PART = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTA
 
 def documents() -> list[Path]:
     """Every Markdown file of the project."""
-    names = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
+    names = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md")
     return [*(HOUSE / name for name in names), *sorted((HOUSE / "docs").rglob("*.md"))]
 
 

@@ -341,7 +341,8 @@ class Store:
     async def keep_decisions(self, machine: str, decided: Sequence[Decided]) -> None:
         """Keep decisions until the control has heard of them."""
         rows = [(machine, each.key, each.characteristic, each.action, each.reason) for each in decided]
-        insert = "INSERT INTO decision VALUES (?, ?, ?, ?, ?) ON CONFLICT (machine, key) DO NOTHING"
+        columns = "machine, key, characteristic, action, reason"
+        insert = f"INSERT INTO decision ({columns}) VALUES (?, ?, ?, ?, ?) ON CONFLICT (machine, key) DO NOTHING"  # noqa: S608
         await self._run(lambda database: database.executemany(insert, rows))
 
     async def decisions(self, machine: str) -> list[Decided]:
