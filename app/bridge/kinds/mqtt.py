@@ -217,13 +217,23 @@ class MqttLink:
         properties = Properties(PacketTypes.PUBLISH)  # type: ignore[no-untyped-call]
         if expires is not None:
             properties.MessageExpiryInterval = round(expires)
-        client = self._there()
-        try:
-            await client.publish(
+        client, listening = self._there(), self._listening
+        assert listening is not None  # as long as there is a client
+        publishing = asyncio.ensure_future(
+            client.publish(
                 f"{self.base}/{topic}", json.dumps(content), qos=AT_LEAST_ONCE, retain=retain, properties=properties
             )
+        )
+        try:
+            # Of a broker that is killed no answer comes: the library would wait for it as long as the caller lets it.
+            await asyncio.wait({publishing, listening}, return_when=asyncio.FIRST_COMPLETED)
+            if not publishing.done():
+                self._there()
+            await publishing
         except aiomqtt.MqttError as error:
             raise self._wrong(error) from error
+        finally:
+            publishing.cancel()
         if client.refused:
             raise Misconfigured(
                 f"The broker {self.where} does not let the bridge write {self.base}/{topic}: {client.refused}. Look at its"
