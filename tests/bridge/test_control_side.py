@@ -149,7 +149,7 @@ def test_an_offer_that_fails_holds_up_no_reading(tmp_path: Path, error: LinkErro
     async def story() -> None:
         await parts(model, 1)
         registers = Refusing(model, error, offsets=True)
-        unit = unit_of(model, store_in(tmp_path), registers)
+        unit = unit_of(model, store_in(tmp_path), registers, offsets_every=0.5)
         order = Order(1, 3, 0.0, -0.01)
         await unit.store.intend(M, order, "hash")
         unit.orders = (order,)

@@ -79,7 +79,7 @@ class TestWithoutScripts:
             shop.read(deviation)
         text = viewer.open(path(shop))
         assert "+4.00\u00a0µm" in text
-        assert "66.6\u00a0%" in text
+        assert "66.7\u00a0%" in text
 
     def test_what_was_decided_on_another_value_says_so(self, shop: Shop, viewer: Person) -> None:
         shop.read(20.0)
