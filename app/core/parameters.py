@@ -233,7 +233,8 @@ def _named(given: Mapping[str, Any], problems: list[Problem]) -> Iterator[tuple[
 
 def _two_points(switch: Any, problems: list[Problem]) -> bool:
     """Tell if R24 asks for two points: any number but 0 does, whatever R25 says."""
-    if switch is None or (isinstance(switch, int | float) and abs(switch) <= 1e300):
+    number = isinstance(switch, int | float) and not isinstance(switch, bool) and abs(switch) <= LARGEST_LENGTH
+    if switch is None or number:
         return bool(switch)
     problems.append(Problem(TWO_POINT_SWITCH, "not_a_number", {}))
     return False
