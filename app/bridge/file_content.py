@@ -173,6 +173,12 @@ def files_of(path: Path) -> tuple[Path, ...]:
     return (source.description,) if source.values is None else (source.description, source.values)
 
 
+def _passed_over(item: aqdef_values.Value, value: aqdef_values.Measured | None) -> str:
+    if value is None and not item.fields.get("K0001", "").strip():
+        return "has no value; passed over"
+    return "is marked as not valid (K0002); passed over"
+
+
 def _nothing_found(settings: Settings) -> str:
     if settings.format == "text":
         return "No line holds a reading as an expression of lines describes it. Try with “inband bridge preview”."
@@ -243,11 +249,9 @@ class _Reader:
                 self._fault(header.line, name, f"is no column of this file; it has {', '.join(names)}.")
             if wanted:
                 return
-            for row in rows:
-                if len(row.cells) > len(names) and any(cell.strip() for cell in row.cells[len(names) :]):
-                    self._fault(row.line, "", f"has {len(row.cells)} cells under {len(names)} columns.")
-                elif len(row.cells) < len(names):
-                    self._fault(row.line, "", f"has only {len(row.cells)} cells under {len(names)} columns: cut off?")
+            for row in delimited.even(rows, len(names), delimiter, complete=self.content.complete):
+                if isinstance(row, delimited.Unusable):
+                    self._fault(row.line, "", str(row))
                 else:
                     yield row.line, dict(zip(names, row.cells, strict=False))
         except UnicodeError:
@@ -340,7 +344,7 @@ class _Reader:
                 continue
             if characteristic.counts:
                 self.content.skipped += 1
-                self.content.remarks.append(f"line {item.line}: {name} counts parts, it measures nothing; passed over")
+                self._remark(aqdef.Remark(item.line, "", name, "counts parts, it measures nothing; passed over"))
                 continue
             if order is None and slashed(item.fields.get("K0004", "")) is not None:
                 self._fault(item.line, "K0004", "could be day/month or month/day: set day_first to true or false.")
@@ -356,7 +360,7 @@ class _Reader:
                 alone = keys.of(item, description.identity(characteristic), measured, value.at)
             if value is None or value.attribute:
                 self.content.skipped += 1
-                self.content.remarks.append(f"line {item.line}: {name} is marked as not valid (K0002); passed over")
+                self._remark(aqdef.Remark(item.line, "", name, _passed_over(item, value)))
             else:
                 self._measured(item, key, name, value, description, clocks.get(item.characteristic), alone)
 
@@ -462,7 +466,11 @@ class _Reader:
         self.content.skipped += 1
         if self.settings.others == "fail":
             where = f"machine.{self.machine.key}.characteristics"
-            said = f"names no characteristic that {where} has" if name == EVERY else f"{name!r} is not named in {where}"
+            said = (
+                f"names no characteristic that {where} has"
+                if name in {EVERY, ""}
+                else f"{name!r} is not named in {where}"
+            )
             self._fault(line, "", f'{said}. Add it there, or set others = "skip".')
 
     def _fault(self, line: int | None, field_: str, reason: str) -> None:

@@ -29,6 +29,7 @@ COUNTING_KINDS = {"1", "5", "6"}
 MOST_REMARKS = 200
 LINE = re.compile(r"[Kk](\d{4,5})(?:/(\d{0,9})(?:/(\d{0,9}))?)?(?:[ \t]+(.*))?", re.DOTALL | re.ASCII)
 _OF_VALUE = re.compile(r"[Kk](00\d\d)/(\d{1,9})/(\d{1,9})(?:[ \t]+(.*))?", re.DOTALL | re.ASCII)
+_BAD_INDEX = re.compile(r"[Kk]\d{4,5}/(\S*)", re.ASCII)
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
 _WHO = {"K1001", "K2001", "K2002"}
 _FAMILIES = set("1234580")
@@ -173,6 +174,13 @@ def open_text(path: Path, encoding: str) -> TextIO:
     return path.open(encoding=encoding, errors="strict" if encoding.startswith("utf") else "replace", newline=None)
 
 
+def no_field(line: str) -> str:
+    """The reason why a line that begins with K is none of a field."""
+    if found := _BAD_INDEX.match(line):
+        return _("has an index that is no number ({index}); it is passed over").format(index=repr(found[1]))
+    return _("is too short or no K field; it is passed over")
+
+
 def _several_files(key: str, value: str, before: str, line: int, of: str = "{name}") -> Unusable:
     return Unusable(
         _(
@@ -218,7 +226,7 @@ class _Describing:
             return
         match = LINE.fullmatch(line)
         if match is None:
-            self._remark(number, "", line[:40], _("is too short or no K field; it is passed over"))
+            self._remark(number, "", line[:40], no_field(line))
             return
         self._any = True
         key, index, text = f"K{match[1]}", int(match[2] or 1), (match[4] or "").strip()

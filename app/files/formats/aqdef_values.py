@@ -244,12 +244,15 @@ class _Reading:
         match = LINE.fullmatch(line)
         if match is None or len(match[1]) != 4:
             wrong = match is None and line[1:5].isdigit()  # the field of a value whose index is none
-            reason = _("has no index that can be read") if wrong else _("is too short or no K field; it is passed over")
+            reason = _("has no index that can be read") if wrong else aqdef.no_field(line)
             yield Remark(number, line[:5] if wrong else "", line[5 * wrong :][:40], reason, wrong)
             return
         if match[3]:
             return  # by the number of a value: the description has it
         key, index, value = f"K{match[1]}", int(match[2] or 1), (match[4] or "").strip()
+        if match[3] == "":
+            reason = _("has a second stroke, but no number of a value behind it; it is taken for {key}/{index}")
+            yield Remark(number, f"{key}/{index}/", value[:40], reason.format(key=key, index=index))
         if key not in VALUE_FIELDS:
             yield Remark(number, key, value[:40], _("is no field that is known here; it is kept and not used"))
         if key == "K0006":

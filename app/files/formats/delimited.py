@@ -143,6 +143,54 @@ def rows(path: Path, encoding: str, delimiter: str) -> Iterator[Row]:
     yield from every
 
 
+def even(rows: Iterable[Row], width: int, delimiter: str, *, complete: bool = True) -> Iterator[Row | Unusable]:
+    """Each row as wide as the header: cells that are missing or left over at its end are empty.
+
+    complete: the file ends with the end of a line. An error in its place is a row with more cells that are filled, and a
+    last one without an end that is shorter than all above it: there the file was cut off.
+    """
+    fewest, last = width, None
+    for row in rows:
+        if last is not None:
+            fewest = min(fewest, len(last.cells))
+            yield _even(last, width, delimiter)
+        last = row
+    if last is None:
+        return
+    if not complete and len(last.cells) < fewest:
+        words = _(
+            "has {cells} cells, lines above have {width}, and has no end: the file is cut off here; take the whole one"
+        )
+        yield Unusable(words.format(cells=len(last.cells), width=fewest), last.line)
+    else:
+        yield _even(last, width, delimiter)
+
+
+def _even(row: Row, width: int, delimiter: str) -> Row | Unusable:
+    if any(cell.strip() for cell in row.cells[width:]):
+        return Unusable(_too_wide(len(row.cells), width, delimiter), row.line)
+    return Row(row.line, row.cells[:width] + [""] * (width - len(row.cells)))
+
+
+def _too_wide(cells: int, width: int, delimiter: str) -> str:
+    sign = {"\t": _("tabulator"), ",": _("comma"), ";": _("semicolon")}.get(delimiter, delimiter)
+    text = _("has {cells} columns, the header has {width}; the column separator is {sign}.").format(
+        cells=cells, width=width, sign=sign
+    )
+    if delimiter == ",":
+        text += " " + _(
+            "A decimal comma parts a cell too: put such numbers in quotation marks, or name another delimiter."
+        )
+    return text
+
+
+def is_complete(path: Path) -> bool:
+    """Tell if the file ends with the end of a line, in whatever encoding."""
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - 4))
+        return file.read().rstrip(b"\0")[-1:] in {b"\n", b"\r", b"\x1a"}
+
+
 def is_value(cell: str) -> bool:
     """Tell if a cell holds a number, a date or a time, as the cells below a header do."""
     return _is_number(cell) or re.match(r"\s*(\d{1,4}[-./]\s?\d{1,2}[-./]\s?\d{1,4}|\d{1,2}:\d{2})", cell) is not None

@@ -21,6 +21,7 @@ from app.bridge.simulators.folder import FolderSimulator
 from app.bridge.simulators.model import Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit
+from app.files.formats.aqdef_values import OF_FIELD as F
 from tests.bridge.plant import PATIENCE, controlled, store_in, until
 from tests.loops import run
 
@@ -71,6 +72,23 @@ def test_a_line_becomes_a_reading_with_its_time_in_the_zone(tmp_path: Path) -> N
         "part": "P1",
         "measured_at": "2026-11-23T06:05:00+01:00",
     }
+
+
+def test_cells_missing_or_left_over_at_the_end_are_empty(tmp_path: Path) -> None:
+    head = HEAD.strip() + ";comment;by;shift\n"
+    content = read(tmp_path, head + LINE + LINE.strip() + ";;;;;\n" + LINE.strip())
+    assert [len(content.faults), len(content.entries)] == [0, 3]
+
+
+def test_values_of_aqdef_that_are_empty_are_not_called_marked(tmp_path: Path) -> None:
+    rows = [f"{F}0{F}23.11.2026/06:05:00", f"40.001{F}255{F}23.11.2026/06:06:00", f"40.002{F}0{F}23.11.2026/06:07:00"]
+    text = "\n".join(["K0100 1", "K2001/1 D40", "K2142/1 mm", *rows, ""])
+    content = read(tmp_path, text, "a.dfq", format="aqdef")
+    assert [entry.body["measured"] for entry in content.entries] == [40.002]
+    assert [remark.partition("; ")[0] for remark in content.remarks] == [
+        "line 4: 'D40' has no value",
+        "line 5: 'D40' is marked as not valid (K0002)",
+    ]
 
 
 def test_names_of_characteristics_may_be_columns(tmp_path: Path) -> None:
@@ -163,7 +181,14 @@ def test_json_that_could_not_be_sent_on_fails(tmp_path: Path, member: str, words
         (HEAD + LINE.replace("40,0123", "40.0123"), {}, "line 2, actual: '40.0123' has a point"),
         (HEAD + LINE.replace("D40", "D50"), {}, "line 2: 'D50' is not named in machine.cmm-1.characteristics"),
         (HEAD + LINE, {"zone": None}, "line 2, time: '23.11.2026 06:05:00' does not say in which time zone"),
-        (HEAD + "23.11.2026 06:05:00;P1\n", {}, "line 2: has only 2 cells under 4 columns: cut off?"),
+        (HEAD + "23.11.2026 06:05:00;P1\n", {}, "line 2: names no characteristic"),
+        (HEAD + "23.11.2026 06:05:00;P1;D40\n", {}, "line 2, actual: '' is empty"),
+        (
+            HEAD + LINE + LINE[:-9],
+            {},
+            "line 3: has 3 cells, lines above have 4, and has no end: the file is cut off here",
+        ),
+        (HEAD + LINE.replace("40,0123", "40,0123;1"), {}, "line 2: has 5 columns, the header has 4"),
         (LINE + LINE, {}, "is no column of this file"),
         (HEAD, {}, "The file holds no readings"),
         (HEAD + LINE.replace("23.11.2026 06:05:00", "25.10.2026 02:30:00"), {}, "is there twice in Europe/Belgrade"),

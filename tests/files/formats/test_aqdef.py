@@ -284,6 +284,9 @@ def test_what_is_not_understood_is_said_and_kept(tmp_path: Path) -> None:
         "K12345 y",
         "what",
         "K0099/1 z",
+        "K2004/1-2 0",
+        "K0001/1 40.1",
+        "K0008/1/ 4",
     ]
     description, found = parsed(tmp_path, lines)
     said = [str(each) for each in [*description.remarks, *found] if isinstance(each, Remark)]
@@ -293,7 +296,9 @@ def test_what_is_not_understood_is_said_and_kept(tmp_path: Path) -> None:
         "line 6, K9876: 'x' is no field that is known here; it is kept and not used",
         "line 7, K12345: 'y' is no field that is known here; it is kept and not used",
         "line 8: 'what' is neither a K field nor a value; it is passed over",
+        "line 10: 'K2004/1-2 0' has an index that is no number ('1-2'); it is passed over",
         "line 9, K0099: 'z' is no field that is known here; it is kept and not used",
+        "line 12, K0008/1/: '4' has a second stroke, but no number of a value behind it; it is taken for K0008/1",
     ]
     assert description.others["K9876", 1] == "x"
 

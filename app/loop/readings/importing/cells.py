@@ -143,13 +143,11 @@ def shown(value: Any) -> str:
 
 def _csv(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
     readers = [_readers(layout) for layout in layouts]
-    layout = layouts[0]
-    width = len(layout.header)
     try:
-        for row in rows_of(path, layout):
-            if len(row.cells) < width or any(cell.strip() for cell in row.cells[width:]):
-                flaw = Flaw(row.line, "", "", _width(len(row.cells), width, layout.delimiter))
-                yield from (Item(place, row.line, flaw) for place in range(len(layouts)))
+        for row in rows_of(path, layouts[0]):
+            if isinstance(row, Unusable):
+                flaw = Flaw(row.line or 0, "", "", str(row))
+                yield from (Item(place, flaw.line, flaw) for place in range(len(layouts)))
                 continue
             for place, own in enumerate(layouts):
                 yield from (Item(place, row.line, found) for found in _of_row(row, own, readers[place]))
@@ -187,18 +185,6 @@ def _refuse_error(text: str) -> None:
         )
     if text in spreadsheet.ERRORS:
         raise Unreadable(_("is an error of the workbook; correct or clear the cell"))
-
-
-def _width(cells: int, width: int, delimiter: str) -> str:
-    sign = {"\t": _("tabulator"), ",": _("comma"), ";": _("semicolon")}.get(delimiter, delimiter)
-    text = _("has {cells} columns, the header has {width}; the column separator is {sign}.").format(
-        cells=cells, width=width, sign=sign
-    )
-    if delimiter == "," and cells > width:
-        text += " " + _(
-            "A decimal comma parts a cell too: put such numbers in quotation marks, or name another delimiter."
-        )
-    return text
 
 
 def _readers(layout: Layout) -> list[_Reader]:

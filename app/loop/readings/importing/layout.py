@@ -213,12 +213,13 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     )
 
 
-def rows_of(path: Path, layout: Layout) -> Iterator[Row]:
-    """The rows of readings, each as wide as the header where the file is a workbook."""
+def rows_of(path: Path, layout: Layout) -> Iterator[Row | Unusable]:
+    """The rows of readings, each as wide as the header, or what is wrong with one."""
     width = len(layout.header)
-    for row in delimited.rows(path, layout.encoding, layout.delimiter):
-        if row.line >= layout.first_line:
-            yield _as_wide(row, width) if layout.kind == "sheet" else row
+    rows = (row for row in delimited.rows(path, layout.encoding, layout.delimiter) if row.line >= layout.first_line)
+    if layout.kind == "sheet":  # what stands beside the table is no part of it
+        return (_as_wide(row, width) for row in rows)
+    return delimited.even(rows, width, layout.delimiter, complete=delimited.is_complete(path))
 
 
 def _as_wide(row: Row, width: int) -> Row:

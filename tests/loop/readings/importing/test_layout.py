@@ -96,6 +96,30 @@ def test_quotes_blank_lines_and_the_line_a_spreadsheet_writes(tmp_path: Path) ->
     assert found[1].line == 6
 
 
+def test_cells_missing_or_left_over_at_the_end_of_a_row_are_empty(tmp_path: Path) -> None:
+    rows = ["measured;part;comment;;", "39.998;a", "39.999", "40.001;b;;;;;", "40.002;c;good;;"]
+    assert good(write(tmp_path, "\n".join([*rows, ""]))) == [
+        (39.998, "a"),
+        (39.999, None),
+        (40.001, "b"),
+        (40.002, "c"),
+    ]
+    assert [str(each) for each in read(write(tmp_path, "part;comment;measured\na;b\n"))] == [
+        "line 2, measured: is empty; remove the line if the probe measured nothing"
+    ]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16-le", "utf-16-be"])
+def test_only_a_last_row_without_an_end_that_is_shorter_than_all_others_is_cut_off(
+    tmp_path: Path, encoding: str
+) -> None:
+    rows = "measured;part;comment;by\n39.998;a;b\n39.999;c;d"
+    assert len(good(write(tmp_path, rows, encoding))) == 2
+    cut = "line 3: has 2 cells, lines above have 3, and has no end: the file is cut off here; take the whole one"
+    assert [str(each) for each in read(write(tmp_path, rows[:-2], encoding))[1:]] == [cut]
+    assert len(good(write(tmp_path, rows[:-2] + "\n", encoding))) == 2
+
+
 def test_a_decimal_comma_in_quotes_between_commas(tmp_path: Path) -> None:
     assert good(write(tmp_path, 'measured,part\n"39,998",a\n')) == [(39.998, "a")]
     flaw = read(write(tmp_path, "measured,part\n39,998,a\n"))[0]
@@ -135,7 +159,7 @@ def test_every_flaw_has_its_line_its_column_and_a_reason(tmp_path: Path) -> None
     found = read(write(tmp_path, "measured,part\n" + "\n".join(rows) + "\n"))
     flaws = [each for each in found if isinstance(each, Flaw)]
     assert [(f.line, f.column) for f in flaws] == [
-        (2, "measured"), (3, "measured"), (4, "measured"), (6, "measured"), (7, "measured"), (8, ""), (9, ""), (10, "part"),
+        (2, "measured"), (3, "measured"), (4, "measured"), (6, "measured"), (7, "measured"), (9, ""), (10, "part"),
     ]  # fmt: skip
     assert "longer than any machine" in flaws[4].reason
     assert str(flaws[0]) == "line 2, measured: '1e999' is too large to be a number of this world"
